@@ -51,7 +51,7 @@ class Judge:
         found = np.zeros((self.model.n * samples, len(self.observation.names)))
         for joint, (block, members) in enumerate(zip(columns, self.observation.column_indices, strict=True)):
             found[joint * samples : (joint + 1) * samples, members] = block.T
-        return found[:, list(self.base.found.kept)]
+        return found[:, list(self.base.identifiability.kept)]
 
     def merits(self, motion: np.ndarray) -> tuple[float, float]:
         """cond(W) with columns of unit norm, and log det(WᵀW / N) with columns in SI units, whose scale adds the same to all trajectories.

@@ -64,7 +64,7 @@ def commanded(folder: Path, seed: int) -> dict[str, Any]:
     drawn = random_poses(nominal, TARGETS, np.random.default_rng([seed, 6]), MeasuringSetup())
     targets = ToolTargets(np.arange(TARGETS), np.full(TARGETS, nominal.point().name), drawn.q)
     found = compensate(model, nominal, targets)
-    done = found.found
+    done = found.reached
     place, turn = model.station[0, :3], vector_rotation(model.station[0, 3:])
     wanted = point_kinematics(nominal, drawn.q[done], jacobians=False).position @ turn.T + place
     commands = PosePlan(q=found.q[done], seed=seed)
@@ -142,7 +142,7 @@ def run() -> list[tuple[str, float, str]]:
     )
     wanted = point_kinematics(nominal, q[found.unambiguous], jacobians=False).position
     worst = np.abs(at.kinematics.position - wanted).max()
-    note = f"{ours:.1f} s of processor time, {100 * found.found.mean():.1f} % with a command, back within {worst * 1e6:.4f} µm"
+    note = f"{ours:.1f} s of processor time, {100 * found.reached.mean():.1f} % with a command, back within {worst * 1e6:.4f} µm"
     return [
         ("100 000 targets: 10 s over ours", 10 / ours, note),
         ("a target by MINPACK on the same forward map", theirs / ours * count, f"{theirs * 1e3:.1f} ms"),

@@ -112,7 +112,7 @@ def _tool_error(nominal: RobotModel, model: RobotModel, true: RobotModel, seed: 
     drawn = random_poses(nominal, TARGETS, np.random.default_rng([seed, 6]), MeasuringSetup())
     names = np.full(TARGETS, nominal.point().name)
     found = compensate(model, nominal, ToolTargets(np.arange(TARGETS), names, drawn.q))
-    done = found.found
+    done = found.reached
     at = tool_at_rest(true, found.q[done], None, names[done]).kinematics.position
     wanted = point_kinematics(nominal, drawn.q[done], jacobians=False).position
     return float(np.linalg.norm(at - wanted, axis=1).mean()) / MILLIMETRE

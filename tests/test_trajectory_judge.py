@@ -47,7 +47,7 @@ def test_condition_and_information_of_the_kept_columns_are_those_of_pinocchio(
     judge: Judge, motion: np.ndarray
 ) -> None:
     whole = _pinocchio(judge, motion)
-    base = whole[:, list(judge.base.found.kept)]
+    base = whole[:, list(judge.base.identifiability.kept)]
     condition, told = judge.merits(motion)
     assert condition == pytest.approx(np.linalg.cond(base / np.linalg.norm(base, axis=0)), rel=1e-8)
     assert told == pytest.approx(np.linalg.slogdet(base.T @ base / len(TIME))[1], abs=1e-6)
@@ -55,7 +55,7 @@ def test_condition_and_information_of_the_kept_columns_are_those_of_pinocchio(
 
 def test_the_kept_columns_are_a_basis(judge: Judge, motion: np.ndarray) -> None:
     whole = _pinocchio(judge, motion)
-    base = whole[:, list(judge.base.found.kept)]
+    base = whole[:, list(judge.base.identifiability.kept)]
     rest = whole - base @ np.linalg.lstsq(base, whole, rcond=None)[0]
     assert np.abs(rest).max() < 1e-9 * np.abs(whole).max()
 

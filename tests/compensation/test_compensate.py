@@ -55,8 +55,8 @@ def test_round_trip_is_within_a_micrometre(
 ) -> None:
     targets, real = random_targets(1000), real.with_bearings(bearings)
     found = compensate(real, tx90l, targets)
-    done = found.found & found.unambiguous
-    assert done.mean() > 0.8 and found.found.mean() > 0.96
+    done = found.reached & found.unambiguous
+    assert done.mean() > 0.8 and found.reached.mean() > 0.96
     assert targets.q is not None and targets.payload is not None
     wanted = point_kinematics(tx90l, targets.q)
     at = seen_in_base(real, found.q[done], targets.payload[done])
@@ -77,7 +77,7 @@ def test_axes_that_tilt_under_gravity_are_compensated(
     tilts = {f"joint_{k}.gravity_compliance_{axis}": 1e-5 for k in (4, 5) for axis in (1, 2)}
     targets, tilting = random_targets(100), real.with_bearings(bearings).with_values(tilts)
     found = compensate(tilting, tx90l, targets)
-    done = found.found & found.unambiguous
+    done = found.reached & found.unambiguous
     assert done.mean() > 0.8 and targets.q is not None and targets.payload is not None
     wanted = point_kinematics(tx90l, targets.q).position[done]
     at = seen_in_base(tilting, found.q[done], targets.payload[done])
@@ -96,7 +96,7 @@ def test_another_engine_puts_the_tool_there(
     )
     targets = replace(random_targets(60), payload=None)
     found = compensate(robot, tx90l, targets)
-    done = found.found & found.unambiguous
+    done = found.reached & found.unambiguous
     plan = PosePlan(q=found.q[done])
     seen = VirtualCell(robot, CellConfig()).noise_free(plan)
     place = robot.station[0]
@@ -113,7 +113,7 @@ def test_commands_are_those_of_a_solver_by_differences(
     found = compensate(real, tx90l, targets)
     assert targets.q is not None and targets.payload is not None
     wanted = point_kinematics(tx90l, targets.q)
-    for k in np.flatnonzero(found.found & found.unambiguous):
+    for k in np.flatnonzero(found.reached & found.unambiguous):
         one = slice(k, k + 1)
         held = tool_at_rest(real, found.q[one], targets.payload[one], targets.target[one]).rest.flank
 
@@ -177,7 +177,7 @@ def test_the_flank_turns_where_the_torque_does(tx90l: RobotModel, real: RobotMod
     near = crossing + np.linspace(-2e-4, 2e-4, 41)
     targets = at(near)
     commands = compensate(real, tx90l, targets)
-    assert commands.found.all() and not commands.unambiguous.any()
+    assert commands.reached.all() and not commands.unambiguous.any()
     steps = np.diff(commands.q[:, 1] - near)
     turn = int(np.argmax(np.abs(steps)))
     assert abs(steps[turn]) == pytest.approx(2 * real.backlash[1], rel=1e-2)
@@ -199,7 +199,7 @@ def test_a_joint_past_its_limit_is_named(tx90l: RobotModel, real: RobotModel) ->
     q = np.tile(EASY, (2, 1))
     q[1, 4] = upper
     found = compensate(shifted, tx90l, targets_at(q))
-    assert found.found.tolist() == [True, False]
+    assert found.reached.tolist() == [True, False]
     assert np.isnan(found.q[1]).all()
     assert found.reason[1].startswith("joint limit: joint_5 would be 0.00")
     assert f"past its limit of {upper:.5g} rad" in found.reason[1]
@@ -209,7 +209,7 @@ def test_a_singular_wrist_is_named(tx90l: RobotModel, real: RobotModel) -> None:
     q = EASY.copy()
     q[4] = 1e-4
     found = compensate(real, tx90l, targets_at(q))
-    assert not found.found[0]
+    assert not found.reached[0]
     assert found.reason[0].startswith("singular: joint_4 and joint_6 can move together")
 
 
@@ -227,7 +227,7 @@ def test_points_alone(tx90l: RobotModel, real: RobotModel, rng: np.random.Genera
     position = np.vstack([point_kinematics(tx90l, near).position, [[5.0, 0.0, 1.0]]])
     targets = ToolTargets(pose=np.arange(31), target=np.full(31, "smr"), position=position)
     found = compensate(real, tx90l, targets, start=EASY)
-    assert found.found.tolist() == [True] * 30 + [False] and not found.elsewhere[:30].any()
+    assert found.reached.tolist() == [True] * 30 + [False] and not found.elsewhere[:30].any()
     assert re.fullmatch(
         r"out of reach: the smallest distance of the tool to the target is 3\d{3} mm", found.reason[30]
     )

@@ -58,7 +58,7 @@ def test_seven_joints_change_least(tmp_path: Path, rng: np.random.Generator) -> 
     robot = real(nominal)
     q = rng.uniform(-1.2, 1.2, (4, 7))
     found = compensate(robot, nominal, targets_at(q))
-    assert found.found.all()
+    assert found.reached.all()
     wanted = point_kinematics(nominal, q)
     for k in range(4):
         flank = tool_at_rest(robot, found.q[[k]], None, np.array(["tip"])).rest.flank
@@ -92,7 +92,7 @@ def test_a_spare_joint_makes_up_for_one_at_its_limit(tmp_path: Path) -> None:
     joints[joint] = replace(joints[joint], upper=limit)
     held = replace(robot, joints=tuple(joints))
     found = compensate(held, nominal, targets_at(q))
-    assert found.found.all() and found.q[0, joint] == pytest.approx(limit, abs=1e-12)
+    assert found.reached.all() and found.q[0, joint] == pytest.approx(limit, abs=1e-12)
     at = tool_at_rest(held, found.q, None, np.array(["tip"])).kinematics
     wanted = point_kinematics(nominal, q)
     np.testing.assert_allclose(at.position, wanted.position, atol=1e-6)
@@ -124,7 +124,7 @@ def test_two_hands(tree: RobotModel, tmp_path: Path) -> None:
     q = np.random.default_rng(5).uniform(-0.5, 0.5, (6, nominal.n))
     target = np.array(["hand", "finger"] * 3)
     found = compensate(robot, nominal, ToolTargets(np.arange(6), target, q))
-    assert found.found.all()
+    assert found.reached.all()
     for name, still in (("hand", ("to_right", "to_finger")), ("finger", ("to_left", "to_slider", "to_hand"))):
         rows = target == name
         wanted = point_kinematics(nominal, q[rows], point=name).position

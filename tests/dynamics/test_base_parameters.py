@@ -36,7 +36,7 @@ def test_the_tx40_regroups_as_published(tx40: RobotModel) -> None:
     """61: the published list plus the rotor inertia of joint 6, which an index error there hides."""
     base = BaseParameters.of(Observation(tx40, CLASSIC))
     assert base.rank == 61
-    assert base.found.gap > 6
+    assert base.identifiability.gap > 6
     assert set(PUBLISHED) <= set(base.expressions)
     assert "joint_6.rotor_inertia" in base.expressions
 
@@ -45,7 +45,7 @@ def test_base_parameters_give_the_same_torques(
     tx40: RobotModel, motion: Motion, rng: np.random.Generator
 ) -> None:
     observation = Observation(tx40, CLASSIC)
-    found = BaseParameters.of(observation).found
+    found = BaseParameters.of(observation).identifiability
     parameters = rng.normal(size=len(observation.names))
     regrouped = np.zeros(len(parameters))
     regrouped[list(found.kept)] = found.regrouping @ parameters

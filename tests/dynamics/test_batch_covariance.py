@@ -57,7 +57,7 @@ def inside(
         noisy = replace(tour, torque=tour.torque + NOISE * coloured(rng, tour.torque.shape))
         found = weighted_least_squares(assemble_regression(observation, base, [noisy], Decimation(2)))
         expected = found.regrouped(names)
-        kept = base.found.kept_names
+        kept = base.identifiability.kept_names
         intervals = [found.interval(name) or (np.nan, np.nan) for name in kept]
         held.append([low < expected[name] < high for name, (low, high) in zip(kept, intervals, strict=True)])
         scores.append([(found.values[n] - expected[n]) / (found.std(n) or np.nan) for n in kept])
@@ -103,7 +103,7 @@ class Recorded:
             wide[:, joint, members] = columns.T / self.sigma[joint]
         torque = np.hstack([part.torque for part in self.parts]).T
         self.right = torque / self.sigma - wide @ observation.values()
-        self.wide = wide[:, :, list(base.found.kept)]
+        self.wide = wide[:, :, list(base.identifiability.kept)]
 
     def with_errors(self, errors: np.ndarray) -> RegressionData:
         """The CAD robot's torques in place of the recorded ones, with `errors` (N, 6), in units of the noise."""
@@ -138,7 +138,7 @@ def recorded(examples: Path, observation: Observation, base: BaseParameters) -> 
 
 def test_it_is_the_block_bootstrap_of_a_real_recording(recorded: Recorded) -> None:
     found = weighted_least_squares(recorded.data)
-    reported = np.array([found.std(name) for name in recorded.base.found.kept_names], dtype=float)
+    reported = np.array([found.std(name) for name in recorded.base.identifiability.kept_names], dtype=float)
     ratio = reported / recorded.bootstrap(recorded.right, np.random.default_rng(5))
     assert np.median(ratio) == pytest.approx(1.0, abs=0.1)
     assert np.mean((ratio > 0.8) & (ratio < 1.25)) > 0.9
@@ -160,7 +160,7 @@ def short_of_rows(recorded: Recorded, runs: int, bootstraps: int) -> tuple[np.nd
     inverse = np.linalg.inv(np.einsum("tja,tjb->ab", recorded.wide, recorded.wide))
     true = np.sqrt(np.diag(inverse @ middle @ inverse))
 
-    kept, values = recorded.base.found.kept_names, recorded.observation.values()
+    kept, values = recorded.base.identifiability.kept_names, recorded.observation.values()
     names = dict(zip(recorded.observation.names, values, strict=True))
     rng, reported, drawn, held = np.random.default_rng(3), [], [], []
     root = np.sqrt(1 - decay**2) * np.linalg.cholesky(between)

@@ -121,8 +121,10 @@ class Arm:
         pairs = zip(columns, observation.column_indices, strict=True)
         predicted = np.transpose([found[members] @ own for own, members in pairs])
         truth = self.truth()
-        beside = base.found.regrouping @ (found - [truth[name] for name in base.found.names])
-        std = np.sqrt(np.diag(estimate.covariance))[list(base.found.kept)]
+        beside = base.identifiability.regrouping @ (
+            found - [truth[name] for name in base.identifiability.names]
+        )
+        std = np.sqrt(np.diag(estimate.covariance))[list(base.identifiability.kept)]
         return float(np.linalg.norm(predicted - torque) / np.linalg.norm(torque)), beside, std
 
 

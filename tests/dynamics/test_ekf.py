@@ -125,7 +125,7 @@ def test_a_standstill_ends_the_motion_and_not_the_parameters(
     )
     whole, _ = filtered(observation, base, motion)
     paused, _ = filtered(observation, base, held)
-    differ = [abs(paused.values[name] - whole.values[name]) for name in base.found.kept_names]
+    differ = [abs(paused.values[name] - whole.values[name]) for name in base.identifiability.kept_names]
     assert max(differ) < 0.02
 
 

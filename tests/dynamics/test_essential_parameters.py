@@ -23,9 +23,9 @@ def fitted(tx40: RobotModel, swing: Motion) -> tuple[RegressionData, Estimate]:
     observation = Observation(tx40, CLASSIC)
     base, rng = BaseParameters.of(observation), np.random.default_rng(4)
     beta = rng.uniform(1.0, 3.0, base.rank) * rng.choice([-1, 1], base.rank)
-    beta[[base.found.kept_names.index(name) for name in ABSENT]] = 0.0
+    beta[[base.identifiability.kept_names.index(name) for name in ABSENT]] = 0.0
     truth = np.zeros(len(observation.names))
-    truth[list(base.found.kept)] = beta
+    truth[list(base.identifiability.kept)] = beta
     columns = observation.columns(swing)
     torque = np.stack(
         [truth[m] @ c for m, c in zip(observation.column_indices, columns, strict=True)], axis=1
@@ -39,7 +39,7 @@ def test_absent_parameters_go_first(fitted: tuple[RegressionData, Estimate]) -> 
     data, estimate = fitted
     found = essential_parameters(data, estimate)
     assert set(found.eliminated[:5]) == set(ABSENT)
-    assert set(found.names) | set(found.eliminated) == set(data.base.found.kept_names)
+    assert set(found.names) | set(found.eliminated) == set(data.base.identifiability.kept_names)
     whole = data.errors(estimate.parameters.coordinates())[0]
     assert data.errors(found.parameters)[0] <= 1.05 * whole
 
@@ -47,7 +47,7 @@ def test_absent_parameters_go_first(fitted: tuple[RegressionData, Estimate]) -> 
 def test_the_others_are_those_of_a_constrained_fit(fitted: tuple[RegressionData, Estimate]) -> None:
     """The values minimise (x - x̂)ᵀ V⁻¹ (x - x̂) with the eliminated at zero, and their covariance is V's given those."""
     data, estimate = fitted
-    found, base = essential_parameters(data, estimate), data.base.found
+    found, base = essential_parameters(data, estimate), data.base.identifiability
     kept = list(base.kept)
     full = base.regrouping @ estimate.parameters.coordinates()
     weight = np.linalg.inv(estimate.covariance[np.ix_(kept, kept)])

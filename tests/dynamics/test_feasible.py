@@ -109,7 +109,7 @@ def bodies(model: RobotModel, estimate: Estimate) -> list[bool]:
 
 
 def base_values(data: RegressionData, parameters: np.ndarray) -> np.ndarray:
-    return data.base.found.regrouping @ parameters
+    return data.base.identifiability.regrouping @ parameters
 
 
 def test_without_noise_the_truth_comes_back(tx40: RobotModel, swing: Motion) -> None:
@@ -203,7 +203,7 @@ def test_uncertainty_is_that_of_the_base_parameters(recorded: tuple[RegressionDa
     assert np.array_equal(found.covariance, linear.covariance)
     assert found.interval("link_1.mass") is None
     moved = base_values(train, found.parameters.coordinates() - linear.parameters.coordinates())
-    std = np.sqrt(np.diag(found.covariance)[list(train.base.found.kept)])
+    std = np.sqrt(np.diag(found.covariance)[list(train.base.identifiability.kept)])
     assert np.abs(moved / std).max() < np.sqrt(1.01 * (found.cost - linear.cost))
 
 

@@ -93,7 +93,7 @@ def test_the_error_is_that_of_predicting_each_block_from_rows_apart_from_it(
     decimation, purge = Decimation(4), 24
     system = experiment_system(observation, motion, decimation, Window(), mask_standstill=True)
     width = len(observation.names)
-    classic = BaseParameters.of(Observation(tx40, CLASSIC)).found.kept
+    classic = BaseParameters.of(Observation(tx40, CLASSIC)).identifiability.kept
     fixed = [observation.names.index(Observation(tx40, CLASSIC).names[i]) for i in classic]
     group = list(range(width - 6, width))
     parts = [p.where(~p.still) for p in rows.regression_blocks(observation, motion, decimation, Window())]

@@ -59,7 +59,7 @@ def test_it_is_the_minimum_of_the_loss(
             float(np.sum(huber(1.345, missed(m, at) / s))) for m, s in zip(motions, scales, strict=True)
         )
 
-    for number in base.found.kept:
+    for number in base.identifiability.kept:
         step = 0.1 * np.sqrt(found.covariance[number, number]) * (np.arange(len(x)) == number)
         ahead, behind = loss(x + step), loss(x - step)
         curvature, slope = ahead - 2 * loss(x) + behind, (ahead - behind) / 2

@@ -42,7 +42,9 @@ def test_with_its_faults_the_published_estimate_comes_back(tx40: RobotModel, mot
     """
     observation = Observation(tx40, CLASSIC)
     names = observation.names
-    kept = [i for i in BaseParameters.of(observation).found.kept if names[i] != "joint_6.rotor_inertia"]
+    kept = [
+        i for i in BaseParameters.of(observation).identifiability.kept if names[i] != "joint_6.rotor_inertia"
+    ]
     systems = []
     for joint, (columns, members) in enumerate(
         zip(observation.columns(motion), observation.column_indices, strict=True)

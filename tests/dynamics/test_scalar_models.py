@@ -114,7 +114,7 @@ def test_intervals_cover(
 def white_std(data: RegressionData) -> np.ndarray:
     """Standard deviations (p,) for errors that are independent from row to row, zero for those that are no base parameters."""
     ((sigma, _),) = data.noise()
-    kept = list(data.base.found.kept)
+    kept = list(data.base.identifiability.kept)
     matrix = data.subsystems[0].triangle.matrix[:, kept] / sigma
     scale = np.linalg.norm(matrix, axis=0)
     std = np.zeros(len(data.names))

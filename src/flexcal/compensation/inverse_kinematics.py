@@ -57,8 +57,8 @@ def nearest_positions(
             break
         r, j = residual[rows] * weight, jacobian[rows] * weight[:, None]
         pull = np.matmul(r[:, None, :], j)[:, 0]
-        held = ((q[rows] <= lower) & (pull < 0)) | ((q[rows] >= upper) & (pull > 0))
-        step = damped_step(np.where(held[:, None, :], 0.0, j), r, damping[rows])
+        at_limit = ((q[rows] <= lower) & (pull < 0)) | ((q[rows] >= upper) & (pull > 0))
+        step = damped_step(np.where(at_limit[:, None, :], 0.0, j), r, damping[rows])
         step *= (_LONGEST_STEP / np.maximum(np.abs(step).max(axis=1), _LONGEST_STEP))[:, None]
         tried = np.clip(q[rows] + step, lower, upper)
         new_residual, new_jacobian = forward(rows, tried)

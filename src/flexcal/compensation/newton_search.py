@@ -23,14 +23,14 @@ _DAMPING = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class Commands:
-    """Motor positions `q` (N, n) after the last step; `found` (N,): with them the tool is at its aim, within all limits.
+    """Motor positions `q` (N, n) after the last step; `reached` (N,): with them the tool is at its aim, within all limits.
 
     `before` and `after` (N, m): aim minus tool, as `ToolPoseTarget.residual` has it, at the nominal command and at `q`; `torque` (N, n) N
     m at rest.
     """
 
     q: np.ndarray
-    found: np.ndarray
+    reached: np.ndarray
     before: np.ndarray
     after: np.ndarray
     torque: np.ndarray
@@ -58,7 +58,7 @@ def solve_commands(
             break
         search.advance(jacobians=iteration >= _SHARED - 1)
     search.try_damped()
-    return Commands(search.q, search.found, search.before, search.after, search.torque)
+    return Commands(search.q, search.reached, search.before, search.after, search.torque)
 
 
 class _Search:
@@ -72,8 +72,8 @@ class _Search:
         self.weight = aim.weight(model)
         self.rows = np.arange(len(nominal))
         self.q, self.origin = nominal.copy(), nominal.copy()
-        self.held = np.zeros(nominal.shape, dtype=bool)
-        self.found, self.turned = np.zeros((2, len(nominal)), dtype=bool)
+        self.at_limit = np.zeros(nominal.shape, dtype=bool)
+        self.reached, self.turned = np.zeros((2, len(nominal)), dtype=bool)
         start = self._at_rest(self.rows, nominal, None, jacobians=True)
         self.flank, self.torque = start.rest.flank, start.rest.torque
         self.jacobian = start.command_jacobian()[:, : aim.rows]
@@ -92,7 +92,7 @@ class _Search:
 
     def try_damped(self) -> None:
         """Rows that came to no end, once more by damped least squares within the limits; twice where the flank turns at the end."""
-        rows = np.flatnonzero(~self.found & ~self.aim.reached(self.after))
+        rows = np.flatnonzero(~self.reached & ~self.aim.reached(self.after))
 
         def forward(own: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             self._evaluate(rows[own], q, jacobians=True)
@@ -106,7 +106,7 @@ class _Search:
             there = rows[self.aim.reached(self.after[rows])]
             self._evaluate(there, self.q[there], jacobians=False)
             turns = self._turn_flanks(there)
-            self.found[there] = ~turns & ~self._far(there)
+            self.reached[there] = ~turns & ~self._far(there)
             rows = there[turns]
 
     def _at_rest(
@@ -141,13 +141,15 @@ class _Search:
         """Mark arms within limits as found; hold the joint farthest beyond one there, where enough others are free; where (k,)."""
         beyond = np.maximum(self.lower - self.q[rows], self.q[rows] - self.upper)
         outside = (beyond > 0).any(axis=1)
-        self.found[rows] = ~outside & self.aim.reached(self.after[rows])
-        moves = ~self.held[rows] & (self.jacobian[rows] != 0).any(axis=1)
+        self.reached[rows] = ~outside & self.aim.reached(self.after[rows])
+        moves = ~self.at_limit[rows] & (self.jacobian[rows] != 0).any(axis=1)
         spare = outside & (moves.sum(axis=1) > self.aim.rows)
         joint = np.argmax(beyond[spare], axis=1)
-        held = rows[spare]
-        self.held[held, joint] = True
-        self.origin[held, joint] = np.clip(self.q[held, joint], self.lower[joint], self.upper[joint])
+        rows_held = rows[spare]
+        self.at_limit[rows_held, joint] = True
+        self.origin[rows_held, joint] = np.clip(
+            self.q[rows_held, joint], self.lower[joint], self.upper[joint]
+        )
         return spare
 
     def _step(self, rows: np.ndarray) -> None:
@@ -155,5 +157,5 @@ class _Search:
         jacobian = self.jacobian[rows]
         moved = self.q[rows] - self.origin[rows]
         wanted = (self.after[rows] + np.matmul(jacobian, moved[:, :, None])[:, :, 0]) * self.weight
-        free = np.where(self.held[rows][:, None, :], 0.0, jacobian * self.weight[:, None])
+        free = np.where(self.at_limit[rows][:, None, :], 0.0, jacobian * self.weight[:, None])
         self.q[rows] = self.origin[rows] + damped_step(free, wanted, _DAMPING * self.model.reach)

@@ -43,7 +43,7 @@ def inverse_kinematics_from_postures(
         rows = np.flatnonzero(~reached)
         if not len(rows):
             break
-        found, there = inverse_kinematics(model, aim.subset(rows), np.tile(other, (len(rows), 1)))
-        q[rows[there]] = found[there]
+        solution, there = inverse_kinematics(model, aim.subset(rows), np.tile(other, (len(rows), 1)))
+        q[rows[there]] = solution[there]
         reached[rows[there]] = True
     return q, reached, reached & ~first

@@ -38,7 +38,7 @@ class Compensation:
     reason: np.ndarray
 
     @property
-    def found(self) -> np.ndarray:
+    def reached(self) -> np.ndarray:
         """Whether there is a command (N,)."""
         return self.reason == ""
 
@@ -94,14 +94,14 @@ def _solve(
         targets.payload if targets.payload is None else targets.payload[rows],
     )
     before[rows] = np.linalg.norm(commands.before[:, :3], axis=1)
-    failed = ~commands.found
+    failed = ~commands.reached
     reason[rows[failed]] = real_reasons(
         model, aim.subset(rows[failed]), known[rows[failed]], commands.subset(failed)
     )
-    done = rows[commands.found]
-    q[done] = commands.q[commands.found]
+    done = rows[commands.reached]
+    q[done] = commands.q[commands.reached]
     certain = certain_flank(
-        model, q[done], commands.torque[commands.found], carried_mass(model, targets.payload, size)[done]
+        model, q[done], commands.torque[commands.reached], carried_mass(model, targets.payload, size)[done]
     )
     unambiguous[done] = certain[:, list(model.backlash_joints)].all(axis=1)
     return Compensation(q, known, before, unambiguous, elsewhere, reason)

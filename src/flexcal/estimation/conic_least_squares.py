@@ -50,10 +50,10 @@ class ConicFit:
         prior = optimum._prior(plane)
         far, unit = float(np.linalg.norm(prior[1])), max(radius, _FINEST * self.size)
         second = optimum._nearest(plane, prior, far, unit, radius)
-        found = optimum.least + plane @ second
-        if min(cone.smallest(found) - cone.floor for cone in self.cones) < -_SLACK:
+        parameters = optimum.least + plane @ second
+        if min(cone.smallest(parameters) - cone.floor for cone in self.cones) < -_SLACK:
             raise _failure("not accurate enough")
-        return found, float(np.sum((first + second)[:seen] ** 2))
+        return parameters, float(np.sum((first + second)[:seen] ** 2))
 
     def _prior(self, plane: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Matrix and right side, whose difference at (y, z) is the distance to the references in standard deviations."""
@@ -97,10 +97,10 @@ class ConicFit:
         solver = clarabel.DefaultSolver(
             quadratic, linear, constraints, np.concatenate(bounds), kinds, settings
         )
-        found = solver.solve()
-        if str(found.status) not in _SOLVED:
-            raise _failure(str(found.status))
-        return units * np.array(found.x[1:])
+        solution = solver.solve()
+        if str(solution.status) not in _SOLVED:
+            raise _failure(str(solution.status))
+        return units * np.array(solution.x[1:])
 
 
 def _bordered(matrix: np.ndarray, corner: float) -> np.ndarray:

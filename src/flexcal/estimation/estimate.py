@@ -129,14 +129,14 @@ class Estimate:
 
         Names that `truth` lacks are taken at the estimate. Dropped parameters come back at the value they were held at.
         """
-        held = self.parameters.coordinates()
+        start = self.parameters.coordinates()
         known = {name: value for name, value in truth.items() if name in self.parameters}
         x = self.parameters.coordinates(known)
         for dropped in self.dropped:
             number = self.parameters.index(dropped.name)
             for kept, coefficient in dropped.absorbed_by:
-                x[self.parameters.index(kept)] += coefficient * (x[number] - held[number])
-            x[number] = held[number]
+                x[self.parameters.index(kept)] += coefficient * (x[number] - start[number])
+            x[number] = start[number]
         return dict(zip(self.parameters.names, (float(v) for v in self.parameters.natural(x)), strict=True))
 
     def _quantile(self) -> float:

@@ -188,16 +188,16 @@ def _select(
             kept.append(column)
             take(column)
     rest = [i for i in range(scaled.shape[1]) if i not in kept]
-    found: list[int] = []
+    chosen: list[int] = []
     for _ in rest:
         norms = np.linalg.norm(remainder, axis=0)
         largest = int(np.argmax(norms))
         if norms[largest] == 0.0:
             break
         if norms[largest] > limit:
-            found.append(largest)
+            chosen.append(largest)
         take(largest)
-    kept += found
+    kept += chosen
     left = [*sizes[len(kept) :], *[0.0] * (scaled.shape[1] - len(sizes))]
     dropped = [i for i in range(scaled.shape[1]) if i not in kept]
     return sorted(kept), dropped, np.array(sorted(sizes[: len(kept)], reverse=True) + left)

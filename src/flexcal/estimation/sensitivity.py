@@ -68,11 +68,11 @@ class Sensitivity:
         from flexcal.estimation.identifiability import analyse
 
         factor = self.factor(chosen)
-        found = analyse(factor, self.parameters.names)
-        if found.rank < len(self.parameters):
+        identifiability = analyse(factor, self.parameters.names)
+        if identifiability.rank < len(self.parameters):
             raise FlexcalError(
-                f"The chosen measurements determine {found.rank} of {len(self.parameters)} parameters "
-                f"(not, for one, {found.weak_directions(1)[0][1]}); choose more, or give a prior."
+                f"The chosen measurements determine {identifiability.rank} of {len(self.parameters)} parameters "
+                f"(not, for one, {identifiability.weak_directions(1)[0][1]}); choose more, or give a prior."
             )
         root = solve_triangular(factor, np.eye(len(self.parameters)))
         return root @ root.T

@@ -78,18 +78,18 @@ def solve(
             reached += f", at {len(points) - len(optima)} the model could not be evaluated"
 
     at = uncertainty(objective, best, prefer, rank_tolerance)
-    if at.found.rank < len(parameters):
-        best = _refitted(objective, best, at.found, max_iterations, tolerance)
-        at = uncertainty(objective, best, at.found.kept_names, rank_tolerance)
-        reached += f"; rank {at.found.rank} of {len(parameters)}"
+    if at.identifiability.rank < len(parameters):
+        best = _refitted(objective, best, at.identifiability, max_iterations, tolerance)
+        at = uncertainty(objective, best, at.identifiability.kept_names, rank_tolerance)
+        reached += f"; rank {at.identifiability.rank} of {len(parameters)}"
     posterior = at.root @ at.root.T if covariance == "posterior" else sandwich(objective, best, at)
     outliers = () if isinstance(chosen, Squares) else np.flatnonzero(best.weights < OUTLIER_WEIGHT)
     return Estimate(
         parameters=parameters.with_coordinates(best.x),
         covariance=posterior,
-        rank=at.found.rank,
-        dropped=at.found.dropped,
-        identifiable=_identifiable(parameters, at.found, posterior),
+        rank=at.identifiability.rank,
+        dropped=at.identifiability.dropped,
+        identifiable=_identifiable(parameters, at.identifiability, posterior),
         cost=best.cost,
         chi2=at.chi2,
         degrees_of_freedom=max(0, round(at.rows - at.effective)),
@@ -113,14 +113,18 @@ def _starts(parameters: Parameters, starts: np.ndarray | None) -> np.ndarray:
 
 
 def _refitted(
-    objective: Objective, optimum: Optimum, found: Identifiability, max_iterations: int, tolerance: float
+    objective: Objective,
+    optimum: Optimum,
+    identifiability: Identifiability,
+    max_iterations: int,
+    tolerance: float,
 ) -> Optimum:
     """The optimum with the dropped parameters at their start values, unless that fits worse (a rank lost at this point only)."""
     size = optimum.x.size
-    kept = np.isin(np.arange(size), found.kept)
+    kept = np.isin(np.arange(size), identifiability.kept)
     start = objective.problem.parameters.coordinates()
     x = np.where(kept, optimum.x, start)
-    x[kept] += found.regrouping[:, ~kept] @ (optimum.x - start)[~kept]
+    x[kept] += identifiability.regrouping[:, ~kept] @ (optimum.x - start)[~kept]
     try:
         again = minimise(objective, x, kept, max_iterations=max_iterations, tolerance=tolerance)
     except FlexcalError:
@@ -128,6 +132,8 @@ def _refitted(
     return again if again.cost <= optimum.cost * (1 + 1e-6) + _SAME_OPTIMUM else optimum
 
 
-def _identifiable(parameters: Parameters, found: Identifiability, covariance: np.ndarray) -> tuple[bool, ...]:
-    kept = set(found.kept)
+def _identifiable(
+    parameters: Parameters, identifiability: Identifiability, covariance: np.ndarray
+) -> tuple[bool, ...]:
+    kept = set(identifiability.kept)
     return tuple(i in kept and known for i, known in enumerate(is_log_identified(parameters, covariance)))

@@ -23,7 +23,7 @@ is twice as large, and the data cannot tell that end of the interval from rigid.
 class Uncertainty:
     """`root` (p, k): the posterior covariance is root rootᵀ; `effective` is the number of parameters the data determine."""
 
-    found: Identifiability
+    identifiability: Identifiability
     root: np.ndarray
     effective: float
     chi2: float
@@ -38,15 +38,15 @@ def uncertainty(
 
     names = objective.problem.parameters.names
     factor = objective.triangular(optimum.x, optimum.residual, optimum.jacobian, optimum.weights)[0]
-    found = analyse(factor, names, prefer=prefer, tolerance=tolerance)
-    kept = list(found.kept)
+    identifiability = analyse(factor, names, prefer=prefer, tolerance=tolerance)
+    kept = list(identifiability.kept)
     scale = 1.0 / np.linalg.norm(factor[:, kept], axis=0)
     triangle = np.linalg.qr(factor[:, kept] * scale, mode="r")
     root = np.zeros((len(names), len(kept)))
     root[kept] = scale[:, None] * solve_triangular(triangle, np.eye(len(kept)))
     weights = optimum.weights[objective.grouping.number]
     return Uncertainty(
-        found=found,
+        identifiability=identifiability,
         root=root,
         effective=len(kept) - float(np.sum((objective.prior_rows @ root) ** 2)),
         chi2=float(np.sum(weights * optimum.residual**2)),

@@ -184,10 +184,10 @@ def _std(
     """Standard deviations of the joints' `rows`; None for base and tool, and where nothing was estimated."""
 
     def change(changed: RobotModel) -> np.ndarray:
-        found = []
+        differences = []
         for (_, _, now), (_, _, was) in zip(parameter_rows(changed)[1:-1], rows[1:-1], strict=True):
-            found += [_difference(key, now[key], was[key]) for key in was]
-        return np.array(found)
+            differences += [_difference(key, now[key], was[key]) for key in was]
+        return np.array(differences)
 
     spread = np.linalg.norm(propagated_covariance_root(model, change), axis=1)
     if not spread.any():
@@ -253,17 +253,17 @@ def _csv(
 
 
 def _remarks(before: DhChain, after: DhChain, names: list[str], four: bool) -> tuple[str, ...]:
-    found = []
+    sentences = []
     for k in range(len(names) - 1):
         if nominal_angle(before, k) >= NEARLY_PARALLEL:
             continue
         pair = f"The axes of {names[k]} and {names[k + 1]} are nearly parallel"
         if not four:
-            found.append(
+            sentences.append(
                 f"{pair}: their row has beta, and d stays nominal; take --four-parameters where beta cannot be entered."
             )
         else:
-            found.append(
+            sentences.append(
                 f"{pair}: their common normal is far away or nowhere, so d stays nominal, and what they are tilted about y is left out."
             )
-    return tuple(found)
+    return tuple(sentences)

@@ -42,8 +42,8 @@ def render_json(model: RobotModel, nominal: RobotModel) -> RenderedModel:
 
 
 def _tool_map(text: str, nominal: RobotModel) -> ToolMap:
-    found = json.loads(text)["parameters"]
-    values = {name: entry["value"] for name, entry in found.items() if entry["value"] is not None}
+    parameters = json.loads(text)["parameters"]
+    values = {name: entry["value"] for name, entry in parameters.items() if entry["value"] is not None}
     read = nominal.with_values(values)
     return lambda q: tool_positions(read, q)[0]
 
@@ -103,12 +103,12 @@ def _point(model: RobotModel, name: str) -> dict[str, Any]:
 
 
 def _payload(model: RobotModel) -> dict[str, Any] | None:
-    held = model.payload
-    if held is None:
+    payload = model.payload
+    if payload is None:
         return None
-    own = held.carried(held.mass)
+    own = payload.carried(payload.mass)
     return {
-        "joint": model.joints[held.joint].name,
+        "joint": model.joints[payload.joint].name,
         "mass": _quantity(model, "payload.mass"),
         "com": own.com.tolist(),
         "inertia_about_com": own.inertia.tolist(),

@@ -54,10 +54,10 @@ def render_mjcf(model: RobotModel) -> RenderedModel:
         ) from problem
     text = _with_all_digits(spec.to_xml(), compiled)
     remarks = ["Looks and collision bodies stay in the URDF."]
-    held = model.payload
-    if held is not None and held.mass > 0:
+    payload = model.payload
+    if payload is not None and payload.mass > 0:
         remarks.append(
-            f"The payload of {held.mass:.3g} kg is part of the link {model.joints[held.joint].link}."
+            f"The payload of {payload.mass:.3g} kg is part of the link {model.joints[payload.joint].link}."
         )
     if model.coulomb[np.isfinite(model.coulomb)].any():
         remarks.append("Coulomb friction of the drives is MuJoCo's frictionloss, which holds an arm at rest.")
@@ -95,9 +95,9 @@ def mjcf_tool(model: RobotModel, text: str) -> ToolMap:
         ]
         stiffness = np.array([_linear(read.jnt_stiffness[read.dof_jntid[i]]) for i in springs])
         result = np.zeros((len(q), 3))
-        for k, held in enumerate(q):
+        for k, motor_positions in enumerate(q):
             data.qpos[:] = 0.0
-            data.qpos[motors] = held
+            data.qpos[motors] = motor_positions
             for _ in range(_PASSES):
                 mujoco.mj_forward(read, data)
                 if not springs:

@@ -55,11 +55,11 @@ def fit_offsets(
     those that the covariance of the model's parameters gives, to first order. Offsets of the joints `undetermined` are held at zero, and so
     are those that are known less well than a joint is made and do not differ from zero by two standard deviations.
     """
-    held = np.isin(np.arange(model.n), sorted(undetermined))
-    fit = _fit(model, nominal, point, held, keep_frames=keep_frames)
+    fixed = np.isin(np.arange(model.n), sorted(undetermined))
+    fit = _fit(model, nominal, point, fixed, keep_frames=keep_frames)
     made = np.array([_MADE_WITHIN[joint.kind] for joint in model.joints])
-    weak = ~held & (fit.std > made) & (np.abs(fit.offsets) < 2 * fit.std)
-    return _fit(model, nominal, point, held | weak, keep_frames=keep_frames) if weak.any() else fit
+    weak = ~fixed & (fit.std > made) & (np.abs(fit.offsets) < 2 * fit.std)
+    return _fit(model, nominal, point, fixed | weak, keep_frames=keep_frames) if weak.any() else fit
 
 
 def undetermined_offsets(nominal: RobotModel, points: Sequence[str], *, base: bool) -> tuple[int, ...]:
@@ -80,13 +80,13 @@ def undetermined_offsets(nominal: RobotModel, points: Sequence[str], *, base: bo
 
 
 def _fit(
-    model: RobotModel, nominal: RobotModel, point: str, held: np.ndarray, *, keep_frames: bool
+    model: RobotModel, nominal: RobotModel, point: str, fixed: np.ndarray, *, keep_frames: bool
 ) -> OffsetFit:
-    """The fit without the offsets that are `held` (n,) at zero."""
+    """The fit without the offsets that are `fixed` (n,) at zero."""
     q, _ = random_poses(model, point, np.random.default_rng(1))
     wanted, flank = tool_positions(model, q, point=point)
     n = model.n
-    free = _free(n, frames=not keep_frames) & ~np.concatenate([held, np.zeros(9, dtype=bool)])
+    free = _free(n, frames=not keep_frames) & ~np.concatenate([fixed, np.zeros(9, dtype=bool)])
     fitted = _solve(nominal, q, wanted, point, free)
     still = _solve(nominal, q, wanted, point, free & (np.arange(n + 9) >= n))
     columns = _columns(nominal, q, fitted, point, free)
@@ -98,7 +98,7 @@ def _fit(
     std = np.linalg.norm(response, axis=1)
     before = PositionErrors.of(wanted - offset_tool(nominal, q, still, point))
     return OffsetFit(
-        np.where(held, 0.0, fitted[:n]), std[:n], ~held, fitted[n : n + 6], fitted[n + 6 :], before
+        np.where(fixed, 0.0, fitted[:n]), std[:n], ~fixed, fitted[n : n + 6], fitted[n + 6 :], before
     )
 
 
@@ -130,21 +130,21 @@ def _solve(
     nominal: RobotModel, q: np.ndarray, wanted: np.ndarray, point: str, free: np.ndarray
 ) -> np.ndarray:
     """Gauss-Newton from zero over the `free` parameters, (n + 9,)."""
-    found = np.zeros(nominal.n + 9)
+    parameters = np.zeros(nominal.n + 9)
     rest = _rest_rows(nominal.n, len(q))
     for _ in range(_STEPS):
-        columns = _columns(nominal, q, found, point, free)
-        missing = (wanted - offset_tool(nominal, q, found, point)).ravel()
-        rows, right = np.vstack([columns, rest]), np.concatenate([missing, -rest @ found])
+        columns = _columns(nominal, q, parameters, point, free)
+        missing = (wanted - offset_tool(nominal, q, parameters, point)).ravel()
+        rows, right = np.vstack([columns, rest]), np.concatenate([missing, -rest @ parameters])
         step = _least_squares(rows, right)
         turned = vector_rotation(step[nominal.n + 3 : nominal.n + 6]) @ vector_rotation(
-            found[nominal.n + 3 : nominal.n + 6]
+            parameters[nominal.n + 3 : nominal.n + 6]
         )
-        found = found + step
-        found[nominal.n + 3 : nominal.n + 6] = rotation_vector(turned)
+        parameters = parameters + step
+        parameters[nominal.n + 3 : nominal.n + 6] = rotation_vector(turned)
         if np.abs(step).max() < _SMALL:
             break
-    return found
+    return parameters
 
 
 def _columns(

@@ -112,21 +112,21 @@ def render_offsets(
 
 def offsets_of(text: str, nominal: RobotModel) -> np.ndarray:
     """Parameters (n + 9,) of `offset_tool` that a table's `text` holds; raises `FlexcalError` for a joint that the robot does not have."""
-    found = np.zeros(nominal.n + 9)
+    parameters = np.zeros(nominal.n + 9)
     pose: dict[str, float] = dict.fromkeys(XYZ_RPY, 0.0)
     lines = (line for line in text.splitlines() if not line.startswith("#"))
     for row in csv.DictReader(lines):
         value = float(row["value"])
         if row["parameter"] == "offset":
-            found[nominal.joint_index(row["joint"])] = value
+            parameters[nominal.joint_index(row["joint"])] = value
         elif row["joint"] == "tool":
-            found[nominal.n + 6 + "xyz".index(row["parameter"])] = value
+            parameters[nominal.n + 6 + "xyz".index(row["parameter"])] = value
         else:
             pose[row["parameter"]] = value
     base = from_xyz_rpy(pose)
-    found[nominal.n : nominal.n + 3] = base[:3, 3]
-    found[nominal.n + 3 : nominal.n + 6] = rotation_vector(base[:3, :3])
-    return found
+    parameters[nominal.n : nominal.n + 3] = base[:3, 3]
+    parameters[nominal.n + 3 : nominal.n + 6] = rotation_vector(base[:3, :3])
+    return parameters
 
 
 def _tool_map(text: str, nominal: RobotModel, point: str) -> ToolMap:

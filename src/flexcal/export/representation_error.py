@@ -161,9 +161,9 @@ def random_poses(model: RobotModel, point: str | None, rng: np.random.Generator)
         wanted = rng.uniform(box.lower, box.upper, (SAMPLES // _TRIES, 3))
         starts = rng.uniform(lower, upper, (_TRIES, len(wanted), model.n))
         tried = [reach_points(model, wanted, start, lower, upper, point=point) for start in starts]
-        found = np.concatenate([q[reached] for q, reached in tried])
-        if len(found) >= _LEAST_REACHED:
-            return found, "working volume"
+        poses = np.concatenate([q[reached] for q, reached in tried])
+        if len(poses) >= _LEAST_REACHED:
+            return poses, "working volume"
     return rng.uniform(lower, upper, (SAMPLES, model.n)), "joint range"
 
 
@@ -195,5 +195,5 @@ def _leave_out(model: RobotModel, term: str) -> RobotModel:
 def _alone(error: PositionErrors | None) -> str:
     if error is None:
         return ""
-    found = error.in_millimetres()
-    return f" (alone {found['mean_mm']:.3f} mm on average, {found['max_mm']:.3f} mm at most)"
+    errors = error.in_millimetres()
+    return f" (alone {errors['mean_mm']:.3f} mm on average, {errors['max_mm']:.3f} mm at most)"

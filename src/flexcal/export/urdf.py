@@ -68,12 +68,12 @@ def urdf_tool(model: RobotModel, text: str) -> ToolMap:
 
 def _remarks(model: RobotModel, bodiless: tuple[str, ...]) -> tuple[str, ...]:
     """One sentence for each thing of the dynamics that the file lacks."""
-    found = [*bodiless_remark(bodiless)]
+    sentences = [*bodiless_remark(bodiless)]
     if any(f"{name}.rotor_inertia" in model.posterior.parameters for name in model.joint_names):
-        found.append(
+        sentences.append(
             "Rotor inertia, friction and torque offset of the drives stay in estimates.yaml: torques need them besides."
         )
-    return tuple(found)
+    return tuple(sentences)
 
 
 def _move(joint: ET.Element, shift: np.ndarray, turn: np.ndarray) -> None:

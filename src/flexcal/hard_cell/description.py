@@ -101,7 +101,7 @@ def read_description(robot: Path) -> ArmDescription:
     (point, declared), *_ = config.points.items()
     station, entry = next(iter(config.stations.items()), ("tracker", None))
     place = None if entry is None else entry.xyz
-    held = config.payload
+    payload = config.payload
 
     def drive(values: tuple[float, ...] | None, otherwise: float = 0.0) -> np.ndarray:
         return np.full(n, otherwise) if values is None else np.array(values, dtype=float)
@@ -120,10 +120,10 @@ def read_description(robot: Path) -> ArmDescription:
         gravity=np.array(config.gravity, dtype=float),
         point=(point, index[declared.frame], np.array(declared.xyz, dtype=float)),
         station=(station, np.zeros(3) if place is None else np.array(place, dtype=float)),
-        payload=0.0 if held is None else held.mass,
-        payload_std=0.0 if held is None else held.mass_std,
-        held_link=-1 if held is None else index[held.frame],
-        held_com=None if held is None else np.array(held.com, dtype=float),
+        payload=0.0 if payload is None else payload.mass,
+        payload_std=0.0 if payload is None else payload.mass_std,
+        held_link=-1 if payload is None else index[payload.frame],
+        held_com=None if payload is None else np.array(payload.com, dtype=float),
     )
 
 

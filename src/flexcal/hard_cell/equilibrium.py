@@ -69,12 +69,12 @@ def stand(
     angles[motor] = motors + np.where(driven, 0.0, free)
     for _ in range(ITERATIONS):
         torque = -arm.gravity(angles) - load
-        found = spring_twist(torque, stiffness, hardening) + backlash * np.sign(torque) + offset
-        moved = np.abs(found - angles)[elastic].max(initial=0.0)
-        angles[elastic] = found[elastic]
+        balanced = spring_twist(torque, stiffness, hardening) + backlash * np.sign(torque) + offset
+        moved = np.abs(balanced - angles)[elastic].max(initial=0.0)
+        angles[elastic] = balanced[elastic]
         if moved < TOLERANCE:
-            held = arm.gravity(angles)
-            return StaticEquilibrium(angles, held[motor], arm.point)
+            torque_at_rest = arm.gravity(angles)
+            return StaticEquilibrium(angles, torque_at_rest[motor], arm.point)
     raise FlexcalError(
         "the hard cell's robot has no stable equilibrium: its springs are too soft for gravity; check the stiffness values."
     )

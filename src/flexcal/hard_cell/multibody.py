@@ -47,8 +47,8 @@ class Multibody:
         self.data.qpos[:] = angles
         self.data.qvel[:] = 0
         mujoco.mj_fwdPosition(self.mjmodel, self.data)
-        mujoco.mj_rne(self.mjmodel, self.data, 0, held := np.empty(self.mjmodel.nv))
-        return held
+        mujoco.mj_rne(self.mjmodel, self.data, 0, torque := np.empty(self.mjmodel.nv))
+        return torque
 
     @property
     def point(self) -> np.ndarray:

@@ -64,8 +64,8 @@ def _standing(
         _expand(arm, robot, places[masses[k]], float(warmth[k]))
         slip = None if rng is None else rng.uniform(-1, 1, robot.n)
         scatter = None if rng is None else robot.joint_scatter * rng.standard_normal(robot.n)
-        found = stand(robot, arm, q, slip=slip, scatter=scatter)
-        point[k], torque[k] = found.point, found.torque
+        equilibrium = stand(robot, arm, q, slip=slip, scatter=scatter)
+        point[k], torque[k] = equilibrium.point, equilibrium.torque
     return point, torque
 
 

@@ -108,7 +108,7 @@ def draw_robot(described: ArmDescription, rng: np.random.Generator) -> HardRobot
     springs[wrist, 2] = np.exp(uniform(np.log(WRIST[0]), np.log(WRIST[1]), int(wrist.sum())))
     dampers[wrist, 2] = WRIST_DAMPING * springs[wrist, 2]
     name, link, place = described.point
-    held = described.held_com
+    com = described.held_com
     arm = replace(
         described,
         links=tuple(_draw_link(k, rng) for k in described.links),
@@ -118,7 +118,7 @@ def draw_robot(described: ArmDescription, rng: np.random.Generator) -> HardRobot
         viscous=described.viscous * np.exp(FRICTION * normal(n)),
         coulomb=described.coulomb * np.exp(FRICTION * normal(n)),
         point=(name, link, place + RULER * normal(3)),
-        held_com=None if held is None else held + PAYLOAD_COM * normal(3),
+        held_com=None if com is None else com + PAYLOAD_COM * normal(3),
     )
     backlash = np.zeros(n)
     backlash[list(arm.backlash_joints)] = uniform(*GAP, len(arm.backlash_joints))

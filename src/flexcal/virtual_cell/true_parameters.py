@@ -102,25 +102,25 @@ def read_truth_of(path: str | Path, model: RobotModel) -> dict[str, float]:
             raise file.error(
                 keys, f"the true value of '{name}' is {value:g}, which is not possible; correct it."
             )
-    found = {name: value for name, (value, _) in entries.items()}
+    values = {name: value for name, (value, _) in entries.items()}
     drawn = draw_truth(model, SpreadConfig(), np.random.default_rng(0))
-    lacking = [name for name in drawn if name not in found]
+    lacking = [name for name in drawn if name not in values]
     if lacking:
         more = f" and {len(lacking) - 1} others" if len(lacking) > 1 else ""
         logging.getLogger("flexcal.virtual_cell").warning(
             f"{path}: '{lacking[0]}'{more} are missing and taken as in {model.path}"
         )
-    return {name: model.value(name) for name in lacking} | found
+    return {name: model.value(name) for name in lacking} | values
 
 
 def _entries(file: YamlFile) -> dict[str, tuple[float, Keys]]:
     """Value and place of every name."""
     if not isinstance(file.data, Mapping) or not file.data:
         raise file.error((), "a truth file holds parameter names and values; this one does not.")
-    found: dict[str, tuple[float, Keys]] = {}
+    entries: dict[str, tuple[float, Keys]] = {}
     for key, item in file.data.items():
         if not _is_block(item):
-            found[key] = (_value(file, (key,), item), (key,))
+            entries[key] = (_value(file, (key,), item), (key,))
             continue
         table = item.get("values")
         if not isinstance(table, Mapping):
@@ -129,8 +129,8 @@ def _entries(file: YamlFile) -> dict[str, tuple[float, Keys]]:
             )
         for name, entry in table.items():
             keys = (key, "values", name)
-            found[name] = (_value(file, keys, entry), keys)
-    return {name: entry for name, entry in found.items() if not NUISANCE.fullmatch(name)}
+            entries[name] = (_value(file, keys, entry), keys)
+    return {name: entry for name, entry in entries.items() if not NUISANCE.fullmatch(name)}
 
 
 def _is_block(item: object) -> bool:

@@ -52,13 +52,13 @@ def repeatability(poses: PoseSet) -> list[PoseRepeatability]:
     number = _numbers(poses)
     order = np.argsort(number, kind="stable")
     groups = np.split(order, np.cumsum(np.bincount(number))[:-1])
-    found = [_evaluate(poses, rows, number) for rows in groups if len(rows) > 1]
-    if not found:
+    repeated = [_evaluate(poses, rows, number) for rows in groups if len(rows) > 1]
+    if not repeated:
         raise FlexcalError(
             f"each of the {len(poses)} poses was visited once only (joint positions within {SAME_COMMAND:g} rad count as the same); "
             f"visit some of them {CYCLES} times."
         )
-    return found
+    return repeated
 
 
 def repeatability_of(points: np.ndarray) -> float:
@@ -85,7 +85,7 @@ def _numbers(poses: PoseSet) -> np.ndarray:
     places = np.floor(poses.q[rows][:, [0, -1]] / _CELL).astype(np.int64).tolist()
     first: list[int] = []
     cells: defaultdict[tuple[int, int], list[int]] = defaultdict(list)
-    found = []
+    numbers = []
     for row, (one, other) in zip(rows.tolist(), places, strict=True):
         others = sorted(
             k
@@ -101,12 +101,12 @@ def _numbers(poses: PoseSet) -> np.ndarray:
             & (payload[leaders] == payload[row])
         )
         if alike.any():
-            found.append(others[int(np.argmax(alike))])
+            numbers.append(others[int(np.argmax(alike))])
         else:
-            found.append(len(first))
+            numbers.append(len(first))
             cells[one, other].append(len(first))
             first.append(row)
-    return np.array(found)[exact]
+    return np.array(numbers)[exact]
 
 
 def _evaluate(poses: PoseSet, rows: np.ndarray, number: np.ndarray) -> PoseRepeatability:

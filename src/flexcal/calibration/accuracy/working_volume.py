@@ -44,19 +44,19 @@ def accuracy_map(
     reach: Propagation, q: np.ndarray, *, threads: int | None = None, progress: Progress = silent
 ) -> AccuracyMap:
     """Mean and 95 % quantile of the tool's error at poses `q` (N, n), to first order in the parameters; `threads` None takes all cores."""
-    found = AccuracyMap(q, np.empty((len(q), 3)), np.empty(len(q)), np.empty(len(q)))
+    result = AccuracyMap(q, np.empty((len(q), 3)), np.empty(len(q)), np.empty(len(q)))
     starts = range(0, len(q), _BATCH)
 
     def fill(start: int) -> None:
         rows = slice(start, start + _BATCH)
-        found.position[rows], roots = reach.roots(q[rows])
+        result.position[rows], roots = reach.roots(q[rows])
         variances = principal_variances(roots @ np.swapaxes(roots, 1, 2))
-        found.mean[rows], found.p95[rows] = mean_distance(variances), distance_quantile(variances)
+        result.mean[rows], result.p95[rows] = mean_distance(variances), distance_quantile(variances)
 
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         for number, _ in enumerate(pool.map(fill, starts), start=1):
             progress("accuracy map", number / len(starts))
-    return found
+    return result
 
 
 def random_poses_in(
@@ -78,12 +78,12 @@ def random_poses_in(
         raise FlexcalError(
             f"the working volume from {_told(box[0])} to {_told(box[1])} is no box; give every smallest coordinate before the largest."
         )
-    found: list[np.ndarray] = []
+    accepted: list[np.ndarray] = []
     have = drawn = 0
     for q in _draws(rng, lower, upper):
         at = point_kinematics(model, q, point=reach.target, jacobians=False).position
         inside = q[np.all((at >= box[0]) & (at <= box[1]), axis=1)]
-        found.append(inside)
+        accepted.append(inside)
         have, drawn = have + len(inside), drawn + len(q)
         progress("poses", min(have / count, 1.0))
         if have >= count:
@@ -93,7 +93,7 @@ def random_poses_in(
                 f"of {drawn} random poses of {model.name} {have} reach the working volume from {_told(box[0])} to {_told(box[1])} m (it "
                 f"reaches {model.reach:.3g} m); give a larger box in the robot's base frame, or a file of the poses to look at."
             )
-    return np.concatenate(found)[:count]
+    return np.concatenate(accepted)[:count]
 
 
 def _draws(rng: np.random.Generator, lower: np.ndarray, upper: np.ndarray) -> Iterator[np.ndarray]:

@@ -32,23 +32,23 @@ class ImplausibleShift:
     times: float
 
 
-def is_implausible(found: Calibration) -> bool:
+def is_implausible(calibration: Calibration) -> bool:
     """Whether data and robot are inconsistent, so that the fit must not be used."""
-    return bool(implausible_shifts(found)) or residuals_implausible(found)
+    return bool(implausible_shifts(calibration)) or residuals_implausible(calibration)
 
 
-def residuals_implausible(found: Calibration) -> bool:
+def residuals_implausible(calibration: Calibration) -> bool:
     """Whether the residuals, without outliers, are larger than plausible for any robot."""
-    rows = ~np.isin(np.arange(len(found.poses)), found.estimate.outliers)
-    position = found.poses.position[rows]
+    rows = ~np.isin(np.arange(len(calibration.poses)), calibration.estimate.outliers)
+    position = calibration.poses.position[rows]
     extent = np.sqrt(np.mean((position - position.mean(axis=0)) ** 2))
-    return bool(np.sqrt(np.mean(found.residuals[rows] ** 2)) > SCATTERED * extent)
+    return bool(np.sqrt(np.mean(calibration.residuals[rows] ** 2)) > SCATTERED * extent)
 
 
-def implausible_shifts(found: Calibration) -> tuple[ImplausibleShift, ...]:
+def implausible_shifts(calibration: Calibration) -> tuple[ImplausibleShift, ...]:
     """Parameters with an implausibly large change from their start values, the largest first."""
-    estimate, prior = found.estimate.parameters, found.prior
-    kept = [name for name in found.identifiability.kept_names if _has_size(name)]
+    estimate, prior = calibration.estimate.parameters, calibration.prior
+    kept = [name for name in calibration.identifiability.kept_names if _has_size(name)]
     named = [*kept, *prior.parameters.names]
     end, start = estimate.subset(named).coordinates(), estimate.subset(named).prior_mean()
     size = np.concatenate(

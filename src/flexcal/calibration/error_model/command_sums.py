@@ -64,11 +64,11 @@ class CommandSums:
 
     def blocks(self, entries: np.ndarray) -> tuple[np.ndarray, ...]:
         """Scalar products (k, 3 s, 3 s) of the commands of each size of group."""
-        found = []
+        products = []
         for size, pairs in self.groups:
             own = (pairs @ entries).reshape(-1, size, size, 3, 3)
-            found.append(own.transpose(0, 1, 3, 2, 4).reshape(-1, 3 * size, 3 * size))
-        return tuple(found)
+            products.append(own.transpose(0, 1, 3, 2, 4).reshape(-1, 3 * size, 3 * size))
+        return tuple(products)
 
     def spread(self, values: np.ndarray) -> np.ndarray:
         """Errors (G T, 3) of all points from those (3 K,) of the commands."""

@@ -76,9 +76,9 @@ class ErrorGroups:
 
     def gathered(self, rows: np.ndarray) -> np.ndarray:
         """Values (N, 3, …) of all points by visits, (G, 3 T, …); zero for points that a visit lacks."""
-        found = rows[self.visits]
-        found[self.visits < 0] = 0.0
-        return found.reshape(len(found), -1, *rows.shape[2:])
+        by_visit = rows[self.visits]
+        by_visit[self.visits < 0] = 0.0
+        return by_visit.reshape(len(by_visit), -1, *rows.shape[2:])
 
     @cached_property
     def common(self) -> np.ndarray:

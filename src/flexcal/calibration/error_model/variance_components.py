@@ -86,8 +86,8 @@ class LinearFit:
         names, scale, variances = self._supported(names, scale, variances, likelihood, share)
         variances = np.where(variances > _NEGLIGIBLE * scale, variances, 0.0)
         stds = dict(zip(names, np.sqrt(variances).tolist(), strict=True))
-        found = ErrorComponents(share=share, **stds)
-        return found, self._uncertainties(names, variances, share)
+        components = ErrorComponents(share=share, **stds)
+        return components, self._uncertainties(names, variances, share)
 
     def _supported(
         self, names: list[str], scale: np.ndarray, variances: np.ndarray, likelihood: float, share: float
@@ -105,8 +105,8 @@ class LinearFit:
                 rest = [i for i in range(len(names)) if i != k]
                 near = variances[rest] / scale[rest]
                 near[0] += variances[k] / scale[k] / 2
-                found = self._maximum([names[i] for i in rest], scale[rest], share, near)
-                trials.append((found[1], found[0], rest))
+                maximum = self._maximum([names[i] for i in rest], scale[rest], share, near)
+                trials.append((maximum[1], maximum[0], rest))
             if not trials:
                 break
             best, kept, rest = max(trials, key=lambda trial: trial[0])

@@ -35,9 +35,9 @@ class ElasticPrior:
         """
         names = _names(model, poses)
         items = [declared_parameter(model, name) for name in names]
-        held = model.posterior
-        covariance = held.prior(Parameters(items))[1]
-        items = [replace(i, prior_std=np.inf) if held.determines(i.name) else i for i in items]
+        posterior = model.posterior
+        covariance = posterior.prior(Parameters(items))[1]
+        items = [replace(i, prior_std=np.inf) if posterior.determines(i.name) else i for i in items]
         for k, name in enumerate(names):
             if name.endswith("drive.stiffness"):
                 covariance[k, k] += secant_scale**2

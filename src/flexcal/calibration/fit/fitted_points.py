@@ -133,14 +133,14 @@ class PointFit:
         loss: Loss | PlainLoss,
         near: FittedPoints | None = None,
         *,
-        held: tuple[Undetermined, ...] = (),
+        fixed: tuple[Undetermined, ...] = (),
         spread: dict[str, float] | None = None,
     ) -> FittedPoints:
         """The fit under some scatter, from the solution `near`, repeated until the flanks are those of the robot that it finds.
 
-        `held` parameters stay at their nominal values; `spread` are the standard deviations of the scatter's components.
+        `fixed` parameters stay at their nominal values; `spread` are the standard deviations of the scatter's components.
         """
-        names = [item.name for item in held]
+        names = [item.name for item in fixed]
         kept = Parameters(item for item in self.free if item.name not in names)
         if near is None:
             at = predict(self.start, self.poses, elastic=self.elastic, jacobians=True)
@@ -168,7 +168,7 @@ class PointFit:
                 require_both_flanks(self.start, flank)
             if passes == _FLANK_PASSES:
                 break
-        return FittedPoints(self, scatter, spread or {}, held, estimate, fitted, after, flank, task)
+        return FittedPoints(self, scatter, spread or {}, fixed, estimate, fitted, after, flank, task)
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,7 +178,7 @@ class FittedPoints:
     fit: PointFit
     scatter: ErrorComponents
     spread: dict[str, float]
-    held: tuple[Undetermined, ...]
+    fixed: tuple[Undetermined, ...]
     estimate: Estimate
     model: RobotModel
     at: Prediction
@@ -281,20 +281,20 @@ class FittedPoints:
 
     def whole_estimate(self) -> Estimate:
         """All parameters: those that moved, those that were held with the uncertainty that this leaves, and the scatter."""
-        undetermined_names = [item.name for item in self.held]
+        undetermined_names = [item.name for item in self.fixed]
         dropped = tuple(d for d in self.fit.identifiability.dropped if d.name not in self.task.kept.names)
         turns = [f"station.{s}.{key}" for s in self.fit.poses.stations for key in ("rx", "ry", "rz")]
         names = dict.fromkeys([*undetermined_names, *(d.name for d in dropped)])
         items = [self.fit.geometric[name] for name in names]
         items += [Parameter(n, "rad", self.model.value(n)) for n in turns if n not in self.fit.geometric]
-        estimate, held = replace(self.estimate, covariance=self._covariance()), Parameters(items)
-        size, all_ = len(estimate.parameters), len(estimate.parameters) + len(held) + len(SCATTER)
+        estimate, fixed = replace(self.estimate, covariance=self._covariance()), Parameters(items)
+        size, all_ = len(estimate.parameters), len(estimate.parameters) + len(fixed) + len(SCATTER)
         covariance = np.zeros((all_, all_))
         covariance[:size, :size] = estimate.covariance
         count = len(undetermined_names)
         if count:
             gain = self._gain(undetermined_names)
-            sizes = np.array([item.size for item in self.held])
+            sizes = np.array([item.size for item in self.fixed])
             covariance[:size, :size] += (gain * sizes**2) @ gain.T
             covariance[:size, size : size + count] = gain * sizes**2
             covariance[size : size + count, :size] = (gain * sizes**2).T
@@ -303,10 +303,10 @@ class FittedPoints:
         covariance[range(all_ - len(SCATTER), all_), range(all_ - len(SCATTER), all_)] = known**2
         return replace(
             estimate,
-            parameters=estimate.parameters + held + scatter,
+            parameters=estimate.parameters + fixed + scatter,
             covariance=covariance,
             dropped=estimate.dropped + dropped,
-            identifiable=self._identifiable() + (False,) * len(held) + tuple(bool(k > 0) for k in known),
+            identifiable=self._identifiable() + (False,) * len(fixed) + tuple(bool(k > 0) for k in known),
         )
 
     def _covariance(self) -> np.ndarray:

@@ -60,24 +60,24 @@ def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotMod
     wanted = predict(stiff, poses, elastic=False).position
     scale = np.where(np.isfinite(std), std, 1.0)
     weight = np.where(np.isfinite(std), 1 / std, 0.0)
-    found, free = stiff, np.zeros((len(names), 0))
+    robot, free = stiff, np.zeros((len(names), 0))
     for _ in range(_STEPS):
-        at = predict(found, poses, elastic=False, jacobians=True)
+        at = predict(robot, poses, elastic=False, jacobians=True)
         columns = at.jacobian(names).reshape(-1, len(names)) * scale
         left, sizes, right = np.linalg.svd(columns, full_matrices=len(columns) < len(names))
         rank = int(np.sum(sizes > _UNSEEN * sizes[0]))
         missing = left[:, :rank].T @ (wanted - at.position).ravel()
         step = scale * (right[:rank].T @ (missing / sizes[:rank]))
         free = scale[:, None] * right[rank:].T
-        values = np.array([found.value(name) for name in names]) + step
+        values = np.array([robot.value(name) for name in names]) + step
         step += free @ np.linalg.lstsq(weight[:, None] * free, -weight * values, rcond=None)[0]
-        changed = np.array([found.value(name) for name in names]) + step
-        found = found.with_values(dict(zip(names, changed.tolist(), strict=True)))
+        changed = np.array([robot.value(name) for name in names]) + step
+        robot = robot.with_values(dict(zip(names, changed.tolist(), strict=True)))
         if np.abs(step).max() < _SMALL:
             break
-    found = model.with_values({name: found.value(name) for name in names})
-    whole, unseen = _propagated(found, names, free, weight)
-    return replace(found, posterior=whole), replace(found, posterior=unseen)
+    robot = model.with_values({name: robot.value(name) for name in names})
+    whole, unseen = _propagated(robot, names, free, weight)
+    return replace(robot, posterior=whole), replace(robot, posterior=unseen)
 
 
 def with_calibrated_points(nominal: RobotModel, model: RobotModel, targets: Sequence[str]) -> RobotModel:

@@ -137,47 +137,47 @@ def calibrate(
         marginalised=elasticity == "marginalised",
         progress=progress,
     )
-    found = _settled(fit, "squares" if loss == "auto" else loss)
-    if loss == "auto" and elasticity == "reestimated" and found.suspects_outliers:
+    fitted = _settled(fit, "squares" if loss == "auto" else loss)
+    if loss == "auto" and elasticity == "reestimated" and fitted.suspects_outliers:
         again = _settled(fit, "cauchy")
-        found = again if again.estimate.outliers else found
-    return _calibration(found)
+        fitted = again if again.estimate.outliers else fitted
+    return _calibration(fitted)
 
 
 def _settled(fit: PointFit, loss: Loss | Literal["squares", "huber", "cauchy"]) -> FittedPoints:
     """The fit with the scatter that its own residuals have, and with what is undetermined under that scatter held."""
     robust = not isinstance(loss_named(loss), Squares)
-    found = fit.solved(fit.first_scatter, "squares")
+    fitted = fit.solved(fit.first_scatter, "squares")
     if robust:
         for _ in range(_PASSES):
-            before, found = found, fit.solved(found.robust_scatter(), loss, found)
-            if found.scatter.settled(before.scatter, 1e-2):
+            before, fitted = fitted, fit.solved(fitted.robust_scatter(), loss, fitted)
+            if fitted.scatter.settled(before.scatter, 1e-2):
                 break
     for _ in range(_PASSES):
-        scatter, spread = found.estimated_scatter()
-        held = found.undetermined(scatter)
-        if scatter.settled(found.scatter, _SETTLED) and held == found.held:
+        scatter, spread = fitted.estimated_scatter()
+        fixed = fitted.undetermined(scatter)
+        if scatter.settled(fitted.scatter, _SETTLED) and fixed == fitted.fixed:
             break
-        found = fit.solved(scatter, loss, found, held=held, spread=spread)
-    return found
+        fitted = fit.solved(scatter, loss, fitted, fixed=fixed, spread=spread)
+    return fitted
 
 
-def _calibration(found: FittedPoints) -> Calibration:
-    fit = found.fit
-    estimate = found.whole_estimate()
-    calibrated = found.model.with_estimate(estimate)
+def _calibration(fitted: FittedPoints) -> Calibration:
+    fit = fitted.fit
+    estimate = fitted.whole_estimate()
+    calibrated = fitted.model.with_estimate(estimate)
     return Calibration(
         model=calibrated,
         estimate=estimate,
-        prior=found.task.prior,
+        prior=fitted.task.prior,
         identifiability=fit.identifiability,
-        undetermined=found.held,
-        scatter=found.scatter,
-        poses=found.poses,
-        residuals=found.residuals,
-        linear=found.linear,
-        flank=found.flank,
-        ambiguous=ambiguous_poses(calibrated, found.at),
+        undetermined=fitted.fixed,
+        scatter=fitted.scatter,
+        poses=fitted.poses,
+        residuals=fitted.residuals,
+        linear=fitted.linear,
+        flank=fitted.flank,
+        ambiguous=ambiguous_poses(calibrated, fitted.at),
         terms=fit.terms,
     )
 

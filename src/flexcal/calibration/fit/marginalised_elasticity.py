@@ -29,9 +29,9 @@ def marginalised(fit: GeometryProblem, *, progress: Callable[[int, float], None]
         estimate = solve(about.geometry_alone(), progress=progress)
         kept = estimate.parameters
         rest = about.shrunk(about.residual(_values(kept + elastic)))
-        found = elastic.prior_mean() + about.spread.T @ rest
-        step = (found - elastic.coordinates()) / np.sqrt(np.diag(fit.prior.covariance))
-        elastic = elastic.with_coordinates(found)
+        theta = elastic.prior_mean() + about.spread.T @ rest
+        step = (theta - elastic.coordinates()) / np.sqrt(np.diag(fit.prior.covariance))
+        elastic = elastic.with_coordinates(theta)
         linearisations += 1
         if np.abs(step).max() < _SETTLED or linearisations == _RELINEARISATIONS:
             break
@@ -78,10 +78,10 @@ class _Marginal:
 
     def geometry_alone(self) -> Problem:
         """The least-squares problem of the geometry, with θ where it is and S as the covariance."""
-        fit, kept, held = self.fit, self.kept, _values(self.elastic)
+        fit, kept, elastic_values = self.fit, self.kept, _values(self.elastic)
 
         def values(x: np.ndarray) -> dict[str, float]:
-            return held | dict(zip(kept.names, kept.natural(x), strict=True))
+            return elastic_values | dict(zip(kept.names, kept.natural(x), strict=True))
 
         def linearise(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             at = fit.predicted(values(x), jacobians=True)

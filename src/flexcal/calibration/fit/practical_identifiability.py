@@ -45,10 +45,10 @@ def undetermined(
     sizes = np.array([plausible_size(start, name) for name in kept.names])
     columns = whitened(whitening, at.jacobian(kept.names))
     largest = np.linalg.norm(columns * sizes, axis=0).max()
-    found = analyse(columns, kept.names, scale=sizes, tolerance=1 / max(largest, 1.0))
-    lost = [item.name for item in found.dropped]
+    identifiability = analyse(columns, kept.names, scale=sizes, tolerance=1 / max(largest, 1.0))
+    lost = [item.name for item in identifiability.dropped]
     lost += hidden
-    partners = {item.name: item.absorbed_by for item in found.dropped}
+    partners = {item.name: item.absorbed_by for item in identifiability.dropped}
     return tuple(
         Undetermined(name, plausible_size(start, name), _cause(start, poses, name, partners.get(name, ())))
         for name in lost

@@ -60,12 +60,14 @@ def random_identifiability(
     )
 
 
-def require_enough(model: RobotModel, poses: PoseSet, parameters: Parameters, found: Identifiability) -> None:
+def require_enough(
+    model: RobotModel, poses: PoseSet, parameters: Parameters, identifiability: Identifiability
+) -> None:
     """Raise `FlexcalError` where the rows are too few for the parameters that many random poses would determine."""
     rows = 3 * len(poses)
-    if found.rank < rows:
+    if identifiability.rank < rows:
         return
-    rank = random_identifiability(model, poses, parameters, found).rank
+    rank = random_identifiability(model, poses, parameters, identifiability).rank
     raise FlexcalError(
         f"{len(poses)} poses give {rows} coordinates, too few for {rank} identifiable parameters; "
         f"measure at least {rank // 3 + 1} poses, better three times as many."

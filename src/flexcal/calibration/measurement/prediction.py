@@ -134,14 +134,14 @@ class Prediction:
             return load
         if key == "mass" or key.startswith("com_"):
             if owner == "payload":
-                held = self.model.payload
-                assert held is not None
-                block = self.rest.regressor[:, :, 4 * held.joint : 4 * held.joint + 4]
+                payload = self.model.payload
+                assert payload is not None
+                block = self.rest.regressor[:, :, 4 * payload.joint : 4 * payload.joint + 4]
                 masses = carried_mass(self.model, self.poses.payload, len(self.poses))[:, None]
                 if key == "mass":
-                    share = masses / held.mass if held.mass > 0 else 1.0
-                    return share * (block[:, :, 0] + block[:, :, 1:] @ held.com_in_link)
-                return masses * (block[:, :, 1:] @ held.rotation[:, "xyz".index(key[-1])])
+                    share = masses / payload.mass if payload.mass > 0 else 1.0
+                    return share * (block[:, :, 0] + block[:, :, 1:] @ payload.com_in_link)
+                return masses * (block[:, :, 1:] @ payload.rotation[:, "xyz".index(key[-1])])
             i = [joint.link for joint in self.model.joints].index(owner)
             block = self.rest.regressor[:, :, 4 * i : 4 * i + 4]
             if key == "mass":

@@ -195,13 +195,13 @@ def propagation(
             joint, _, spring = owner.rpartition(".")
             rows[6 * n + 6 + axes.index((model.joint_index(joint), SPRINGS.index(spring)))] += row
         elif owner == "payload":
-            held = model.payload
-            assert held is not None
-            own = body + 4 * held.joint
-            share = mass / held.mass if held.mass > 0 else 1.0
-            moments = share * np.array([1.0, *held.com_in_link]) if key == "mass" else np.zeros(4)
+            attached = model.payload
+            assert attached is not None
+            own = body + 4 * attached.joint
+            share = mass / attached.mass if attached.mass > 0 else 1.0
+            moments = share * np.array([1.0, *attached.com_in_link]) if key == "mass" else np.zeros(4)
             if key != "mass":
-                moments[1:] = mass * held.rotation[:, "xyz".index(key[-1])]
+                moments[1:] = mass * attached.rotation[:, "xyz".index(key[-1])]
             rows[own : own + 4] += np.outer(moments, row)
         elif owner in links:
             i = links.index(owner)

@@ -155,9 +155,9 @@ class TermTrials:
         prior = self.rigid.prior
         if not len(prior.parameters):
             return np.zeros((len(self.rigid.poses), 3, 0))
-        found = self.rigid.estimate.parameters.subset(prior.parameters.names)
-        slope = found.natural_slope(found.coordinates())
-        return self._prediction.jacobian(found.names) * slope @ np.linalg.cholesky(prior.covariance)
+        parameters = self.rigid.estimate.parameters.subset(prior.parameters.names)
+        slope = parameters.natural_slope(parameters.coordinates())
+        return self._prediction.jacobian(parameters.names) * slope @ np.linalg.cholesky(prior.covariance)
 
     def _block(self, term: str) -> np.ndarray:
         if term not in self._columns:

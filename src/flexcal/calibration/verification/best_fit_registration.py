@@ -32,14 +32,14 @@ class Placement:
 
     def values(self, model: RobotModel) -> dict[str, float]:
         """The parameters of stations and points that put `model` there."""
-        found: dict[str, float] = {}
+        parameters: dict[str, float] = {}
         for name, (turn, offset) in self.stations.items():
             numbers = (*offset, *rotation_vector(turn))
-            found |= {f"station.{name}.{key}": float(v) for key, v in zip(STATION, numbers, strict=True)}
+            parameters |= {f"station.{name}.{key}": float(v) for key, v in zip(STATION, numbers, strict=True)}
         for name, shift in self.shifts.items():
             for axis, value in zip("xyz", shift, strict=True):
-                found[f"point.{name}.{axis}"] = model.value(f"point.{name}.{axis}") + float(value)
-        return found
+                parameters[f"point.{name}.{axis}"] = model.value(f"point.{name}.{axis}") + float(value)
+        return parameters
 
     def expected(self, poses: PoseSet, nominal: np.ndarray, orientation: np.ndarray) -> np.ndarray:
         """Where the instrument should read the targets (N, 3) m, which are at `nominal` (N, 3), turned by `orientation` (N, 3, 3)."""
@@ -69,41 +69,45 @@ def best_placement(poses: PoseSet, nominal: np.ndarray, orientation: np.ndarray)
     `nominal` (N, 3) m and `orientation` (N, 3, 3) of each target's frame, in the base frame. What the poses cannot tell apart (a tool that
     never turns: where the point is, and where the instrument) is the shortest step from where it was.
     """
-    found = rigid_placement(poses, nominal)
+    placement = rigid_placement(poses, nominal)
     shifts = {name: np.zeros(3) for name in poses.targets}
-    points_from = 6 * len(found.stations)
+    points_from = 6 * len(placement.stations)
     blocks = [slice(first, first + _BLOCK) for first in range(0, len(poses), _BLOCK)]
     parts = [(poses.subset(rows), nominal[rows], orientation[rows]) for rows in blocks]
-    found = Placement(found.stations, shifts)
+    placement = Placement(placement.stations, shifts)
     for _ in range(_STEPS):
         factor = np.zeros((0, points_from + 3 * len(shifts) + 1))
         for part in parts:
-            factor = np.asarray(np.linalg.qr(np.vstack([factor, _linearised(found, *part)]), mode="r"))
+            factor = np.asarray(np.linalg.qr(np.vstack([factor, _linearised(placement, *part)]), mode="r"))
         step = np.linalg.lstsq(factor[:, :-1], factor[:, -1], rcond=_RANK)[0]
         stations = {}
-        for k, (name, (turn, offset)) in enumerate(found.stations.items()):
+        for k, (name, (turn, offset)) in enumerate(placement.stations.items()):
             own = step[6 * k : 6 * k + 6]
             stations[name] = (vector_rotation(own[:3]) @ turn, offset + own[3:])
         moved = step[points_from:].reshape(-1, 3)
-        shifts = {name: shift + own for (name, shift), own in zip(found.shifts.items(), moved, strict=True)}
-        found = Placement(stations, shifts)
+        shifts = {
+            name: shift + own for (name, shift), own in zip(placement.shifts.items(), moved, strict=True)
+        }
+        placement = Placement(stations, shifts)
         if np.abs(step).max() < _SMALL:
             break
-    return found
+    return placement
 
 
-def _linearised(found: Placement, poses: PoseSet, nominal: np.ndarray, orientation: np.ndarray) -> np.ndarray:
+def _linearised(
+    placement: Placement, poses: PoseSet, nominal: np.ndarray, orientation: np.ndarray
+) -> np.ndarray:
     """(3 N, k + 1): how the points move with every station's turn and offset and every target's shift, and what they miss, m."""
-    points_from = 6 * len(found.stations)
-    expected = found.expected(poses, nominal, orientation)
-    columns = np.zeros((len(poses), 3, points_from + 3 * len(found.shifts) + 1))
-    for k, (name, (turn, offset)) in enumerate(found.stations.items()):
+    points_from = 6 * len(placement.stations)
+    expected = placement.expected(poses, nominal, orientation)
+    columns = np.zeros((len(poses), 3, points_from + 3 * len(placement.shifts) + 1))
+    for k, (name, (turn, offset)) in enumerate(placement.stations.items()):
         own = poses.station == name
         columns[own, :, 6 * k : 6 * k + 3] = -np.cross(
             (expected[own] - offset)[:, :, None], np.eye(3), axis=1
         )
         columns[own, :, 6 * k + 3 : 6 * k + 6] = np.eye(3)
-        for j, target in enumerate(found.shifts):
+        for j, target in enumerate(placement.shifts):
             seen = own & (poses.target == target)
             columns[seen, :, points_from + 3 * j : points_from + 3 * j + 3] = turn @ orientation[seen]
     columns[:, :, -1] = poses.position - expected

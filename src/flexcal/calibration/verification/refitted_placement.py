@@ -82,8 +82,8 @@ def verify_refitted(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) ->
         scatter_rms=np.sqrt(scatter),
         ambiguous=standing.ambiguous,
     )
-    found = replace(covariance, roots=roots, independent=independent, visit=None, common=None)
-    return RefittedVerification(tuple(what), placed, basis.shape[1], result, found)
+    left_out_covariance = replace(covariance, roots=roots, independent=independent, visit=None, common=None)
+    return RefittedVerification(tuple(what), placed, basis.shape[1], result, left_out_covariance)
 
 
 _WORDS = {"station": "the instrument", "point": "the measured point"}
@@ -104,23 +104,23 @@ def _placed(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) -> RobotMo
         return _points_found(model, poses)
     base = predict(replace(model, station=np.zeros_like(model.station)), poses)
     at, turned = base.position, base.kinematics.orientation
-    found = best_placement(poses, at, turned) if "point" in what else rigid_placement(poses, at)
-    return model.with_values(found.values(model))
+    placement = best_placement(poses, at, turned) if "point" in what else rigid_placement(poses, at)
+    return model.with_values(placement.values(model))
 
 
 def _points_found(model: RobotModel, poses: PoseSet) -> RobotModel:
     """The robot with its points moved to where the measurements from known stations have them."""
     names = _names(poses, ("point",))
-    found = model
+    robot = model
     for _ in range(_STEPS):
-        at = predict(found, poses, jacobians=True)
+        at = predict(robot, poses, jacobians=True)
         columns = at.jacobian(names).reshape(3 * len(poses), -1)
         step = np.linalg.lstsq(columns, (poses.position - at.position).ravel(), rcond=_RANK)[0]
-        values = {name: found.value(name) + float(v) for name, v in zip(names, step, strict=True)}
-        found = found.with_values(values)
+        values = {name: robot.value(name) + float(v) for name, v in zip(names, step, strict=True)}
+        robot = robot.with_values(values)
         if np.abs(step).max() < _SMALL:
             break
-    return found
+    return robot
 
 
 def _left_out_noise(independent: np.ndarray, blocks: np.ndarray, own: np.ndarray) -> np.ndarray:

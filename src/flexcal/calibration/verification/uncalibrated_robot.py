@@ -44,11 +44,11 @@ class UncalibratedRobot:
 
     def errors(self, poses: PoseSet) -> UncalibratedErrors:
         """Errors at `poses`, whose stations and targets are those that were placed."""
-        found = (
+        statistics = (
             None if robot is None else poses.position - predicted_positions(robot, poses, elastic=False)
             for robot in (self.declared, self.registered, self.own)
         )
-        return UncalibratedErrors(*found)
+        return UncalibratedErrors(*statistics)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,16 +95,18 @@ def uncalibrated_model(model: RobotModel, poses: PoseSet) -> UncalibratedRobot:
     registered = at_base.with_values(rigid_placement(poses, position).values(at_base))
     own = None
     if can_register_with_points(poses):
-        found = best_placement(poses, position, orientation)
-        own = at_base.with_values(found.values(at_base))
+        placement = best_placement(poses, position, orientation)
+        own = at_base.with_values(placement.values(at_base))
     return UncalibratedRobot(declared, registered, own)
 
 
 def _tools(model: RobotModel, poses: PoseSet) -> tuple[np.ndarray, np.ndarray]:
     """Positions (N, 3) and orientations (N, 3, 3) of the rigid robot's targets in its base frame."""
     blocks = [poses.subset(slice(first, first + _BLOCK)) for first in range(0, len(poses), _BLOCK)]
-    found = (predict(model, block, elastic=False) for block in blocks)
-    positions, orientations = zip(*((at.position, at.kinematics.orientation) for at in found), strict=True)
+    predictions = (predict(model, block, elastic=False) for block in blocks)
+    positions, orientations = zip(
+        *((at.position, at.kinematics.orientation) for at in predictions), strict=True
+    )
     return np.concatenate(positions), np.concatenate(orientations)
 
 

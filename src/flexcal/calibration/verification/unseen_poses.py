@@ -128,15 +128,17 @@ def verify_jointly(
     squares = (shared**2).sum(axis=(1, 2))
     if independent is not None:
         squares = squares + np.trace(independent, axis1=1, axis2=2)
-    found = Verification(
+    verification = Verification(
         position=at.position,
         errors=poses.position - at.position,
         parameter_rms=np.sqrt((roots**2).sum(axis=(1, 2))),
         scatter_rms=np.sqrt(squares),
         ambiguous=ambiguous_poses(model, at),
     )
-    freedom = np.inf if noise_free else _freedom(model, at, poses, float(np.sum(found.expected_rms**2)))
-    return found, ErrorCovariance(
+    freedom = (
+        np.inf if noise_free else _freedom(model, at, poses, float(np.sum(verification.expected_rms**2)))
+    )
+    return verification, ErrorCovariance(
         np.concatenate([roots, shared], axis=2),
         shared.shape[2],
         independent,

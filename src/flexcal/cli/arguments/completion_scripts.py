@@ -69,13 +69,13 @@ def _bash() -> str:
     ]
     choices, options = [], []
     for verb in VERBS:
-        found = options_of(verb)
+        own_options = options_of(verb)
         options.append(
-            f"            {quote(verb.name)}) words={quote(' '.join([o.name for o in found] + ['--help']))} ;;"
+            f"            {quote(verb.name)}) words={quote(' '.join([o.name for o in own_options] + ['--help']))} ;;"
         )
         choices += [
             f"        {quote(f'{verb.name} {option.name}')}) words={quote(' '.join(option.choices))} ;;"
-            for option in found
+            for option in own_options
             if option.choices
         ]
     choices.append("        'completion completion') words='bash zsh fish' ;;")

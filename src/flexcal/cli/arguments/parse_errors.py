@@ -56,5 +56,5 @@ def _told(said: str) -> list[str]:
         elif text.strip() and line[0] not in "╭╰":
             sections[-1].append(text)
     drawn = said.lstrip().startswith("╭")
-    found = sections[0] if drawn or len(sections) < 2 else sections[1]
-    return [found[0].strip(), *found[1:]] if found else []
+    lines = sections[0] if drawn or len(sections) < 2 else sections[1]
+    return [lines[0].strip(), *lines[1:]] if lines else []

@@ -23,7 +23,7 @@ def options_of(verb: Verb) -> tuple[Option, ...]:
     """The options of a verb in the order of its help; those without a name in front are none."""
     command = command_class(verb)
     hints = get_type_hints(command, include_extras=True)
-    found = []
+    options = []
     for field in fields(command):
         kind, notes = hints[field.name], ()
         if get_origin(kind) is Annotated:
@@ -32,5 +32,5 @@ def options_of(verb: Verb) -> tuple[Option, ...]:
             continue
         named = next((note.name for note in notes if getattr(note, "name", None)), None)
         choices = tuple(map(str, get_args(kind))) if get_origin(kind) is Literal else ()
-        found.append(Option(f"--{named or field.name.replace('_', '-')}", kind is bool, choices))
-    return tuple(found)
+        options.append(Option(f"--{named or field.name.replace('_', '-')}", kind is bool, choices))
+    return tuple(options)

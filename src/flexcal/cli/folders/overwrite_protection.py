@@ -96,7 +96,7 @@ class _Place:
     def own_files(self) -> dict[Path, str]:
         """Files there that this verb may write over, with their SHA-256; raises `InputError` for the first that it may not."""
         known = Ledger.read(self.folder).entries if self.folder.is_dir() else {}
-        found: dict[Path, str] = {}
+        digests: dict[Path, str] = {}
         for path in self._present():
             refuse_irregular(path)
             digest, writer = known.get(path.name, ("", ""))
@@ -110,8 +110,8 @@ class _Place:
                     f"{path} was written by 'flexcal {writer}', which another verb does not write over; "
                     f"give 'flexcal {self.verb}' {self.kind} of its own with --out."
                 )
-            found[path] = digest
-        return found
+            digests[path] = digest
+        return digests
 
     def enter(self, run: FileTransaction) -> None:
         """Add to the files of a run the ledger with them, and remove those of an earlier one that it did not write again."""

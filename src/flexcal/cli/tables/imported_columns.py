@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 _ROWS = 3
 
 
-def first_rows_table(found: ImportedFile) -> Table:
+def first_rows_table(imported: ImportedFile) -> Table:
     """One row a column of flexcal: the file's column, its unit, the first values in SI, and why."""
-    what = {"poses": "measured poses", "log": "a log of joints", "joints": "joint positions"}[found.kind]
-    rows = len(next(iter(found.columns.values())))
-    table = Table(title=f"{found.file}: {what}, {rows} rows; the first in SI units", title_justify="left")
+    what = {"poses": "measured poses", "log": "a log of joints", "joints": "joint positions"}[imported.kind]
+    rows = len(next(iter(imported.columns.values())))
+    table = Table(title=f"{imported.file}: {what}, {rows} rows; the first in SI units", title_justify="left")
     table.add_column("")
     table.add_column("column")
     table.add_column("unit")
@@ -26,8 +26,8 @@ def first_rows_table(found: ImportedFile) -> Table:
         table.add_column(f"row {number + 1}", justify="right")
     table.add_column("recognised by")
     listed = set()
-    for placed in found.placed:
-        names = standard_columns(placed.quantity, found.model.n)
+    for placed in imported.placed:
+        names = standard_columns(placed.quantity, imported.model.n)
         for i, name in enumerate(names):
             listed.add(name)
             sign = "" if placed.gains[i] == 1 else "−" if placed.gains[i] == -1 else f"{placed.gains[i]:g} · "
@@ -37,16 +37,16 @@ def first_rows_table(found: ImportedFile) -> Table:
                 name,
                 column,
                 placed.units[i] or "",
-                *_first(found, name),
+                *_first(imported, name),
                 placed.why if not i else "″",
             )
     given = {"pose": "rows are numbered", "sigma": "--sigma"}
-    for name in found.columns:
+    for name in imported.columns:
         if name not in listed:
-            table.add_row(name, "", "", *_first(found, name), given.get(name, "its name"))
+            table.add_row(name, "", "", *_first(imported, name), given.get(name, "its name"))
     return table
 
 
-def _first(found: ImportedFile, name: str) -> list[str]:
-    values = found.columns[name][:_ROWS]
+def _first(imported: ImportedFile, name: str) -> list[str]:
+    values = imported.columns[name][:_ROWS]
     return [f"{value:.6g}" if values.dtype.kind == "f" else str(value) for value in values]

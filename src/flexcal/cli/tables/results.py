@@ -88,15 +88,17 @@ def predicted_table(std: Mapping[str, float]) -> Table:
     return table
 
 
-def dropped_table(found: Mapping[str, Any], most: int = 4) -> Table:
+def dropped_table(identifiability: Mapping[str, Any], most: int = 4) -> Table:
     """Parameters that are not identifiable, and the `most` largest coefficients of the parameters that absorb each."""
-    title = f"identifiability: {found['rank']} of {found['parameters']} parameters"
-    if found["gap_decades"] is not None and found["dropped"]:
-        title += f" ({found['gap_decades']:.0f} decades between the last kept and the first dropped)"
+    title = f"identifiability: {identifiability['rank']} of {identifiability['parameters']} parameters"
+    if identifiability["gap_decades"] is not None and identifiability["dropped"]:
+        title += (
+            f" ({identifiability['gap_decades']:.0f} decades between the last kept and the first dropped)"
+        )
     table = Table(title=title, title_justify="left")
     table.add_column("not identifiable")
     table.add_column("absorbed by")
-    for entry in found["dropped"]:
+    for entry in identifiability["dropped"]:
         kept = entry["absorbed_by"]
         parts = [f"{k['coefficient']:+.3g} {k['name']}" for k in kept[:most]]
         more = f" and {len(kept) - most} more" if len(kept) > most else ""
@@ -200,11 +202,11 @@ def drive_gain_table(factors: Mapping[str, Mapping[str, Any]], declared: Sequenc
     for heading in ("declared", "identified", "95 % interval"):
         table.add_column(heading, justify="right")
     for (name, factor), gain in zip(factors.items(), declared, strict=True):
-        found, interval = "not identifiable", ""
+        gain_text, interval = "not identifiable", ""
         if factor["identifiable"]:
             ends = sorted((gain * factor["low"], gain * factor["high"]))
-            found, interval = f"{gain * factor['estimate']:.5g}", f"{ends[0]:.5g} to {ends[1]:.5g}"
-        table.add_row(name.rpartition(".")[0], f"{gain:.5g}", found, interval)
+            gain_text, interval = f"{gain * factor['estimate']:.5g}", f"{ends[0]:.5g} to {ends[1]:.5g}"
+        table.add_row(name.rpartition(".")[0], f"{gain:.5g}", gain_text, interval)
     return table
 
 
@@ -212,8 +214,8 @@ def friction_table(rows: Sequence[Mapping[str, Any]]) -> Table:
     """The best sets of none, one, two … friction terms beyond the classic ones, with their cross-validation errors."""
     best: dict[int, Mapping[str, Any]] = {}
     for row in rows:
-        held = best.setdefault(len(row["terms"]), row)
-        if row["cross_validation_percent"] < held["cross_validation_percent"]:
+        best_of_size = best.setdefault(len(row["terms"]), row)
+        if row["cross_validation_percent"] < best_of_size["cross_validation_percent"]:
             best[len(row["terms"])] = row
     table = Table(title="friction terms tried", title_justify="left")
     table.add_column("beyond the classic ones")

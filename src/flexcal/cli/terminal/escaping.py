@@ -10,7 +10,7 @@ _UNSAFE = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u20
 
 def printable(text: str) -> str:
     """`text` with control characters and marks of the writing direction written out (`\\x1b`), tabs and line ends kept."""
-    return _UNSAFE.sub(lambda found: ascii(found.group())[1:-1], text)
+    return _UNSAFE.sub(lambda match: ascii(match.group())[1:-1], text)
 
 
 def sentence(problem: object) -> str:

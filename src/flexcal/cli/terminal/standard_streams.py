@@ -32,14 +32,14 @@ def buffered_output() -> Iterator[None]:
     Messages that standard error does not take are lost. Raises `FlexcalError` where standard output cannot be written; that its reader has
     gone is no error.
     """
-    shown, held = sys.stdout, _HeldOutput(sys.stdout)
+    shown, buffer = sys.stdout, _HeldOutput(sys.stdout)
     try:
-        with redirect_stdout(held), redirect_stderr(_Forgiving(sys.stderr)):
+        with redirect_stdout(buffer), redirect_stderr(_Forgiving(sys.stderr)):
             yield
     except BaseException:
-        _show(shown, held)
+        _show(shown, buffer)
         raise
-    problem = _show(shown, held)
+    problem = _show(shown, buffer)
     if problem is not None and not isinstance(problem, BrokenPipeError):
         reason = problem.strerror or str(problem)
         raise FlexcalError(
@@ -47,10 +47,10 @@ def buffered_output() -> Iterator[None]:
         ) from problem
 
 
-def _show(stream: TextIO, held: _HeldOutput) -> OSError | None:
+def _show(stream: TextIO, buffer: _HeldOutput) -> OSError | None:
     """Write what was held; what stands in the way of it, None where nothing does."""
     try:
-        stream.write(held.text())
+        stream.write(buffer.text())
         stream.flush()
     except OSError as problem:
         # nothing more can be said there, not even at exit

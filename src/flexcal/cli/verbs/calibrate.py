@@ -85,20 +85,20 @@ class Calibrate:
         require_at_least(0, secant_scale=self.secant_scale)
         console = Console(self.json)
         with console.progress() as progress:
-            found = self._calibrated(self.terms, progress)
-            known = all(point["std_m"] <= KNOWN_POINT_STD for point in found.found_points.values())
-            write = self.write_point and known and not is_implausible(found.selected)
-            told = point_lines(found.found_points) if write else []
+            calibration = self._calibrated(self.terms, progress)
+            known = all(point["std_m"] <= KNOWN_POINT_STD for point in calibration.found_points.values())
+            write = self.write_point and known and not is_implausible(calibration.selected)
+            told = point_lines(calibration.found_points) if write else []
             if write:
-                found = self._with_points_written(found, progress)
-        document = found.document()
+                calibration = self._with_points_written(calibration, progress)
+        document = calibration.document()
         seen = document["identifiability"]
         if seen["dropped"]:
             console.show(dropped_table(seen))
         console.show(weak_table(seen["weak_directions"]))
-        if found.selected.terms != found.rigid.terms:
+        if calibration.selected.terms != calibration.rigid.terms:
             dropped = [d["name"] for d in seen["selected"]["dropped"]]
-            further = [name for name in dropped if name not in found.rigid.identifiability.names]
+            further = [name for name in dropped if name not in calibration.rigid.identifiability.names]
             lost = f"; not separately identifiable: {', '.join(further)}" if further else ""
             console.say(
                 f"with all terms: {seen['selected']['rank']} of {seen['selected']['parameters']} parameters{lost}"
@@ -106,7 +106,9 @@ class Calibrate:
         for line in considered_lines(document["term_selection"]):
             console.say(line)
         errors = document["calibration"]
-        terms = ("elastic, " if found.selected.model.elastic else "") + " + ".join(found.selected.terms)
+        terms = ("elastic, " if calibration.selected.model.elastic else "") + " + ".join(
+            calibration.selected.terms
+        )
         labels = {"rigid": "rigid", "selected": f"selected: {terms}"}
         rows = uncalibrated_rows(document) | {label: errors[key] for key, label in labels.items()}
         console.show(error_table("distance to the measured points", rows))
@@ -119,20 +121,22 @@ class Calibrate:
             known = all(point["std_m"] <= KNOWN_POINT_STD for point in document["points"].values())
             for line in point_lines(document["points"]):
                 console.say(f"{line}; --write-point writes it to {self.robot}" if known else line)
-        console.say(found.trust.sentence)
+        console.say(calibration.trust.sentence)
         where = estimates_option(self.out)
-        console.say(f"wrote {found.estimates}")
+        console.say(f"wrote {calibration.estimates}")
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")
         following = (
             f"correct the data or {self.robot}, and calibrate again; "
             f"flexcal import {self.robot} {self.poses[0]} looks for the error"
-            if is_implausible(found.selected)
+            if is_implausible(calibration.selected)
             else f"flexcal verify {self.robot} OTHER_POSES…{where}, on poses outside this fit "
             "(flexcal design poses --random plans some)"
         )
-        if found.bearings is not None and found.bearings.contradicted:
-            following = f"write `bearings: {found.bearings.preferred}` in {self.robot}, and calibrate again"
+        if calibration.bearings is not None and calibration.bearings.contradicted:
+            following = (
+                f"write `bearings: {calibration.bearings.preferred}` in {self.robot}, and calibrate again"
+            )
         console.finish(document, following)
 
     def _calibrated(self, terms: Sequence[str], progress: Progress) -> RobotCalibration:
@@ -150,15 +154,15 @@ class Calibrate:
             progress=progress,
         )
 
-    def _with_points_written(self, found: RobotCalibration, progress: Progress) -> RobotCalibration:
+    def _with_points_written(self, calibration: RobotCalibration, progress: Progress) -> RobotCalibration:
         """Write the points to robot.yaml, and calibrate again: the estimates are relative to the declared points."""
         from flexcal.jobs.setup import write_point_position
 
         text = current_path(self.robot).read_text(encoding="utf-8")
         try:
-            for name, point in found.found_points.items():
+            for name, point in calibration.found_points.items():
                 write_point_position(self.robot, name, point["found_xyz_m"])
-            return self._calibrated(found.selected.terms, progress)
+            return self._calibrated(calibration.selected.terms, progress)
         except BaseException:
             write_text(self.robot, text)
             raise
@@ -186,11 +190,11 @@ def point_lines(points: Mapping[str, Mapping[str, Any]]) -> list[str]:
         if point["std_m"] > KNOWN_POINT_STD:
             lines.append(undetermined_point_remark(name, point["std_m"]))
         elif off > _FOUND_BESIDE:
-            found, declared = (
+            calibrated, declared = (
                 ", ".join(f"{v:.5f}" for v in point[key]) for key in ("found_xyz_m", "declared_xyz_m")
             )
             lines.append(
-                f"calibrated position of the point {name}: [{found}] m in {point['frame']}, {off / MILLIMETRE:.2f} mm from the "
+                f"calibrated position of the point {name}: [{calibrated}] m in {point['frame']}, {off / MILLIMETRE:.2f} mm from the "
                 f"declared [{declared}]"
             )
     return lines

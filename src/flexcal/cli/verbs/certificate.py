@@ -43,7 +43,7 @@ class Certificate(ParticularsOptions):
         require_robot(self.robot, self.targets, self.before, self.after)
         console = Console(self.json)
         with console.progress() as progress:
-            found = certify_robot(
+            certificate = certify_robot(
                 self.robot,
                 self.targets,
                 self.before,
@@ -54,7 +54,7 @@ class Certificate(ParticularsOptions):
                 command=command_line(),
                 progress=progress,
             )
-        document = found.document()
+        document = certificate.document()
         labels = {
             "after": "after, in the calibrated frame",
             "after_refitted": "after, best-fit registered, point found too",
@@ -68,6 +68,6 @@ class Certificate(ParticularsOptions):
                 )
         for remark in document["remarks"]:
             console.say(remark)
-        console.say(found.trust.sentence)
+        console.say(certificate.trust.sentence)
         console.say(f"wrote {self.out}: {document['targets']} targets")
         console.finish(document, f"open {self.out} and print it, and sign it")

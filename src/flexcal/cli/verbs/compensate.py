@@ -26,9 +26,9 @@ def _point_words(name: str, point: Mapping[str, Any]) -> str:
             f"{what} is brought to the targets; it was not measured, and what the measured points do not determine of it "
             "(position along and about the last axis, orientation) stays nominal"
         )
-    found, declared = (point[key] for key in ("found_xyz_m", "declared_xyz_m"))
-    off = float(sum((a - b) ** 2 for a, b in zip(found, declared, strict=True)) ** 0.5) / MILLIMETRE
-    place = ", ".join(f"{value:.5f}" for value in found)
+    calibrated, declared = (point[key] for key in ("found_xyz_m", "declared_xyz_m"))
+    off = float(sum((a - b) ** 2 for a, b in zip(calibrated, declared, strict=True)) ** 0.5) / MILLIMETRE
+    place = ", ".join(f"{value:.5f}" for value in calibrated)
     return (
         f"the point '{name}' is brought to the targets: calibrated position [{place}] m in {point['frame']}, {off:.2f} mm from the "
         f"declared one; --frame {point['frame']} takes that frame instead"
@@ -71,7 +71,7 @@ class Compensate:
         require_robot(self.robot, self.targets)
         console = Console(self.json)
         with console.progress() as progress:
-            found = compensate_robot(
+            compensation = compensate_robot(
                 self.robot,
                 self.targets,
                 self.out,
@@ -81,7 +81,7 @@ class Compensate:
                 start=self.start,
                 progress=progress,
             )
-        document = found.document()
+        document = compensation.document()
         if document["start"] is not None:
             listed = ", ".join(f"{joint} {value:.4g}" for joint, value in document["start"].items())
             console.say(

@@ -48,7 +48,7 @@ class Demo:
         console = Console(self.json)
         robot = example_robot("tx90l") if self.robot is None else self.robot
         with console.progress() as progress:
-            found = run_two_stage(
+            demo = run_two_stage(
                 robot,
                 self.out,
                 seed=self.seed,
@@ -72,7 +72,7 @@ class Demo:
         console.show(error_table("distance between prediction and point", rows))
         if document["cad_alone"] is not None:
             console.show(gain_table(document))
-        console.say(found.trust.sentence)
+        console.say(demo.trust.sentence)
         console.say(f"took {document['seconds']['total']:.0f} s; all results are in {self.out}")
         console.finish(document, f"open {self.out / 'report.html'}")
 

@@ -130,8 +130,8 @@ class DesignPoses:
     def _choose(self, console: Console) -> None:
         from flexcal.jobs.experiments import plan_calibration_poses
 
-        found = self._planned(console, plan_calibration_poses)
-        document = found.document()
+        design = self._planned(console, plan_calibration_poses)
+        document = design.document()
         seen = document["identifiability"]
         console.say(
             f"{seen['rank']} of {seen['parameters']} parameters are identifiable from position measurements"
@@ -159,8 +159,8 @@ class DesignPoses:
     def _continue(self, console: Console) -> None:
         from flexcal.jobs.experiments import plan_next_poses
 
-        found = self._planned(console, partial(plan_next_poses, measured=self.measured))
-        document = found.document()
+        design = self._planned(console, partial(plan_next_poses, measured=self.measured))
+        document = design.document()
         errors, least = document["tool_error_mm"], document["least_possible_mm"]
         console.say(
             f"after {document['measured']} measured poses the predicted tool error is {errors[0]:.4f} mm from tracker noise alone "

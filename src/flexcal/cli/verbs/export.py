@@ -51,15 +51,15 @@ class Export(ABC):
         """Export, and print the error due to terms that the format lacks."""
         require_robot(self.robot)
         console = Console(self.json)
-        found = self.write()
-        document = found.document()
+        exported = self.write()
+        document = exported.document()
         for table in self.tables(document):
             console.show(table)
-        console.say(f"wrote {found.export.path}")
-        for sentence in (*found.export.loss.sentences, *found.export.remarks):
+        console.say(f"wrote {exported.export.path}")
+        for sentence in (*exported.export.loss.sentences, *exported.export.remarks):
             console.say(sentence)
         following = self.following(document)
-        if not found.calibrated:
+        if not exported.calibrated:
             console.say("there is no calibration: the joint placements are nominal")
             following = f"flexcal calibrate {self.robot} POSES…, and export again"
         console.finish(document, following)

@@ -87,7 +87,7 @@ class IdentifyDynamics:
             raise InputError("--hold-out and --validate exclude each other; give one of them.")
         console = Console(self.json)
         with console.progress() as progress:
-            found = identify_robot_dynamics(
+            dynamics = identify_robot_dynamics(
                 self.robot,
                 self.logs,
                 hold_out=share,
@@ -101,23 +101,23 @@ class IdentifyDynamics:
                 jobs=self.jobs,
                 progress=progress,
             )
-        document = found.document()
+        document = dynamics.document()
         console.show(base_parameter_table(document["base_parameters"]))
         if self.flexible:
             springs = {
                 name: q for name, q in document["parameters"].items() if any(key in name for key in _SPRINGS)
             }
-            units = {item.name: item.unit for item in found.estimate.parameters}
+            units = {item.name: item.unit for item in dynamics.estimate.parameters}
             console.show(quantity_table("drives of the elastic joints", springs, units))
         console.say(
-            f"{document['rank']} of {found.train.base.rank} base parameters from {document['equations']} equations; "
+            f"{document['rank']} of {dynamics.train.base.rank} base parameters from {document['equations']} equations; "
             f"{document['masked_rows']} rows at standstill left out"
         )
         for sentence in preprocessing_remarks(document["signals"]):
             console.say(sentence)
         if document["friction_tried"]:
             console.show(friction_table(document["friction_tried"]))
-        console.say(f"friction: {', '.join(found.friction.labels)}")
+        console.say(f"friction: {', '.join(dynamics.friction.labels)}")
         if document["selection_remark"]:
             console.say(document["selection_remark"])
         error = document["error_percent"]
@@ -134,9 +134,9 @@ class IdentifyDynamics:
             f"relative torque error with the {len(essential['parameters'])} essential parameters alone: "
             f"{essential['error_percent']['train']:.2f} %"
         )
-        if found.bodiless:
+        if dynamics.bodiless:
             console.say(
-                f"the inertials of {', '.join(found.bodiless)} are not physically consistent: torques are right, but springs and a URDF "
+                f"the inertials of {', '.join(dynamics.bodiless)} are not physically consistent: torques are right, but springs and a URDF "
                 "need consistent ones; use --estimator sdp"
             )
         for remark in (*document["remarks"], *document["notes"]):
@@ -146,19 +146,19 @@ class IdentifyDynamics:
             console.say(f"{weight.question} {weight.answer}")
         if (share := document["external_share"]) and (sensor := check_external(share)).status != "good":
             console.say(sensor.answer)
-        console.say(found.trust.sentence)
-        console.say(f"wrote {found.estimates}")
+        console.say(dynamics.trust.sentence)
+        console.say(f"wrote {dynamics.estimates}")
         if learned and learned["file"]:
             console.say(f"wrote {learned['file']}")
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")
-        console.finish(document, self._next(found))
+        console.finish(document, self._next(dynamics))
 
-    def _next(self, found: DynamicsIdentification) -> str:
+    def _next(self, dynamics: DynamicsIdentification) -> str:
         """Payload and frequency responses for an elastic robot; else validation, the payload where one is declared, and then a URDF if the
         inertials are physically consistent."""
         where = estimates_option(self.out)
-        model = found.train.observation.model
+        model = dynamics.train.observation.model
         payload = (
             f"record logs with the payload and flexcal identify payload {self.robot} LOADED.parquet{where}"
         )
@@ -168,7 +168,7 @@ class IdentifyDynamics:
         if not (self.hold_out or self.validate):
             kept = "" if self.estimator == "wls" else f" --estimator {self.estimator}"
             return f"{verb} --validate other.parquet{kept}"
-        if found.bodiless:
+        if dynamics.bodiless:
             return f"{verb} --estimator sdp" + (f" --hold-out {self.hold_out}" if self.hold_out else "")
         urdf = f"flexcal export urdf {self.robot}{where} --out identified.urdf"
         return urdf if model.nominal_payload is None else f"{payload}; or {urdf}"

@@ -49,15 +49,15 @@ class IdentifyGains:
         require_at_least(1, jobs=self.jobs)
         console = Console(self.json)
         with console.progress() as progress:
-            found = identify_gains(
+            gains = identify_gains(
                 self.robot, self.logs, out=self.out, command=command_line(), jobs=self.jobs, progress=progress
             )
-        document = found.document()
+        document = gains.document()
         console.show(drive_gain_table(document["parameters"], document["declared_gains"]))
         for sentence in preprocessing_remarks(document["signals"]):
             console.say(sentence)
-        console.say(f"signals: {{tau: {{gain: [{', '.join(f'{gain:.5g}' for gain in found.gains)}]}}}}")
-        console.say(found.trust.sentence)
+        console.say(f"signals: {{tau: {{gain: [{', '.join(f'{gain:.5g}' for gain in gains.gains)}]}}}}")
+        console.say(gains.trust.sentence)
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")
         console.finish(document, f"flexcal identify dynamics {self.robot} {self.logs[0]}")

@@ -37,18 +37,18 @@ class IdentifyInertials:
         require_robot(self.robot, self.folder)
         console = Console(self.json)
         with console.progress() as progress:
-            found = identify_robot_inertials(
+            inertials = identify_robot_inertials(
                 self.robot, self.folder, out=self.out, command=command_line(), progress=progress
             )
-        document = found.document()
-        units = {item.name: item.unit for item in found.estimate.parameters}
+        document = inertials.document()
+        units = {item.name: item.unit for item in inertials.estimate.parameters}
         console.show(quantity_table("links and drives", document["parameters"], units))
         error = document["error_percent"]
         console.say(
             f"relative torque error: {error['train']:.2f} % in the fit, {error['nominal']:.2f} % with the values of robot.yaml"
         )
-        console.say(found.trust.sentence)
-        for line in stored_lines(self.robot, found.estimates, self.out):
+        console.say(inertials.trust.sentence)
+        for line in stored_lines(self.robot, inertials.estimates, self.out):
             console.say(line)
         loaded = f"flexcal design trajectory {self.robot} --loaded --out holding.yaml, for the payload"
-        console.finish(document, after_dynamics(self.robot, found.nominal, loaded))
+        console.finish(document, after_dynamics(self.robot, inertials.nominal, loaded))

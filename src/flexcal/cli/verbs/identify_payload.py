@@ -72,7 +72,7 @@ class IdentifyPayload:
         require_at_least(1, jobs=self.jobs)
         console = Console(self.json)
         with console.progress() as progress:
-            found = identify_robot_payload(
+            payload = identify_robot_payload(
                 self.robot,
                 self.logs,
                 free=self.free,
@@ -84,25 +84,25 @@ class IdentifyPayload:
                 jobs=self.jobs,
                 progress=progress,
             )
-        document = found.document()
-        units = {item.name: item.unit for item in found.fit.estimate.parameters}
-        title = f"payload in the frame {found.frame}, inertia about its centre of mass"
+        document = payload.document()
+        units = {item.name: item.unit for item in payload.fit.estimate.parameters}
+        title = f"payload in the frame {payload.frame}, inertia about its centre of mass"
         console.show(quantity_table(title, document["parameters"], units))
         console.say(f"relative torque error: {document['error_percent']['train']:.2f} %")
         for sentence in preprocessing_remarks(document["signals"]):
             console.say(sentence)
         for remark in document["remarks"]:
             console.say(remark)
-        console.say(found.trust.sentence)
-        console.say(f"as a line of robot.yaml: {found.declaration}")
-        for line in stored_lines(self.robot, found.estimates, self.out):
+        console.say(payload.trust.sentence)
+        console.say(f"as a line of robot.yaml: {payload.declaration}")
+        for line in stored_lines(self.robot, payload.estimates, self.out):
             console.say(line)
-        console.finish(document, self._next(found))
+        console.finish(document, self._next(payload))
 
-    def _next(self, found: RobotPayload) -> str:
+    def _next(self, payload: RobotPayload) -> str:
         where = estimates_option(self.out or self.estimates)
-        if "calibration" in found.blocks:
+        if "calibration" in payload.blocks:
             return f"flexcal compensate {self.robot} targets.csv{where} --out commands.csv"
-        if found.declared.elastic and "stiffness" not in found.blocks:
+        if payload.declared.elastic and "stiffness" not in payload.blocks:
             return f"flexcal design frequency {self.robot} --out frequency.yaml"
         return f"flexcal design poses {self.robot} --count 40 --out poses.yaml"

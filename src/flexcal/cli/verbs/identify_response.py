@@ -119,14 +119,14 @@ class IdentifyResponse:
         console = Console(self.json)
         with console.progress() as progress:
             method = cast(Any, self.method.replace("-", "_"))
-            found = identify_response(
+            responses = identify_response(
                 robot, folder, self.out, method=method, command=command_line(), progress=progress
             )
-        document = found.document()
+        document = responses.document()
         console.show(response_table(document["responses"]))
-        for remark in found.sensor_remarks:
+        for remark in responses.sensor_remarks:
             console.say(remark)
-        console.say(found.trust.sentence)
+        console.say(responses.trust.sentence)
         console.say(f"wrote {self.out / 'report.html'}")
         console.finish(document, f"flexcal identify stiffness {robot} {self.out}")
 
@@ -153,10 +153,10 @@ class IdentifyResponse:
             raise InputError(f"--rate is {self.rate:g}; it must be positive.")
         console = Console(self.json)
         with console.progress() as progress:
-            found = identify_excitation(
+            identified = identify_excitation(
                 _files(self.source), self.out, options, command=command_line(), progress=progress
             )
-        document = found.document()
+        document = identified.document()
         for remark in document["remarks"]:
             console.say(remark)
         console.show(element_table(document))
@@ -166,7 +166,7 @@ class IdentifyResponse:
             console.show(masses_table(document["masses"]))
         else:
             console.say(f"no masses were fitted: {document['masses']['reason']}")
-        console.say(found.trust.sentence)
+        console.say(identified.trust.sentence)
         console.say(f"wrote {self.out / 'response.csv'}")
         console.say(f"wrote {self.out / 'report.html'}")
         console.finish(document, _next(document, self.out))

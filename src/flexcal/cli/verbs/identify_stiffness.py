@@ -60,7 +60,7 @@ class IdentifyStiffness:
         require_at_least(0, seed=self.seed)
         console = Console(self.json)
         with console.progress() as progress:
-            found = identify_robot_stiffness(
+            stiffness = identify_robot_stiffness(
                 self.robot,
                 self.responses,
                 inertias_known=self.inertias_known,
@@ -71,9 +71,9 @@ class IdentifyStiffness:
                 command=command_line(),
                 progress=progress,
             )
-        document = found.document()
+        document = stiffness.document()
         quantities = document["parameters"]
-        units = {item.name: item.unit for item in found.estimate.parameters}
+        units = {item.name: item.unit for item in stiffness.estimate.parameters}
         for title, ending in (("stiffness", ".stiffness"), ("damping", ".damping")):
             shown = {name: values for name, values in quantities.items() if name.endswith(ending)}
             console.show(quantity_table(title, shown, units))
@@ -93,9 +93,9 @@ class IdentifyStiffness:
             console.say(
                 f"chi-square over its expectation: {fit['reduced_chi2']:.2f} (near 1 where model and noise are right)"
             )
-        for remark in found.remarks:
+        for remark in stiffness.remarks:
             console.say(remark)
-        console.say(found.trust.sentence)
-        for line in stored_lines(self.robot, found.estimates, self.out):
+        console.say(stiffness.trust.sentence)
+        for line in stored_lines(self.robot, stiffness.estimates, self.out):
             console.say(line)
         console.finish(document, f"flexcal design poses {self.robot} --count 40 --out poses.yaml")

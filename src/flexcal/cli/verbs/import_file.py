@@ -78,7 +78,7 @@ class Import:
 
         require_robot(self.robot, self.file)
         console = Console(self.json)
-        found = import_file(
+        imported = import_file(
             self.robot,
             self.file,
             mapped=self.map,
@@ -88,25 +88,25 @@ class Import:
             topic=self.topic,
             unchecked=self.unchecked,
         )
-        console.show(first_rows_table(found))
-        for left in reasons_unused(found.left_out):
+        console.show(first_rows_table(imported))
+        for left in reasons_unused(imported.left_out):
             console.say(f"left out: {left}")
-        for remark in found.remarks:
+        for remark in imported.remarks:
             console.say(remark)
-        self._say_fit(console, found)
-        if not found.trusted and not self.unchecked:
-            raise InputError(self._doubt(found))
+        self._say_fit(console, imported)
+        if not imported.trusted and not self.unchecked:
+            raise InputError(self._doubt(imported))
         if self.write_point:
-            self._write_point(console, found)
+            self._write_point(console, imported)
         if self.write_signals:
-            self._add_signals(console, found)
+            self._add_signals(console, imported)
         if self.out is not None:
-            rows = len(next(iter(found.columns.values())))
+            rows = len(next(iter(imported.columns.values())))
             console.say(f"wrote {self.out}: {rows} rows")
-        console.finish(found.document(), self._following(found))
+        console.finish(imported.document(), self._following(imported))
 
-    def _say_fit(self, console: Console, found: ImportedFile) -> None:
-        fit = found.misfit
+    def _say_fit(self, console: Console, imported: ImportedFile) -> None:
+        fit = imported.misfit
         if fit is None:
             return
         console.say(
@@ -125,10 +125,10 @@ class Import:
                 )
             )
 
-    def _write_point(self, console: Console, found: ImportedFile) -> None:
+    def _write_point(self, console: Console, imported: ImportedFile) -> None:
         from flexcal.jobs.setup import write_point_position
 
-        fit = found.misfit
+        fit = imported.misfit
         if fit is None or fit.doubtful:
             raise InputError(
                 f"{self.file}: these points do not determine the position of the reflector on the tool; leave --write-point out."
@@ -136,8 +136,8 @@ class Import:
         write_point_position(self.robot, fit.point, fit.moved)
         console.say(f"wrote the xyz of {fit.point} to {self.robot}")
 
-    def _doubt(self, found: ImportedFile) -> str:
-        fit = found.misfit
+    def _doubt(self, imported: ImportedFile) -> str:
+        fit = imported.misfit
         assert fit is not None
         share = f"{100 * fit.moved_rms / fit.reach:.0f} % of its reach"
         what = f"{self.file}: the points do not fit this robot as the columns are read: the residuals are {share}"
@@ -153,33 +153,33 @@ class Import:
             + "."
         )
 
-    def _add_signals(self, console: Console, found: ImportedFile) -> None:
+    def _add_signals(self, console: Console, imported: ImportedFile) -> None:
         from flexcal.data.tables import TIMESTAMP
         from flexcal.jobs.setup import add_signals
 
-        if not found.signals:
+        if not imported.signals:
             console.say("robot.yaml needs no `signals:` for these columns")
             return
-        add_signals(self.robot, found.signals)
+        add_signals(self.robot, imported.signals)
         console.say(f"added `signals:` to {self.robot}")
-        if found.signals.get("t", {}).get("unit") == TIMESTAMP:
-            (column,) = found.signals["t"]["columns"]
+        if imported.signals.get("t", {}).get("unit") == TIMESTAMP:
+            (column,) = imported.signals["t"]["columns"]
             console.say(
                 f"with it the timestamps of {column} are read as seconds from the first; where they are irregular, the verbs that read "
                 "logs resample them to a uniform time step, and say so"
             )
 
-    def _following(self, found: ImportedFile) -> str:
+    def _following(self, imported: ImportedFile) -> str:
         if self.out is None:
-            return f"if the columns are right, the same with --out {'log' if found.kind == 'log' else 'poses'}.csv, else with --map"
-        if found.kind == "log":
+            return f"if the columns are right, the same with --out {'log' if imported.kind == 'log' else 'poses'}.csv, else with --map"
+        if imported.kind == "log":
             return f"flexcal identify dynamics {self.robot} {self.out}"
-        if found.kind == "joints":
+        if imported.kind == "joints":
             return f"flexcal design poses {self.robot} --from {self.out} --out plan.yaml"
         from flexcal.jobs.inputs import stored_estimates
 
         calibrate, verify = (f"flexcal {verb} {self.robot} {self.out}" for verb in ("calibrate", "verify"))
-        if stored_estimates(found.model, None).is_file():
+        if stored_estimates(imported.model, None).is_file():
             return (
                 f"{verify}, if these poses are outside the calibration; or, to calibrate again, {calibrate}"
             )

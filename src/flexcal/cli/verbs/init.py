@@ -40,8 +40,8 @@ class Init:
         from flexcal.jobs.setup import init_robot
 
         console = Console(self.json)
-        found = init_robot(self.urdf, self.folder, tip=self.tip)
-        arm, model = found.arm, found.model
+        described = init_robot(self.urdf, self.folder, tip=self.tip)
+        arm, model = described.arm, described.model
         console.say(
             f"{model.name}: {model.n} joints ({', '.join(model.joint_names)}), reach {model.reach:.2f} m"
         )
@@ -50,11 +50,11 @@ class Init:
             console.say(f"not part of the arm, locked: {stand}")
         others = f"; other frames there: {', '.join(arm.frames[1:])}" if arm.frames[1:] else ""
         console.say(f"the reflector is assumed to be in the frame {arm.frame}{others}")
-        for remark in found.remarks:
+        for remark in described.remarks:
             console.say(remark)
-        console.say(f"wrote {found.file}")
+        console.say(f"wrote {described.file}")
         console.finish(
-            found.document(),
-            f"write the position of the reflector under `points:` in {found.file}, then flexcal design poses {found.file} "
-            f"--out {self.folder / 'poses.yaml'}; or, for existing measurements, flexcal import {found.file} FILE",
+            described.document(),
+            f"write the position of the reflector under `points:` in {described.file}, then flexcal design poses {described.file} "
+            f"--out {self.folder / 'poses.yaml'}; or, for existing measurements, flexcal import {described.file} FILE",
         )

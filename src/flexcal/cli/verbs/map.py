@@ -64,7 +64,7 @@ class Map:
         require_at_least(0, seed=self.seed, payload=self.payload)
         console = Console(self.json)
         with console.progress() as progress:
-            found = map_accuracy(
+            accuracy = map_accuracy(
                 self.robot,
                 self.out,
                 working=self.working,
@@ -76,7 +76,7 @@ class Map:
                 command=command_line(),
                 progress=progress,
             )
-        document = found.document()
+        document = accuracy.document()
         console.show(map_table(document))
         if document["before"] is not None:
             console.show(error_table("at the verification poses", uncalibrated_rows(document)))
@@ -93,7 +93,7 @@ class Map:
             )
         for remark in document["remarks"]:
             console.say(remark)
-        console.say(found.trust.sentence)
+        console.say(accuracy.trust.sentence)
         pages = dict.fromkeys([self.out, page_beside(self.out)])
         console.say(f"wrote {' and '.join(str(path) for path in pages)}: {document['poses']} poses")
         where = estimates_option(self.estimates)

@@ -47,7 +47,7 @@ class Measure:
         console = Console(self.json)
         robot = robot_file(self.plan, self.robot)
         with console.progress() as progress:
-            found = measure(
+            measurement = measure(
                 robot,
                 self.plan,
                 self.cell,
@@ -57,17 +57,19 @@ class Measure:
                 truth=self.truth,
                 progress=progress,
             )
-        if found.kind == "trajectory":
-            console.say(f"wrote {found.recordings} recordings to {self.out}")
-            verb = "payload" if found.loaded else "inertials"
+        if measurement.kind == "trajectory":
+            console.say(f"wrote {measurement.recordings} recordings to {self.out}")
+            verb = "payload" if measurement.loaded else "inertials"
             following = f"flexcal identify {verb} {robot} {self.out}"
-        elif found.recordings:
-            console.say(f"wrote {found.recordings} recordings of {found.poses} poses to {self.out}")
+        elif measurement.recordings:
+            console.say(
+                f"wrote {measurement.recordings} recordings of {measurement.poses} poses to {self.out}"
+            )
             following = f"flexcal identify response {robot} {self.out} --out responses"
         else:
-            console.say(f"wrote {found.poses} measured points to {self.out / 'poses.csv'}")
+            console.say(f"wrote {measurement.poses} measured points to {self.out / 'poses.csv'}")
             points = f"{robot} {self.out / 'poses.csv'}"
-            following = f"flexcal {'verify' if found.for_verification else 'calibrate'} {points}"
+            following = f"flexcal {'verify' if measurement.for_verification else 'calibrate'} {points}"
             if self.plan.suffix not in (".yaml", ".yml"):
                 following = f"flexcal verify {points} to verify a calibration, or flexcal calibrate {points}"
-        console.finish(found.document(), following)
+        console.finish(measurement.document(), following)

@@ -34,10 +34,10 @@ class Predict:
         require_robot(self.robot, self.commands)
         console = Console(self.json)
         with console.progress() as progress:
-            found = predict_robot(
+            prediction = predict_robot(
                 self.robot, self.commands, self.out, estimates=self.estimates, progress=progress
             )
-        document = found.document()
+        document = prediction.document()
         beside = document["beside_nominal"]
         console.say(
             f"distance of the tool from that of the nominal robot: mean {beside['mean_mm']:.3f} mm, max {beside['max_mm']:.3f} mm"

@@ -82,9 +82,9 @@ class Report(ParticularsOptions):
             f"mean error of {second} minus that of {first}: {difference['mean']:+.3f} mm, 95 % interval {difference['low']:+.3f} to "
             f"{difference['high']:+.3f} mm: {real}"
         )
-        for block, found in document["parameters"].items():
+        for block, changes in document["parameters"].items():
             console.say(
-                f"{block}: {len(found['changed'])} of {found['compared']} parameters changed by more than their joint uncertainty"
+                f"{block}: {len(changes['changed'])} of {changes['compared']} parameters changed by more than their joint uncertainty"
             )
         if document["parameters"] and document["shared"]:
             console.say(

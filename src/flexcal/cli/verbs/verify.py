@@ -48,7 +48,7 @@ class Verify:
         require_robot_and_files(self.robot, self.poses, "POSES")
         console = Console(self.json)
         with console.progress() as progress:
-            found = verify_robot(
+            verification = verify_robot(
                 self.robot,
                 self.poses,
                 estimates=self.estimates,
@@ -57,7 +57,7 @@ class Verify:
                 command=command_line(),
                 progress=progress,
             )
-        document = found.document()
+        document = verification.document()
         blocks = document["verification"]
         labels = {"measured": "calibrated"}
         if document["refit"] is not None:
@@ -82,10 +82,10 @@ class Verify:
         )
         for remark in document["remarks"]:
             console.say(remark)
-        console.say(found.trust.sentence)
+        console.say(verification.trust.sentence)
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")
-        console.finish(document, self._next(found.trust.status))
+        console.finish(document, self._next(verification.trust.status))
 
     def _next(self, status: Status) -> str:
         """The next step after a verdict."""

@@ -36,14 +36,14 @@ def labels(plan: MultisinePlan | TrajectoryPlan) -> Iterator[RecordingLabel]:
 
 def existing_file(folder: Path, name: str) -> Path:
     """The file of this name with either ending; raises `InputError` where there is none, or both."""
-    found = [folder / (name + ending) for ending in ENDINGS if (folder / (name + ending)).is_file()]
-    if not found:
+    files = [folder / (name + ending) for ending in ENDINGS if (folder / (name + ending)).is_file()]
+    if not files:
         raise InputError(
             f"{folder / name}.csv (or .parquet) is missing; record it, or give the folder that has it."
         )
-    if len(found) > 1:
+    if len(files) > 1:
         raise InputError(f"{folder / name} is there as .csv and as .parquet; remove one.")
-    return found[0]
+    return files[0]
 
 
 def write_recordings(

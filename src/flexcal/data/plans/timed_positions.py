@@ -27,8 +27,8 @@ class TimedPositions:
 
     def rounded(self) -> TimedPositions:
         """As it is written."""
-        found = {key: np.round(getattr(self, key), _DECIMALS) for key in ("time", "position", "velocity")}
-        return replace(self, **found, acceleration=np.round(self.acceleration, _DECIMALS))
+        columns = {key: np.round(getattr(self, key), _DECIMALS) for key in ("time", "position", "velocity")}
+        return replace(self, **columns, acceleration=np.round(self.acceleration, _DECIMALS))
 
     def write_csv(self, path: Path) -> None:
         """Columns t, q1…, dq1…, ddq1…, in the URDF's order of the joints, atomically."""

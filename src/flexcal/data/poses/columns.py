@@ -31,9 +31,9 @@ def payload_column(table: Table, signals: dict[str, Signal], model: RobotModel) 
         raise table.file.error(
             "there is a column 'payload', but robot.yaml declares none; add `payload:` with its centre of mass."
         )
-    held = signals["payload"].values(table)
-    check_positive(table, signals["payload"], held, zero=True)
-    return held[:, 0]
+    payload = signals["payload"].values(table)
+    check_positive(table, signals["payload"], payload, zero=True)
+    return payload[:, 0]
 
 
 def target_column(table: Table, model: RobotModel) -> np.ndarray:

@@ -77,12 +77,14 @@ def read_pose_pool(path: str | Path, model: RobotModel) -> PosePool:
     pose = whole_numbers(table, signals["pose"].columns[0], signals["pose"].values(table)[:, 0])
     check_same_pose(pose, q, table)
     first = np.sort(np.unique(pose, return_index=True)[1])
-    held = payload_column(table, signals, model)
-    if held is not None and np.ptp(held) > 0:
-        row = int(np.argmax(held != held[0]))
-        sentence = f"{held[row]:g} kg follow {held[0]:g} kg; choose from poses with one payload at a time."
+    payload = payload_column(table, signals, model)
+    if payload is not None and np.ptp(payload) > 0:
+        row = int(np.argmax(payload != payload[0]))
+        sentence = (
+            f"{payload[row]:g} kg follow {payload[0]:g} kg; choose from poses with one payload at a time."
+        )
         raise table.error(row, signals["payload"].columns[0], sentence)
-    return PosePool(q[first], pose[first], None if held is None else float(held[0]))
+    return PosePool(q[first], pose[first], None if payload is None else float(payload[0]))
 
 
 def write_poses(path: str | Path, poses: PoseSet) -> None:
@@ -123,31 +125,31 @@ def _read(path: Path, model: RobotModel) -> PoseSet:
         raise file.error("sigma and sigma_x, sigma_y, sigma_z are both there; keep one.")
     stamps = timestamp_columns(signals)
     (table,) = with_seconds([file.read((*texts, *stamps))], stamps)
-    found = {name: signal.values(table) for name, signal in signals.items()}
-    check_joint_units(model, table, signals["q"], found["q"])
+    values = {name: signal.values(table) for name, signal in signals.items()}
+    check_joint_units(model, table, signals["q"], values["q"])
     rows = len(table)
-    position = found["xyz"] if place == "xyz" else np.full((rows, 3), np.nan)
-    sigma = found.get("sigma_xyz", found.get("sigma"))
+    position = values["xyz"] if place == "xyz" else np.full((rows, 3), np.nan)
+    sigma = values.get("sigma_xyz", values.get("sigma"))
     for name in ("sigma", "sigma_xyz", "length"):
-        if name in found:
-            check_positive(table, signals[name], found[name], zero=False)
+        if name in values:
+            check_positive(table, signals[name], values[name], zero=False)
     target = target_column(table, model) if "target" in texts else np.full(rows, first_point(file, model))
     station = table.columns["station"] if "station" in texts else np.full(rows, _first_station(model))
     poses = PoseSet(
-        q=found["q"],
+        q=values["q"],
         position=position,
         sigma=np.broadcast_to(DEFAULT_SIGMA if sigma is None else sigma, (rows, 3)).copy(),
-        torque=found.get("tau"),
+        torque=values.get("tau"),
         payload=payload_column(table, signals, model),
         target=target,
         station=station,
-        temperature=found["temperature"][:, 0] if "temperature" in found else None,
-        time=found["t"][:, 0] if "t" in found else None,
-        pose=whole_numbers(table, signals["pose"].columns[0], found["pose"][:, 0]),
-        quaternion_wxyz=unit_quaternions(table, signals["quaternion"], found["quaternion"])
-        if "quaternion" in found
+        temperature=values["temperature"][:, 0] if "temperature" in values else None,
+        time=values["t"][:, 0] if "t" in values else None,
+        pose=whole_numbers(table, signals["pose"].columns[0], values["pose"][:, 0]),
+        quaternion_wxyz=unit_quaternions(table, signals["quaternion"], values["quaternion"])
+        if "quaternion" in values
         else None,
-        length=found["length"][:, 0] if "length" in found else None,
+        length=values["length"][:, 0] if "length" in values else None,
         sigma_given=sigma is not None,
     )
     check_same_pose(poses.pose, poses.q, table)

@@ -49,22 +49,24 @@ def read_targets(path: str | Path, model: RobotModel) -> ToolTargets:
         if (name in signals or name in texts) and "xyz" not in signals:
             raise file.error(f"there is '{name}' but no x, y, z; add them, or remove it.")
     table = file.read(texts)
-    found = {name: signal.values(table) for name, signal in signals.items()}
-    if "q" in found:
-        check_joint_units(model, table, signals["q"], found["q"])
-    if "xyz" in found and "station" not in texts:
-        _check_metres(table, signals["xyz"].columns, found["xyz"], model.reach)
+    values = {name: signal.values(table) for name, signal in signals.items()}
+    if "q" in values:
+        check_joint_units(model, table, signals["q"], values["q"])
+    if "xyz" in values and "station" not in texts:
+        _check_metres(table, signals["xyz"].columns, values["xyz"], model.reach)
     if "station" in texts:
         _check_stations(table, model)
-    pose = whole_numbers(table, signals["pose"].columns[0], found["pose"][:, 0])
+    pose = whole_numbers(table, signals["pose"].columns[0], values["pose"][:, 0])
     quaternion = (
-        unit_quaternions(table, signals["quaternion"], found["quaternion"]) if "quaternion" in found else None
+        unit_quaternions(table, signals["quaternion"], values["quaternion"])
+        if "quaternion" in values
+        else None
     )
     targets = ToolTargets(
         pose=pose,
         target=_points(file, table, model),
-        q=found.get("q"),
-        position=found.get("xyz"),
+        q=values.get("q"),
+        position=values.get("xyz"),
         rotation=None if quaternion is None else wxyz_rotation(quaternion),
         station=table.columns["station"] if "station" in texts else None,
         payload=payload_column(table, signals, model),

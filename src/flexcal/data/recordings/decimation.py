@@ -74,15 +74,15 @@ class DecimationStream:
 
     def __init__(self, decimation: Decimation) -> None:
         self._stages = decimation.stages
-        self._held: list[np.ndarray | None] = [None] * len(self._stages)
+        self._pending: list[np.ndarray | None] = [None] * len(self._stages)
 
     def push(self, columns: np.ndarray) -> np.ndarray:
         """The kept samples (k, M) that the next `columns` (k, N) complete; M may be zero."""
         for i, stage in enumerate(self._stages):
-            held = self._held[i]
-            whole = columns if held is None else np.concatenate([held, columns], axis=1)
+            pending = self._pending[i]
+            whole = columns if pending is None else np.concatenate([pending, columns], axis=1)
             columns = _decimated(whole, stage)
-            self._held[i] = whole[:, stage * columns.shape[1] :].copy()
+            self._pending[i] = whole[:, stage * columns.shape[1] :].copy()
         return columns
 
 
@@ -91,12 +91,12 @@ def _decimated(columns: np.ndarray, stage: int) -> np.ndarray:
     length = 2 * _REACH * stage + 1
     count = max(0, (columns.shape[1] - length) // stage + 1)
     shifted = _shifted_filter(stage)
-    found = np.empty((len(columns), count))
+    kept = np.empty((len(columns), count))
     for start in range(0, count, _TOGETHER):
         number = min(_TOGETHER, count - start)
         first, reach = start * stage, (number - 1) * stage + length
-        found[:, start : start + number] = columns[:, first : first + reach] @ shifted[:reach, :number]
-    return found
+        kept[:, start : start + number] = columns[:, first : first + reach] @ shifted[:reach, :number]
+    return kept
 
 
 @cache

@@ -133,19 +133,19 @@ def _stamped(
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Time stamps and all other quantities, block by block, checked as a whole log is."""
     before: float | None = None
-    held: float | None = None
+    payload: float | None = None
     for table in tables:
         t = signals["t"].values(table)[:, 0]
         _check_time(table, signals["t"], t, before)
         before = float(t.max()) if before is None else max(before, float(t.max()))
-        yield t, _stacked(model, table, signals, held)
-        held = float(signals["payload"].values(table)[0, 0]) if "payload" in signals else None
+        yield t, _stacked(model, table, signals, payload)
+        payload = float(signals["payload"].values(table)[0, 0]) if "payload" in signals else None
 
 
 def _stacked(
-    model: RobotModel, table: Table, signals: dict[str, Signal], held: float | None = None
+    model: RobotModel, table: Table, signals: dict[str, Signal], payload: float | None = None
 ) -> np.ndarray:
-    """All quantities but the time side by side (N, ·), in the order of `signals`; `held` is the payload of the rows before, kg."""
+    """All quantities but the time side by side (N, ·), in the order of `signals`; `payload` is that of the rows before, kg."""
     parts = []
     for quantity, signal in signals.items():
         if quantity == "t":
@@ -154,26 +154,26 @@ def _stacked(
         if quantity in ("q", "qa"):
             check_joint_units(model, table, signal, values)
         if quantity == "payload":
-            _check_payload(model, table, signal, values[:, 0], held)
+            _check_payload(model, table, signal, values[:, 0], payload)
         parts.append(values)
     return np.concatenate(parts, axis=1)
 
 
 def _check_payload(
-    model: RobotModel, table: Table, signal: Signal, held: np.ndarray, before: float | None
+    model: RobotModel, table: Table, signal: Signal, payload: np.ndarray, before: float | None
 ) -> None:
     if model.payload is None:
         raise table.file.error(
             "there is a column 'payload', but robot.yaml declares none; add `payload:` with the frame to which it is attached."
         )
-    first = held[0] if before is None else before
-    wrong = (held < 0) | (held != first)
+    first = payload[0] if before is None else before
+    wrong = (payload < 0) | (payload != first)
     if wrong.any():
         row = int(np.argmax(wrong))
         sentence = (
-            f"a payload of {held[row]:g} kg; it must not be negative."
-            if held[row] < 0
-            else f"{held[row]:g} kg follow {first:g} kg; a log has one payload, so cut it there into two files."
+            f"a payload of {payload[row]:g} kg; it must not be negative."
+            if payload[row] < 0
+            else f"{payload[row]:g} kg follow {first:g} kg; a log has one payload, so cut it there into two files."
         )
         raise table.error(row, signal.columns[0], sentence)
 

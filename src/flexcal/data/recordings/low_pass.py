@@ -86,11 +86,11 @@ class LowPass:
         length, response = self._response
         lost = 2 * self.support
         rows = np.ascontiguousarray(values.T)
-        found = np.empty((rows.shape[0], max(0, rows.shape[1] - lost)))
+        result = np.empty((rows.shape[0], max(0, rows.shape[1] - lost)))
         step = length - lost
-        for start in range(0, found.shape[1], step):
+        for start in range(0, result.shape[1], step):
             part = np.fft.rfft(rows[:, start : start + length], length, axis=1)
             filtered = np.fft.irfft(part * response, length, axis=1)[:, lost:]
-            stop = min(start + step, found.shape[1])
-            found[:, start:stop] = filtered[:, : stop - start]
-        return found.T
+            stop = min(start + step, result.shape[1])
+            result[:, start:stop] = filtered[:, : stop - start]
+        return result.T

@@ -60,12 +60,12 @@ class Clock:
 
 def in_order(t: np.ndarray, values: np.ndarray, positions: int) -> Samples:
     """Rows sorted by their stamps `t` (N,), without repeated ones; the first `positions` columns of the values (N, m) are positions."""
-    found = Samples(t, values)
+    samples = Samples(t, values)
     if (np.diff(t) < 0).any():
         order = np.argsort(t, kind="stable")
         late = int(np.sum(t < np.maximum.accumulate(t)))
-        found = Samples(t[order], values[order], sorted=late)
-    return _without_repeated(found, positions) if positions else found
+        samples = Samples(t[order], values[order], sorted=late)
+    return _without_repeated(samples, positions) if positions else samples
 
 
 def clock_of(t: np.ndarray, positions: np.ndarray, fill: float) -> Clock:

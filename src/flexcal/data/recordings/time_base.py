@@ -73,11 +73,11 @@ def uniform_blocks(
     clock: Clock | None = None
     even: _EvenTimes | None = None
     stretch, repairs = _Stretch(), np.zeros(3, dtype=int)
-    held = Samples(np.zeros(0), np.zeros((0, 0)))
+    pending = Samples(np.zeros(0), np.zeros((0, 0)))
     for t, values, last in _with_last(blocks):
         new = Samples(t, values)
         if clock is None:
-            new = held = _joined(held, new)
+            new = pending = _joined(pending, new)
             if new.t.size < ENOUGH and not last:
                 continue
         new = in_order(new.t, new.values, positions)
@@ -87,19 +87,19 @@ def uniform_blocks(
                 raise FlexcalError("a recording needs at least two samples.")
             clock = clock_of(new.t, new.values[:, :positions], fill)
             even = _EvenTimes(clock) if clock.even else None
-            held = Samples(np.zeros(0), new.values[:0])
+            pending = Samples(np.zeros(0), new.values[:0])
         if even is not None:
-            new = _joined(held, Samples(even.times(new.t), new.values))
+            new = _joined(pending, Samples(even.times(new.t), new.values))
         else:
-            new = _joined(held, new)
+            new = _joined(pending, new)
             new = merged(in_order(new.t, new.values, 0))
             repairs += new.repairs
         t, values = new.t, new.values
         edges = [0, *(sampling_gaps(t, clock.gap) + 1), t.size]
         for first, end in pairwise(edges):
-            found = stretch.push(t[first:end], values[first:end], clock, whole=last or end < t.size)
-            if found is not None:
-                base, part = found
+            completed = stretch.push(t[first:end], values[first:end], clock, whole=last or end < t.size)
+            if completed is not None:
+                base, part = completed
                 ordered, alike, repeated = (int(count) for count in repairs)
                 yield replace(base, sorted=ordered, merged=alike, repeated=repeated), part
                 repairs[:] = 0
@@ -108,22 +108,22 @@ def uniform_blocks(
         kept = edges[-2]
         if stretch.begun:
             kept += int(np.searchsorted(t[kept:], stretch.next - _REACH * clock.gap))
-        held = Samples(t[kept:], values[kept:])
+        pending = Samples(t[kept:], values[kept:])
 
 
-def _joined(held: Samples, new: Samples) -> Samples:
-    if not held.t.size:
+def _joined(pending: Samples, new: Samples) -> Samples:
+    if not pending.t.size:
         return new
-    return Samples(np.concatenate([held.t, new.t]), np.concatenate([held.values, new.values]))
+    return Samples(np.concatenate([pending.t, new.t]), np.concatenate([pending.values, new.values]))
 
 
 def _with_last(blocks: Iterable[_BLOCK]) -> Iterator[tuple[np.ndarray, np.ndarray, bool]]:
     iterator = iter(blocks)
-    held = next(iterator, None)
-    while held is not None:
+    current = next(iterator, None)
+    while current is not None:
         following = next(iterator, None)
-        yield (*held, following is None)
-        held = following
+        yield (*current, following is None)
+        current = following
 
 
 class _EvenTimes:
@@ -140,9 +140,9 @@ class _EvenTimes:
         if t.size and (self._last is None or t[0] - self._last > self._gap):
             starts = np.concatenate([[0], starts])
         edges = np.unique([0, *starts, t.size])
-        found = [self._run(t[a:b], fresh=bool(np.isin(a, starts))) for a, b in pairwise(edges)]
+        runs = [self._run(t[a:b], fresh=bool(np.isin(a, starts))) for a, b in pairwise(edges)]
         self._last = float(t[-1]) if t.size else self._last
-        return np.concatenate([np.zeros(0), *found])
+        return np.concatenate([np.zeros(0), *runs])
 
     def _run(self, t: np.ndarray, *, fresh: bool) -> np.ndarray:
         if fresh:

@@ -139,12 +139,12 @@ def assign(
     joints than the robot's, and every column that is not understood.
     """
     mapped = mapped_signals(model)
-    found: dict[str, Signal] = {}
+    assigned: dict[str, Signal] = {}
     for quantity in (*required, *optional):
         choice = _choose(file, quantity, model.n, mapped.get(quantity), quantity in required)
         if choice is not None:
-            found[quantity] = choice
-    used = {column for signal in found.values() for column in signal.columns} | set(texts)
+            assigned[quantity] = choice
+    used = {column for signal in assigned.values() for column in signal.columns} | set(texts)
     known = [name for quantity in (*required, *optional) for name in standard_columns(quantity, model.n)]
     known += [
         name for quantity in (*required, *optional) if quantity in mapped for name in mapped[quantity].columns
@@ -155,7 +155,7 @@ def assign(
                 suggestion(column, [*known, *texts]) or "; rename it, map it under `signals:`, or remove it."
             )
             raise file.error(f"the column '{column}' is not known{hint}")
-    return found
+    return assigned
 
 
 def _choose(file: TableFile, quantity: str, n: int, mapped: Signal | None, required: bool) -> Signal | None:

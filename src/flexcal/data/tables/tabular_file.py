@@ -162,12 +162,14 @@ def tables_in(folder: Path) -> str:
         tables = [file for file in folder.iterdir() if file.suffix in (".csv", ".parquet")]
     except OSError:
         tables = []
-    found = [str(file) for file in sorted(tables, key=lambda file: (file.stem != "poses", file.name))]
-    if not found:
+    shown_names = [str(file) for file in sorted(tables, key=lambda file: (file.stem != "poses", file.name))]
+    if not shown_names:
         return "; there is none in it"
-    if len(found) == 1:
-        return f" in it, {found[0]}"
-    shown = ", ".join(found[:_SHOWN]) + (f" and {len(found) - _SHOWN} others" if len(found) > _SHOWN else "")
+    if len(shown_names) == 1:
+        return f" in it, {shown_names[0]}"
+    shown = ", ".join(shown_names[:_SHOWN]) + (
+        f" and {len(shown_names) - _SHOWN} others" if len(shown_names) > _SHOWN else ""
+    )
     return f" in it: {shown}"
 
 

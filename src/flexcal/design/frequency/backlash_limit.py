@@ -28,11 +28,11 @@ def static_amplitude_share(model: RobotModel, plan: MultisinePlan) -> float:
     The reference motion is left out, as in the paper. Above 1 where there is room.
     """
     drives = _loose(model, plan)
-    held = np.abs(
+    gravity = np.abs(
         static_equilibrium(model, plan.poses, plan.payload).torque[:, [plan.joints[k] for k in drives]]
     )
     power = np.sum([_strain(model, q, plan)[drives] * plan.amplitude**2 for q in plan.poses], axis=(2, 3))
-    return float((held / (CREST * np.sqrt(power))).min(initial=np.inf))
+    return float((gravity / (CREST * np.sqrt(power))).min(initial=np.inf))
 
 
 def backlash_load(model: RobotModel, q: np.ndarray, plan: MultisinePlan) -> np.ndarray:
@@ -51,11 +51,11 @@ def backlash_load(model: RobotModel, q: np.ndarray, plan: MultisinePlan) -> np.n
         -excited * omega**2 * np.sin(angle),
     )
     period = 1 / plan.reference_frequency_hz if omega else 1.0
-    held = periodic_torque(model, *motion, period=period, payload=plan.payload)
-    held = held[:, [plan.joints[k] for k in drives]]
+    torque = periodic_torque(model, *motion, period=period, payload=plan.payload)
+    torque = torque[:, [plan.joints[k] for k in drives]]
     still = static_equilibrium(model, q[None], plan.payload).torque[0, [plan.joints[k] for k in drives]]
-    one_sided = (held > 0).all(axis=0) | (held < 0).all(axis=0)
-    least = np.where(one_sided, np.abs(held).min(axis=0), 0.0)
+    one_sided = (torque > 0).all(axis=0) | (torque < 0).all(axis=0)
+    least = np.where(one_sided, np.abs(torque).min(axis=0), 0.0)
     with np.errstate(divide="ignore"):
         needed = np.maximum(SELDOM / least, CREST / np.abs(still))
     return _strain(model, q, plan)[drives] * needed[:, None, None] ** 2

@@ -38,21 +38,21 @@ class FrequencyPoseCandidates:
 
     def random(self, count: int, rng: np.random.Generator, progress: Progress = silent) -> np.ndarray:
         """`count` poses (count, n) rad, uniform; raises `FlexcalError`, with what each check threw out, where too few are found."""
-        found: list[np.ndarray] = []
+        accepted: list[np.ndarray] = []
         lost = {"gravity preload": 0, "collision": 0}
         drawn = 0
         for _ in range(_TRIES):
             q = rng.uniform(self.lower, self.upper, (_BATCH, self.model.n))
             drawn += _BATCH
-            found += list(self.kept(q, lost))
-            progress("candidates", min(1.0, len(found) / count))
-            if len(found) >= count:
-                return np.array(found[:count])
-            if drawn >= 40 * count + 1000 and len(found) < 0.02 * count:
+            accepted += list(self.kept(q, lost))
+            progress("candidates", min(1.0, len(accepted) / count))
+            if len(accepted) >= count:
+                return np.array(accepted[:count])
+            if drawn >= 40 * count + 1000 and len(accepted) < 0.02 * count:
                 break
         losses = ", ".join(f"{name} threw out {number}" for name, number in lost.items())
         raise FlexcalError(
-            f"of {drawn} random poses of {self.model.name} only {len(found)} of the wanted {count} can be excited: {losses}; "
+            f"of {drawn} random poses of {self.model.name} only {len(accepted)} of the wanted {count} can be excited: {losses}; "
             "lower the excitation or the reference motion, or hold a heavier payload."
         )
 
@@ -66,13 +66,13 @@ class FrequencyPoseCandidates:
         lost = {"gravity preload": 0, "collision": 0} if lost is None else lost
         swing = np.isin(np.arange(self.model.n), self.plan.joints) * self.plan.reference_amplitude
         ends = np.outer([0.0, 1.0, -1.0], swing)
-        held = q[preloaded(self.model, q, self.plan.payload)]
-        free = [x for x in held if not self.checker.collides(x + ends).any()]
+        preloaded_poses = q[preloaded(self.model, q, self.plan.payload)]
+        free = [x for x in preloaded_poses if not self.checker.collides(x + ends).any()]
         closed = [
             x
             for x in free
             if amplitude_share(backlash_load(self.model, x, self.plan), self.plan.amplitude) >= 1
         ]
-        lost["collision"] += len(held) - len(free)
-        lost["gravity preload"] += len(q) - len(held) + len(free) - len(closed)
+        lost["collision"] += len(preloaded_poses) - len(free)
+        lost["gravity preload"] += len(q) - len(preloaded_poses) + len(free) - len(closed)
         return np.array(closed).reshape(-1, self.model.n)

@@ -40,22 +40,22 @@ def payload_placements(
     The excitation is lowered where a place strains a gap too much; places where next to nothing would be left are not in the result.
     Raises `FlexcalError` where no payload is declared or held, or where it hangs on the axis.
     """
-    held = model.payload
-    if held is None or plan.payload == 0 or not held.mass > 0:
+    payload = model.payload
+    if payload is None or plan.payload == 0 or not payload.mass > 0:
         raise FlexcalError(
             f"{model.path} declares no payload for this plan, so no placement can be evaluated; add `payload:`."
         )
-    axis = model.joints[held.joint].axis
-    if np.linalg.norm(np.cross(axis, held.com_in_link)) < 1e-3:
+    axis = model.joints[payload.joint].axis
+    if np.linalg.norm(np.cross(axis, payload.com_in_link)) < 1e-3:
         raise FlexcalError(
-            f"the payload's centre of mass lies on the axis of {model.joint_names[held.joint]}, so its direction has "
+            f"the payload's centre of mass lies on the axis of {model.joint_names[payload.joint]}, so its direction has "
             f"no effect; declare in {model.path} its offset from the axis."
         )
     places = []
     for number in range(DIRECTIONS):
         progress("payload", number / DIRECTIONS)
-        turned = axis_rotation(axis, 2 * np.pi * number / DIRECTIONS) @ held.com_in_link
-        com = held.rotation.T @ (turned - held.translation)
+        turned = axis_rotation(axis, 2 * np.pi * number / DIRECTIONS) @ payload.com_in_link
+        com = payload.rotation.T @ (turned - payload.translation)
         robot = model.with_values({f"payload.com_{key}": float(x) for key, x in zip("xyz", com, strict=True)})
         try:
             lowered = within_preload(robot, plan)

@@ -78,9 +78,9 @@ class PlannedResponses:
                 f"{100 * reached:.2g} % for {name}; choose more poses or hold a payload off the wrist's axis."
             )
         for _, realisations, kept in sorted(tried):
-            found = self._measured(realisations, kept)
-            if largest_stiffness_std(found.sensitivity)[1] <= wanted:
-                return found
+            planned = self._measured(realisations, kept)
+            if largest_stiffness_std(planned.sensitivity)[1] <= wanted:
+                return planned
         return most
 
     def _measured(self, realisations: int, kept: int) -> PlannedResponses:

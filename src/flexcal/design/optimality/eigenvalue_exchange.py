@@ -111,11 +111,11 @@ def spectral_exchange(
     too small has σ_min = 0 and σ_min has many local optima; the better result counts.
     """
     if criterion.name == "O1":
-        found = rank_exchange(
+        exchanged = rank_exchange(
             sensitivity, count, DOptimal(uses_prior=False), start=start, passes=passes, progress=progress
         )
-        merits = np.exp(0.5 * np.array(found.history))
-        return Selection(found.chosen, float(np.exp(0.5 * found.merit)), tuple(merits.tolist()))
+        merits = np.exp(0.5 * np.array(exchanged.history))
+        return Selection(exchanged.chosen, float(np.exp(0.5 * exchanged.merit)), tuple(merits.tolist()))
     progress(SELECTION_STAGE, 0.0)
     starts = [start] if start is not None else _starts(sensitivity, count)
     tried = []

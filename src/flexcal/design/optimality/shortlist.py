@@ -38,21 +38,23 @@ def exchange_on_shortlist(
         return exchange(sensitivity, count, criterion, progress=progress)
     short = min(len(sensitivity), max(SHORT, 4 * count))
     listed = np.random.default_rng(0).choice(len(sensitivity), short, replace=False)
-    found = exchange(sensitivity.subset(listed), count, criterion)
-    chosen, history = listed[found.chosen], [found.merit]
+    selection = exchange(sensitivity.subset(listed), count, criterion)
+    chosen, history = listed[selection.chosen], [selection.merit]
     for number in range(ROUNDS):
         progress(SELECTION_STAGE, (number + 1) / (ROUNDS + 1))
         promise = predicted_gains(sensitivity, chosen, criterion)
         promise[chosen] = np.inf
         listed = np.argpartition(-promise, short - 1)[:short]
         place = {int(candidate): k for k, candidate in enumerate(listed)}
-        found = exchange(sensitivity.subset(listed), count, criterion, start=[place[int(i)] for i in chosen])
-        before, chosen = chosen, listed[found.chosen]
-        history.append(found.merit)
+        selection = exchange(
+            sensitivity.subset(listed), count, criterion, start=[place[int(i)] for i in chosen]
+        )
+        before, chosen = chosen, listed[selection.chosen]
+        history.append(selection.merit)
         if set(chosen) == set(before):
             break
     progress(SELECTION_STAGE, 1.0)
-    return Selection(chosen, found.merit, tuple(history))
+    return Selection(chosen, selection.merit, tuple(history))
 
 
 def predicted_gains(sensitivity: Sensitivity, chosen: np.ndarray, criterion: Criterion) -> np.ndarray:

@@ -39,7 +39,7 @@ def random_candidates(
     checks["collision"] = lambda q: ~checker.collides(q)
     checks["visibility"] = lambda q: visible(checker, q, setup)
     lost = dict.fromkeys(checks, 0)
-    found: list[np.ndarray] = []
+    accepted: list[np.ndarray] = []
     have = drawn = 0
     while have < count:
         progress("candidates", have / count)
@@ -56,10 +56,10 @@ def random_candidates(
             passed = check(q)
             lost[name] += int(np.sum(~passed))
             q = q[passed]
-        found.append(q)
+        accepted.append(q)
         have += len(q)
     progress("candidates", 1.0)
-    return np.concatenate(found or [np.zeros((0, model.n))])[:count]
+    return np.concatenate(accepted or [np.zeros((0, model.n))])[:count]
 
 
 def above_floor(checker: CollisionChecker, q: np.ndarray, point: str | None = None) -> np.ndarray:

@@ -122,14 +122,14 @@ def base_sensitivity(full: Sensitivity) -> BaseSensitivity:
         )
     # σ_min has a meaning in declared units only: the station is scaled like any other length
     scale = np.where([p.unit == "rad" for p in full.parameters], tolerance, _length_scale(full.parameters))
-    found = analyse(_triangle(full.jacobian), full.parameters.names, scale=scale)
-    kept = list(found.kept)
-    spread = found.regrouping * tolerance / scale[kept][:, None]
+    identifiability = analyse(_triangle(full.jacobian), full.parameters.names, scale=scale)
+    kept = list(identifiability.kept)
+    spread = identifiability.regrouping * tolerance / scale[kept][:, None]
     factor = np.linalg.qr(spread.T, mode="r")
     root = np.linalg.solve(factor, np.eye(len(kept)))
-    parameters = Parameters(Parameter(name, "1", 0.0) for name in found.kept_names)
+    parameters = Parameters(Parameter(name, "1", 0.0) for name in identifiability.kept_names)
     sensitivity = Sensitivity(full.jacobian[:, :, kept] * scale[kept], parameters, root @ root.T)
-    return BaseSensitivity(sensitivity, found, scale[kept])
+    return BaseSensitivity(sensitivity, identifiability, scale[kept])
 
 
 def _triangle(jacobian: np.ndarray) -> np.ndarray:

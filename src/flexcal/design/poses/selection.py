@@ -57,21 +57,21 @@ class PoseDesign:
 
     @classmethod
     def of(
-        cls, found: PoseCandidates, criterion: Criterion, selection: Selection, rng: np.random.Generator
+        cls, candidates: PoseCandidates, criterion: Criterion, selection: Selection, rng: np.random.Generator
     ) -> PoseDesign:
         """The design that takes this `selection` of the candidates; `rng` draws the plan's seed."""
-        chosen = found.pool.q[selection.chosen]
-        loose = list(preload_joints(found.model))
+        chosen = candidates.pool.q[selection.chosen]
+        loose = list(preload_joints(candidates.model))
         return cls(
-            plan=_plan(chosen, found.setup, rng),
+            plan=_plan(chosen, candidates.setup, rng),
             criterion=criterion,
-            candidates=found.pool,
+            candidates=candidates.pool,
             selection=selection,
-            base=found.base,
-            tool_error_weight=found.tool_error_weight,
-            flank_joints=tuple(found.model.joint_names[i] for i in loose),
-            flank=np.sign(gravity_torque(found.model, chosen, found.setup.payload))[:, loose],
-            hidden=found.hidden,
+            base=candidates.base,
+            tool_error_weight=candidates.tool_error_weight,
+            flank_joints=tuple(candidates.model.joint_names[i] for i in loose),
+            flank=np.sign(gravity_torque(candidates.model, chosen, candidates.setup.payload))[:, loose],
+            hidden=candidates.hidden,
         )
 
     def in_order(self, order: np.ndarray) -> PoseDesign:
@@ -158,7 +158,7 @@ def design_poses(
     Raises `FlexcalError` for an unknown criterion, where the poses are fewer than the parameters need, where too few candidates pass the
     checks, and where all of them press a backlash onto one flank.
     """
-    found = pose_candidates(
+    suitable = pose_candidates(
         model,
         rng=rng,
         candidates=candidates,
@@ -168,11 +168,11 @@ def design_poses(
         checker=checker,
         progress=progress,
     )
-    return choose_poses(found, count, rng=rng, criterion=criterion, progress=progress)
+    return choose_poses(suitable, count, rng=rng, criterion=criterion, progress=progress)
 
 
 def choose_poses(
-    found: PoseCandidates,
+    candidates: PoseCandidates,
     count: int,
     *,
     rng: np.random.Generator,
@@ -180,26 +180,26 @@ def choose_poses(
     progress: Progress = silent,
 ) -> PoseDesign:
     """As `design_poses`, from candidates that have been found; `rng` draws the plan's seed."""
-    rank = found.base.identifiability.rank
+    rank = candidates.base.identifiability.rank
     if 3 * count < rank:
         raise FlexcalError(
-            f"{count} poses cannot determine {rank} geometric parameters of {found.model.name}; "
+            f"{count} poses cannot determine {rank} geometric parameters of {candidates.model.name}; "
             f"choose at least {-(-rank // 3)}, better twice as many."
         )
-    wanted = criterion_named(criterion, found.tool_error_weight)
-    selection = exchange_on_shortlist(found.base.sensitivity, count, wanted, progress=progress)
-    return PoseDesign.of(found, wanted, selection, rng)
+    wanted = criterion_named(criterion, candidates.tool_error_weight)
+    selection = exchange_on_shortlist(candidates.base.sensitivity, count, wanted, progress=progress)
+    return PoseDesign.of(candidates, wanted, selection, rng)
 
 
-def fewest_poses(found: PoseCandidates, most: int, wanted: float) -> int:
+def fewest_poses(candidates: PoseCandidates, most: int, wanted: float) -> int:
     """How many candidates, chosen one by one, predict a tool error of at most `wanted` (m); raises `FlexcalError` where `most` do not."""
-    weight, sensitivity = found.tool_error_weight, found.base.sensitivity
+    weight, sensitivity = candidates.tool_error_weight, candidates.base.sensitivity
     order = greedy(sensitivity, most, TraceOptimal(weight, "c")).chosen
-    least = -(-found.base.identifiability.rank // 3)
+    least = -(-candidates.base.identifiability.rank // 3)
     for count in range(least, most + 1):
-        if tool_error(found.base, weight, order[:count]) <= wanted:
+        if tool_error(candidates.base, weight, order[:count]) <= wanted:
             return count
-    reached = tool_error(found.base, weight, order)
+    reached = tool_error(candidates.base, weight, order)
     raise FlexcalError(
         f"{most} poses predict a tool error of {reached / MILLIMETRE:.4f} mm from tracker noise alone, not {wanted / MILLIMETRE:.4f} mm; "
         "allow more poses, or a larger error."

@@ -41,7 +41,7 @@ class NextPoses:
 
 
 def next_poses(
-    found: PoseCandidates,
+    candidates: PoseCandidates,
     measured: PoseSet,
     count: int,
     *,
@@ -55,47 +55,48 @@ def next_poses(
     Raises `FlexcalError` for another criterion, for fewer candidates, and for poses measured with another target, from another station, or
     with a draw-wire.
     """
-    merit = criterion_named(criterion, found.tool_error_weight)
+    merit = criterion_named(criterion, candidates.tool_error_weight)
     if not isinstance(merit, DOptimal | TraceOptimal):
         raise FlexcalError(f"the criterion of the next poses must be c, A or D, not {criterion}.")
-    before = found.base.sensitivity
-    added, noisier = measured_information(found, measured)
+    before = candidates.base.sensitivity
+    added, noisier = measured_information(candidates, measured)
     information = before.prior_information + added
     known = Sensitivity(before.jacobian / noisier, before.parameters, information)
-    base = replace(found.base, sensitivity=known)
+    base = replace(candidates.base, sensitivity=known)
     selection = greedy(known, count, merit)
     done = len(np.unique(measured.pose))
     steps = range(count + 1)
-    errors = [tool_error(base, found.tool_error_weight, selection.chosen[:number]) for number in steps]
+    errors = [tool_error(base, candidates.tool_error_weight, selection.chosen[:number]) for number in steps]
     alone = replace(known, prior_information=before.prior_information)
     least = (
-        trace_lower_bound(alone, TraceOptimal(found.tool_error_weight, "c"), done + np.array(steps)) ** 0.5
+        trace_lower_bound(alone, TraceOptimal(candidates.tool_error_weight, "c"), done + np.array(steps))
+        ** 0.5
     )
-    design = PoseDesign.of(replace(found, base=base), merit, selection, rng)
+    design = PoseDesign.of(replace(candidates, base=base), merit, selection, rng)
     return NextPoses(design, done, np.array(errors), np.minimum(least, errors))
 
 
-def measured_information(found: PoseCandidates, measured: PoseSet) -> tuple[np.ndarray, float]:
+def measured_information(candidates: PoseCandidates, measured: PoseSet) -> tuple[np.ndarray, float]:
     """Information (rank, rank) of measured poses on the combinations that the candidates tell apart, and their noise by the setup's."""
-    _check(found.model, measured, found.setup)
-    information, noisier = np.zeros(2 * (len(found.base.scale),)), []
+    _check(candidates.model, measured, candidates.setup)
+    information, noisier = np.zeros(2 * (len(candidates.base.scale),)), []
     for first in range(0, len(measured), BLOCK):
-        rows, ratio = _rows(found, measured.subset(slice(first, first + BLOCK)))
+        rows, ratio = _rows(candidates, measured.subset(slice(first, first + BLOCK)))
         flat = rows.reshape(-1, rows.shape[2])
         information = information + flat.T @ flat
         noisier.append(ratio)
     return information, float(np.median(np.concatenate(noisier)))
 
 
-def _rows(found: PoseCandidates, measured: PoseSet) -> tuple[np.ndarray, np.ndarray]:
+def _rows(candidates: PoseCandidates, measured: PoseSet) -> tuple[np.ndarray, np.ndarray]:
     """Whitened rows (N, 3, rank) and noise by the setup's (N, 3)."""
-    model, setup = found.model, found.setup
+    model, setup = candidates.model, candidates.setup
     payload = np.full(len(measured), np.nan) if measured.payload is None else measured.payload
-    rows = np.zeros((len(measured), 3, len(found.base.scale)))
+    rows = np.zeros((len(measured), 3, len(candidates.base.scale)))
     for mass in np.unique(payload):
-        held = np.isnan(payload) if np.isnan(mass) else payload == mass
+        of_mass = np.isnan(payload) if np.isnan(mass) else payload == mass
         own = replace(setup, payload=setup.payload if np.isnan(mass) else float(mass))
-        rows[held] = found.base.columns(geometry_jacobian(model, measured.q[held], own)[1])
+        rows[of_mass] = candidates.base.columns(geometry_jacobian(model, measured.q[of_mass], own)[1])
     expected = measuring_noise(model, measured.q, setup)[:, None]
     std = measured.sigma if measured.sigma_given else np.broadcast_to(expected, (len(measured), 3))
     return rows / std[..., None], std / expected

@@ -47,25 +47,25 @@ def working_box(
             f"the working volume from {_told(lower)} to {_told(upper)} is no box; give every smallest coordinate before the largest."
         )
     wanted = rng.uniform(lower, upper, (BOX_POINTS, 3))
-    q, found = _configurations(checker, wanted, rng, point)
-    if not found.any():
+    q, reached = _configurations(checker, wanted, rng, point)
+    if not reached.any():
         raise FlexcalError(
             f"{checker.model.name} reaches no point of the working volume from {_told(lower)} to {_told(upper)} m without touching "
             f"something, though it reaches {checker.model.reach:.3g} m; give it in m in the robot's base frame."
         )
-    return WorkingVolume(q[found], wanted[found], float(found.mean()), np.stack([lower, upper]))
+    return WorkingVolume(q[reached], wanted[reached], float(reached.mean()), np.stack([lower, upper]))
 
 
 def working_points(
     checker: CollisionChecker, points: np.ndarray, rng: np.random.Generator, *, point: str | None = None
 ) -> WorkingVolume:
     """The given `points` (W, 3), m, base frame, each in a random orientation. Raises `FlexcalError` for one out of reach."""
-    q, found = _configurations(checker, points, rng, point)
-    if not found.all():
-        first = int(np.argmin(found))
+    q, reached = _configurations(checker, points, rng, point)
+    if not reached.all():
+        first = int(np.argmin(reached))
         raise FlexcalError(
             f"{checker.model.name} does not reach working point {first + 1} at {_told(points[first])} m without touching something "
-            f"({int(np.sum(~found))} of {len(points)} points are like that); give them in m in the robot's base frame."
+            f"({int(np.sum(~reached))} of {len(points)} points are like that); give them in m in the robot's base frame."
         )
     return WorkingVolume(q, points)
 
@@ -77,9 +77,9 @@ def _configurations(
     model = checker.model
     lower, upper = joint_ranges(model)
     q = np.zeros((len(wanted), model.n))
-    found = np.zeros(len(wanted), dtype=bool)
+    solved = np.zeros(len(wanted), dtype=bool)
     for _ in range(TRIES):
-        left = np.flatnonzero(~found)
+        left = np.flatnonzero(~solved)
         if not len(left):
             break
         tried, reached = reach_points(
@@ -87,8 +87,8 @@ def _configurations(
         )
         reached &= above_floor(checker, tried, point)
         reached[reached] = ~checker.collides(tried[reached])
-        q[left[reached]], found[left[reached]] = tried[reached], True
-    return q, found
+        q[left[reached]], solved[left[reached]] = tried[reached], True
+    return q, solved
 
 
 def _told(position: np.ndarray) -> str:

@@ -67,12 +67,12 @@ class Clearance:
         for i in np.flatnonzero(perhaps.any(axis=1)).tolist():
             pairs = np.flatnonzero(perhaps[i])
             pin.updateGeometryPlacements(robot, data, geometry, distances, configurations[i])
-            found = np.array(
+            least_distances = np.array(
                 [pin.computeDistance(geometry, distances, pair).min_distance for pair in pairs.tolist()]
             )
-            found -= self._margins[pairs]
-            self._distance[i, pairs], self._where[i, pairs] = found, q[i]
-            within = pairs[found < self.within].tolist()
+            least_distances -= self._margins[pairs]
+            self._distance[i, pairs], self._where[i, pairs] = least_distances, q[i]
+            within = pairs[least_distances < self.within].tolist()
             if within:
                 jacobian = pin.computeJointJacobians(robot, data, configurations[i])[:, self._columns]
                 jacobians += [jacobian] * len(within)
@@ -80,7 +80,7 @@ class Clearance:
                 result = distances.distanceResults[pair]
                 close.append((i, pair))
                 points.append(np.array([result.getNearestPoint1(), result.getNearestPoint2(), result.normal]))
-            if found.min(initial=np.inf) < least:
+            if least_distances.min(initial=np.inf) < least:
                 break
         instants, pairs = np.array(close, dtype=int).reshape(-1, 2).T
         one, other, normal = np.array(points).reshape(-1, 3, 3).transpose(1, 0, 2)

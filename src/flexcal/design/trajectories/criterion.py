@@ -138,7 +138,7 @@ def excitation_criterion(
         return ExcitationCriterion(
             MarginalD(wanted, criterion), unknowns, faint * np.outer(sizes, sizes), instants, CONDITIONING
         )
-    names = columns.found.kept_names
+    names = columns.identifiability.kept_names
     if criterion == "condition":
         return ExcitationCriterion(
             ConditionNumberCriterion(), Unknowns(names, np.eye(columns.rank), nothing), nothing, instants
@@ -162,13 +162,15 @@ def declared_unknowns(columns: BaseRegressor, free: tuple[str, ...] = ()) -> Unk
         if value > 0
     ]
     names += [f"{joint}.{key}" for key in DRIVE[1:] for joint in model.joint_names]
-    held = model.nominal_payload
-    if held is not None and held.mass_std > 0 and columns.payload is None:
+    payload = model.nominal_payload
+    if payload is not None and payload.mass_std > 0 and columns.payload is None:
         names.append("payload.mass")
     names += [name for name in free if name not in names]
     known = np.array([name not in free and _has_prior(model, name) for name in names])
     directions = np.column_stack([_direction(columns, name) for name in names])
-    return Unknowns(tuple(names), columns.found.regrouping @ directions, np.diag(known.astype(float)))
+    return Unknowns(
+        tuple(names), columns.identifiability.regrouping @ directions, np.diag(known.astype(float))
+    )
 
 
 def _has_prior(model: RobotModel, name: str) -> bool:
@@ -180,8 +182,8 @@ def _has_prior(model: RobotModel, name: str) -> bool:
 
 def _direction(columns: BaseRegressor, name: str) -> np.ndarray:
     """Change (p,) of all columns' values by one prior standard deviation of a parameter, or by one of its coordinate without prior."""
-    if name in columns.found.names and name.rpartition(".")[2] in DRIVE[1:]:
-        return np.eye(len(columns.found.names))[columns.found.names.index(name)]
+    if name in columns.identifiability.names and name.rpartition(".")[2] in DRIVE[1:]:
+        return np.eye(len(columns.identifiability.names))[columns.identifiability.names.index(name)]
     model: RobotModel = columns.model
     item = declared_parameter(model, name)
     size = item.prior_std if np.isfinite(item.prior_std) else 1.0

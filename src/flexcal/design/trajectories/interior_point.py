@@ -84,7 +84,7 @@ def _two_loops(
     for step, change in reversed(pairs):
         shares.append((step @ left) / (step @ change))
         left -= shares[-1] * change
-    found = curved(left)
+    product = curved(left)
     for (step, change), share in zip(pairs, reversed(shares), strict=True):
-        found += (share - (change @ found) / (step @ change)) * step
-    return found
+        product += (share - (change @ product) / (step @ change)) * step
+    return product

@@ -116,13 +116,13 @@ class MotionSpace:
 
         def solve(vector: np.ndarray) -> np.ndarray:
             values = vector.reshape(self.shape)
-            found = np.empty_like(values)
+            solution = np.empty_like(values)
             for joint in range(self.joints):
                 scaled = maps * self.scale[:, joint]
                 size = np.einsum("dik,di,dil->kl", scaled, weights[:, :, joint], scaled, optimize=True)
                 size[np.diag_indices_from(size)] += _DAMPING
-                found[:, joint] = np.linalg.solve(size, values[:, joint])
-            return found.ravel()
+                solution[:, joint] = np.linalg.solve(size, values[:, joint])
+            return solution.ravel()
 
         return solve
 

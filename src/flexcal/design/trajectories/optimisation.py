@@ -70,10 +70,10 @@ class TrajectoryDesign:
         limits = self.limits
         half, middle = (limits.upper - limits.lower) / 2, (limits.upper + limits.lower) / 2
         torque = np.einsum("jrn,r->nj", self.columns.write(motion), self.columns.base_values)
-        found = {"position": (q - middle) / half, "velocity": dq / limits.velocity}
+        taken = {"position": (q - middle) / half, "velocity": dq / limits.velocity}
         if np.isfinite(limits.acceleration).any():
-            found["acceleration"] = ddq / limits.acceleration
-        return found | {"torque": torque / limits.torque}
+            taken["acceleration"] = ddq / limits.acceleration
+        return taken | {"torque": torque / limits.torque}
 
     def largest_shares(self) -> dict[str, float]:
         """The largest share of each over all trajectories, at instants 0.1 % of a period apart."""
@@ -168,9 +168,9 @@ def design_trajectories(
         x = _designed(program, begin, starts, steps, rng, progress, number, len(stages))
         fine = program.finer(FINER)
         motion = fine.space.motion(x)
-        found = program.information(motion)
-        merits.append(aim.merit(found))
-        goal = goal.after(found)
+        gained = program.information(motion)
+        merits.append(aim.merit(gained))
+        goal = goal.after(gained)
         information.append(goal.gathered)
         coefficients.append(program.space.coefficients(x))
         least = fine.clearance.near(motion[0])[1].min(initial=least)
@@ -289,11 +289,11 @@ def _smaller(
 ) -> np.ndarray:
     """Of the motions between `x` and the same place without a swing, and between `x` and `inside`, the best of the first two that keep
     the limits."""
-    found = [inside]
+    motions = [inside]
     for towards in (program.space.still(x), inside):
         share = 1.0
         while share > _SMALLEST and not keeps(towards + share * (x - towards)):
             share *= _SHRINKING
         if share > _SMALLEST:
-            found.append(towards + share * (x - towards))
-    return max(found, key=lambda y: _merit(program, y))
+            motions.append(towards + share * (x - towards))
+    return max(motions, key=lambda y: _merit(program, y))

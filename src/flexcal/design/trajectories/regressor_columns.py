@@ -29,13 +29,13 @@ _SEED = 1991
 class BaseRegressor:
     """The observation matrix of a rigid robot with classic friction (Eq. 2.20), its base columns only (Gautier 1991).
 
-    `payload` is what the robot holds, kg; None takes the declared one. `found` says which of all columns (`names`) are kept and what
-    the others add to them.
+    `payload` is what the robot holds, kg; None takes the declared one. `identifiability` says which of all columns (`names`) are kept and
+    what the others add to them.
     """
 
     model: RobotModel
     payload: float | None
-    found: Identifiability
+    identifiability: Identifiability
 
     @classmethod
     def of(cls, model: RobotModel, payload: float | None = None) -> BaseRegressor:
@@ -63,7 +63,7 @@ class BaseRegressor:
     @property
     def rank(self) -> int:
         """Number of base parameters."""
-        return self.found.rank
+        return self.identifiability.rank
 
     @cached_property
     def values(self) -> np.ndarray:
@@ -81,21 +81,21 @@ class BaseRegressor:
     @cached_property
     def base_values(self) -> np.ndarray:
         """Values of the base columns (r,)."""
-        return self.found.regrouping @ self.values
+        return self.identifiability.regrouping @ self.values
 
     @cached_property
     def smooth_values(self) -> np.ndarray:
         """Values of the base columns (r,) that make the torque without Coulomb friction."""
         values = self.values.copy()
-        coulomb = [name.endswith(".coulomb") for name in self.found.names]
+        coulomb = [name.endswith(".coulomb") for name in self.identifiability.names]
         values[coulomb] = 0.0
-        return self.found.regrouping @ values
+        return self.identifiability.regrouping @ values
 
     @cached_property
     def _places(self) -> np.ndarray:
         """(n, 10 n): row of the joints' columns below each other where a link's column is, -1 for those left out."""
         places = np.full((self.model.n, 10 * self.model.n), -1)
-        for row, column in enumerate(self.found.kept):
+        for row, column in enumerate(self.identifiability.kept):
             if column < places.shape[1]:
                 places[:, column] = self.rank * np.arange(self.model.n) + row
         return places
@@ -106,7 +106,7 @@ class BaseRegressor:
         links = 10 * self.model.n
         return tuple(
             (row, (column - links) % self.model.n, (column - links) // self.model.n)
-            for row, column in enumerate(self.found.kept)
+            for row, column in enumerate(self.identifiability.kept)
             if column >= links
         )
 
@@ -118,31 +118,31 @@ class BaseRegressor:
     def write(self, motion: np.ndarray) -> np.ndarray:
         """Columns (n, r, N) of every joint's torque, N m, along q, q̇, q̈ (3, N, n)."""
         q, dq, ddq = motion
-        found = np.zeros((self.model.n, self.rank, len(q)))
-        write_torque_regressor(self.model, q, dq, ddq, self._places, found.reshape(-1, len(q)))
+        columns = np.zeros((self.model.n, self.rank, len(q)))
+        write_torque_regressor(self.model, q, dq, ddq, self._places, columns.reshape(-1, len(q)))
         for row, joint, kind in self._drives:
-            found[joint, row] = (
+            columns[joint, row] = (
                 ddq[:, joint],
                 dq[:, joint],
                 np.tanh(dq[:, joint] / self._reversal[joint]),
                 1.0,
             )[kind]
-        return found
+        return columns
 
     def by_motion(self, motion: np.ndarray, slopes: np.ndarray) -> np.ndarray:
         """∂f/∂q, ∂f/∂q̇, ∂f/∂q̈ (3, N, n) of any f of the columns from `slopes` = ∂f/∂columns (n, r, N)."""
         q, dq, ddq = motion
         rows = slopes.reshape(-1, len(q))
-        found = np.array(placed_regressor_adjoint(self.model, q, dq, ddq, self._places, rows))
+        derivatives = np.array(placed_regressor_adjoint(self.model, q, dq, ddq, self._places, rows))
         for row, joint, kind in self._drives:
             if kind == 0:
-                found[2, :, joint] += slopes[joint, row]
+                derivatives[2, :, joint] += slopes[joint, row]
             elif kind == 1:
-                found[1, :, joint] += slopes[joint, row]
+                derivatives[1, :, joint] += slopes[joint, row]
             elif kind == 2:
                 width = self._reversal[joint]
-                found[1, :, joint] += slopes[joint, row] / (width * np.cosh(dq[:, joint] / width) ** 2)
-        return found
+                derivatives[1, :, joint] += slopes[joint, row] / (width * np.cosh(dq[:, joint] / width) ** 2)
+        return derivatives
 
 
 _KEPT_FIRST = ("Izz", "Ixx", "Ixy", "Ixz", "Iyz", "Iyy", "mc_x", "mc_y", "mc_z", "mass")

@@ -27,7 +27,7 @@ def sequence(columns: BaseRegressor, name: SequenceName) -> tuple[Stage, ...]:
     owner = {joint.link: k for k, joint in enumerate(model.joints)} | {
         joint: k for k, joint in enumerate(model.joint_names)
     }
-    each = [(kept, *kept.rpartition(".")[::2]) for kept in columns.found.kept_names]
+    each = [(kept, *kept.rpartition(".")[::2]) for kept in columns.identifiability.kept_names]
 
     def of_joints(first: int, last: int) -> Stage:
         wanted = tuple(kept for kept, body, _ in each if first <= owner[body] < last)

@@ -36,17 +36,17 @@ def essential_parameters(data: RegressionData, estimate: Estimate) -> EssentialP
     relative standard deviation is at most 30 times the smallest, or where the next step would make the residual of `data` more than
     5 % larger than with all base parameters. Those that the data hide, and their values, stay out of it.
     """
-    base = data.base.found
+    base = data.base.identifiability
     hidden = {entry.name for entry in estimate.dropped}
     rows = [i for i, kept in enumerate(base.kept) if base.names[kept] not in hidden]
     kept = np.array([base.kept[i] for i in rows], dtype=int)
-    found = estimate.parameters.coordinates()
-    held = base.regrouping[rows] @ found - found[kept]
-    values = found[kept] + held
+    parameters = estimate.parameters.coordinates()
+    regrouped = base.regrouping[rows] @ parameters - parameters[kept]
+    values = parameters[kept] + regrouped
     covariance = estimate.covariance[np.ix_(kept, kept)]
     alive = np.ones(len(kept), dtype=bool)
     eliminated: list[str] = []
-    limit = _LARGEST_GROWTH * data.errors(found)[0]
+    limit = _LARGEST_GROWTH * data.errors(parameters)[0]
     while alive.sum() > 1:
         relative = np.sqrt(np.diag(covariance)[alive]) / np.maximum(
             np.abs(values[alive]), np.finfo(float).tiny
@@ -57,11 +57,11 @@ def essential_parameters(data: RegressionData, estimate: Estimate) -> EssentialP
         along = covariance[:, worst] / covariance[worst, worst]
         shorter = values - along * values[worst]
         shorter[~alive] = shorter[worst] = 0.0
-        candidate = found.copy()
-        candidate[kept] = shorter - held
+        candidate = parameters.copy()
+        candidate[kept] = shorter - regrouped
         if data.errors(candidate)[0] > limit:
             break
-        values, found = shorter, candidate
+        values, parameters = shorter, candidate
         covariance = covariance - np.outer(along, covariance[worst])
         alive[worst] = False
         eliminated.append(base.names[kept[worst]])
@@ -70,5 +70,5 @@ def essential_parameters(data: RegressionData, estimate: Estimate) -> EssentialP
         values[alive],
         np.sqrt(np.diag(covariance)[alive]),
         tuple(eliminated),
-        found,
+        parameters,
     )

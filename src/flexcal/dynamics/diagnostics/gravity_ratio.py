@@ -53,11 +53,11 @@ def weight_shares(data: RegressionData, estimate: Estimate) -> dict[str, Gravity
     sprung = {entry.joint for entry in model.config.dynamics.joint_springs}
     x, covariance = estimate.parameters.coordinates()[:links], estimate.covariance[:links, :links]
     quantile = student_quantile(0.975, max(1.0, estimate.covariance_freedom or estimate.degrees_of_freedom))
-    found = {}
+    ratios = {}
     for k, name in enumerate(model.joint_names):
         if size[k] <= _LEAST * size.max() or name in sprung:
             continue
         slope = declared[:, k] @ columns[:, k] / np.sum(declared[:, k] ** 2)
         share, half = float(slope @ x), quantile * math.sqrt(max(0.0, float(slope @ covariance @ slope)))
-        found[name] = GravityRatio(share, share - half, share + half)
-    return found
+        ratios[name] = GravityRatio(share, share - half, share + half)
+    return ratios

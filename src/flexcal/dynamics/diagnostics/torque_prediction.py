@@ -101,24 +101,24 @@ class _Spectrum:
     def __init__(self, length: int) -> None:
         self._length = length
         self._window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length)
-        self._held: np.ndarray | None = None
+        self._pending: np.ndarray | None = None
         self._sum: np.ndarray | float = 0.0
         self._segments = 0
 
     def push(self, values: np.ndarray) -> None:
         """The next rows (M, k)."""
-        held = values if self._held is None else np.concatenate([self._held, values])
-        while len(held) >= self._length:
-            part = held[: self._length]
+        pending = values if self._pending is None else np.concatenate([self._pending, values])
+        while len(pending) >= self._length:
+            part = pending[: self._length]
             lines = np.fft.rfft(self._window[:, None] * (part - part.mean(axis=0)), axis=0)
             self._sum = self._sum + np.abs(lines) ** 2
             self._segments += 1
-            held = held[self._length // 2 :]
-        self._held = held
+            pending = pending[self._length // 2 :]
+        self._pending = pending
 
     def interrupt(self) -> None:
         """A gap precedes the next rows: no segment reaches across it."""
-        self._held = None
+        self._pending = None
 
     def density(self, step: float, width: int) -> tuple[np.ndarray, np.ndarray]:
         """Frequencies (F,), Hz, and one-sided densities (F, k) of rows that are `step` (s) apart, without the mean at 0 Hz."""

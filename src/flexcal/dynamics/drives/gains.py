@@ -28,8 +28,8 @@ def drive_gains(data: RegressionData, payloads: Sequence[float]) -> Estimate:
     payload's share drowns. One below zero turns the sign of what was measured. Raises `FlexcalError` without a declared payload, where
     all or no experiments carry one, or several, as `noise_levels` and `instrumental_fit` do, and where the gains do not settle.
     """
-    held, names = data.observation.model.payload, data.observation.model.joint_names
-    if held is None or not any(payloads) or all(payloads):
+    payload, names = data.observation.model.payload, data.observation.model.joint_names
+    if payload is None or not any(payloads) or all(payloads):
         raise FlexcalError(
             "drive gains need recordings both with and without the payload that robot.yaml declares."
         )
@@ -39,7 +39,7 @@ def drive_gains(data: RegressionData, payloads: Sequence[float]) -> Estimate:
             f"payloads of {masses[0]:g} and {masses[1]:g} kg are two payloads with different centres of mass and inertias; give "
             "recordings of one payload."
         )
-    terms = _Terms(data, payloads, held.joint)
+    terms = _Terms(data, payloads, payload.joint)
     noise = noise_levels(data)
     kept = terms.determined(noise)
     values = _settled(terms, noise, kept)
@@ -101,7 +101,7 @@ class _Terms:
 
     def __init__(self, data: RegressionData, payloads: Sequence[float], link: int) -> None:
         self.data, self._payloads = data, payloads
-        self._base = list(data.base.found.kept)
+        self._base = list(data.base.identifiability.kept)
         first = len(LINK_PARAMETERS) * link
         self._mass, self._rest = first, list(range(first + 1, first + len(LINK_PARAMETERS)))
         n = data.observation.model.n
@@ -111,10 +111,10 @@ class _Terms:
     @property
     def whole(self) -> list[tuple[Batch]]:
         """Every experiment as one batch: all that values need, and too little for their covariance."""
-        found: dict[int, list[TriangularFactor]] = {}
+        by_experiment: dict[int, list[TriangularFactor]] = {}
         for s in self.data.subsystems:
-            found.setdefault(s.experiment, []).append(s.triangle)
-        return [(Batch(0, own[0].rows, tuple(t.factor for t in own)),) for own in found.values()]
+            by_experiment.setdefault(s.experiment, []).append(s.triangle)
+        return [(Batch(0, own[0].rows, tuple(t.factor for t in own)),) for own in by_experiment.values()]
 
     def fit(
         self,
@@ -131,10 +131,10 @@ class _Terms:
     def least_squares(self, noise: Sequence[float], kept: Sequence[int]) -> np.ndarray:
         """(width,) to begin with."""
         system = self._system(noise)
-        found = np.zeros(self._width)
+        solution = np.zeros(self._width)
         scale = 1.0 / np.linalg.norm(system[:, kept], axis=0)
-        found[kept] = scale * np.linalg.lstsq(system[:, kept] * scale, system[:, -1], rcond=None)[0]
-        return found
+        solution[kept] = scale * np.linalg.lstsq(system[:, kept] * scale, system[:, -1], rcond=None)[0]
+        return solution
 
     def determined(self, noise: Sequence[float]) -> list[int]:
         """Numbers of the columns that the data determine."""
@@ -150,16 +150,16 @@ class _Terms:
         return triangular(np.vstack(stack))
 
     def _mapped(self, experiments: Sequence[Sequence[Batch]], values: np.ndarray) -> list[list[Batch]]:
-        found = []
+        mapped = []
         for batches, mass in zip(experiments, self._payloads, strict=True):
             maps = [self._map(joint, mass, values) for joint in range(self.data.observation.model.n)]
-            found.append(
+            mapped.append(
                 [
                     replace(batch, factors=tuple(f @ m for f, m in zip(batch.factors, maps, strict=True)))
                     for batch in batches
                 ]
             )
-        return found
+        return mapped
 
     def _map(self, joint: int, mass: float, values: np.ndarray) -> np.ndarray:
         """(m + 1, 2 width + 1): from a joint's [W, Y] in one experiment to instruments, columns and right-hand side."""

@@ -23,7 +23,7 @@ def stiffness_attenuation(data: RegressionData, estimate: Estimate) -> dict[str,
     matrix = weighted_system(data, noise_levels(data)).matrix
     seen = [i for i, known in enumerate(estimate.identifiable) if known]
     norms = np.linalg.norm(matrix, axis=0)
-    found: dict[str, float] = {}
+    attenuation: dict[str, float] = {}
     for name in stiffnesses:
         own = names.index(name)
         if own not in seen:
@@ -32,5 +32,5 @@ def stiffness_attenuation(data: RegressionData, estimate: Estimate) -> dict[str,
         basis = np.linalg.qr(matrix[:, others] / norms[others])[0]
         left = matrix[:, own] - basis @ (basis.T @ matrix[:, own])
         rows = sum(s.triangle.rows for s in data.subsystems if own in s.column_indices)
-        found[name] = rows / float(estimate.values[name] ** 2 * (left @ left))
-    return found
+        attenuation[name] = rows / float(estimate.values[name] ** 2 * (left @ left))
+    return attenuation

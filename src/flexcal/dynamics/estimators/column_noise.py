@@ -47,16 +47,16 @@ def regressor_errors(recorded: RecordedRows, noisy: Sequence[Experiment]) -> Reg
         passes = (
             regression_blocks(observation, each, recorded.decimation, window) for each in (experiment, other)
         )
-        held = [np.zeros((0, width)) for width in observation.widths]
+        tables = [np.zeros((0, width)) for width in observation.widths]
         count = 0
         for block, spoilt in zip(*passes, strict=True):
             keep = ~block.still if recorded.mask_standstill else np.ones(len(block), dtype=bool)
             count += int(keep.sum())
             parts = _difference(block.where(keep), spoilt.where(keep))
-            held = [reduced([h, part.T]) for h, part in zip(held, parts, strict=True)]
+            tables = [reduced([h, part.T]) for h, part in zip(tables, parts, strict=True)]
         whole = []
         for table, projection, column_indices in zip(
-            held, observation.projection, observation.column_indices, strict=True
+            tables, observation.projection, observation.column_indices, strict=True
         ):
             whole.append(np.column_stack([table[:, :-1] @ projection, table[:, -1]]))
             whole[-1][:, :-1][:, exact[column_indices]] = 0.0

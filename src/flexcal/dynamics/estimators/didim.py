@@ -24,7 +24,7 @@ def direct_and_inverse(data: RegressionData, recorded: RecordedRows) -> Estimate
 
     def step(robot: np.ndarray) -> Estimate:
         simulated = recorded.simulated(robot)
-        found = linear_fit(simulated, noise_levels(simulated))
-        return replace(found, message="Gauss-Newton on simulated torques")
+        estimate = linear_fit(simulated, noise_levels(simulated))
+        return replace(estimate, message="Gauss-Newton on simulated torques")
 
     return simulated_iteration(data, step, "DIDIM")

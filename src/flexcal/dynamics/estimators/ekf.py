@@ -60,12 +60,12 @@ def kalman_filter(data: RegressionData, recorded: RecordedRows) -> Estimate:
                     state.restart()
                 models = StateTransitions.of(steps, about, _smoothing(recorded))
                 state.follow(models, _step_noise(sigma, steps, recorded))
-    found, spread = _settled(state, recorded, torque, unknowns.kept)
-    cost = float(np.linalg.norm(system.right - system.matrix @ found) ** 2)
+    parameters, spread = _settled(state, recorded, torque, unknowns.kept)
+    cost = float(np.linalg.norm(system.right - system.matrix @ parameters) ** 2)
     level = state.squares / max(1, state.count)
     message = f"extended Kalman filter; mean normalised innovation squared {level:.3g}, which should be 1"
     freedom = unknowns.freedom(system)
-    return unknowns.estimate(found, spread.covariance, spread.freedom, cost, freedom, message, _PASSES)
+    return unknowns.estimate(parameters, spread.covariance, spread.freedom, cost, freedom, message, _PASSES)
 
 
 def _smoothing(recorded: RecordedRows) -> int:
@@ -104,13 +104,13 @@ def _settled(
     onward = np.linalg.inv(np.linalg.cholesky(known + sum(e.information.sum(axis=0) for e in scores)))
     begun = np.linalg.solve(root, (state.start - state.parameters)[kept])
     step = onward @ (known @ begun + sum(e.score.sum(axis=0) for e in scores))
-    found = state.parameters.copy()
-    found[kept] += root @ onward.T @ step
+    parameters = state.parameters.copy()
+    parameters[kept] += root @ onward.T @ step
     settled = [e.of(onward).after(step) for e in scores]
     level = state.squares / max(1, state.count)
     root = root @ onward.T
     offsets = offset_scores(recorded.observation, kept, root)
-    return found, covariance_of_scores(settled, root, level, offsets, onward @ known @ onward.T)
+    return parameters, covariance_of_scores(settled, root, level, offsets, onward @ known @ onward.T)
 
 
 class _Filter:
@@ -191,7 +191,7 @@ def _prior(data: RegressionData, unknowns: Unknowns) -> tuple[np.ndarray, np.nda
     keys = [name.rpartition(".")[2] for name in data.names]
     positive = np.array([key in ("rotor_inertia", "viscous", "coulomb") for key in keys]) & (values == 0)
     guess = np.where(positive, std, values)
-    base = data.base.found
+    base = data.base.identifiability
     rows = base.regrouping[[base.kept.index(number) for number in unknowns.kept]]
     start = values.copy()
     start[unknowns.kept] += rows @ (guess - values)

@@ -58,19 +58,19 @@ class EnergyModel(ScalarEquations):
 
     def _stored(self, motion: Motion) -> np.ndarray:
         """Energy of links and rotors by parameter (p + 1, N), the last row zero."""
-        found = np.zeros((len(self.names) + 1, len(motion)))
-        found[: len(LINK_PARAMETERS) * self.model.n] = energy_regressor(self.model, motion.q, motion.dq).T
+        energy = np.zeros((len(self.names) + 1, len(motion)))
+        energy[: len(LINK_PARAMETERS) * self.model.n] = energy_regressor(self.model, motion.q, motion.dq).T
         for column in self._columns(replace(motion, ddq=motion.dq), {}, inertial=True):
-            found[self.names.index(column.name)] += 0.5 * motion.dq[:, column.joint] * column.values
-        return found
+            energy[self.names.index(column.name)] += 0.5 * motion.dq[:, column.joint] * column.values
+        return energy
 
     def _power(self, motion: Motion, memory: Memory) -> np.ndarray:
         """Power of what stores no energy, by parameter, and of the motors and of what acts from outside (p + 1, N)."""
-        found = np.zeros((len(self.names) + 1, len(motion)))
+        power = np.zeros((len(self.names) + 1, len(motion)))
         for column in self._columns(motion, memory, inertial=False):
-            found[self.names.index(column.name)] += motion.dq[:, column.joint] * column.values
-        found[-1] = np.sum(motion.dq * motion.net, axis=1)
-        return found
+            power[self.names.index(column.name)] += motion.dq[:, column.joint] * column.values
+        power[-1] = np.sum(motion.dq * motion.net, axis=1)
+        return power
 
     def _columns(self, motion: Motion, memory: Memory, *, inertial: bool) -> Iterator[Column]:
         for term in self.observation.terms:

@@ -46,10 +46,10 @@ def feasible_least_squares(data: RegressionData) -> Estimate:
         cones,
         float(np.linalg.norm(system.right)) or 1.0,
     )
-    found, rise = fit.solve()
+    nearest, rise = fit.solve()
     parameters = Parameters(
         Parameter(item.name, item.unit, float(value))
-        for item, value in zip(linear.parameters, found, strict=True)
+        for item, value in zip(linear.parameters, nearest, strict=True)
     )
     return replace(
         linear,

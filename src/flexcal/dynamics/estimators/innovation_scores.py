@@ -22,7 +22,7 @@ class InnovationScores:
         self._noise, self._length = position_noise, length
         self._number = 0
         self._state: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
-        self._found: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        self._by_batch: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
     def follow(self, models: StateTransitions, torque_noise: np.ndarray, first_speed: float) -> None:
         """Steps that follow those before; `torque_noise` (n,) is the standard deviation of a step's mean torque (N m)."""
@@ -57,8 +57,8 @@ class InnovationScores:
             innovation_covariance, np.column_stack([innovation, slope[:n], spread[:n]])
         )
         batch = (self._number - 1) // self._length
-        score, information = self._found.get(batch, (0.0, 0.0))
-        self._found[batch] = (
+        score, information = self._by_batch.get(batch, (0.0, 0.0))
+        self._by_batch[batch] = (
             score + slope[:n].T @ weighted[:, 0],
             information + slope[:n].T @ weighted[:, 1 : 1 + slope.shape[1]],
         )
@@ -74,8 +74,8 @@ class InnovationScores:
     def scores(self) -> Scores:
         """Of all steps so far."""
         size = self._root.shape[1]
-        length = max(self._found, default=0) + 1
+        length = max(self._by_batch, default=0) + 1
         score, information = np.zeros((length, size)), np.zeros((length, size, size))
-        for number, (own, part) in self._found.items():
+        for number, (own, part) in self._by_batch.items():
             score[number], information[number] = own, part
-        return Scores(score, information, len(self._found))
+        return Scores(score, information, len(self._by_batch))

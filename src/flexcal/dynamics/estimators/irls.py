@@ -31,21 +31,21 @@ def huber_least_squares(data: RegressionData, recorded: RecordedRows) -> Estimat
     rows beyond the bend of the loss do not answer to the parameters (Huber 1981, section 7.6), for which one number serves all joints.
     Raises `FlexcalError` as `weighted_least_squares` does, and where the steps do not settle.
     """
-    found = weighted_least_squares(data)
+    estimate = weighted_least_squares(data)
     for iteration in range(1, _ITERATIONS + 1):
-        before = found.parameters.coordinates()
+        before = estimate.parameters.coordinates()
         residuals = recorded.residuals(before)
         noise = _robust_noise(data, residuals)
         weights = _weights(residuals, noise)
-        found = linear_fit(recorded.weighted(weights), noise)
-        seen = np.array(found.identifiable)
-        step = np.abs(found.parameters.coordinates() - before)[seen]
-        if np.all(step <= _SETTLED * np.sqrt(np.diag(found.covariance))[seen]):
+        estimate = linear_fit(recorded.weighted(weights), noise)
+        seen = np.array(estimate.identifiable)
+        step = np.abs(estimate.parameters.coordinates() - before)[seen]
+        if np.all(step <= _SETTLED * np.sqrt(np.diag(estimate.covariance))[seen]):
             every = np.concatenate([own[np.isfinite(own)] for own in weights])
             bend = float(np.mean(every) / np.mean(every == 1.0))
             return replace(
-                found,
-                covariance=bend**2 * found.covariance,
+                estimate,
+                covariance=bend**2 * estimate.covariance,
                 message=f"Huber's loss; {np.mean(every < 0.5):.2%} of the rows have a weight below 0.5",
                 iterations=iteration,
             )

@@ -56,10 +56,10 @@ def instrumental_fit(
             "heavier payload where gains are sought, or check `controller:` in robot.yaml."
         )
     root = scale[size:-1, None] * np.linalg.inv(regressors[:size])
-    found = start.copy()
-    found[kept] += root @ right[:size, 0] / scale[-1]
+    parameters = start.copy()
+    parameters[kept] += root @ right[:size, 0] / scale[-1]
     whiten = scale[:size, None] * np.linalg.inv(instruments[:size])
-    cost = float(np.sum((whole[:, size:] @ np.append(start[kept] - found[kept], 1.0)) ** 2))
+    cost = float(np.sum((whole[:, size:] @ np.append(start[kept] - parameters[kept], 1.0)) ** 2))
     covariance = score_covariance(
         experiments,
         noise,
@@ -67,19 +67,19 @@ def instrumental_fit(
             np.vstack([parameter_rows(whiten, kept, own), np.zeros((len(own) + 1, size))])
             for own in column_indices
         ],
-        [np.concatenate([np.zeros(len(own)), -found[own], [1.0]]) for own in column_indices],
+        [np.concatenate([np.zeros(len(own)), -parameters[own], [1.0]]) for own in column_indices],
         root,
         cost / (equations - size),
     )
-    return InstrumentalFit(found, covariance, cost, weakest)
+    return InstrumentalFit(parameters, covariance, cost, weakest)
 
 
 def _columns(column_indices: np.ndarray, kept: Sequence[int], start: np.ndarray) -> np.ndarray:
     """(2 m + 1, 2 k + 1): from a joint's [Z, W, Y] to the kept columns of Z, those of W, and Y less what `start` explains."""
     m, size = len(column_indices), len(kept)
     chosen = parameter_rows(np.eye(size), kept, column_indices)
-    found = np.zeros((2 * m + 1, 2 * size + 1))
-    found[:m, :size] = found[m : 2 * m, size : 2 * size] = chosen
-    found[m : 2 * m, -1] = -start[column_indices]
-    found[-1, -1] = 1.0
-    return found
+    mapping = np.zeros((2 * m + 1, 2 * size + 1))
+    mapping[:m, :size] = mapping[m : 2 * m, size : 2 * size] = chosen
+    mapping[m : 2 * m, -1] = -start[column_indices]
+    mapping[-1, -1] = 1.0
+    return mapping

@@ -26,13 +26,15 @@ def linear_fit(data: RegressionData, noise: Sequence[float]) -> Estimate:
     kept, start = unknowns.kept, data.observation.values()
     factor, scale = unknowns.reduced(system)
     triangle, target = factor[:-1, :-1], factor[:-1, -1]
-    found = start.copy()
-    found[kept] += scale * np.linalg.solve(triangle, target)
+    parameters = start.copy()
+    parameters[kept] += scale * np.linalg.solve(triangle, target)
     freedom = unknowns.freedom(system)
     cost = float(factor[-1, -1] ** 2)
     root = scale[:, None] * np.linalg.solve(triangle, np.eye(len(kept)))
-    spread = batch_covariance(data, noise, found, kept, root, cost / freedom)
-    return unknowns.estimate(found, spread.covariance, spread.freedom, cost, freedom, "linear least squares")
+    spread = batch_covariance(data, noise, parameters, kept, root, cost / freedom)
+    return unknowns.estimate(
+        parameters, spread.covariance, spread.freedom, cost, freedom, "linear least squares"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +48,7 @@ class Unknowns:
     @classmethod
     def of(cls, data: RegressionData, system: TriangularFactor) -> Unknowns:
         """The base parameters that a weighted `system` of all columns determines."""
-        base = data.base.found
+        base = data.base.identifiability
         structural = [data.names[i] for i in base.kept]
         seen = analyse(system.matrix[:, base.kept], structural, prefer=structural)
         return cls(data, [base.kept[i] for i in seen.kept], seen.dropped)
@@ -68,7 +70,7 @@ class Unknowns:
 
     def estimate(
         self,
-        found: np.ndarray,
+        parameters: np.ndarray,
         covariance: np.ndarray,
         covariance_freedom: float,
         cost: float,
@@ -76,14 +78,15 @@ class Unknowns:
         message: str,
         iterations: int = 1,
     ) -> Estimate:
-        """Of all parameters `found` (p,), with the `covariance` (k, k) of the kept ones."""
-        names, base, model = self.data.names, self.data.base.found, self.data.observation.model
+        """Of all `parameters` (p,), with the `covariance` (k, k) of the kept ones."""
+        names, base, model = self.data.names, self.data.base.identifiability, self.data.observation.model
         whole = np.zeros((len(names), len(names)))
         whole[np.ix_(self.kept, self.kept)] = covariance
         seen = set(self.kept)
         return Estimate(
             parameters=Parameters(
-                Parameter(name, unit_in(model, name), float(v)) for name, v in zip(names, found, strict=True)
+                Parameter(name, unit_in(model, name), float(v))
+                for name, v in zip(names, parameters, strict=True)
             ),
             covariance=whole,
             rank=len(self.kept),

@@ -84,28 +84,30 @@ def maximum_likelihood(data: RegressionData, recorded: RecordedRows) -> Estimate
     ]
     observation, factor = recorded.observation, recorded.decimation.factor
     means = [_mean_rows(observation, motion, factor) for motion in motions]
-    found = weighted_least_squares(data).parameters.coordinates()
+    parameters = weighted_least_squares(data).parameters.coordinates()
     for iteration in range(1, _ITERATIONS + 1):
-        missed = [_residuals(observation, motion, found, factor) for motion in motions]
+        missed = [_residuals(observation, motion, parameters, factor) for motion in motions]
         roots = [_root(_scatter(own), rows) for own, rows in zip(missed, means, strict=True)]
         parts = [_whitened(rows, root) for rows, root in zip(means, roots, strict=True)]
         stack = np.concatenate(parts)
         system = TriangularFactor.of(stack[:, :-1], stack[:, -1])
         unknowns = Unknowns.of(data, system)
-        before, kept = found, unknowns.kept
+        before, kept = parameters, unknowns.kept
         triangle, scale = unknowns.reduced(system)
-        found = observation.values()
-        found[kept] += scale * np.linalg.solve(triangle[:-1, :-1], triangle[:-1, -1])
+        parameters = observation.values()
+        parameters[kept] += scale * np.linalg.solve(triangle[:-1, :-1], triangle[:-1, -1])
         freedom, cost = unknowns.freedom(system), float(triangle[-1, -1] ** 2)
         root = scale[:, None] * np.linalg.solve(triangle[:-1, :-1], np.eye(len(kept)))
         apart = [_whitened(np.moveaxis(own, 0, -1), left) for own, left in zip(missed, roots, strict=True)]
         scores = [part[:, kept].T @ own for part, own in zip(parts, apart, strict=True)]
         covariance, known = _covariance(scores, root)
         level = max(1.0, cost / freedom)
-        if np.all(np.abs(found - before)[kept] <= _SETTLED * np.sqrt(level) * np.linalg.norm(root, axis=1)):
+        if np.all(
+            np.abs(parameters - before)[kept] <= _SETTLED * np.sqrt(level) * np.linalg.norm(root, axis=1)
+        ):
             periods = " + ".join(str(len(motion.periods)) for motion in motions)
             message = f"maximum likelihood from {periods} periods; mean squared error {cost / freedom:.3g} of the noise"
-            return unknowns.estimate(found, level * covariance, known, cost, freedom, message, iteration)
+            return unknowns.estimate(parameters, level * covariance, known, cost, freedom, message, iteration)
     raise FlexcalError(
         f"the noise estimate does not converge in {_ITERATIONS} iterations; use --estimator wls."
     )
@@ -131,11 +133,11 @@ def _mean_rows(observation: Observation, motion: RepeatedMotion, factor: int) ->
 def _coefficients(observation: Observation, motion: Motion, memory: Memory, factor: int) -> np.ndarray:
     """Those of [W, Y] for one period (2 K + 1, n, p + 1)."""
     systems = [_rows(system.T, factor) for system in observation.systems(motion, memory)]
-    found = np.zeros((len(systems[0]), observation.model.n, len(observation.names) + 1))
+    coefficients = np.zeros((len(systems[0]), observation.model.n, len(observation.names) + 1))
     for joint, (system, column_indices) in enumerate(zip(systems, observation.column_indices, strict=True)):
-        found[:, joint, column_indices] = system[:, :-1]
-        found[:, joint, -1] = system[:, -1]
-    return found
+        coefficients[:, joint, column_indices] = system[:, :-1]
+        coefficients[:, joint, -1] = system[:, -1]
+    return coefficients
 
 
 def _rows(values: np.ndarray, factor: int) -> np.ndarray:
@@ -201,14 +203,14 @@ def _shapes(squares: np.ndarray, lines: np.ndarray) -> np.ndarray:
 
 def _missed(observation: Observation, motion: Motion, parameters: np.ndarray, memory: Memory) -> np.ndarray:
     """τ − W χ (N, n) of one period."""
-    found = []
+    residuals = []
     for start in range(0, len(motion), _BLOCK):
         part = motion.part(start, min(start + _BLOCK, len(motion)))
         systems = observation.systems(part, memory)
-        found.append(
+        residuals.append(
             [s[-1] - parameters[m] @ s[:-1] for s, m in zip(systems, observation.column_indices, strict=True)]
         )
-    return np.concatenate(found, axis=1).T
+    return np.concatenate(residuals, axis=1).T
 
 
 def _root(covariance: np.ndarray, rows: np.ndarray) -> np.ndarray:

@@ -43,7 +43,7 @@ class RecordedRows:
 
     def residuals(self, parameters: np.ndarray) -> list[np.ndarray]:
         """Y − W χ (equations, rows), N m, of every experiment at `parameters` (p,), NaN for rows that are left out."""
-        found = []
+        by_experiment = []
         for experiment, window in zip(self.experiments, self.windows, strict=True):
             count = experiment.samples // self.decimation.factor + 1
             missed = np.full((len(self.observation.labels), count), np.nan)
@@ -52,8 +52,8 @@ class RecordedRows:
                 missed[:, part.number] = part.torque - part.predicted(
                     self.observation.column_indices, parameters
                 )
-            found.append(missed)
-        return found
+            by_experiment.append(missed)
+        return by_experiment
 
     def weighted(self, weights: Sequence[np.ndarray]) -> RegressionData:
         """The equations, each multiplied by the root of its weight: (equations, rows) an experiment, as `residuals` are."""

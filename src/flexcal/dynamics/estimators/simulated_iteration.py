@@ -29,15 +29,15 @@ def simulated_iteration(data: RegressionData, step: Callable[[np.ndarray], Estim
     at the start. Raises `FlexcalError` where the steps do not settle.
     """
     robot = _first(data)
-    kept, regrouping = np.array(data.base.found.kept), data.base.found.regrouping
+    kept, regrouping = np.array(data.base.identifiability.kept), data.base.identifiability.regrouping
     for iteration in range(1, _ITERATIONS + 1):
-        found = step(robot)
-        moved = regrouping @ (found.parameters.coordinates() - robot)
-        seen = np.array(found.identifiable)[kept]
-        std = np.sqrt(np.diag(found.covariance))[kept]
+        estimate = step(robot)
+        moved = regrouping @ (estimate.parameters.coordinates() - robot)
+        seen = np.array(estimate.identifiable)[kept]
+        std = np.sqrt(np.diag(estimate.covariance))[kept]
         room = _SETTLED * std + _ROUNDING * np.abs(regrouping) @ np.abs(robot)
         if np.all((np.abs(moved) <= room)[seen]):
-            return replace(found, iterations=iteration)
+            return replace(estimate, iterations=iteration)
         robot[kept] += moved if iteration <= _WHOLE else 0.5 * moved
     raise FlexcalError(f"{name} does not converge in {_ITERATIONS} simulations; use --estimator wls.")
 

@@ -43,18 +43,18 @@ def total_least_squares(data: RegressionData, errors: RegressionData) -> Estimat
     values, directions = np.linalg.svd(solve_triangular(factor, spoilt.T, trans=1).T)[1:]
     level = 1.0 / values[0] ** 2
     along = np.linalg.solve(factor, directions[0])
-    found = start.copy()
-    found[kept] -= scale * along[:-1] / along[-1]
-    cost = float(np.linalg.norm(system.right - system.matrix @ found) ** 2)
+    parameters = start.copy()
+    parameters[kept] -= scale * along[:-1] / along[-1]
+    cost = float(np.linalg.norm(system.right - system.matrix @ parameters) ** 2)
     freedom = unknowns.freedom(system)
     triangle, errors_seen = factor[:-1, :-1], spoilt[:-1, :-1]
     root = scale[:, None] * np.linalg.solve(triangle, np.eye(len(kept)))
-    spread = batch_covariance(data, noise, found, kept, root, cost / freedom)
+    spread = batch_covariance(data, noise, parameters, kept, root, cost / freedom)
     seen = triangle.T @ triangle
     more = np.linalg.solve(seen - level * errors_seen.T @ errors_seen, seen) * scale[:, None] / scale
     covariance = more @ spread.covariance @ more.T
     message = f"total least squares; the errors are {np.sqrt(level):.3g} times as large as those of position and torque noise"
-    return unknowns.estimate(found, covariance, spread.freedom, cost, freedom, message)
+    return unknowns.estimate(parameters, covariance, spread.freedom, cost, freedom, message)
 
 
 def _torque_share(own: Subsystem, wrong: Subsystem, sigma: float, parameters: np.ndarray) -> float:

@@ -37,9 +37,10 @@ def noise_levels(data: RegressionData) -> list[float]:
             )
         noise.append(_first(data, s) if s.undriven else s.floored(sigma))
     for _ in range(_ROUNDS if any(s.undriven for s in data.subsystems) else 0):
-        found = _fitted(data, noise)
+        parameters = _fitted(data, noise)
         noise = [
-            _left(s, found) if s.undriven else sigma for s, sigma in zip(data.subsystems, noise, strict=True)
+            _left(s, parameters) if s.undriven else sigma
+            for s, sigma in zip(data.subsystems, noise, strict=True)
         ]
     return noise
 
@@ -49,9 +50,9 @@ def _fitted(data: RegressionData, noise: list[float]) -> np.ndarray:
     system = weighted_system(data, noise)
     unknowns = Unknowns.of(data, system)
     factor, scale = unknowns.reduced(system)
-    found = data.observation.values()
-    found[unknowns.kept] += scale * np.linalg.solve(factor[:-1, :-1], factor[:-1, -1])
-    return found
+    parameters = data.observation.values()
+    parameters[unknowns.kept] += scale * np.linalg.solve(factor[:-1, :-1], factor[:-1, -1])
+    return parameters
 
 
 def _first(data: RegressionData, s: Subsystem) -> float:

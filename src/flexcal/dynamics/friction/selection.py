@@ -58,12 +58,12 @@ class ModelUncertainty:
     def growth(self, estimate: Estimate) -> dict[str, float]:
         """By how much each standard deviation of an estimate that is already `widened` grew, as a factor."""
         squares = np.mean(self.deviations**2, axis=0)
-        found = {}
+        factors = {}
         for name, square in zip(self.names, squares, strict=True):
             std = estimate.std(name) if name in estimate.parameters else None
             if std:
-                found[name] = float(1.0 / np.sqrt(max(1.0 - square / std**2, 1e-6)))
-        return found
+                factors[name] = float(1.0 / np.sqrt(max(1.0 - square / std**2, 1e-6)))
+        return factors
 
 
 _CLASSIC = ("viscous", "coulomb", "torque_offset")
@@ -109,7 +109,7 @@ def select_friction(
     candidates = [candidate for name in library for candidate in candidate_shapes(name, scale)]
     wide = Observation(model, (*plain, *candidates))
     systems = equations(wide)
-    base = BaseParameters.of(Observation(model, plain)).found
+    base = BaseParameters.of(Observation(model, plain)).identifiability
     fixed = [wide.names.index(name) for name in base.kept_names]
     reach = -(-2 * decimation.support // decimation.factor)
     blocks = folds(systems, wide.column_indices, len(wide.names), fixed, reach)
@@ -144,5 +144,5 @@ def _scale(
     classic = Observation(model, CLASSIC)
     systems = equations(classic)
     data = RegressionData.of(classic, BaseParameters.of(classic), systems)
-    found = weighted_least_squares(data).parameters.coordinates()
-    return ExcitationScale.of(systems, classic, found[: len(LINK_PARAMETERS) * model.n])
+    parameters = weighted_least_squares(data).parameters.coordinates()
+    return ExcitationScale.of(systems, classic, parameters[: len(LINK_PARAMETERS) * model.n])

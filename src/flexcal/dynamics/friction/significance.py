@@ -35,7 +35,7 @@ class CandidateFit:
         regrouping = np.zeros((len(kept), len(names)))
         regrouping[range(len(kept)), kept] = 1.0
         base = replace(
-            BaseParameters.of(replace(self.observation, terms=())).found,
+            BaseParameters.of(replace(self.observation, terms=())).identifiability,
             names=names,
             rank=len(kept),
             kept=kept,
@@ -50,13 +50,13 @@ class CandidateFit:
         times the number of parameters (Bonferroni). The covariance allows for noise with a memory; a term that acts at one joint counts.
         At least eight degrees of freedom are taken: torques that a model with too few terms misses pass for noise with a long memory.
         """
-        found = self.estimate([*before, *group])
+        estimate = self.estimate([*before, *group])
         ratios = [
-            abs(found.parameters[number].value) / np.sqrt(found.covariance[number, number])
+            abs(estimate.parameters[number].value) / np.sqrt(estimate.covariance[number, number])
             for number in group
-            if found.identifiable[number]
+            if estimate.identifiable[number]
         ]
         if not ratios:
             return 1.0
-        freedom = max(_FREEDOM, found.covariance_freedom or _FREEDOM)
+        freedom = max(_FREEDOM, estimate.covariance_freedom or _FREEDOM)
         return float(min(1.0, 2.0 * len(ratios) * stdtr(freedom, -max(ratios))))

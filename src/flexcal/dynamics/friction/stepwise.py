@@ -117,9 +117,9 @@ def best_shapes(
     chosen: list[Candidate] = []
     trials: list[SelectionStep] = []
     for name in names:
-        found, tried = _best(folds, plain, groups, chosen, [c for c in groups if c.name == name])
+        best, tried = _best(folds, plain, groups, chosen, [c for c in groups if c.name == name])
         trials += tried
-        chosen.append(found)
+        chosen.append(best)
     return FrictionChoice(tuple(chosen), tuple(trials))
 
 

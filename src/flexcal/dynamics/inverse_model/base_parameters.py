@@ -21,21 +21,21 @@ nothing of the links beside their noise, which would bend the stiffness."""
 
 @dataclass(frozen=True, eq=False)
 class BaseParameters:
-    """`found` names the kept columns of an observation and what absorbs the others; its rank is the structural rank."""
+    """The base parameters of an observation: `identifiability` names its kept columns and what absorbs the others."""
 
-    found: Identifiability
+    identifiability: Identifiability
 
     @property
     def rank(self) -> int:
         """Structural rank: the number of base parameters."""
-        return self.found.rank
+        return self.identifiability.rank
 
     @property
     def expressions(self) -> tuple[str, ...]:
         """Each base parameter written out, as "link_1.Izz + joint_1.rotor_inertia + 0.0506 link_3.mass"."""
         return tuple(
-            _written(self.found.names[kept], row, self.found.names)
-            for kept, row in zip(self.found.kept, self.found.regrouping, strict=True)
+            _written(self.identifiability.names[kept], row, self.identifiability.names)
+            for kept, row in zip(self.identifiability.kept, self.identifiability.regrouping, strict=True)
         )
 
     @classmethod

@@ -36,12 +36,12 @@ def inertial_columns(model: RobotModel) -> tuple[InertialColumns, ...]:
     q, dq, ddq = random_states(model, _SAMPLES_PER_COLUMN * len(names))
     matrix = torque_regressor(model, q, dq, ddq)
     scale = scale_by_kind(matrix.transpose(1, 0, 2).reshape(-1, len(names)), names)
-    found = []
+    joints = []
     for joint in range(model.n):
         felt = np.array([number for number in range(len(names)) if _beyond(model, joint, number)])
         seen = analyse(matrix[:, joint, felt], [names[number] for number in felt], scale=scale[felt])
-        found.append(InertialColumns(felt, felt[list(seen.kept)], seen.regrouping))
-    return tuple(found)
+        joints.append(InertialColumns(felt, felt[list(seen.kept)], seen.regrouping))
+    return tuple(joints)
 
 
 def _beyond(model: RobotModel, joint: int, column: int) -> bool:

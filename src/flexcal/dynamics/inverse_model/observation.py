@@ -76,13 +76,13 @@ class Observation:
     @cached_property
     def projection(self) -> tuple[np.ndarray, ...]:
         """For every equation (reduced, columns): its columns from its reduced ones."""
-        found = []
+        projections = []
         for links, own in zip(self._links, self._drives, strict=True):
             kept, felt = links.projection.shape
             projection = np.eye(kept + len(own), felt + len(own), k=felt - kept)
             projection[:kept, :felt] = links.projection
-            found.append(projection)
-        return tuple(found)
+            projections.append(projection)
+        return tuple(projections)
 
     @cached_property
     def _links(self) -> tuple[InertialColumns, ...]:
@@ -157,18 +157,18 @@ class Observation:
         where there are springs and the motion has no arm side.
         """
         links, drives = self._places
-        found = np.empty((sum(self.widths), len(motion)))
+        rows = np.empty((sum(self.widths), len(motion)))
         if self._tilted is None:
-            write_torque_regressor(self.model, *self._link_states(motion), links, found)
+            write_torque_regressor(self.model, *self._link_states(motion), links, rows)
         else:
-            self._tilted.write(self._link_states(motion), motion, links, found)
+            self._tilted.write(self._link_states(motion), motion, links, rows)
         undriven = np.zeros((len(motion), len(self.bearings)))
         right = [motion.net, motion.torque[:, self._torques[self.model.n :]], undriven]
-        found[np.cumsum(self.widths) - 1] = np.hstack(right).T
+        rows[np.cumsum(self.widths) - 1] = np.hstack(right).T
         columns = self._drive_columns(motion, {} if memory is None else memory)
         for place, column in zip(drives, columns, strict=True):
-            found[place] = column.values
-        return found
+            rows[place] = column.values
+        return rows
 
     def systems(self, motion: Motion, memory: Memory | None = None) -> list[np.ndarray]:
         """For every equation all its columns and, last, its torque (columns + 1, N), where `reduced` leaves some out."""
@@ -212,14 +212,14 @@ class Observation:
         if self._tilted is not None:
             return [system[:-1] for system in self.systems(motion)]
         links = torque_regressor(self.model, *self._link_states(motion))
-        found = [np.zeros((len(own), len(motion))) for own in self.column_indices]
+        values = [np.zeros((len(own), len(motion))) for own in self.column_indices]
         for joint, own in enumerate(self._links[: self.model.n]):
-            found[joint][: len(own.felt)] = links[:, joint, own.felt].T
+            values[joint][: len(own.felt)] = links[:, joint, own.felt].T
         number = {name: i for i, name in enumerate(self.names)}
         for column in self._drive_columns(motion, {}):
             own = self.column_indices[column.joint]
-            found[column.joint][np.searchsorted(own, number[column.name])] = column.values
-        return found
+            values[column.joint][np.searchsorted(own, number[column.name])] = column.values
+        return values
 
     def values(self) -> np.ndarray:
         """The model's values of all columns (p,), zero where it knows none."""

@@ -79,7 +79,9 @@ class TiltedBearings:
         self._tree.torque_regressor(self._geometry, self.model.gravity, q, dq, ddq, wide, out)
 
     def _whole(self, values: np.ndarray, motion: Motion, order: int) -> np.ndarray:
-        found = np.empty((len(values), len(self.coordinates)))
+        coordinates = np.empty((len(values), len(self.coordinates)))
         for number, (joint, component) in enumerate(self.coordinates):
-            found[:, number] = values[:, joint] if component == 2 else motion.tilt(component, order)[:, joint]
-        return found
+            coordinates[:, number] = (
+                values[:, joint] if component == 2 else motion.tilt(component, order)[:, joint]
+            )
+        return coordinates

@@ -20,7 +20,7 @@ offset, relative to the Coulomb friction of its joint."""
 
 @dataclass(frozen=True, eq=False)
 class PayloadEquations:
-    """Equations of several recordings, of which `loaded` (one each) tells where the payload is `held`.
+    """Equations of several recordings, of which `loaded` (one each) tells where the payload `attached` is held.
 
     Unknown are y and z of the `prior`, what friction is beyond the robot's own in the loaded recordings, and the payload's ten
     parameters φ in its frame, in this order. `data` are equations of links and drives, with the columns of an `FlexibilityCorrection` each.
@@ -28,7 +28,7 @@ class PayloadEquations:
 
     data: RegressionData
     loaded: Sequence[bool]
-    held: Payload
+    attached: Payload
     prior: RobotPrior
 
     @cached_property
@@ -70,13 +70,13 @@ class PayloadEquations:
     def batches(self) -> list[list[Batch]]:
         """The equations of every recording in parts that follow each other, of these unknowns."""
         joints = range(self.data.observation.model.n)
-        maps = {held: [self._map(joint, held) for joint in joints] for held in set(self.loaded)}
+        maps = {loaded: [self._map(joint, loaded) for joint in joints] for loaded in set(self.loaded)}
         return [
             [
-                replace(batch, factors=tuple(f @ m for f, m in zip(batch.factors, maps[held], strict=True)))
+                replace(batch, factors=tuple(f @ m for f, m in zip(batch.factors, maps[loaded], strict=True)))
                 for batch in own
             ]
-            for own, held in zip(self.data.batches, self.loaded, strict=True)
+            for own, loaded in zip(self.data.batches, self.loaded, strict=True)
         ]
 
     def system(self, noise: Sequence[float]) -> np.ndarray:
@@ -91,21 +91,21 @@ class PayloadEquations:
     def coefficients(self, unknowns: np.ndarray, loaded: bool) -> np.ndarray:
         """χ (p,) of all columns of `data` with which W χ are the torques that `unknowns` (u,) predict, with the payload or without."""
         missed = np.append(-unknowns, 1.0)
-        found = np.zeros(len(self.data.names))
+        parameters = np.zeros(len(self.data.names))
         for joint, column_indices in enumerate(self.data.observation.column_indices):
-            found[column_indices] = -(self._map(joint, loaded) @ missed)[:-1]
-        return found
+            parameters[column_indices] = -(self._map(joint, loaded) @ missed)[:-1]
+        return parameters
 
     def _map(self, joint: int, loaded: bool) -> np.ndarray:
         """(m + 1, unknowns + 1): from a joint's [W, Y] to its equations."""
         names, column_indices = self.data.names, self.data.observation.column_indices[joint]
-        base = {number: row for row, number in enumerate(self.data.base.found.kept)}
+        base = {number: row for row, number in enumerate(self.data.base.identifiability.kept)}
         result = np.zeros((len(column_indices) + 1, len(self.names) + 1))
         first = self.prior.free.shape[1]
         known = slice(first, first + self.prior.base_root.shape[1])
         changes = {name: known.stop + number for number, name in enumerate(self._rubbing)}
         errors = dict(zip(map(error_column, self.prior.sources), self.prior.source_root, strict=True))
-        moved, link = payload_to_link_frame(self.held), len(LINK_PARAMETERS) * self.held.joint
+        moved, link = payload_to_link_frame(self.attached), len(LINK_PARAMETERS) * self.attached.joint
         result[-1, -1] = 1.0
         for row, number in zip(result, column_indices, strict=False):
             name = names[number]
@@ -124,10 +124,10 @@ class PayloadEquations:
         return result
 
 
-def payload_to_link_frame(held: Payload) -> np.ndarray:
+def payload_to_link_frame(payload: Payload) -> np.ndarray:
     """(10, 10): from a body's ten parameters in the payload's frame to those in the frame of the link that carries it."""
     place = np.eye(4)
-    place[:3, :3], place[:3, 3] = held.rotation, held.translation
+    place[:3, :3], place[:3, 3] = payload.rotation, payload.translation
     moved = place @ PSEUDO_INERTIA @ place.T
     basis = PSEUDO_INERTIA.reshape(len(LINK_PARAMETERS), -1)
     return np.linalg.lstsq(basis.T, moved.reshape(len(LINK_PARAMETERS), -1).T, rcond=None)[0]

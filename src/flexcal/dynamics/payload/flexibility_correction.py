@@ -150,7 +150,7 @@ class _Course:
 
 def _slow(experiment: Experiment) -> list[Motion]:
     """What a low-pass leaves of every stretch of an experiment, every so many samples, the last one among them."""
-    found, longest = [], 0.0
+    slow_parts, longest = [], 0.0
     for stretch in stretches(experiment.blocks()):
         whole = Motion.joined(stretch)
         step = float(whole.time[1] - whole.time[0]) if len(whole) > 1 else 0.0
@@ -160,10 +160,10 @@ def _slow(experiment: Experiment) -> list[Motion]:
         stride = max(1, int(1.0 / (_RATE_HZ * step)))
         some = slice((len(whole) - 1) % stride, None, stride)
         q, dq, ddq = (_low_passed(values, step)[some] for values in (whole.q, whole.dq, whole.ddq))
-        found.append(Motion(whole.time[some], q, dq, ddq, whole.torque[some]))
-    if not found:
+        slow_parts.append(Motion(whole.time[some], q, dq, ddq, whole.torque[some]))
+    if not slow_parts:
         raise FlexcalError(f"{experiment.name}: {longest:.2g} s of motion are too short; record for longer.")
-    return found
+    return slow_parts
 
 
 def _low_passed(values: np.ndarray, step: float) -> np.ndarray:

@@ -76,47 +76,49 @@ def identify_payload(equations: PayloadEquations) -> PayloadFit:
     (`identified_moments`). Raises `FlexcalError` as `residual_noise` does, and where the 95 % interval of the mass contains zero
     or lies below it.
     """
-    held, noise = equations.held, first_noise(equations)
-    found = _solve(equations, noise, np.zeros(len(LINK_PARAMETERS)))
+    payload, noise = equations.attached, first_noise(equations)
+    solution = _solve(equations, noise, np.zeros(len(LINK_PARAMETERS)))
     for _ in range(_ROUNDS):
         start = np.zeros(len(LINK_PARAMETERS))
-        if found.missing and found.values[0] > 0:
-            start = _declared(held, float(found.values[0]))
-        noise = residual_noise(equations, noise, found.unknowns, found.unknowns_root)
-        found = _solve(equations, noise, start)
-    quantile = student_quantile(0.975, found.freedom)
-    least = float(found.values[0]) - quantile * float(np.sqrt(found.covariance[0, 0]))
-    if "payload.mass" in {entry.name for entry in found.missing}:
+        if solution.missing and solution.values[0] > 0:
+            start = _declared(payload, float(solution.values[0]))
+        noise = residual_noise(equations, noise, solution.unknowns, solution.unknowns_root)
+        solution = _solve(equations, noise, start)
+    quantile = student_quantile(0.975, solution.freedom)
+    least = float(solution.values[0]) - quantile * float(np.sqrt(solution.covariance[0, 0]))
+    if "payload.mass" in {entry.name for entry in solution.missing}:
         raise FlexcalError(
             "the payload's mass is not identifiable beside the robot's own inertia in this motion; move the joints that lift "
             "it, or give --free logs."
         )
-    most, robot = 2 * float(found.values[0]) - least, float(equations.data.observation.model.mass.sum())
+    most, robot = 2 * float(solution.values[0]) - least, float(equations.data.observation.model.mass.sum())
     if most < -_UNSEEN * robot:
         raise FlexcalError(
-            f"the estimated mass of the payload is negative ({found.values[0]:.3g} kg, 95 % interval {least:.3g} to {most:.3g} kg), as of "
-            "no body: the robot's own dynamics were identified with a payload, are of another robot, or the torques have another sign "
-            "or scale in these logs."
+            f"the estimated mass of the payload is negative ({solution.values[0]:.3g} kg, 95 % interval {least:.3g} to {most:.3g} kg), "
+            "as of no body: the robot's own dynamics were identified with a payload, are of another robot, or the torques have another "
+            "sign or scale in these logs."
         )
     if not least > 0:
         raise FlexcalError(
-            f"no payload can be told from zero: its estimated mass is {found.values[0]:.3g} kg, with an upper 95 % limit of {most:.3g} kg; "
-            "check that it was held, the signs of the torques and the robot's own dynamics."
+            f"no payload can be told from zero: its estimated mass is {solution.values[0]:.3g} kg, with an upper 95 % limit of "
+            f"{most:.3g} kg; check that it was held, the signs of the torques and the robot's own dynamics."
         )
-    nearest = nearest_body(found.values, found.root, found.unseen)
+    nearest = nearest_body(solution.values, solution.root, solution.unseen)
     body = payload_from_link_frame(nearest.parameters)
-    covariance = body_covariance(nearest.parameters, found.covariance)
+    covariance = body_covariance(nearest.parameters, solution.covariance)
     half = quantile * np.sqrt(np.diag(covariance))
-    missing = {entry.name for entry in found.missing}
+    missing = {entry.name for entry in solution.missing}
     told = np.array([f"payload.{key}" not in missing for key in LINK_PARAMETERS])
     told[4:] = identified_moments(body, half[4:]) if told[4:].all() else False
-    body = np.where(told, body, _body(held, float(body[0])))
+    body = np.where(told, body, _body(payload, float(body[0])))
     covariance = np.where(np.outer(told, told), covariance, 0.0)
     covariance[0] /= body[0]
     covariance[:, 0] /= body[0]
-    estimate = _estimate(found, nearest.rise, body, covariance, told)
-    error, joint_errors = _missed_shares(equations, found.unknowns)
-    return PayloadFit(estimate, nearest.rise, error, joint_errors, _own_error(equations.data), found.unknowns)
+    estimate = _estimate(solution, nearest.rise, body, covariance, told)
+    error, joint_errors = _missed_shares(equations, solution.unknowns)
+    return PayloadFit(
+        estimate, nearest.rise, error, joint_errors, _own_error(equations.data), solution.unknowns
+    )
 
 
 def _own_error(data: RegressionData) -> float:
@@ -125,14 +127,14 @@ def _own_error(data: RegressionData) -> float:
     return float(np.sqrt(left / sum(np.sum(s.triangle.right**2) for s in data.subsystems)))
 
 
-def _body(held: Payload, mass: float) -> np.ndarray:
+def _body(payload: Payload, mass: float) -> np.ndarray:
     """The declared body (10,), scaled to a mass."""
-    share = mass / held.mass if held.mass > 0 else 0.0
-    return np.concatenate([[mass], held.com, share * held.moments])
+    share = mass / payload.mass if payload.mass > 0 else 0.0
+    return np.concatenate([[mass], payload.com, share * payload.moments])
 
 
-def _declared(held: Payload, mass: float) -> np.ndarray:
-    return link_frame_from_payload(_body(held, mass))
+def _declared(payload: Payload, mass: float) -> np.ndarray:
+    return link_frame_from_payload(_body(payload, mass))
 
 
 def _solve(equations: PayloadEquations, noise: Sequence[float], start: np.ndarray) -> _Solution:
@@ -213,7 +215,7 @@ def _scale(system: np.ndarray, own: slice) -> np.ndarray:
 
 
 def _estimate(
-    found: _Solution,
+    solution: _Solution,
     rise: float,
     body: np.ndarray,
     covariance: np.ndarray,
@@ -233,11 +235,11 @@ def _estimate(
         rank=int(told.sum()),
         dropped=tuple(Dropped(name) for name, seen in zip(names, told, strict=True) if not seen),
         identifiable=tuple(bool(seen) for seen in told),
-        cost=found.cost + rise,
-        chi2=found.chi2 + rise,
-        degrees_of_freedom=found.freedom_left,
+        cost=solution.cost + rise,
+        chi2=solution.chi2 + rise,
+        degrees_of_freedom=solution.freedom_left,
         status="converged",
         message=message,
         iterations=1,
-        covariance_freedom=found.freedom,
+        covariance_freedom=solution.freedom,
     )

@@ -38,8 +38,8 @@ def nearest_body(parameters: np.ndarray, root: np.ndarray, unseen: np.ndarray) -
     reference = pseudo_inertia(extended(Inertia(mass, parameters[1:4] / mass, np.zeros((3, 3)))))
     cone = Cone(np.arange(len(parameters)), PSEUDO_INERTIA, reference, _FLOOR, _FAINT)
     size = float(np.linalg.norm(np.linalg.lstsq(root, parameters, rcond=None)[0]))
-    found, rise = ConicFit(parameters, root, unseen, (cone,), size).solve()
-    return NearestBody(found, rise)
+    nearest, rise = ConicFit(parameters, root, unseen, (cone,), size).solve()
+    return NearestBody(nearest, rise)
 
 
 def payload_from_link_frame(parameters: np.ndarray) -> np.ndarray:

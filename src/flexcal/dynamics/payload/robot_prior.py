@@ -36,24 +36,26 @@ class RobotPrior:
         cls,
         observation: Observation,
         base: BaseParameters,
-        found: Estimate | None,
+        estimate: Estimate | None,
         sources: tuple[str, ...] = (),
     ) -> RobotPrior:
-        """From the posterior of the observed model, in which `found` is the block `dynamics`; without it the base parameters are free.
+        """From the posterior of the observed model, in which `estimate` is the block `dynamics`; without it the base parameters are free.
 
-        A base parameter that the recordings of `found` hid is free, with those that took its place; so is friction that was found beside
+        A base parameter that the recordings of `estimate` hid is free, with those that took its place; so is friction that was found beside
         terms which are not the classic ones of `observation`, and a drive's parameter that was not found at all. The `sources` of error
         are as the posterior knows them, else as uncertain as declared.
         """
         model = observation.model
         links = {joint.link for joint in model.joints}
-        kept = base.found.kept_names
+        kept = base.identifiability.kept_names
         owned = [
             name
             for name in model.posterior.parameters.names
             if name.rpartition(".")[0] in links or name in observation.names
         ]
-        dynamics = [name for name in owned if model.posterior.determines(name)] if found is not None else []
+        dynamics = (
+            [name for name in owned if model.posterior.determines(name)] if estimate is not None else []
+        )
         others = [name for name in sources if name not in dynamics]
         items = (
             *model.posterior.parameters.subset(dynamics),
@@ -62,8 +64,8 @@ class RobotPrior:
         covariance = model.posterior.prior(Parameters(items))[1]
         root = _root(covariance)
         base_root = _jacobian(observation, base, owned, dynamics) @ root[: len(dynamics)]
-        free = np.eye(len(kept)) if found is None else _free(found, kept)
-        values = base.found.regrouping @ observation.values()
+        free = np.eye(len(kept)) if estimate is None else _free(estimate, kept)
+        values = base.identifiability.regrouping @ observation.values()
         return cls(
             values, base_root, free, sources, root[[(dynamics + others).index(name) for name in sources]]
         )
@@ -91,7 +93,7 @@ def _jacobian(
         robot = model.with_values(dict(zip(owned, own.natural(moved), strict=True)))
         known = robot.values
         values = np.nan_to_num([known.get(name, 0.0) for name in observation.names])
-        return base.found.regrouping @ values
+        return base.identifiability.regrouping @ values
 
     for k, name in enumerate(names):
         size = _STEP * max(1.0, abs(x[own.index(name)]))
@@ -100,11 +102,11 @@ def _jacobian(
     return result
 
 
-def _free(found: Estimate, kept: tuple[str, ...]) -> np.ndarray:
+def _free(estimate: Estimate, kept: tuple[str, ...]) -> np.ndarray:
     """Directions (r, d) of the base parameters that an estimate leaves open."""
     columns = []
-    classic = all(_classic(name) for name in found.parameters.names)
-    for entry in found.dropped:
+    classic = all(_classic(name) for name in estimate.parameters.names)
+    for entry in estimate.dropped:
         if entry.name in kept:
             column = np.zeros(len(kept))
             column[kept.index(entry.name)] = 1.0
@@ -115,7 +117,7 @@ def _free(found: Estimate, kept: tuple[str, ...]) -> np.ndarray:
     for number, name in enumerate(kept):
         key = name.rpartition(".")[2].partition("_at_")[0]
         of_drive = key not in LINK_PARAMETERS
-        lacking = of_drive and name not in found.parameters
+        lacking = of_drive and name not in estimate.parameters
         if lacking or (of_drive and not classic and key in FRICTION):
             columns.append(np.eye(len(kept))[number])
     return np.array(columns).reshape(-1, len(kept)).T

@@ -29,7 +29,7 @@ def residual_noise(
     `root` (u, k) has root rootᵀ = the covariance by the `noise` before. Raises `FlexcalError` where hardly more rows are left than they
     determine unknowns.
     """
-    n, missed, found = equations.data.observation.model.n, np.append(-values, 1.0), []
+    n, missed, levels = equations.data.observation.model.n, np.append(-values, 1.0), []
     for number, s in enumerate(equations.data.subsystems):
         experiment, joint = divmod(number, n)
         rows = np.vstack([batch.factors[joint] for batch in equations.batches[experiment]])
@@ -40,5 +40,5 @@ def residual_noise(
                 f"{s.triangle.rows} equations of {equations.data.observation.labels[joint]} in recording {experiment + 1} do not determine "
                 "its noise; record for longer, or decimate less."
             )
-        found.append(s.floored(float(np.linalg.norm(rows @ missed)) / np.sqrt(freedom)))
-    return found
+        levels.append(s.floored(float(np.linalg.norm(rows @ missed)) / np.sqrt(freedom)))
+    return levels

@@ -83,12 +83,12 @@ class RegressionData:
         for s in self.subsystems:
             sizes[s.column_indices] += np.sum(s.triangle.matrix**2, axis=0)
         scale = 1.0 / np.sqrt(np.where(sizes > 0, sizes, 1.0))
-        kept = set(self.base.found.kept)
-        found = []
+        kept = set(self.base.identifiability.kept)
+        levels = []
         for s in self.subsystems:
             columns = np.array([i for i, number in enumerate(s.column_indices) if number in kept])
-            found.append(s.triangle.part(columns).noise(scale[s.column_indices[columns]]))
-        return found
+            levels.append(s.triangle.part(columns).noise(scale[s.column_indices[columns]]))
+        return levels
 
     def errors(self, parameters: np.ndarray) -> tuple[float, np.ndarray]:
         """‖Y − W χ‖ / ‖Y‖ for `parameters` (p,): of all driven equations stacked, and of each of the observation's.

@@ -78,7 +78,7 @@ def batched(
     blocks: Iterable[RegressionBlock], name: str, length: int, *, mask_standstill: bool
 ) -> ExperimentSystem:
     """The rows of the experiment `name` in batches of `length`; raises `FlexcalError` as `experiment_system` does."""
-    found: list[Batch] = []
+    batches: list[Batch] = []
     masked = 0
     current: _Growing | None = None
     first, last = math.inf, -math.inf
@@ -92,18 +92,18 @@ def batched(
         for part in _split(block, length):
             number = int(part.number[0]) // length
             if current is None or current.number != number:
-                found += [] if current is None else [current.batch()]
+                batches += [] if current is None else [current.batch()]
                 current = _Growing(number, part.projection)
             current.add(part)
-    found += [] if current is None else [current.batch()]
-    if not all(np.isfinite(factor).all() for batch in found for factor in batch.factors):
+    batches += [] if current is None else [current.batch()]
+    if not all(np.isfinite(factor).all() for batch in batches for factor in batch.factors):
         raise FlexcalError(f"the equations of {name} are not finite.")
-    if not found:
+    if not batches:
         raise FlexcalError(
             f"no equations remain of {name}: it, or the part that is fitted or held out, is too short for its filters, "
             "or the robot stands still in it."
         )
-    return ExperimentSystem(tuple(found), length, last - first, masked)
+    return ExperimentSystem(tuple(batches), length, last - first, masked)
 
 
 class _Growing:

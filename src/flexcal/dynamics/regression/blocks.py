@@ -113,10 +113,10 @@ def _stretch_rows(
         centres.push(start, piece.time, still)
         reduced = stream.push(observation.reduced(piece, memory))
         number, time, still = centres.pop(reduced.shape[1])
-        found = RegressionBlock(number, time, still, np.split(reduced, ends[:-1]), observation.projection)
+        block = RegressionBlock(number, time, still, np.split(reduced, ends[:-1]), observation.projection)
         inside = (time >= window.start) & (time < window.end)
         if inside.any():
-            yield found.where(inside)
+            yield block.where(inside)
 
 
 class _Centres:
@@ -131,35 +131,35 @@ class _Centres:
         self._start = number
         self._number: int | None = None
         self._first = decimation.support
-        self._held = np.zeros((2, 0))
+        self._pending = np.zeros((2, 0))
 
     def push(self, start: int, time: np.ndarray, still: np.ndarray) -> None:
         if self._number is None:
             self._number = self._start + start // self._decimation.factor
-        self._held = np.hstack([self._held, [time, still]])
+        self._pending = np.hstack([self._pending, [time, still]])
 
     def pop(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        factor, size = self._decimation.factor, self._held.shape[1]
+        factor, size = self._decimation.factor, self._pending.shape[1]
         centres = self._first + factor * np.arange(count)
-        time, still = self._held
+        time, still = self._pending
         before = np.concatenate([[0.0], np.cumsum(still)])
         low, high = np.maximum(centres - factor + 1, 0), np.minimum(centres + factor, size)
         number = (self._number or 0) + np.arange(count)
         self._number = (self._number or 0) + count
         spent = min(size, max(0, self._first + factor * (count - 1)))
-        self._held, self._first = self._held[:, spent:], self._first + factor * count - spent
+        self._pending, self._first = self._pending[:, spent:], self._first + factor * count - spent
         return number, time[centres], before[high] > before[low]
 
 
 def _pieces(motions: Iterable[Motion], size: int) -> Iterator[tuple[int, Motion]]:
     """Parts of `size` samples (the last one shorter), each with the number of its first sample."""
-    start, held = 0, None
+    start, pending = 0, None
     for motion in motions:
-        whole = motion if held is None else Motion.joined([held, motion])
+        whole = motion if pending is None else Motion.joined([pending, motion])
         full = len(whole) // size * size
         for first in range(0, full, size):
             yield start + first, whole.part(first, first + size)
         start += full
-        held = whole.part(full, len(whole))
-    if held is not None and len(held):
-        yield start, held
+        pending = whole.part(full, len(whole))
+    if pending is not None and len(pending):
+        yield start, pending

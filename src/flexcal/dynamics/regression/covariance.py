@@ -61,10 +61,10 @@ def offset_scores(observation: Equations, kept: Sequence[int], root: np.ndarray)
 
 def parameter_rows(matrix: np.ndarray, kept: Sequence[int], column_indices: np.ndarray) -> np.ndarray:
     """The rows (m, k) of a matrix (k, k) that belong to `column_indices`, of which `kept` have one; zero for the others."""
-    found = np.zeros((len(column_indices), matrix.shape[1]))
+    rows_of = np.zeros((len(column_indices), matrix.shape[1]))
     _, at, rows = np.intersect1d(column_indices, kept, return_indices=True)
-    found[at] = matrix[rows]
-    return found
+    rows_of[at] = matrix[rows]
+    return rows_of
 
 
 def score_covariance(
@@ -90,11 +90,11 @@ def score_covariance(
     offset.
     """
     joints = len(seen)
-    found = [
+    scores = [
         _scores(own, noise[joints * number : joints * (number + 1)], seen, missed)
         for number, own in enumerate(experiments)
     ]
-    return covariance_of_scores(found, root, variance, offsets)
+    return covariance_of_scores(scores, root, variance, offsets)
 
 
 def covariance_of_scores(

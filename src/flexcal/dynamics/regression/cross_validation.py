@@ -75,8 +75,8 @@ def prediction_errors(
         train, test = train - train[:, fixed] @ solution, test - test[:, fixed] @ solution
         train[:, np.linalg.norm(train, axis=0) < _NEW] = 0.0
         for number, group in enumerate(groups):
-            found = np.linalg.lstsq(train[:, group], train[:, -1], rcond=_RANK)[0]
-            left = test[:, -1] - test[:, group] @ found
+            parameters = np.linalg.lstsq(train[:, group], train[:, -1], rcond=_RANK)[0]
+            left = test[:, -1] - test[:, group] @ parameters
             missed[number] += (scale[-1] ** 2) * float(left @ left)
         size += float(fold.test[:, -1] @ fold.test[:, -1])
     return [math.sqrt(value / size) for value in missed]
@@ -85,7 +85,7 @@ def prediction_errors(
 def solutions(folds: Sequence[Fold], kept: Sequence[int], start: np.ndarray) -> list[np.ndarray]:
     """For every block the parameters (p,) that least squares finds outside of it; those that are not `kept`, and directions that are not
     seen there, stay as in `start` (p,)."""
-    found = []
+    parameters = []
     for fold in folds:
         train = fold.train[:, kept]
         norms = np.linalg.norm(train, axis=0)
@@ -93,21 +93,21 @@ def solutions(folds: Sequence[Fold], kept: Sequence[int], start: np.ndarray) -> 
         left = fold.train[:, -1] - fold.train[:, :-1] @ start
         values = start.copy()
         values[kept] += np.linalg.lstsq(train / scale, left, rcond=_RANK)[0] / scale
-        found.append(values)
-    return found
+        parameters.append(values)
+    return parameters
 
 
 def fold_numbers(systems: Sequence[ExperimentSystem]) -> list[dict[int, int]]:
     """For every system the block in which each of its batches lies, by the batch's number."""
     total = sum(batch.rows for system in systems for batch in system.batches)
-    done, found = 0, []
+    done, numbers = 0, []
     for system in systems:
         own = {}
         for batch in system.batches:
             own[batch.number] = min(FOLDS - 1, FOLDS * (done + batch.rows // 2) // total)
             done += batch.rows
-        found.append(own)
-    return found
+        numbers.append(own)
+    return numbers
 
 
 @dataclass(frozen=True, eq=False)

@@ -97,7 +97,7 @@ def choose_cutoff(
     """
     highest = min(proposed_hz, _ROWS_HZ)
     observation = Observation(model, CLASSIC)
-    kept = np.array(sorted(BaseParameters.of(observation).found.kept))
+    kept = np.array(sorted(BaseParameters.of(observation).identifiability.kept))
     tables = [_Tables(model, observation, kept, pieces, highest) for pieces in loads]
     tables = [table for table in tables if table.enough]
     if not tables:
@@ -122,7 +122,7 @@ class _Losses:
 
     def __init__(self, tables: Sequence[_Tables], highest_hz: float, signs_of: int | None) -> None:
         self._tables, self._highest, self._signs_of = tables, highest_hz, signs_of
-        self._found: dict[int, np.ndarray] = {}
+        self._losses: dict[int, np.ndarray] = {}
         number = 0
         while (
             self.total(number) <= _RISEN * self.total(self._lowest)
@@ -136,12 +136,12 @@ class _Losses:
 
     def blocks(self, number: int) -> np.ndarray:
         """Of all blocks of all tables (B,)."""
-        if number not in self._found:
+        if number not in self._losses:
             signs_of = number if self._signs_of is None else self._signs_of
             cutoff, signs = (self._highest / _RATIO**n for n in (number, signs_of))
             each = [table.losses(cutoff, signs) for table in self._tables]
-            self._found[number] = np.concatenate(each)
-        return self._found[number]
+            self._losses[number] = np.concatenate(each)
+        return self._losses[number]
 
     def total(self, number: int) -> float:
         """Of all blocks together."""
@@ -150,7 +150,7 @@ class _Losses:
     @property
     def _lowest(self) -> int:
         self.blocks(0)
-        return min(self._found, key=self.total)
+        return min(self._losses, key=self.total)
 
     @property
     def lower_is_better(self) -> bool:
@@ -162,12 +162,12 @@ class _Losses:
     def highest_alike(self) -> int:
         """The number of the highest cut-off whose squared error is nearly the smallest."""
         most = (1 + _ALIKE) * self.total(self._lowest)
-        return min(number for number in self._found if self.total(number) <= most)
+        return min(number for number in self._losses if self.total(number) <= most)
 
     @property
     def highest_good(self) -> int:
         """The number of the highest cut-off that is within a standard error of the best one."""
-        lost = {number: blocks - self.blocks(self._lowest) for number, blocks in self._found.items()}
+        lost = {number: blocks - self.blocks(self._lowest) for number, blocks in self._losses.items()}
         return min(number for number, more in lost.items() if more.sum() <= _standard_error(more))
 
 
@@ -212,15 +212,15 @@ class _Tables:
         """Squared errors (10, n) of the blocks and joints."""
         weighted = np.einsum("bjkl,j->bkl", whole, 1.0 / sigma**2)
         total = weighted.sum(axis=0)
-        found = np.zeros(inner.shape[:2])
+        errors = np.zeros(inner.shape[:2])
         for block, own in enumerate(weighted):
             train = total - own
             scale = 1.0 / np.sqrt(np.maximum(np.diag(train)[:-1], np.finfo(float).tiny))
             matrix = train[:-1, :-1] * np.outer(scale, scale)
             x = scale * np.linalg.lstsq(matrix, scale * train[:-1, -1], rcond=_RANK)[0]
             beside = np.append(-x, 1.0)
-            found[block] = np.einsum("k,jkl,l->j", beside, inner[block], beside)
-        return found
+            errors[block] = np.einsum("k,jkl,l->j", beside, inner[block], beside)
+        return errors
 
     def _products(self, cutoff_hz: float, signs_hz: float) -> tuple[np.ndarray, np.ndarray]:
         """[W, Y]ᵀ [W, Y] (10, n, p + 1, p + 1) of every block and joint: of its inner rows, and of all."""

@@ -52,7 +52,7 @@ class GaussianProcess:
         if size == 0:
             return cls(inputs, values, scale, 0.0, 1.0)
         every = -(-len(values) // _SHAPED_BY)
-        found = []
+        optima = []
         with warnings.catch_warnings():
             # a length at its bound is no fault: the input does not matter
             warnings.simplefilter("ignore", ConvergenceWarning)
@@ -61,8 +61,8 @@ class GaussianProcess:
                 fit: Any = GaussianProcessRegressor(kernel).fit(
                     inputs[::every] / scale, values[::every] / size
                 )
-                found.append((fit.log_marginal_likelihood_value_, fit.kernel_.theta))
-        amplitude, *lengths, noise = np.exp(max(found, key=lambda pair: pair[0])[1]).tolist()
+                optima.append((fit.log_marginal_likelihood_value_, fit.kernel_.theta))
+        amplitude, *lengths, noise = np.exp(max(optima, key=lambda pair: pair[0])[1]).tolist()
         return cls(inputs, values, scale * lengths, amplitude * size**2, noise * size**2)
 
     def predict(self, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -96,12 +96,12 @@ def _without_blocks(
 ) -> tuple[np.ndarray, list[int]]:
     """Parameters (1 + blocks, p): the estimate's, and as they would be without each of the blocks of those numbers."""
     observation, base = recorded.observation, recorded.base
-    kept = list(base.found.kept)
-    found = folds(systems, observation.column_indices, len(observation.names), kept, _reach(recorded))
+    kept = list(base.identifiability.kept)
+    blocks = folds(systems, observation.column_indices, len(observation.names), kept, _reach(recorded))
     all_rows = weighted_least_squares(RegressionData.of(observation, base, systems)).parameters.coordinates()
-    moved = [own - all_rows for own in solutions(found, kept, observation.values())]
+    moved = [own - all_rows for own in solutions(blocks, kept, observation.values())]
     values = estimate.parameters.coordinates()
-    return np.array([values, *(values + step for step in moved)]), [fold.number for fold in found]
+    return np.array([values, *(values + step for step in moved)]), [fold.number for fold in blocks]
 
 
 def _thinned(

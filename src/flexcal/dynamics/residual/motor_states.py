@@ -39,8 +39,8 @@ class MotorStates:
     @classmethod
     def joined(cls, parts: Iterable[MotorStates]) -> MotorStates:
         """One after the other."""
-        held = list(parts)
-        return cls(*(np.concatenate([getattr(part, field.name) for part in held]) for field in fields(cls)))
+        states = list(parts)
+        return cls(*(np.concatenate([getattr(part, field.name) for part in states]) for field in fields(cls)))
 
 
 def motor_states(recorded: RecordedRows, parameters: np.ndarray) -> Iterator[MotorStates]:

@@ -48,17 +48,17 @@ def motion_bandwidth(recordings: Iterable[Recording]) -> MotionBandwidth:
 
 def _segments(recordings: Iterable[Recording]) -> Iterator[tuple[float, np.ndarray]]:
     """Positions of an even number of samples without gaps, all of one length, with their time step; the last ones may be left out."""
-    held, longest = np.zeros((0, 0)), np.zeros((0, 0))
+    pending, longest = np.zeros((0, 0)), np.zeros((0, 0))
     step, whole = 0.0, False
     for recording in recordings:
         step, base = recording.time_step, recording.time_base
-        begins = not held.size or (base is not None and base.gap > 0)
-        held = recording.q if begins else np.concatenate([held, recording.q])
-        longest = max(longest, held, key=len)
+        begins = not pending.size or (base is not None and base.gap > 0)
+        pending = recording.q if begins else np.concatenate([pending, recording.q])
+        longest = max(longest, pending, key=len)
         length = 2 * round(_SEGMENT / step / 2)
-        while len(held) >= length:
+        while len(pending) >= length:
             whole = True
-            yield step, held[:length]
-            held = held[length:]
+            yield step, pending[:length]
+            pending = pending[length:]
     if not whole:
         yield step, longest[: len(longest) // 2 * 2]

@@ -44,8 +44,8 @@ class GravityTorqueCheck:
     def of(cls, recording: Recording, model: RobotModel) -> GravityTorqueCheck:
         """Of some samples, evenly spread."""
         some = slice(None, None, max(1, len(recording) // _POSES))
-        held = None if recording.payload is None else recording.payload[some]
-        weight, torque = gravity_torque(model, recording.q[some], held), recording.torque[some]
+        payload = None if recording.payload is None else recording.payload[some]
+        weight, torque = gravity_torque(model, recording.q[some], payload), recording.torque[some]
         if recording.external_torque is not None:
             torque = torque + recording.external_torque[some]
         balanced = [entry.joint for entry in model.config.dynamics.joint_springs]

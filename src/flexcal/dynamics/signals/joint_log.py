@@ -62,7 +62,7 @@ class JointLog:
         faults = LogFaults(path, model)
         spans: list[tuple[float, float]] = []
         summary, steps = TimeSummary(), []
-        held: list[float] = []
+        payloads: list[float] = []
         sensed: list[bool] = []
         carried = [GravityTorqueCheck.empty(model.n)]
 
@@ -77,7 +77,7 @@ class JointLog:
                 else:
                     spans.append((recording.start, end))
                 if recording.payload is not None:
-                    held.append(float(recording.payload[0]))
+                    payloads.append(float(recording.payload[0]))
                 sensed.append(recording.force is not None)
                 carried.append(GravityTorqueCheck.of(recording, model))
                 faults.add(recording)
@@ -124,7 +124,7 @@ class JointLog:
             np.where(rests, 0.5 * (lowest + highest), np.nan),
             used,
             summary.sentence,
-            held[0] if held else None,
+            payloads[0] if payloads else None,
             reduce(add, carried),
             any(sensed),
         )

@@ -56,10 +56,10 @@ class LogFaults:
                 raise InputError(
                     f"{self._path}: the torque of {name} is the same throughout; it was not measured: correct the log, or record again."
                 )
-            held = torque.held
-            if held is not None:
+            stay = torque.stay
+            if stay is not None:
                 raise InputError(
-                    f"{self._path}: the torque of {name} stays at its extreme {held.value:.6g} for {held.samples} samples; "
+                    f"{self._path}: the torque of {name} stays at its extreme {stay.value:.6g} for {stay.samples} samples; "
                     "drive or sensor saturates there: record a slower motion, or cut these rows out into files of their own."
                 )
         slides = {joint.name for joint in self._model.joints if joint.kind == "prismatic"}

@@ -96,12 +96,12 @@ class Motion:
     @classmethod
     def joined(cls, parts: Iterable[Motion]) -> Motion:
         """Motions that follow each other as one."""
-        held = list(parts)
-        columns = zip(*((m.time, m.q, m.dq, m.ddq, m.torque) for m in held), strict=True)
-        outside = [m.external for m in held if m.external is not None]
+        motions = list(parts)
+        columns = zip(*((m.time, m.q, m.dq, m.ddq, m.torque) for m in motions), strict=True)
+        outside = [m.external for m in motions if m.external is not None]
         return cls(
             *(np.concatenate(column) for column in columns),
-            arm=ArmSide.joined([m.arm for m in held]),
+            arm=ArmSide.joined([m.arm for m in motions]),
             external=np.concatenate(outside) if outside else None,
         )
 
@@ -224,16 +224,16 @@ def _filtered(
     step = first.time_step
     border = int(np.ceil(_BORDER_PERIODS / (cutoff_hz * step)))
     columns = _columns(chain([first], iterator), torque)
-    number, held = 0, None
+    number, pending = 0, None
     n = first.torque.shape[1]
     for q, acted in smoothed(columns, LowPass(step, cutoff_hz)):
-        if held is not None:
-            yield held
-        found = FilteredPositions(first.start + step * number, step, q, acted[:, :n], acted[:, n:])
-        held = found.part(min(max(0, border - number), len(found)), len(found))
-        number += len(found)
-    if held is not None:
-        yield held.part(0, len(held) - border)
+        if pending is not None:
+            yield pending
+        filtered = FilteredPositions(first.start + step * number, step, q, acted[:, :n], acted[:, n:])
+        pending = filtered.part(min(max(0, border - number), len(filtered)), len(filtered))
+        number += len(filtered)
+    if pending is not None:
+        yield pending.part(0, len(pending) - border)
 
 
 def _columns(recordings: Iterable[Recording], torque: TorqueLog) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -266,17 +266,17 @@ def smoothed(
             waiting.append(beside)
             yield values
 
-    held = None
+    pending = None
     for values in _extended(watched(), low_pass):
-        held = values if held is None else np.concatenate([held, values])
-        x = low_pass.apply(held)
+        pending = values if pending is None else np.concatenate([pending, values])
+        x = low_pass.apply(pending)
         count = len(x) - 2 * BESIDE
         if count <= 0:
             continue
         beside = np.concatenate(waiting)
         waiting[:] = [beside[count:]]
         yield x, beside[:count]
-        held = held[count:]
+        pending = pending[count:]
 
 
 def differences(x: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

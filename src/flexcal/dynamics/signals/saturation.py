@@ -79,12 +79,12 @@ class SaturationDetector:
         large = float(np.quantile(steps[::_EVERY], _USUALLY)) if len(steps) else 0.0
         same = steps <= _ROUNDING * np.abs(values).max()
         for sign in (-1, 1):
-            found = _plateau(values, sign, same, _OVERSHOOT * large, np.abs(speed), reach)
-            known = self._ends.get(sign, found)
-            if np.isclose(found.value, known.value, rtol=_ROUNDING, atol=0.0):
-                self._ends[sign] = found.merged(known)
-            elif sign * found.value > sign * known.value:
-                self._ends[sign] = found
+            run = _plateau(values, sign, same, _OVERSHOOT * large, np.abs(speed), reach)
+            known = self._ends.get(sign, run)
+            if np.isclose(run.value, known.value, rtol=_ROUNDING, atol=0.0):
+                self._ends[sign] = run.merged(known)
+            elif sign * run.value > sign * known.value:
+                self._ends[sign] = run
 
     @property
     def span(self) -> float:
@@ -92,7 +92,7 @@ class SaturationDetector:
         return self._ends[1].value - self._ends[-1].value
 
     @property
-    def held(self) -> SaturatedRun | None:
+    def stay(self) -> SaturatedRun | None:
         """The longest stay at an extreme that is no chance, and not near zero."""
         size = max(abs(end.value) for end in self._ends.values())
         return next((end for end in self._long() if abs(end.value) >= _LARGE * size), None)

@@ -81,17 +81,17 @@ class SimulatedExperiment:
 
         Beyond an end the low-pass takes the path to go on turned by half a turn, with the noise of the last sample and no acceleration.
         """
-        found = np.zeros(len(time), dtype=bool)
+        inside = np.zeros(len(time), dtype=bool)
         for part in self._parts:
             if part.low_pass is not None:
                 border = 1.0 / part.low_pass.cutoff_hz
-                found |= (time >= part.first + border) & (time <= part.last - border)
-        return found
+                inside |= (time >= part.first + border) & (time <= part.last - border)
+        return inside
 
     @cached_property
     def _parts(self) -> tuple[_Part, ...]:
         """Those between gaps, in one pass."""
-        found = []
+        parts = []
         for stretch in stretches(self.experiment.blocks()):
             first, last, samples = math.inf, 0.0, 0
             for motion in stretch:
@@ -102,8 +102,8 @@ class SimulatedExperiment:
                 step = (last - first) / (samples - 1)
                 low_pass = LowPass(step, _PATH / (step * self.decimation.factor), _TAIL)
                 low_pass = low_pass if low_pass.fits(samples, BESIDE) else None
-            found.append(_Part(first, last, low_pass))
-        return tuple(found)
+            parts.append(_Part(first, last, low_pass))
+        return tuple(parts)
 
     def _simulated(
         self, motions: Iterator[Motion], robot: RigidRobotSimulator, low_pass: LowPass

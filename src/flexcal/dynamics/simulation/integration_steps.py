@@ -47,7 +47,7 @@ class IntegrationSteps:
 
     def slopes(self, parameters: np.ndarray) -> np.ndarray:
         """Derivative of the torques by q and by q̇ (2, N, n, n) at `parameters` (p,), by differences."""
-        found = np.zeros((2, len(self.torque), *2 * self.torque.shape[1:]))
+        derivatives = np.zeros((2, len(self.torque), *2 * self.torque.shape[1:]))
         at = self._torques(self.middle, parameters)
         for joint in range(self.torque.shape[1]):
             shift = _SHIFT * (np.arange(self.torque.shape[1]) == joint)
@@ -56,8 +56,8 @@ class IntegrationSteps:
                 replace(self.middle, dq=self.middle.dq + shift),
             )
             for kind, motion in enumerate(moved):
-                found[kind, :, :, joint] = (self._torques(motion, parameters) - at) / _SHIFT
-        return found
+                derivatives[kind, :, :, joint] = (self._torques(motion, parameters) - at) / _SHIFT
+        return derivatives
 
     def _torques(self, motion: Motion, parameters: np.ndarray) -> np.ndarray:
         return columns(self.observation, motion, dict(self.memory)) @ parameters
@@ -72,7 +72,7 @@ def discretise_motion(
     """
     memory: Memory = {}
     for stretch in stretches(experiment.blocks()):
-        held: Motion | None = None
+        pending: Motion | None = None
         begins = True
         for block in stretch:
             first, last = np.searchsorted(block.time, [window.start, window.end])
@@ -81,7 +81,7 @@ def discretise_motion(
             if first == last:
                 continue
             motion = block.part(first, last)
-            motion = motion if held is None else Motion.joined([held, motion])
+            motion = motion if pending is None else Motion.joined([pending, motion])
             stride = (
                 max(1, int(_STEP / float(motion.time[1] - motion.time[0]) + 1e-6)) if len(motion) > 1 else 1
             )
@@ -91,16 +91,16 @@ def discretise_motion(
                 part = motion.part(start * stride, stop * stride + 1)
                 yield replace(_steps(observation, part, stride, memory, slowest), begins=begins)
                 begins = False
-            held = motion.part(count * stride, len(motion))
+            pending = motion.part(count * stride, len(motion))
 
 
 def columns(observation: Observation, motion: Motion, memory: Memory) -> np.ndarray:
     """W (N, n, p) of all columns."""
-    found = np.zeros((len(motion), observation.model.n, len(observation.names)))
+    regressor = np.zeros((len(motion), observation.model.n, len(observation.names)))
     systems = observation.systems(motion, memory)
     for joint, (system, column_indices) in enumerate(zip(systems, observation.column_indices, strict=True)):
-        found[:, joint, column_indices] = system[:-1].T
-    return found
+        regressor[:, joint, column_indices] = system[:-1].T
+    return regressor
 
 
 def _steps(

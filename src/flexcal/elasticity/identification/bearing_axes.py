@@ -82,8 +82,8 @@ def with_fitting_bearings(
         begun = {model.bearings: (model, first), other.bearings: (other, first_fit(other, data, first.x))}
     except FlexcalError:
         return *complete(model, first), None
-    found = compared(first, begun[other.bearings][1])
-    better = found.preferred or model.bearings
+    comparison = compared(first, begun[other.bearings][1])
+    better = comparison.preferred or model.bearings
     robot, fit = complete(*begun[better])
     ended = {better: (robot, fit)}
     if robot.braked != model.braked:
@@ -92,6 +92,6 @@ def with_fitting_bearings(
         try:
             ended[worse] = robot, fit_responses(robot, data, fit.x)
         except FlexcalError:
-            return *ended[better], found
-        found = compared(ended[model.bearings][1], ended[other.bearings][1])
-    return *(ended.get(found.taken) or complete(*begun[found.taken])), found
+            return *ended[better], comparison
+        comparison = compared(ended[model.bearings][1], ended[other.bearings][1])
+    return *(ended.get(comparison.taken) or complete(*begun[comparison.taken])), comparison

@@ -41,11 +41,11 @@ class CompliantHeldJoints:
         ]
         if not rigid:
             return cls({})
-        held = model.with_drive_springs(dict.fromkeys(rigid, (1e12, 0.0)))
-        axes = [(e.index, c) for e in held.elastic for c in e.components]
-        rows = [len(held.driven) + axes.index((i, 2)) for i in rigid]
+        compliant = model.with_drive_springs(dict.fromkeys(rigid, (1e12, 0.0)))
+        axes = [(e.index, c) for e in compliant.elastic for c in e.components]
+        rows = [len(compliant.driven) + axes.index((i, 2)) for i in rigid]
         inertia = np.median(
-            [np.diag(linearise(held, r.q_mean, r.payload).mass)[rows] for r in responses], axis=0
+            [np.diag(linearise(compliant, r.q_mean, r.payload).mass)[rows] for r in responses], axis=0
         )
         omega = 2 * np.pi * max(float(r.frequencies_hz[-1]) for r in responses)
         return cls(

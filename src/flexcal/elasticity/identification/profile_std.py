@@ -25,8 +25,8 @@ def profile_std_ratio(problem: Problem, fitted: Estimate) -> np.ndarray:
         std = float(np.sqrt(variance))
         if not item.name.endswith(".stiffness") or not WELL_KNOWN < std <= LOG_STD_LIMIT:
             continue
-        held = x.copy()
-        held[number] += np.log(2.0)
-        rise = profile_cost_increase(problem, fitted, held, [number])
+        shifted = x.copy()
+        shifted[number] += np.log(2.0)
+        rise = profile_cost_increase(problem, fitted, shifted, [number])
         stretch[number] = max(1.0, 0.5 / (std * np.sqrt(max(2.0 * rise, 1e-3))))
     return stretch

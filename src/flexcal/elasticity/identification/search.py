@@ -145,7 +145,7 @@ class PopulationSearch:
             done += 1
             progress("searching", done / self.generations)
 
-        found = differential_evolution(
+        evolution = differential_evolution(
             cost,
             [(-np.log(self.factor), np.log(self.factor))] * len(springs),
             popsize=max(1, self.population // len(springs)),
@@ -156,7 +156,7 @@ class PopulationSearch:
             callback=tell,
         )
         progress("searching", 1.0)
-        start[springs] += found.x
+        start[springs] += evolution.x
         return start
 
 

@@ -150,10 +150,10 @@ def identify_stiffness(
     progress("fitting", 0.3)
 
     def completed(robot: RobotModel, begun: ResponseFit) -> tuple[RobotModel, ResponseFit]:
-        held = CompliantHeldJoints.of(robot, responses)
+        candidates = CompliantHeldJoints.of(robot, responses)
         fit = None
-        if held.is_supported(robot, data, begun):
-            robot, fit = _with_held_joints(robot, held, data, search, rng, progress)
+        if candidates.is_supported(robot, data, begun):
+            robot, fit = _with_held_joints(robot, candidates, data, search, rng, progress)
         return robot, final_fit(robot, data, begun) if fit is None else fit
 
     model, fit, bearings = with_fitting_bearings(model, data, first, completed)
@@ -184,26 +184,26 @@ def identify_stiffness(
 
 def _with_held_joints(
     model: RobotModel,
-    held: CompliantHeldJoints,
+    candidates: CompliantHeldJoints,
     data: ResponseData,
     search: Search,
     rng: np.random.Generator,
     progress: Progress,
 ) -> tuple[RobotModel, ResponseFit | None]:
-    """The robot with springs at those of the `held` joints for which the data ask, and its fit; the same robot and None for none."""
+    """The robot with springs at those of the `candidates` for which the data ask, and its fit; the same robot and None for none."""
     values: dict[str, float] = {}
-    while held.springs:
-        wider = model.with_drive_springs(held.springs)
+    while candidates.springs:
+        wider = model.with_drive_springs(candidates.springs)
         parameters = data.parameters(wider)[0]
         if values:
             x = parameters.coordinates({name: values[name] for name in parameters.names})
             fit = fit_responses(wider, data, x)
         else:
             fit = _searched_fit(wider, data, search, rng, progress)
-        least_significant = held.least_significant(wider, data, fit)
+        least_significant = candidates.least_significant(wider, data, fit)
         if least_significant is None:
             return wider, fit
-        held = held.only([i for i in held.springs if i != least_significant])
+        candidates = candidates.only([i for i in candidates.springs if i != least_significant])
         values = fit.estimate.values
     return model, None
 

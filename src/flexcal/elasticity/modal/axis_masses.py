@@ -44,7 +44,7 @@ def identify_masses(fit: ModalFit, response: LocalResponse, masses: int | None =
         return AxisMasses(
             reason="several inputs act at once; record an axis with its own drive alone to fit masses to it"
         )
-    found = pairs(fit)
+    alternating = pairs(fit)
     bare = _bare(fit)
     if bare is not None:
         return AxisMasses(
@@ -61,18 +61,18 @@ def identify_masses(fit: ModalFit, response: LocalResponse, masses: int | None =
             reason=f"at {100 * phase:.0f} % of the lines the phase is not that of a motion where the input acts (acceleration 0 to "
             f"180° ahead of the force); {_FIRST}"
         )
-    allowed = min(len(found) + 1, MOST_MASSES)
+    allowed = min(len(alternating) + 1, MOST_MASSES)
     if masses is not None and masses > allowed:
         low, high = fit.data.spectra.frequencies_hz[[0, -1]]
         return AxisMasses(
             reason=f"{masses} masses need {masses - 1} pairs of an antiresonance and the resonance above it, and the band from "
-            f"{low:.3g} to {high:.3g} Hz shows {len(found)}; excite a wider band, or give --masses {allowed}"
+            f"{low:.3g} to {high:.3g} Hz shows {len(alternating)}; excite a wider band, or give --masses {allowed}"
         )
-    strongest = sorted(found, key=lambda pair: pair[0] / pair[1])
+    strongest = sorted(alternating, key=lambda pair: pair[0] / pair[1])
     wanted = range(1, allowed + 1) if masses is None else (masses,)
     fits = tuple(fit_chain(fit, count, sorted(strongest[: count - 1])) for count in wanted)
     chosen = min(fits, key=lambda one: one.criterion)
-    if masses is None and not found and _modes(fit):
+    if masses is None and not alternating and _modes(fit):
         return AxisMasses(
             fits,
             reason="no antiresonance lies below a resonance in the band, as it does between two masses; excite lower frequencies",

@@ -87,13 +87,13 @@ def pairs(fit: ModalFit) -> list[tuple[float, float]]:
     """Antiresonance and the resonance above it (rad/s) of the first output to the first input, where they alternate."""
     poles = [r.frequency_hz.estimate for r in resonances(fit) if r.frequency_hz.known]
     zeros = [r.frequency_hz.estimate for r in antiresonances(fit, 0, 0) if r.frequency_hz.known]
-    found, low = [], 0.0
+    alternating, low = [], 0.0
     for pole in poles:
         between = [zero for zero in zeros if low < zero < pole]
         if len(between) == 1:
-            found.append((2 * np.pi * between[0], 2 * np.pi * pole))
+            alternating.append((2 * np.pi * between[0], 2 * np.pi * pole))
         low = pole
-    return found
+    return alternating
 
 
 def fit_chain(fit: ModalFit, masses: int, chosen: Sequence[tuple[float, float]]) -> ChainFit:
@@ -157,10 +157,10 @@ def _fitted(data: BandData, start: MassChain, prior: np.ndarray) -> tuple[MassCh
 
     bound = np.r_[np.full(at.size - 1, 12.0), 5.0]
     lower, upper = prior - bound, prior + bound
-    found = least_squares(
+    solution = least_squares(
         residual, np.clip(at, lower + 1e-6, upper - 1e-6), bounds=(lower, upper), x_scale="jac", max_nfev=80
     )
-    return _chain(data, found.x), float(found.cost)
+    return _chain(data, solution.x), float(solution.cost)
 
 
 def _errors(data: BandData, chain: MassChain, inputs: np.ndarray) -> np.ndarray:

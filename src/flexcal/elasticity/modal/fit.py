@@ -120,9 +120,11 @@ class ModalFit:
         errors = np.moveaxis(s.outputs, 2, 1) - np.einsum("kyu,rku->ryk", response, s.inputs)
         prior = np.zeros_like(size)
         prior[2 * count : 2 * count + 2] = _SLOW_PRIOR, 1.0
-        found = sandwich(rows, projection(errors[..., None])[..., 0], s.excited, projection, prior)
+        estimated = sandwich(rows, projection(errors[..., None])[..., 0], s.excited, projection, prior)
         outer = np.outer(size, size)
-        return FitCovariance(found.covariance * outer, found.likelihood * outer, found.degrees_of_freedom)
+        return FitCovariance(
+            estimated.covariance * outer, estimated.likelihood * outer, estimated.degrees_of_freedom
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,10 +196,10 @@ def refined_response(spectra: RecordSpectra, model: ModalModel, sigma: np.ndarra
     rest = spectra.outputs - np.einsum("kyu,rku->rky", guessed, spectra.inputs)
     data = BandData(spectra, sigma)
     rest = rest - transients(data, transient_basis(data, model.slow, model.quadratics), rest)
-    found = local_response(replace(spectra, outputs=rest))
-    response = found.response + model.response(found.frequencies_hz)
-    diagonal = np.real(np.diagonal(found.scatter, axis1=1, axis2=2))
-    return replace(found, response=response, coherence=_coherence(spectra, found, response, diagonal))
+    local = local_response(replace(spectra, outputs=rest))
+    response = local.response + model.response(local.frequencies_hz)
+    diagonal = np.real(np.diagonal(local.scatter, axis1=1, axis2=2))
+    return replace(local, response=response, coherence=_coherence(spectra, local, response, diagonal))
 
 
 def refined_response_at(spectra: RecordSpectra, model: ModalModel, response: LocalResponse) -> LocalResponse:
@@ -206,22 +208,22 @@ def refined_response_at(spectra: RecordSpectra, model: ModalModel, response: Loc
 
 
 def _coherence(
-    spectra: RecordSpectra, found: LocalResponse, response: np.ndarray, scatter: np.ndarray
+    spectra: RecordSpectra, local: LocalResponse, response: np.ndarray, scatter: np.ndarray
 ) -> np.ndarray:
     """Multiple coherence (L, n_y): power that the response explains at the lines, pooled over the window, over the total."""
     from flexcal.frequency.periodic import pool_noise
 
-    at = np.searchsorted(spectra.frequencies_hz, found.frequencies_hz - 1e-9)
+    at = np.searchsorted(spectra.frequencies_hz, local.frequencies_hz - 1e-9)
     lines = np.flatnonzero(spectra.excited)
     every = np.stack(
         [
-            np.interp(spectra.frequencies_hz[lines], found.frequencies_hz, element)
+            np.interp(spectra.frequencies_hz[lines], local.frequencies_hz, element)
             for element in response.reshape(len(at), -1).T
         ],
         -1,
     ).reshape(len(lines), *response.shape[1:])
     power = (np.abs(np.einsum("kyu,rku->rky", every, spectra.inputs[:, lines])) ** 2).mean(0)
-    count = max(1, round(found.correlated_hz / spectra.resolution_hz * len(lines) / len(spectra.excited)))
+    count = max(1, round(local.correlated_hz / spectra.resolution_hz * len(lines) / len(spectra.excited)))
     power = pool_noise(power, lines, at, count)
     return power / np.maximum(power + scatter, np.finfo(float).tiny)
 
@@ -258,7 +260,7 @@ def _fitted(data: BandData, start: np.ndarray) -> ModalFit:
     ]
     upper = [*[np.log(_REACH)] * count, *[np.log(_HIGHEST_DAMPING)] * count, np.log(low), 5.0]
     inside = np.clip(start, np.add(lower, 1e-6), np.subtract(upper, 1e-6))
-    found = least_squares(
+    solution = least_squares(
         lambda z: _reduced(data, z)[0],
         inside,
         bounds=(lower, upper),
@@ -267,8 +269,10 @@ def _fitted(data: BandData, start: np.ndarray) -> ModalFit:
         ftol=1e-7,
         xtol=1e-8,
     )
-    order = np.argsort(found.x[:count])
-    z = np.concatenate([found.x[:count][order], found.x[count : 2 * count][order], found.x[2 * count :]])
+    order = np.argsort(solution.x[:count])
+    z = np.concatenate(
+        [solution.x[:count][order], solution.x[count : 2 * count][order], solution.x[2 * count :]]
+    )
     rest, numerators = _reduced(data, z)
     natural, damping, slow = np.exp(z[:count]), np.exp(z[count : 2 * count]), float(np.exp(z[-2]))
     model = ModalModel(
@@ -303,8 +307,8 @@ def _reduced(data: BandData, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         projected = q.T @ seen
         rest.append(seen - q @ projected)
         numerators.append((np.linalg.solve(r, projected) / scale).reshape(n_u, BACKGROUND + 2 * count))
-    held = [(z[-2] - _FIRST[0]) * np.sqrt(_SLOW_PRIOR), z[-1]]
-    return np.concatenate([*rest, held]), np.stack(numerators)
+    prior_rows = [(z[-2] - _FIRST[0]) * np.sqrt(_SLOW_PRIOR), z[-1]]
+    return np.concatenate([*rest, prior_rows]), np.stack(numerators)
 
 
 def _with_another(fit: ModalFit, response: LocalResponse) -> ModalFit | None:

@@ -51,9 +51,9 @@ class ModalModel:
         for k, numerator in enumerate(above):
             others = [factor for other, factor in enumerate(factors) if other != k]
             total = np.polyadd(total, reduce(np.polymul, others, np.array(numerator)))
-        found = np.roots(total) * self.highest
-        found = found[found.imag > 1e-9 * self.highest]
-        return found[np.argsort(np.abs(found))]
+        roots = np.roots(total) * self.highest
+        roots = roots[roots.imag > 1e-9 * self.highest]
+        return roots[np.argsort(np.abs(roots))]
 
 
 def quadratics(natural: np.ndarray, damping: np.ndarray) -> np.ndarray:

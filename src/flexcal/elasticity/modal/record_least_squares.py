@@ -94,7 +94,7 @@ def transient_basis(data: BandData, slow: float, of: np.ndarray) -> np.ndarray:
 
 def transients(data: BandData, basis: np.ndarray, rest: np.ndarray) -> np.ndarray:
     """The transients (R, K, n_y) in `rest` (R, K, n_y), real combinations of `basis` (n_y, K, T), by weighted least squares."""
-    found = np.empty_like(rest)
+    result = np.empty_like(rest)
     for y in range(rest.shape[2]):
         weight = 1.0 / data.sigma[:, y, None]
         rows = stack(basis[y] * weight)
@@ -105,8 +105,8 @@ def transients(data: BandData, basis: np.ndarray, rest: np.ndarray) -> np.ndarra
             if scale.size
             else scale[:, None]
         )
-        found[:, :, y] = (basis[y] @ solved).T
-    return found
+        result[:, :, y] = (basis[y] @ solved).T
+    return result
 
 
 def stack(values: np.ndarray) -> np.ndarray:
@@ -140,14 +140,14 @@ def pooled_covariance(errors: np.ndarray, excited: np.ndarray) -> np.ndarray:
     """Covariance (K, n_y, n_y) of errors (R, K, n_y) pooled over records and neighbouring bins of the same kind (excited or not)."""
     records, bins, _ = errors.shape
     squares = np.einsum("rki,rkj->kij", errors, errors.conj()) / records
-    found = np.empty_like(squares)
+    pooled = np.empty_like(squares)
     index = np.arange(bins)
     for kind in (True, False):
         own = index[excited == kind]
         if own.size:
             count = min(own.size, max(5, -(-_POOLED // records)))
-            found[own] = pool_noise(squares[own], own, own, count)
-    return found
+            pooled[own] = pool_noise(squares[own], own, own, count)
+    return pooled
 
 
 def _unshrunk(errors: np.ndarray, rows: np.ndarray, bread: np.ndarray, basis: np.ndarray) -> np.ndarray:

@@ -63,12 +63,12 @@ class Resonance:
 
 def resonances(fit: ModalFit) -> tuple[Resonance, ...]:
     """The modes in the band that are no heavily damped background, by growing frequency."""
-    model, found = fit.model, fit.uncertainty
-    std, count = np.sqrt(np.diag(found.covariance)), len(fit.model.natural)
+    model, uncertainty = fit.model, fit.uncertainty
+    std, count = np.sqrt(np.diag(uncertainty.covariance)), len(fit.model.natural)
     return tuple(
         Resonance(
-            LogValue(float(model.frequencies_hz[m]), float(std[m]), found.degrees_of_freedom),
-            LogValue(float(model.damping[m]), float(std[count + m]), found.degrees_of_freedom),
+            LogValue(float(model.frequencies_hz[m]), float(std[m]), uncertainty.degrees_of_freedom),
+            LogValue(float(model.damping[m]), float(std[count + m]), uncertainty.degrees_of_freedom),
         )
         for m in range(count)
         if model.damping[m] < HEAVILY_DAMPED and _inside(fit, float(model.frequencies_hz[m]))
@@ -77,10 +77,10 @@ def resonances(fit: ModalFit) -> tuple[Resonance, ...]:
 
 def antiresonances(fit: ModalFit, output: int, input: int) -> tuple[Resonance, ...]:
     """Lightly damped zeros of an element in the band; the damping of a zero beyond the imaginary axis is negative and not determined."""
-    found = fit.uncertainty
+    uncertainty = fit.uncertainty
     zeros = fit.model.zeros(output, input)
     result = []
-    scale = np.sqrt(np.diag(found.covariance))
+    scale = np.sqrt(np.diag(uncertainty.covariance))
     for zero in zeros:
         frequency, damping = abs(zero) / (2 * np.pi), -zero.real / abs(zero)
         if abs(damping) > HEAVILY_DAMPED or not _inside(fit, frequency):
@@ -88,20 +88,20 @@ def antiresonances(fit: ModalFit, output: int, input: int) -> tuple[Resonance, .
 
         def moved(steps: np.ndarray, zero: complex = zero) -> np.ndarray:
             """log |s| and damping of the zero nearest to this one."""
-            found = fit.moved(fit.parameters + steps * scale).zeros(output, input)
-            nearest = found[np.argmin(np.abs(found - zero))] if found.size else zero
+            near_zeros = fit.moved(fit.parameters + steps * scale).zeros(output, input)
+            nearest = near_zeros[np.argmin(np.abs(near_zeros - zero))] if near_zeros.size else zero
             return np.array([np.log(abs(nearest)), -nearest.real / abs(nearest)])
 
         derivative = jacobian(moved, np.zeros_like(scale), 1e-3)
-        correlation = found.covariance / np.outer(scale, scale)
+        correlation = uncertainty.covariance / np.outer(scale, scale)
         std = np.sqrt(np.maximum(np.einsum("ip,pq,iq->i", derivative, correlation, derivative), 0.0))
         result.append(
             Resonance(
-                LogValue(frequency, float(std[0]), found.degrees_of_freedom),
+                LogValue(frequency, float(std[0]), uncertainty.degrees_of_freedom),
                 LogValue(
                     float(damping),
                     float(std[1] / damping) if damping > 0 else np.inf,
-                    found.degrees_of_freedom,
+                    uncertainty.degrees_of_freedom,
                 ),
             )
         )
@@ -118,10 +118,10 @@ class Peak:
 
 def peaks(fit: ModalFit, output: int, input: int) -> tuple[Peak, ...]:
     """Maxima of |G| of the modal model in the band; with heavy damping they lie off the natural frequencies."""
-    band, found = fit.data.spectra.frequencies_hz, fit.uncertainty
+    band, uncertainty = fit.data.spectra.frequencies_hz, fit.uncertainty
     grid = np.geomspace(band[0], band[-1], _GRID)
-    scale = np.sqrt(np.diag(found.covariance))
-    correlation = found.covariance / np.outer(scale, scale)
+    scale = np.sqrt(np.diag(uncertainty.covariance))
+    correlation = uncertainty.covariance / np.outer(scale, scale)
     magnitude = np.abs(fit.model.response(grid)[:, output, input])
     result = []
     for at in np.flatnonzero((magnitude[1:-1] > magnitude[:-2]) & (magnitude[1:-1] >= magnitude[2:])) + 1:
@@ -142,7 +142,9 @@ def peaks(fit: ModalFit, output: int, input: int) -> tuple[Peak, ...]:
             continue
         derivative = jacobian(slope, np.zeros_like(scale), 1e-3)[0]
         std = float(np.sqrt(max(derivative @ correlation @ derivative, 0.0))) / -curvature
-        result.append(Peak(LogValue(float(grid[at]), std, found.degrees_of_freedom), float(magnitude[at])))
+        result.append(
+            Peak(LogValue(float(grid[at]), std, uncertainty.degrees_of_freedom), float(magnitude[at]))
+        )
     return tuple(result)
 
 

@@ -164,14 +164,14 @@ def check_sensors(model: RobotModel, responses: Sequence[FrequencyResponse]) -> 
     """
     for name in dict.fromkeys(name for response in responses for name in response.sensors):
         gains = [_line_gains(model, name, response) for response in responses if name in response.sensors]
-        found = np.concatenate(gains)
-        found = found[np.abs(found) > 0]
-        if not found.size:
+        ratios = np.concatenate(gains)
+        ratios = ratios[np.abs(ratios) > 0]
+        if not ratios.size:
             raise FlexcalError(
                 f"the readings of the sensor {name} do not change with the torques; check its cable and its column, or leave that out."
             )
         _check_gain(
-            model, name, float(np.median(np.abs(found))), float(np.median(np.real(found) / np.abs(found)))
+            model, name, float(np.median(np.abs(ratios))), float(np.median(np.real(ratios) / np.abs(ratios)))
         )
 
 

@@ -69,20 +69,20 @@ class ResonanceWeighting:
 
 def extrema(curve: np.ndarray, prominence: float) -> list[int]:
     """Positions of the alternating maxima and minima of `curve` (L,) that differ by more than `prominence` from one to the next."""
-    found: list[int] = []
+    positions: list[int] = []
     low = high = 0
     rising: bool | None = None
     for k, value in enumerate(curve):
         high = k if value > curve[high] else high
         low = k if value < curve[low] else low
         if rising is not False and value < curve[high] - prominence:
-            found += [high] if high > 0 else []
+            positions += [high] if high > 0 else []
             rising, low = False, k
         elif rising is not True and value > curve[low] + prominence:
-            found += [low] if low > 0 else []
+            positions += [low] if low > 0 else []
             rising, high = True, k
         if rising is True:
             low = k
         elif rising is False:
             high = k
-    return found
+    return positions

@@ -116,12 +116,12 @@ def read_estimates(path: str | Path, *, without: Block | None = None) -> dict[Bl
     recover(Path(path).parent)
     file = read_yaml_file(path)
     stored = file.structure(StoredEstimates)
-    found: dict[Block, Estimate] = {}
+    estimates: dict[Block, Estimate] = {}
     for name in BLOCKS:
         block = stored.block(name)
         if block is not None and name != without:
-            found[name] = _estimate(file, name, block, _covariance(file, name, block))
-    return found
+            estimates[name] = _estimate(file, name, block, _covariance(file, name, block))
+    return estimates
 
 
 def write_estimates(path: str | Path, block: Block, estimate: Estimate) -> None:
@@ -175,14 +175,14 @@ def provenance(
     repeats), options, and the SHA-256 of the `blocks` of the file `estimates` that were used."""
     from importlib.metadata import version
 
-    found = {"program": f"flexcal {version('flexcal')}"}
+    origin = {"program": f"flexcal {version('flexcal')}"}
     paths = [Path(path) for path in inputs]
     names = [path.name for path in paths]
-    found |= {f"input.{p.name if names.count(p.name) == 1 else p.as_posix()}": sha256_of(p) for p in paths}
-    found |= {f"option.{name}": str(value) for name, value in (options or {}).items()}
+    origin |= {f"input.{p.name if names.count(p.name) == 1 else p.as_posix()}": sha256_of(p) for p in paths}
+    origin |= {f"option.{name}": str(value) for name, value in (options or {}).items()}
     if estimates is not None:
-        found |= {f"block.{block}": block_sha256(estimates, block) for block in blocks}
-    return found
+        origin |= {f"block.{block}": block_sha256(estimates, block) for block in blocks}
+    return origin
 
 
 def sha256_of(path: str | Path) -> str:

@@ -30,10 +30,10 @@ def structure(data: Any, cls: type[T]) -> T:
     try:
         return _converter().structure(data, cls)
     except Exception as problem:
-        found = failures(problem, ())
-        if any(failure is None for failure in found):
+        faults = failures(problem, ())
+        if any(failure is None for failure in faults):
             raise
-        raise StructureError([failure for failure in found if failure is not None]) from problem
+        raise StructureError([failure for failure in faults if failure is not None]) from problem
 
 
 @functools.cache

@@ -46,7 +46,7 @@ def failures(problem: BaseException, keys: Keys) -> list[tuple[Keys, str] | None
         known = known_keys(problem.cl)
         return [((*keys, key), _unknown_key(key, keys, known)) for key in problem.extra_fields]
     if isinstance(problem, BaseExceptionGroup):
-        found: list[tuple[Keys, str] | None] = []
+        faults: list[tuple[Keys, str] | None] = []
         misspelt = any(isinstance(inner, ForbiddenExtraKeysError) for inner in problem.exceptions)
         for inner in problem.exceptions:
             place = keys
@@ -59,10 +59,10 @@ def failures(problem: BaseException, keys: Keys) -> list[tuple[Keys, str] | None
                 name = str(place[-1])
                 if misspelt:  # the unknown key, named by its own failure, is probably this one
                     continue
-                found.append((keys, f"the key '{name}'{_inside(keys)} is missing; add '{name}: …'."))
+                faults.append((keys, f"the key '{name}'{_inside(keys)} is missing; add '{name}: …'."))
             else:
-                found.extend(failures(inner, place))
-        return found
+                faults.extend(failures(inner, place))
+        return faults
     if isinstance(problem, (Fault, FlexcalError, ValueError, TypeError)):
         subject = f"{dotted(keys)}: " if keys else ""
         sentence = str(problem)

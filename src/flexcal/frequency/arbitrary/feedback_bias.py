@@ -46,8 +46,8 @@ class Feedback:
         but not beyond it.
         """
         log = np.log(self.frequencies_hz)
-        held = np.cumsum(self.power * np.gradient(self.frequencies_hz))
-        end = self.frequencies_hz[int(np.searchsorted(held, _NEARLY_ALL * held[-1]))]
+        cumulative_power = np.cumsum(self.power * np.gradient(self.frequencies_hz))
+        end = self.frequencies_hz[int(np.searchsorted(cumulative_power, _NEARLY_ALL * cumulative_power[-1]))]
         beyond = self.frequencies_hz > _BEYOND * end
         if 2.0 * _BEYOND * end > self.frequencies_hz[-1]:
             beyond[:] = True
@@ -120,13 +120,13 @@ def _products(signal: np.ndarray, lags: int) -> np.ndarray:
     Of every pair of lags by adding to and taking from that of the lags before what enters and leaves the sum.
     """
     count, channels = signal.shape
-    found = np.empty((channels, lags + 1, channels, lags + 1))
+    products = np.empty((channels, lags + 1, channels, lags + 1))
     latest = signal[lags:]
     for b in range(lags + 1):
         edge = latest.T @ signal[lags - b : count - b]
-        found[:, 0, :, b], found[:, b, :, 0] = edge, edge.T
+        products[:, 0, :, b], products[:, b, :, 0] = edge, edge.T
     for a in range(1, lags + 1):
         enters = signal[lags - a][:, None, None] * signal[lags - 1 :: -1][:lags].T
         leaves = signal[count - a][:, None, None] * signal[count - 1 : count - 1 - lags : -1].T
-        found[:, a, :, 1:] = found[:, a - 1, :, :-1] + enters - leaves
-    return found
+        products[:, a, :, 1:] = products[:, a - 1, :, :-1] + enters - leaves
+    return products

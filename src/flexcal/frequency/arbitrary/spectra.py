@@ -101,7 +101,7 @@ def record_spectra(
     if periods:
         excited = _carrying(u, (np.arange(len(frequencies)) + _LOWEST) % periods == 0)
         instruments = u * excited[:, None]
-    found = RecordSpectra(
+    measured = RecordSpectra(
         frequencies_hz=frequencies,
         inputs=u,
         outputs=y,
@@ -113,7 +113,7 @@ def record_spectra(
         settled=all(_is_settled(piece) for piece in pieces),
         periods=periods,
     )
-    return found, r
+    return measured, r
 
 
 def _is_settled(piece: ExcitationRecord) -> bool:

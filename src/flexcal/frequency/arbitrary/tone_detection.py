@@ -47,17 +47,17 @@ def detect_tones(pieces: Sequence[ExcitationRecord]) -> Tones | None:
         moved = piece.inputs - piece.inputs.mean(0)
         power += (np.abs(np.fft.rfft(window * moved, axis=0)) ** 2).sum(1)
     power[:_FIRST] = 0.0
-    whole, found = power.sum(), []
+    whole, frequencies = power.sum(), []
     if not whole > 0:
         return None
     left, few = power.copy(), 0
-    while len(found) < _MOST and left.sum() > (1.0 - _ALL) * whole:
+    while len(frequencies) < _MOST and left.sum() > (1.0 - _ALL) * whole:
         at = int(left.argmax())
         lobe = slice(max(at - _LOBE, 0), at + _LOBE + 1)
         centre = np.average(np.arange(size // 2 + 1)[lobe], weights=left[lobe])
-        found.append(float(centre / (size * pieces[0].time_step)))
+        frequencies.append(float(centre / (size * pieces[0].time_step)))
         left[lobe] = 0.0
         if not few and left.sum() <= (1.0 - _NEARLY_ALL) * whole:
-            few = len(found)
+            few = len(frequencies)
     alone = bool(left.sum() <= (1.0 - _ALL) * whole)
-    return Tones(tuple(sorted(found if alone else found[:few])), alone) if few else None
+    return Tones(tuple(sorted(frequencies if alone else frequencies[:few])), alone) if few else None

@@ -119,8 +119,8 @@ def shrink_to_diagonal(covariance: np.ndarray, freedom: float) -> np.ndarray:
     index = np.arange(covariance.shape[-1])
     off[:, index, index] = 0.0
     chance = (variance.sum(-1) ** 2 - (variance**2).sum(-1)) / freedom
-    found = (np.abs(off) ** 2).sum((-1, -2))
-    intensity = np.divide(chance, found, out=np.ones_like(chance), where=found > chance)
+    power = (np.abs(off) ** 2).sum((-1, -2))
+    intensity = np.divide(chance, power, out=np.ones_like(chance), where=power > chance)
     shrunk = off * (1.0 - intensity)[:, None, None]
     shrunk[:, index, index] = variance
     return shrunk

@@ -290,10 +290,10 @@ def sensed(
     own = (
         np.arange(axes)[:, None] * stacked.shape[1] + np.arange(axes)
     ).ravel()  # columns, of each the axes' rows
-    found: dict[str, Any] = {"response": stacked[:, :axes], "covariance": covariance[:, own[:, None], own]}
+    values: dict[str, Any] = {"response": stacked[:, :axes], "covariance": covariance[:, own[:, None], own]}
     if sensors:
-        found |= {"sensors": sensors, "sensor_response": stacked[:, axes:], "joint_covariance": covariance}
-    return found
+        values |= {"sensors": sensors, "sensor_response": stacked[:, axes:], "joint_covariance": covariance}
+    return values
 
 
 def _elements(covariance: np.ndarray, axes: int) -> np.ndarray:

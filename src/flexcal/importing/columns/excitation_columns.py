@@ -180,20 +180,24 @@ def _named(text: str, foreign: ForeignTable, option: str, *, is_output: bool) ->
     if not is_output:
         factor, said = _input_unit(unit or name.unit or _own_unit(column))
         return ResponseColumn(Channel(column, said), factor)
-    found = _output(column, name, unit)
+    recognised = _output(column, name, unit)
     if kind is not None:
-        if found is not None and found.channel.unit and found.channel.derivative != KIND_NAMES[kind]:
+        if (
+            recognised is not None
+            and recognised.channel.unit
+            and recognised.channel.derivative != KIND_NAMES[kind]
+        ):
             raise InputError(
                 f"{option} {text}: the unit of '{column}' is not that of a {kind}; leave one of them out."
             )
-        factor, said = (found.factor, found.channel.unit) if found is not None else (1.0, "")
+        factor, said = (recognised.factor, recognised.channel.unit) if recognised is not None else (1.0, "")
         return ResponseColumn(Channel(column, said, KIND_NAMES[kind]), factor)
-    if found is None:
+    if recognised is None:
         raise InputError(
             f"{option} {text}: whether '{column}' is a position, a velocity or an acceleration is not known; "
             f"say it, as in {option} '{column}=acceleration'."
         )
-    return found
+    return recognised
 
 
 def _input_unit(unit: str | None) -> tuple[float, str]:
@@ -245,16 +249,16 @@ def _guessed_inputs(foreign: ForeignTable, free: Mapping[str, ColumnName]) -> li
     """All columns of the most telling kind there is, measured ones before commanded ones, without those that hardly change."""
     kinds = [dict(KINDS)["tau"], _FORCE, dict(KINDS)["current"], _DRIVE]
     for words in kinds:
-        found = [
+        candidates = [
             c for c, name in free.items() if set(name.words) & words and not set(name.words) & _NO_OUTPUT
         ]
-        if not found:
+        if not candidates:
             continue
-        best = min(rank(free[column].words) for column in found)
-        found = [column for column in found if rank(free[column].words) == best]
-        spread = {column: _spread(foreign, column) for column in found}
+        best = min(rank(free[column].words) for column in candidates)
+        candidates = [column for column in candidates if rank(free[column].words) == best]
+        spread = {column: _spread(foreign, column) for column in candidates}
         largest = max(spread.values())
-        columns = [column for column in found if largest > 0 and spread[column] > _QUIET * largest]
+        columns = [column for column in candidates if largest > 0 and spread[column] > _QUIET * largest]
         result = []
         for column in columns:
             factor, unit = _input_unit(free[column].unit or _own_unit(column))
@@ -277,15 +281,15 @@ def _guessed_references(
         and (item := _output(column, name)) is not None
         and item.channel.derivative == 0
     ]
-    for found in (added, commanded):
-        if len(found) == inputs:
-            return [ResponseColumn(Channel(column)) for column in found]
+    for references in (added, commanded):
+        if len(references) == inputs:
+            return [ResponseColumn(Channel(column)) for column in references]
     return []
 
 
 def _guessed_outputs(foreign: ForeignTable, free: Mapping[str, ColumnName]) -> list[ResponseColumn]:
     """All columns of the lowest derivative there is, measured ones before commanded ones."""
-    found = [
+    candidates = [
         (column, item)
         for column, name in free.items()
         if not set(name.words) & _NO_OUTPUT
@@ -293,9 +297,9 @@ def _guessed_outputs(foreign: ForeignTable, free: Mapping[str, ColumnName]) -> l
         and (item := _output(column, name)) is not None
         and _spread(foreign, column) > 0
     ]
-    if not found:
+    if not candidates:
         return []
-    lowest = min(item.channel.derivative for _, item in found)
-    found = [(column, item) for column, item in found if item.channel.derivative == lowest]
-    best = min(rank(free[column].words) for column, _ in found)
-    return [item for column, item in found if rank(free[column].words) == best]
+    lowest = min(item.channel.derivative for _, item in candidates)
+    candidates = [(column, item) for column, item in candidates if item.channel.derivative == lowest]
+    best = min(rank(free[column].words) for column, _ in candidates)
+    return [item for column, item in candidates if rank(free[column].words) == best]

@@ -61,8 +61,8 @@ def read_response_records(
     records: list[ExcitationRecord] = []
     remarks = list(columns.remarks)
     for file, table in zip(files, tables, strict=True):
-        found, notes = _records(file, table, columns, rate_hz)
-        records += found
+        of_file, notes = _records(file, table, columns, rate_hz)
+        records += of_file
         remarks += notes
     step = float(np.median([record.time_step for record in records]))
     near = [abs(record.time_step / step - 1) < 1e-3 for record in records]
@@ -109,18 +109,18 @@ def _records(
         [0 <= k < len(columns.outputs) and columns.outputs[k].channel.derivative == 0 for k in number]
     )
     order = np.argsort(~is_position, kind="stable")
-    summary, found = TimeSummary(), []
+    summary, records = TimeSummary(), []
     for base, ordered in uniform_blocks([(t, values[:, order])], positions=int(is_position.sum())):
         if len(ordered) < SHORTEST:
             summary.short += len(ordered) * base.time_step
             continue
         summary.add(base)
-        found.append(_record(file.name, base.time_step, ordered[:, np.argsort(order)], columns))
-    if not found:
+        records.append(_record(file.name, base.time_step, ordered[:, np.argsort(order)], columns))
+    if not records:
         raise InputError(f"{file}: no stretch without a gap has {SHORTEST} samples; record longer.")
     if summary.sentence:
         notes.append(f"{summary.sentence} ({file.name})")
-    return found, notes
+    return records, notes
 
 
 def _record(name: str, step: float, values: np.ndarray, columns: ResponseColumns) -> ExcitationRecord:

@@ -53,7 +53,9 @@ def joint_quantities(
             groups.setdefault((quantity, words), {})[joint] = name.column
         elif name.number is not None:
             numbered.setdefault((quantity, words), {})[name.number] = name.column
-        locked = [held for held in model.config.locked if _says(name, held) is not None]
+        locked = [
+            locked_joint for locked_joint in model.config.locked if _says(name, locked_joint) is not None
+        ]
         if joint is None and locked:
             reasons[name.column] = f"{locked[0]} is locked"
     groups = _completed(groups, (set(range(model.n)),))
@@ -70,7 +72,7 @@ def joint_quantities(
 
 def _completed(groups: _Groups, wholes: Sequence[set[int]]) -> _Groups:
     """Wordings that complete each other to one of the `wholes`, as the angles of some joints and the strokes of others, are one group."""
-    found = dict(groups)
+    completed = dict(groups)
     for quantity in dict.fromkeys(key[0] for key in groups):
         for standing in range(3):
             parts = [
@@ -84,16 +86,16 @@ def _completed(groups: _Groups, wholes: Sequence[set[int]]) -> _Groups:
             apart = len(columns) == sum(len(groups[key]) for key in parts)
             if len(parts) > 1 and apart and any(set(columns) == whole for whole in wholes):
                 for key in parts:
-                    del found[key]
-                found[parts[0]] = columns
-    return found
+                    del completed[key]
+                completed[parts[0]] = columns
+    return completed
 
 
 def _best(
     groups: Mapping[tuple[str, tuple[str, ...]], Mapping[int, str]], n: int, reasons: dict[str, str]
 ) -> dict[str, tuple[str, ...]]:
     """Of every quantity the group with all joints that is measured rather than commanded; none where two are alike."""
-    found: dict[str, tuple[str, ...]] = {}
+    best: dict[str, tuple[str, ...]] = {}
     for quantity in dict.fromkeys(key[0] for key in groups):
         of_it = {words: columns for (kind, words), columns in groups.items() if kind == quantity}
         order = {words: (rank(words), words != (quantity,)) for words in of_it}
@@ -112,8 +114,8 @@ def _best(
         for words in whole[1:]:
             reasons |= dict.fromkeys(of_it[words].values(), f"{of_it[whole[0]][0]} … are taken as {quantity}")
         if whole:
-            found[quantity] = tuple(of_it[whole[0]][joint] for joint in range(n))
-    return found
+            best[quantity] = tuple(of_it[whole[0]][joint] for joint in range(n))
+    return best
 
 
 def _joint_of(name: ColumnName, model: RobotModel) -> tuple[int | None, tuple[str, ...]]:

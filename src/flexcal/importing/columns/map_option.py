@@ -73,7 +73,7 @@ def apply_map(
     for quantity in placed.keys() - said.keys():
         if mapped & set(placed[quantity].columns):
             placed.pop(quantity)
-    taken = {column for found in placed.values() for column in found.columns} | set(texts.values())
+    taken = {column for assignment in placed.values() for column in assignment.columns} | set(texts.values())
     reasons = {left.column: left.why for left in guess.left_out}
     left = tuple(
         UnusedColumn(column, reasons.get(column, "not mapped"))
@@ -138,13 +138,13 @@ def _said(
         raise InputError(
             f"--map does not give {', '.join(missing)}, which was not recognised either; map it too."
         )
-    found = []
+    assigned = []
     for i in range(len(names)):
         if i in entries:
-            found.append(entries[i])
+            assigned.append(entries[i])
         elif guessed is not None:
-            found.append((guessed.columns[i], guessed.units[i], guessed.gains[i], guessed.offsets[i]))
-    columns, units, gains, offsets = zip(*found, strict=True)
+            assigned.append((guessed.columns[i], guessed.units[i], guessed.gains[i], guessed.offsets[i]))
+    columns, units, gains, offsets = zip(*assigned, strict=True)
     usual = guessed.units if guessed is not None else place(foreign, model, quantity, columns, "").units
     known = UNITS.get(quantity, {})
     named = [parse_name(column, foreign.units.get(column)).unit for column in columns]

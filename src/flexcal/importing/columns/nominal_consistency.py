@@ -81,14 +81,16 @@ def check_nominal(
     rms, _ = tool.miss(q, xyz, 1)
     moved_rms, shift = tool.miss(q, xyz, _ROUNDS)
     declared = model.point(point).xyz
-    found = NominalMismatch(rms, moved_rms, declared, declared + shift, model.reach, model.point(point).name)
+    mismatch = NominalMismatch(
+        rms, moved_rms, declared, declared + shift, model.reach, model.point(point).name
+    )
     if moved_rms < _ODD * model.reach:
-        return found
+        return mismatch
     if len(q) >= _FEWEST_FROM_HAND and tool.miss_from_hand(q, xyz) < min(
         _MADE_GOOD * moved_rms, _ODD * model.reach
     ):
-        return replace(found, proposal=_FROM_HAND, supported=False)
-    return _explained(model, tool, q, xyz, placed, found)
+        return replace(mismatch, proposal=_FROM_HAND, supported=False)
+    return _explained(model, tool, q, xyz, placed, mismatch)
 
 
 @dataclass(frozen=True)
@@ -148,20 +150,20 @@ def _explained(
     q: np.ndarray,
     xyz: np.ndarray,
     placed: ColumnAssignment,
-    found: NominalMismatch,
+    mismatch: NominalMismatch,
 ) -> NominalMismatch:
     """The misfit with the simplest explanation that makes good most of it, with the point where it was declared if one does so."""
-    enough = min(_MADE_GOOD * found.moved_rms, _ODD * model.reach)
+    enough = min(_MADE_GOOD * mismatch.moved_rms, _ODD * model.reach)
     simple = list(_simple_changes(model))
     for rounds in (1, _ROUNDS):
         for change in simple:
             if tool.miss(*change.read(q, xyz), rounds)[0] < enough:
-                return replace(found, **_said(model, placed, change))
+                return replace(mismatch, **_said(model, placed, change))
     if model.n <= _MOST_JOINTS:
         change = _signs_and_zeros(model, tool, q, xyz)
         if tool.miss(*change.read(q, xyz), _ROUNDS)[0] < enough:
-            return replace(found, **_said(model, placed, change))
-    return found
+            return replace(mismatch, **_said(model, placed, change))
+    return mismatch
 
 
 def _simple_changes(model: RobotModel) -> Iterator[_Change]:

@@ -117,7 +117,7 @@ def _left(
     names: Sequence[ColumnName], placed: Mapping[str, ColumnAssignment], reasons: Mapping[str, str]
 ) -> list[ColumnName]:
     """The columns that are nothing yet."""
-    taken = {column for found in placed.values() for column in found.columns}
+    taken = {column for assignment in placed.values() for column in assignment.columns}
     return [name for name in names if name.column not in taken and name.column not in reasons]
 
 
@@ -127,7 +127,7 @@ def _guess(
     texts: Mapping[str, str],
     reasons: Mapping[str, str],
 ) -> RecognisedColumns:
-    taken = {column for found in placed.values() for column in found.columns} | set(texts.values())
+    taken = {column for assignment in placed.values() for column in assignment.columns} | set(texts.values())
     left = tuple(
         UnusedColumn(column, reasons.get(column, "not recognised"))
         for column in foreign.table.columns
@@ -170,7 +170,7 @@ def _vectors(names: Sequence[ColumnName], reasons: dict[str, str]) -> dict[str, 
             groups["sigma_xyz"].setdefault(rest, {})[f"sigma_{parts[-1]}"] = name.column
         elif parts and parts[-1] != "w" and not words & NO_POINT:
             groups["xyz"].setdefault(rest, {})[parts[-1]] = name.column
-    found: dict[str, tuple[str, ...]] = {}
+    vectors: dict[str, tuple[str, ...]] = {}
     for quantity, of_it in groups.items():
         wanted = VECTORS[quantity]
         whole = sorted((rest for rest, axes in of_it.items() if set(axes) == set(wanted)), key=rank)
@@ -179,24 +179,24 @@ def _vectors(names: Sequence[ColumnName], reasons: dict[str, str]) -> dict[str, 
             why = f"{' and '.join(tied)} could both begin {quantity}: say which with --map"
             reasons |= {column: why for rest in whole for column in of_it[rest].values()}
         elif whole:
-            found[quantity] = tuple(of_it[whole[0]][axis] for axis in wanted)
+            vectors[quantity] = tuple(of_it[whole[0]][axis] for axis in wanted)
             for rest in whole[1:]:
                 reasons |= dict.fromkeys(
-                    of_it[rest].values(), f"{found[quantity][0]} … are taken as {quantity}"
+                    of_it[rest].values(), f"{vectors[quantity][0]} … are taken as {quantity}"
                 )
         else:
             for axes in of_it.values():
                 if len(axes) > 1:
                     missing = " and ".join(axis for axis in wanted if axis not in axes)
                     reasons |= dict.fromkeys(axes.values(), f"no {missing} was recognised beside them")
-    return found
+    return vectors
 
 
 def _singles(
     names: Sequence[ColumnName], foreign: ForeignTable, reasons: dict[str, str]
 ) -> dict[str, tuple[str, ...]]:
     """Columns of quantities that have one: all of whose words are of that quantity, or neutral."""
-    found: dict[str, tuple[str, ...]] = {}
+    singles: dict[str, tuple[str, ...]] = {}
     for name in names:
         words = set(name.words)
         for quantity, spoken in SINGLE.items():
@@ -206,14 +206,14 @@ def _singles(
             values = foreign.numbers[name.column]
             if quantity == "pose" and not (values == np.rint(values)).all():
                 continue
-            if quantity in found:
-                reasons[name.column] = f"{found[quantity][0]} is taken as {quantity}"
+            if quantity in singles:
+                reasons[name.column] = f"{singles[quantity][0]} is taken as {quantity}"
             else:
-                found[quantity] = (name.column,)
+                singles[quantity] = (name.column,)
     others = [name.column for name in names if name.column in foreign.times and name.column not in reasons]
-    if others and "t" not in found:
-        found["t"] = (others[0],)
-    return found
+    if others and "t" not in singles:
+        singles["t"] = (others[0],)
+    return singles
 
 
 def place(

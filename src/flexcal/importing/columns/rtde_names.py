@@ -53,25 +53,27 @@ def rtde_columns(
         return {}
     columns = _of_joints("actual_q")
     units = joint_units(model, np.stack([there[column] for column in columns], axis=1))
-    found = {"q": ColumnAssignment.plain("q", columns, units, f"{_WHY}; the unit by the joints' limits")}
+    assignments = {
+        "q": ColumnAssignment.plain("q", columns, units, f"{_WHY}; the unit by the joints' limits")
+    }
     for quantity, stem, unit in _OF_JOINTS:
         columns = _of_joints(stem)
         if set(columns) <= there.keys():
-            found[quantity] = ColumnAssignment.plain(quantity, columns, (unit,) * JOINTS, _WHY)
+            assignments[quantity] = ColumnAssignment.plain(quantity, columns, (unit,) * JOINTS, _WHY)
     for stem, why in _REASONS.items():
         reasons |= {column: why for column in _of_joints(stem) if column in there}
     steps = []
     if TIME in there and TIME not in foreign.times:
-        found["t"] = ColumnAssignment.plain("t", (TIME,), ("s",), _WHY)
+        assignments["t"] = ColumnAssignment.plain("t", (TIME,), ("s",), _WHY)
     if TIME in there:
         steps = np.diff(there[TIME])
     if set(TOOL) <= there.keys():
         if len(steps) and np.median(steps) <= _SLOWEST:
             reasons |= dict.fromkeys(TOOL, _IN_LOG)
         else:
-            found["xyz"] = ColumnAssignment.plain("xyz", TOOL, ("m",) * 3, f"{_WHY}; not measured")
+            assignments["xyz"] = ColumnAssignment.plain("xyz", TOOL, ("m",) * 3, f"{_WHY}; not measured")
         reasons |= {column: _TURN for column in _of_joints("actual_TCP_pose")[3:] if column in there}
-    return found
+    return assignments
 
 
 def _of_joints(stem: str) -> tuple[str, ...]:

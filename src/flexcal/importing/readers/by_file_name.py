@@ -16,19 +16,19 @@ from flexcal.importing.tables import ForeignTable
 
 def with_times(foreign: ForeignTable) -> ForeignTable:
     """`foreign` with texts most of which are timestamps as seconds from the first of their column, named in `times`."""
-    found = {}
+    times = {}
     for name, texts in foreign.texts.items():
         seconds = seconds_of(texts.tolist())
         if seconds is not None:
-            found[name] = seconds
-    if not found:
+            times[name] = seconds
+    if not times:
         return foreign
     notes = [
         f"{name} counts in seconds from {foreign.texts[name][np.isfinite(seconds)][0]}"
-        for name, seconds in found.items()
+        for name, seconds in times.items()
     ]
-    table = Table(foreign.table.file, foreign.table.first, {**foreign.table.columns, **found})
-    return replace(foreign, table=table, notes=(*foreign.notes, *notes), times=(*foreign.times, *found))
+    table = Table(foreign.table.file, foreign.table.first, {**foreign.table.columns, **times})
+    return replace(foreign, table=table, notes=(*foreign.notes, *notes), times=(*foreign.times, *times))
 
 
 _TEXT = (".csv", ".tsv", ".txt", ".dat", ".asc")

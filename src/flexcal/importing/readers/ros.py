@@ -105,13 +105,13 @@ def _point_topic(path: Path, kinds: dict[str, str], asked: str | None) -> str | 
 
 def _joint_states(reader: Any, notes: list[str]) -> list[_Stream]:
     """A stream for every topic and set of names; what is left out is added to the `notes`."""
-    found: dict[tuple[str, tuple[str, ...]], list[tuple[float, float, list[np.ndarray]]]] = {}
+    messages: dict[tuple[str, tuple[str, ...]], list[tuple[float, float, list[np.ndarray]]]] = {}
     without: Counter[str] = Counter()
     for topic, received, message in _messages(reader, (_JOINTS,), notes):
         values = [np.asarray(getattr(message, field), dtype=float) for field in _FIELDS]
         names = tuple(message.name)
         if len(values[0]) == len(names) > 0:
-            found.setdefault((topic, names), []).append((_stamp(message), received, values))
+            messages.setdefault((topic, names), []).append((_stamp(message), received, values))
         else:
             without[topic] += 1
     notes += [
@@ -119,7 +119,7 @@ def _joint_states(reader: Any, notes: list[str]) -> list[_Stream]:
         for topic, count in without.items()
     ]
     streams = []
-    for (topic, names), rows in found.items():
+    for (topic, names), rows in messages.items():
         fields = {}
         for k, field in enumerate(_FIELDS):
             if all(len(row[2][k]) == len(names) for row in rows):

@@ -83,19 +83,19 @@ def unit_of(text: str) -> str | None:
 
 def parse_name(column: str, unit: str | None = None) -> ColumnName:
     """Take a name apart; `unit` is what the file says besides."""
-    text, found = column, None if unit is None else unit_of(unit)
+    text, given_unit = column, None if unit is None else unit_of(unit)
     bracket = _BRACKETS.search(column)
     if bracket and not bracket[1].isdigit():
-        text, found = column[: bracket.start()], found or unit_of(bracket[1])
+        text, given_unit = column[: bracket.start()], given_unit or unit_of(bracket[1])
     parts = [part.lower() for part in _WORDS.findall(_without_accents(text))]
-    if found is None and len(parts) > 1:
+    if given_unit is None and len(parts) > 1:
         last = parts[-1]
         after_words = len(parts) > 2 or not parts[0].isdigit()
         if last in _AS_WORD or (last in _LAST_WORD and after_words and not _is_short(parts[:-1])):
-            found, parts = _SPELLINGS[last], parts[:-1]
+            given_unit, parts = _SPELLINGS[last], parts[:-1]
     numbers = [int(part) for part in parts if part.isdigit()]
     words = tuple(part for part in parts if not part.isdigit())
-    return ColumnName(column, text, words, numbers[-1] if numbers else None, found)
+    return ColumnName(column, text, words, numbers[-1] if numbers else None, given_unit)
 
 
 def _without_accents(text: str) -> str:

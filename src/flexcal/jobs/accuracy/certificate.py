@@ -205,7 +205,8 @@ def certify_robot(
     progress("reading", 0.0)
     wanted = read_targets(targets, model)
     base, as_declared = (
-        desired_pose(model, nominal, wanted).position for nominal in (calibrated.found, calibrated.nominal)
+        desired_pose(model, nominal, wanted).position
+        for nominal in (calibrated.with_points, calibrated.nominal)
     )
     sets = {file: verification_poses(calibrated, [file]) for file in (before, after)}
     rows = {file: _rows(file, poses, targets, wanted) for file, poses in sets.items()}
@@ -241,9 +242,9 @@ def certify_robot(
         calibrated,
         None if placed is None else _visited(start, _placed(placed, start, declared)),
         _visited(start, _registered(start, declared)),
-        _visited(start, _best_fit(calibrated.found, *visited[before])),
+        _visited(start, _best_fit(calibrated.with_points, *visited[before])),
         there,
-        _visited(visited[after][0], _best_fit(calibrated.found, *visited[after])),
+        _visited(visited[after][0], _best_fit(calibrated.with_points, *visited[after])),
         len(every) - len(common),
         known,
         error_scale(known, _measured_noise(there, covariance)),

@@ -34,14 +34,16 @@ _CHANGED = {
 }
 
 
-def proposed_refit(model: RobotModel, poses: PoseSet, found: Verification) -> RefittedVerification | None:
+def proposed_refit(
+    model: RobotModel, poses: PoseSet, verification: Verification
+) -> RefittedVerification | None:
     """The refit that reduces the leave-one-out errors to less than half; None where there is none.
 
     The remaining errors have to be about as large as predicted, or a tenth of those before, because a refit also reduces errors of a
     model that is wrong far from its calibration poses.
     """
-    rms = _rms(found)
-    if found.all.mean < _MUCH:
+    rms = _rms(verification)
+    if verification.all.mean < _MUCH:
         return None
     best: RefittedVerification | None = None
     tried: Sequence[tuple[Refit, ...]] = (("station",), ("point",), ("station", "point"))
@@ -64,7 +66,7 @@ def _explains(best: RefittedVerification, rms: float) -> bool:
 
 
 def refit_remarks(
-    found: Verification,
+    verification: Verification,
     poses: PoseSet,
     refit: RefittedVerification | None,
     better: RefittedVerification | None,
@@ -79,7 +81,7 @@ def refit_remarks(
         return ()
     after, cause = _CHANGED[better.what]
     return (
-        f"mean error {found.all.mean / MILLIMETRE:.3g} mm; {after} {better.result.all.mean / MILLIMETRE:.2g} mm: {cause}. "
+        f"mean error {verification.all.mean / MILLIMETRE:.3g} mm; {after} {better.result.all.mean / MILLIMETRE:.2g} mm: {cause}. "
         f"--refit {' '.join(better.what)} verifies the geometry alone, and costs {_poses(better)} poses",
     )
 
@@ -102,5 +104,5 @@ def _poses(refit: RefittedVerification) -> int:
     return -(-refit.parameters // 3)
 
 
-def _rms(found: Verification) -> float:
-    return float(np.sqrt((found.errors**2).sum(axis=1).mean()))
+def _rms(verification: Verification) -> float:
+    return float(np.sqrt((verification.errors**2).sum(axis=1).mean()))

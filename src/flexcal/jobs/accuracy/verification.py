@@ -189,18 +189,18 @@ def verify_robot(
     known = all(is_station_identified(model, station) for station in poses.stations)
     stands = verify_jointly(model, poses) if known else None
     anew = verify_refitted(model, poses, refit) if refit else None
-    found = stands if anew is None else (anew.result, anew.covariance)
-    assert found is not None
+    verified = stands if anew is None else (anew.result, anew.covariance)
+    assert verified is not None
     standing = model if anew is None else anew.model
     result = RobotVerification(
         model=standing,
         poses=poses,
-        result=found[0],
-        covariance=found[1],
+        result=verified[0],
+        covariance=verified[1],
         before=before,
         refit=anew,
         as_calibrated=stands[0] if stands is not None and refit else None,
-        better=proposed_refit(model, poses, found[0]) if anew is None else None,
+        better=proposed_refit(model, poses, verified[0]) if anew is None else None,
         uncalibrated=() if "point" in refit else unmeasured,
         outside=outside_ranges(calibrated, measured.q),
         fitted=fitted,

@@ -106,22 +106,22 @@ class RobotMap:
 
     def document(self) -> dict[str, Any]:
         """The JSON document."""
-        found, scale = self.map, self.scale
+        predicted, scale = self.map, self.scale
         return {
-            "poses": len(found.q),
+            "poses": len(predicted.q),
             "target": self.reach.target,
             "station": self.reach.station,
             "payload_kg": self.reach.payload,
             "box_m": self.box,
             "before": None if self.before is None else self.before.document(),
-            "predicted": {"mean": _spread(found.mean), "p95": _spread(found.p95)},
+            "predicted": {"mean": _spread(predicted.mean), "p95": _spread(predicted.p95)},
             "sources": self.sources,
             "worst": [
                 {
-                    "position_m": found.position[k],
-                    "q": found.q[k],
-                    "mean_mm": found.mean[k] / MILLIMETRE,
-                    "p95_mm": found.p95[k] / MILLIMETRE,
+                    "position_m": predicted.position[k],
+                    "q": predicted.q[k],
+                    "mean_mm": predicted.mean[k] / MILLIMETRE,
+                    "p95_mm": predicted.p95[k] / MILLIMETRE,
                     "sources": {kind: float(shares[row]) for kind, shares in self.worst_sources.items()},
                 }
                 for row, k in enumerate(self.worst)
@@ -173,8 +173,8 @@ def map_accuracy(
     scale, before, study, fitted, sample = _verified(calibrated, verification)
     rng = np.random.default_rng([seed, 7])
     box, q = _poses(reach, working, count, seed, rng, progress)
-    found = accuracy_map(reach, q, progress=progress).scaled(error_scale_factor(scale))
-    worst = _worst(found)
+    predicted = accuracy_map(reach, q, progress=progress).scaled(error_scale_factor(scale))
+    worst = _worst(predicted)
     some = q[rng.permutation(len(q))[:_SOURCE_POSES]]
     shares = {kind: float(values.mean()) for kind, values in error_sources(reach, some).items()}
     place = working_file(working)
@@ -187,7 +187,7 @@ def map_accuracy(
     sources = error_sources(reach, q[worst])
     result = RobotMap(
         reach,
-        found,
+        predicted,
         box,
         worst,
         shares,
@@ -200,9 +200,9 @@ def map_accuracy(
         RunRecord(origin, command),
         sample,
     )
-    page = MapStudy(model, found, box, result.document(), scale, study)
+    page = MapStudy(model, predicted, box, result.document(), scale, study)
     if out != page_beside(out):
-        _write_table(out, found)
+        _write_table(out, predicted)
     write_page(page_beside(out), map_page(page))
     return result
 
@@ -245,33 +245,33 @@ def _verified(
     poses = verification_poses(calibrated, files)
     sample = StratifiedSample.of(poses)
     poses = poses if sample is None else poses.subset(sample.rows)
-    found, covariance = verify_jointly(calibrated.model, poses)
-    if (moved := proposed_refit(calibrated.model, poses, found)) is not None:
-        (said,) = refit_remarks(found, poses, None, moved)
+    verification, covariance = verify_jointly(calibrated.model, poses)
+    if (moved := proposed_refit(calibrated.model, poses, verification)) is not None:
+        (said,) = refit_remarks(verification, poses, None, moved)
         named = " and ".join(str(file) for file in files)
         raise InputError(f"{named} cannot verify the map: {said}; give points measured as the calibration's.")
     before = uncalibrated_model(calibrated.nominal, poses).errors(poses)
     with naming(files[0]):
-        scale = error_scale(found, covariance)
-    return scale, before, found, already_fitted(calibrated, files, poses), sample
+        scale = error_scale(verification, covariance)
+    return scale, before, verification, already_fitted(calibrated, files, poses), sample
 
 
-def _worst(found: AccuracyMap) -> np.ndarray:
+def _worst(predicted: AccuracyMap) -> np.ndarray:
     """Rows of the worst places that are apart from each other, the worst first."""
-    least = _APART * float(np.linalg.norm(np.ptp(found.position, axis=0)))
+    least = _APART * float(np.linalg.norm(np.ptp(predicted.position, axis=0)))
     chosen: list[int] = []
-    for k in np.argsort(-found.p95, kind="stable"):
-        if all(np.linalg.norm(found.position[k] - found.position[c]) >= least for c in chosen):
+    for k in np.argsort(-predicted.p95, kind="stable"):
+        if all(np.linalg.norm(predicted.position[k] - predicted.position[c]) >= least for c in chosen):
             chosen.append(int(k))
         if len(chosen) == _WORST:
             break
     return np.array(chosen)
 
 
-def _write_table(out: Path, found: AccuracyMap) -> None:
-    columns = {name: found.position[:, i] for i, name in enumerate("xyz")}
-    columns |= {f"q{i + 1}": found.q[:, i] for i in range(found.q.shape[1])}
-    errors = {"mean_mm": found.mean / MILLIMETRE, "p95_mm": found.p95 / MILLIMETRE}
+def _write_table(out: Path, predicted: AccuracyMap) -> None:
+    columns = {name: predicted.position[:, i] for i, name in enumerate("xyz")}
+    columns |= {f"q{i + 1}": predicted.q[:, i] for i in range(predicted.q.shape[1])}
+    errors = {"mean_mm": predicted.mean / MILLIMETRE, "p95_mm": predicted.p95 / MILLIMETRE}
     write_table(out, columns | errors)
 
 

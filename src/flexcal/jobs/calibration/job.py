@@ -125,13 +125,13 @@ class RobotCalibration:
         """The measured points: their frames, and where they are in it, m, as declared and as found, with the 1σ distance of the latter."""
         fit = self.selected
         targets = fit.poses.targets
-        found = probable_robot(fit.model, targets)
+        robot = probable_robot(fit.model, targets)
         return {
             name: {
                 "frame": fit.model.points[name].frame,
                 "declared_xyz_m": fit.model.points[name].xyz,
-                "found_xyz_m": found_xyz(found, name),
-                "std_m": point_uncertainty(found, name),
+                "found_xyz_m": found_xyz(robot, name),
+                "std_m": point_uncertainty(robot, name),
             }
             for name in targets
         }
@@ -139,7 +139,7 @@ class RobotCalibration:
     @cached_property
     def _numbers(self) -> dict[str, Any]:
         selected, chosen, before = self.selected, self.selection, self.before.document()
-        found, drift = selected.identifiability, Drift.of(selected)
+        identifiability, drift = selected.identifiability, Drift.of(selected)
         bearings = bearing_remarks(self.bearings, selected)
         blamed = self.bearings is not None and self.bearings.contradicted
         misfit = None if self.stiffness is None else self.stiffness.misfit
@@ -148,8 +148,8 @@ class RobotCalibration:
             "joints": {joint.name: joint.kind for joint in selected.model.joints},
             "identifiability": identifiability_block(self.rigid.identifiability)
             | {
-                "selected": identifiability_block(found)
-                | identifiability_spectrum(found)
+                "selected": identifiability_block(identifiability)
+                | identifiability_spectrum(identifiability)
                 | {"undetermined": [{"name": u.name, "cause": u.cause} for u in selected.undetermined]}
             },
             "terms": list(selected.terms),
@@ -240,7 +240,7 @@ def calibrate_robot(
 
     def fit(robot_: RobotModel, chosen: Sequence[str], stage: str, *, elastic: bool) -> Calibration:
         progress(stage, 0.0)
-        found = calibrate(
+        calibration = calibrate(
             robot_,
             poses,
             terms=chosen,
@@ -250,7 +250,7 @@ def calibrate_robot(
             loss=loss,
         )
         progress(stage, 1.0)
-        return found
+        return calibration
 
     base = ("kinematic", "backlash") if model.backlash_joints else ("kinematic",)
     rigid = fit(model, base, "rigid fit", elastic=False)

@@ -49,7 +49,7 @@ class RobotCompensation:
                 self.file.row_word: int(self.file.first + k),
                 "reason": str(self.result.reason[k]),
             }
-            for k in np.flatnonzero(~self.result.found)
+            for k in np.flatnonzero(~self.result.reached)
         ]
 
     @property
@@ -74,15 +74,15 @@ class RobotCompensation:
 
     def document(self) -> dict[str, Any]:
         """The JSON document; `error_before_mm` is how far the real tool would be off with the nominal commands."""
-        result, found = self.result, self.result.found
-        before = result.before[found] / MILLIMETRE
-        change = np.abs(result.q - result.nominal)[found].max(axis=0)
+        result, reached = self.result, self.result.reached
+        before = result.before[reached] / MILLIMETRE
+        change = np.abs(result.q - result.nominal)[reached].max(axis=0)
         return {
             "targets": len(self.targets),
             "points": self.points,
             "points_not_found_m": self.lost_points,
-            "compensated": int(found.sum()),
-            "ambiguous": int((found & ~result.unambiguous).sum()),
+            "compensated": int(reached.sum()),
+            "ambiguous": int((reached & ~result.unambiguous).sum()),
             "error_before_mm": {
                 "mean_mm": float(before.mean()),
                 "p90_mm": float(np.quantile(before, 0.9)),
@@ -92,7 +92,7 @@ class RobotCompensation:
             "start": None
             if self.start is None
             else dict(zip(self.model.joint_names, self.start.tolist(), strict=True)),
-            "from_other_postures": self.targets.pose[found & result.elsewhere].tolist(),
+            "from_other_postures": self.targets.pose[reached & result.elsewhere].tolist(),
             "refused": self.refused,
         }
 
@@ -126,7 +126,7 @@ def compensate_robot(
             raise InputError("--target and --frame exclude each other; give one of them.")
     model, nominal = (
         robot_ if frame is None else with_point_at_frame(robot_, frame)
-        for robot_ in (calibrated.probable, calibrated.found)
+        for robot_ in (calibrated.probable, calibrated.with_points)
     )
     targets = _of_point(read_targets(file, model), file, target if frame is None else frame)
     for station in dict.fromkeys([] if targets.station is None else targets.station.tolist()):
@@ -143,14 +143,14 @@ def compensate_robot(
             f"{file} has joint positions, which are the start of the inverse kinematics; leave --start out."
         )
     result = compensate(model, nominal, targets, start=origin, progress=progress)
-    if not result.found.any():
+    if not result.reached.any():
         raise FlexcalError(
             f"{file}: none of the {len(targets)} targets can be compensated; pose {targets.pose[0]}: {result.reason[0]}."
         )
-    found = targets.subset(result.found)
-    commands = ToolTargets(found.pose, found.target, result.q[result.found], payload=found.payload)
+    reached = targets.subset(result.reached)
+    commands = ToolTargets(reached.pose, reached.target, result.q[result.reached], payload=reached.payload)
     table = open_table(file)
-    write_commands(out, model, commands, result.unambiguous[result.found], table)
+    write_commands(out, model, commands, result.unambiguous[result.reached], table)
     return RobotCompensation(model, table, targets, result, origin, nominal, calibrated.measured)
 
 

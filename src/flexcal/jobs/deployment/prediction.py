@@ -54,7 +54,7 @@ def predict_robot(
     for first in range(0, len(commands), _BLOCK):
         progress("predicting", first / len(commands))
         block = commands.subset(slice(first, first + _BLOCK))
-        parts.append(_predicted(calibrated.probable, calibrated.found, block))
+        parts.append(_predicted(calibrated.probable, calibrated.with_points, block))
     progress("predicting", 1.0)
     position, rotation, beside, certain = (np.concatenate(part) for part in zip(*parts, strict=True))
     tool = replace(commands, q=None, position=position, rotation=rotation)

@@ -94,10 +94,10 @@ class IdentifiedGains:
     @property
     def gains(self) -> list[float]:
         """Declared gains times factors (n,); as declared where the recordings do not determine the factor."""
-        found = zip(
+        factors = zip(
             self.declared, self.factors.parameters.coordinates(), self.factors.identifiable, strict=True
         )
-        return [float(gain * factor) if told else float(gain) for gain, factor, told in found]
+        return [float(gain * factor) if told else float(gain) for gain, factor, told in factors]
 
     @property
     def trust(self) -> Trust:

@@ -91,15 +91,15 @@ def identify_robot_inertials(
     origin = provenance([robot, nominal.urdf, folder / PLAN, *files], {})
     estimate = replace(estimate, provenance=origin)
     before = trajectory_error(nominal, plan, recordings)
-    found = RobotInertials(nominal, estimate, len(plan), before, error, target, command)
+    inertials = RobotInertials(nominal, estimate, len(plan), before, error, target, command)
     others = read_estimates(source, without="dynamics") if source.exists() else {}
     store_block(source, target, others, "dynamics", estimate)
     if out is not None:
         from flexcal.jobs.pages import report_folder
 
-        write_results(out, found.document())
+        write_results(out, inertials.document())
         report_folder(out)
-    return found
+    return inertials
 
 
 def identify_inertials_from_recordings(

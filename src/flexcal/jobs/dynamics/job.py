@@ -43,7 +43,7 @@ def identify_robot_dynamics(
     target = estimates_target(source, out, "dynamics")
     if learn_residual:
         LearnedDynamics.require_place(target)
-    found = identify_dynamics(
+    identified = identify_dynamics(
         with_blocks(bare, blocks, source),
         logs,
         estimator=ESTIMATORS[estimator],
@@ -58,14 +58,14 @@ def identify_robot_dynamics(
     options = {
         "estimator": estimator,
         "hold_out": hold_out,
-        "friction": ", ".join(found.friction.labels),
+        "friction": ", ".join(identified.friction.labels),
         "flexible": flexible,
     }
     used = source if blocks else None
     origin = provenance([robot, bare.urdf, *logs], options, used, tuple(blocks))
     result = replace(
-        found,
-        estimate=replace(found.estimate, provenance=origin),
+        identified,
+        estimate=replace(identified.estimate, provenance=origin),
         estimates=target,
         record=RunRecord(
             provenance([robot, bare.urdf, *logs, *validate], options, used, tuple(blocks)), command

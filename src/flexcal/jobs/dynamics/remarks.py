@@ -51,7 +51,7 @@ _LARGEST_ATTENUATION = 0.5
 
 def dynamics_remarks(data: RegressionData, estimate: Estimate) -> tuple[str, ...]:
     """One sentence each; every parameter of a drive that a declared term brings and the data do not determine is named."""
-    base = data.base.found
+    base = data.base.identifiability
     structural = {base.names[i] for i in base.kept}
     absorbed = {entry.name: entry.absorbed_by for entry in estimate.dropped}
     silent = set(data.silent)
@@ -99,11 +99,11 @@ def selection_remark(friction: FrictionSelection, estimate: Estimate) -> str | N
 
 
 def _by_joint(names: tuple[str, ...]) -> dict[str, list[str]]:
-    found: dict[str, list[str]] = {}
+    by_joint: dict[str, list[str]] = {}
     for name in names:
         joint, _, key = name.rpartition(".")
-        found.setdefault(joint, []).append(key)
-    return found
+        by_joint.setdefault(joint, []).append(key)
+    return by_joint
 
 
 def _attenuated(data: RegressionData, estimate: Estimate) -> Iterator[str]:

@@ -197,14 +197,14 @@ class DynamicsIdentification:
 
     def _essential_parameters(self) -> dict[str, Any]:
         """What stays of the base parameters, with value and standard deviation, and the error of the torques with it alone."""
-        found = self.essential
-        percent = {"train": 100 * self.train.errors(found.parameters)[0], "held_out": None}
+        essential = self.essential
+        percent = {"train": 100 * self.train.errors(essential.parameters)[0], "held_out": None}
         if self.held_out is not None:
-            percent["held_out"] = 100 * self.held_out.errors(found.parameters)[0]
-        stay = zip(found.names, found.values, found.std, strict=True)
+            percent["held_out"] = 100 * self.held_out.errors(essential.parameters)[0]
+        stay = zip(essential.names, essential.values, essential.std, strict=True)
         return {
             "parameters": [{"name": name, "estimate": value, "std": std} for name, value, std in stay],
-            "eliminated": list(found.eliminated),
+            "eliminated": list(essential.eliminated),
             "error_percent": percent,
         }
 
@@ -219,9 +219,9 @@ class DynamicsIdentification:
         hidden = {entry.name for entry in self.estimate.dropped}
         rows = []
         for expression, kept, row in zip(
-            base.expressions, base.found.kept, base.found.regrouping, strict=True
+            base.expressions, base.identifiability.kept, base.identifiability.regrouping, strict=True
         ):
-            name, value = base.found.names[kept], float(row @ x)
+            name, value = base.identifiability.names[kept], float(row @ x)
             std = None if name in hidden else self.estimate.std(name)
             percent = None if std is None or value == 0 else 100 * std / abs(value)
             unit = self.estimate.parameters[name].unit

@@ -47,11 +47,11 @@ class PoseRequest:
 
 @dataclass(frozen=True, eq=False)
 class CandidatePoses:
-    """The candidates `found`, the given `pool` that they come from, if any, where the robot will work (None: anywhere), and the `files` of
+    """The `candidates`, the given `pool` that they come from, if any, where the robot will work (None: anywhere), and the `files` of
     both."""
 
     checker: CollisionChecker
-    found: PoseCandidates
+    candidates: PoseCandidates
     pool: PosePool | None
     working: WorkingVolume | None
     files: tuple[Path, ...]
@@ -73,7 +73,7 @@ class CandidatePoses:
             else candidates
         )
         with naming(candidates) if isinstance(candidates, Path) else nullcontext():
-            found = pose_candidates(
+            pose_pool = pose_candidates(
                 model,
                 rng=rng,
                 candidates=given,
@@ -86,7 +86,7 @@ class CandidatePoses:
         files = [candidates] if isinstance(candidates, Path) else []
         if (file := working_file(request.working)) is not None:
             files.append(file)
-        return cls(checker, found, given if isinstance(given, PosePool) else None, place, tuple(files))
+        return cls(checker, pose_pool, given if isinstance(given, PosePool) else None, place, tuple(files))
 
 
 def working_file(given: str | None) -> Path | None:

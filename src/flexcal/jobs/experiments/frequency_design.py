@@ -149,10 +149,10 @@ def plan_frequency_experiments(
     else:
         plan = plan_without_poses(model, kind, detection_lines=detection_lines, seed=seed)
         if poses is None:
-            found = optimise_excitation(
+            designed = optimise_excitation(
                 model, plan, count=choose or POSES, candidates=candidates, sensors=sensors, progress=progress
             )
-            flat, planned, choice = found.flat, found.planned, found.choice
+            flat, planned, choice = designed.flat, designed.planned, designed.choice
         else:
             given = read_frequency_poses(
                 poses, kind, model, excitation_margin(model, plan.reference_amplitude)
@@ -166,13 +166,13 @@ def plan_frequency_experiments(
     curve = None if choice is None else _curve(choice, seed)
     places = payload_placements(model, planned.plan, sensors, progress) if place_payload else ()
     files = [file for file in (poses, declared_sensors(robot)) if file is not None]
-    found = DesignedFrequency(
+    designed = DesignedFrequency(
         planned, flat, out, choice, curve, places, RunRecord(robot_provenance(model, files), command)
     )
     write_plan(out, planned.plan)
-    study = FrequencyDesignStudy(model, planned, flat, found.curve, found.document())
+    study = FrequencyDesignStudy(model, planned, flat, designed.curve, designed.document())
     write_page(page_beside(out), frequency_page(study))
-    return found
+    return designed
 
 
 def _require_all(model: RobotModel, kind: PlanName, poses: Path | None) -> None:

@@ -30,7 +30,7 @@ class NextPosesPlan:
 
     plan: PosePlan | None
     file: Path | None
-    found: NextPoses
+    poses: NextPoses
     stop: int | None
     wanted: float | None
     seed: int
@@ -40,12 +40,12 @@ class NextPosesPlan:
 
     def document(self) -> dict[str, Any]:
         """The JSON document; `stop_after` counts the next poses, and is null where those asked for do not suffice."""
-        found, design = self.found, self.found.design
+        poses, design = self.poses, self.poses.design
         return (
             {
                 "plan": self.file,
                 "poses": 0 if self.plan is None else len(self.plan),
-                "measured": found.measured,
+                "measured": poses.measured,
             }
             | pool_block(design, self.pool, self.seed)
             | {
@@ -55,8 +55,8 @@ class NextPosesPlan:
                 "stop_after": self.stop,
                 "working": working_block(self.working),
                 "flanks": flank_block(design),
-                "tool_error_mm": found.tool_error / MILLIMETRE,
-                "least_possible_mm": found.possible / MILLIMETRE,
+                "tool_error_mm": poses.tool_error / MILLIMETRE,
+                "least_possible_mm": poses.possible / MILLIMETRE,
                 **self.record.document(),
             }
         )
@@ -80,7 +80,7 @@ def plan_next_poses(
     known = read_poses(measured, model, require_motion=False)
     rng = np.random.default_rng([request.seed, 7])
     choice = CandidatePoses.of(model, request, rng, progress)
-    after = next_poses(choice.found, known, count, rng=rng, criterion=request.criterion)
+    after = next_poses(choice.candidates, known, count, rng=rng, criterion=request.criterion)
     stop = after.enough(wanted)
     origin = robot_provenance(model, (*measured, *choice.files))
     if stop == 0:

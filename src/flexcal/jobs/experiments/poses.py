@@ -152,8 +152,8 @@ def plan_calibration_poses(
     rng = np.random.default_rng([seed, 2])
     choice = CandidatePoses.of(model, request, rng, progress)
     if request.wanted is not None:
-        count = fewest_poses(choice.found, count, request.wanted)
-    design = choose_poses(choice.found, count, rng=rng, criterion=request.criterion, progress=progress)
+        count = fewest_poses(choice.candidates, count, request.wanted)
+    design = choose_poses(choice.candidates, count, rng=rng, criterion=request.criterion, progress=progress)
     way = measurement_order(choice.checker, design.plan.q)
     design = design.in_order(way.order)
     curve = pose_curve(design, rng=np.random.default_rng([seed, 5]), progress=progress)

@@ -78,12 +78,12 @@ class TrajectoryRequest:
         def onward(search: int) -> Progress:
             return lambda stage, share: progress(stage, (search + share) / self.searches)
 
-        found = [self._search(nominal, search, onward(search)) for search in range(self.searches)]
-        return sorted(found, key=lambda design: -design.merits[-1])
+        designs = [self._search(nominal, search, onward(search)) for search in range(self.searches)]
+        return sorted(designs, key=lambda design: -design.merits[-1])
 
     def _search(self, nominal: RobotModel, search: int, progress: Progress) -> TrajectoryDesign:
         loaded = self.loaded or any(name.startswith("payload.") for name in self.of)
-        found = design_trajectories(
+        design = design_trajectories(
             nominal,
             self.count,
             criterion=self.criterion,
@@ -103,7 +103,7 @@ class TrajectoryRequest:
             seed=self.seed + _NEXT_SEED * search,
             progress=progress,
         )
-        return replace(found, plan=replace(found.plan, seed=self.seed))
+        return replace(design, plan=replace(design.plan, seed=self.seed))
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,8 +185,8 @@ class DesignedTrajectories:
             "base_parameters": design.columns.rank,
             "condition": self.conditions[0],
             "searches": [
-                {"condition": condition, "merit": found.merits[-1]}
-                for condition, found in zip(self.conditions, self.designs, strict=True)
+                {"condition": condition, "merit": searched.merits[-1]}
+                for condition, searched in zip(self.conditions, self.designs, strict=True)
             ],
             "criterion": design.goal.criterion.name,
             "merits": list(design.merits),
@@ -232,13 +232,13 @@ def plan_trajectories(
     origin = provenance([robot, nominal.urdf, *(() if request.after is None else (request.after,))])
     designs = request.design(known, progress)
     timed = tuple(timed_motion(designs[0], number, rate_hz) for number in range(len(designs[0].plan)))
-    found = DesignedTrajectories(designs, timed, rate_hz, assumed, out, RunRecord(origin, command))
-    write_page(found.page, trajectory_page(found.design, found.document()))
-    for motion, (csv, ros) in zip(timed, found.timed_files, strict=True):
+    designed = DesignedTrajectories(designs, timed, rate_hz, assumed, out, RunRecord(origin, command))
+    write_page(designed.page, trajectory_page(designed.design, designed.document()))
+    for motion, (csv, ros) in zip(timed, designed.timed_files, strict=True):
         motion.positions.write_csv(csv)
         motion.positions.write_ros(ros)
-    write_plan(out, found.design.plan)
-    return found
+    write_plan(out, designed.design.plan)
+    return designed
 
 
 def exciting_plan(nominal: RobotModel, *, count: int = 3, seed: int) -> TrajectoryPlan:

@@ -53,12 +53,12 @@ def read_responses(paths: Sequence[Path], model: RobotModel) -> tuple[list[Path]
     """Frequency responses of a robot from files, or from the response_pose_<p>.npz of folders, by pose number; raises `InputError`."""
     files: list[Path] = []
     for path in paths:
-        found = sorted(path.glob("response_pose_*.npz")) if path.is_dir() else [path]
-        if not found:
+        there = sorted(path.glob("response_pose_*.npz")) if path.is_dir() else [path]
+        if not there:
             raise InputError(
                 f"{path} holds no frequency responses (response_pose_1.npz …); run 'flexcal identify response' first."
             )
-        files += found
+        files += there
     require_distinct_files(files)
     responses = [FrequencyResponse.load(file) for file in files]
     for file, response in zip(files, responses, strict=True):
@@ -73,8 +73,8 @@ def read_responses(paths: Sequence[Path], model: RobotModel) -> tuple[list[Path]
 def plan_files(files: Sequence[Path]) -> list[Path]:
     """The frequency plans beside responses, one a folder; none where a folder lacks it."""
     folders = dict.fromkeys(file.parent for file in files)
-    found = [next((f / name for name in _PLANS if (f / name).is_file()), None) for f in folders]
-    return [path for path in found if path is not None] if all(found) else []
+    plans = [next((f / name for name in _PLANS if (f / name).is_file()), None) for f in folders]
+    return [path for path in plans if path is not None] if all(plans) else []
 
 
 def common_plan(paths: Sequence[Path]) -> MultisinePlan | None:

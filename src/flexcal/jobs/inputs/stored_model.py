@@ -39,7 +39,7 @@ class CalibratedRobot:
         return probable_robot(self.model, self.measured)
 
     @cached_property
-    def found(self) -> RobotModel:
+    def with_points(self) -> RobotModel:
         """`nominal` with the measured points at their calibrated positions on the tool."""
         return with_calibrated_points(self.nominal, self.probable, self.measured)
 

@@ -27,11 +27,11 @@ def _payload(log: JointLog, model: RobotModel) -> float:
 
 def require_unloaded(logs: Sequence[JointLog], model: RobotModel) -> None:
     """Raises `InputError` for a log that was recorded with a payload."""
-    for log, held in zip(logs, payload_masses(logs, model), strict=True):
-        if held > 0:
+    for log, payload in zip(logs, payload_masses(logs, model), strict=True):
+        if payload > 0:
             raise InputError(
-                f"{log.path}: recorded with a payload of {held:g} kg, but the robot's own dynamics need logs without; give both kinds to "
-                "'flexcal identify gains'."
+                f"{log.path}: recorded with a payload of {payload:g} kg, but the robot's own dynamics need logs without; give both kinds "
+                "to 'flexcal identify gains'."
             )
 
 

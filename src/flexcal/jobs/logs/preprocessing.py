@@ -52,14 +52,14 @@ def choose_preprocessing(
     declared = model.config.dynamics
     if declared.cutoff_hz is not None and declared.decimation is not None:
         return Preprocessing(declared.cutoff_hz, Decimation(declared.decimation), declared.mask_standstill)
-    found = [motion_bandwidth(log_blocks(log, model)) for log in logs]
-    for log, motion in zip(logs, found, strict=True):
+    bandwidths = [motion_bandwidth(log_blocks(log, model)) for log in logs]
+    for log, motion in zip(logs, bandwidths, strict=True):
         if motion.frequency_hz == 0:
             raise InputError(
                 f"{log}: the positions show no motion above their noise; record a motion that excites all joints."
             )
-    rate = min(motion.rate_hz for motion in found)
-    wanted = rows_hz = min(_PASSED * max(motion.frequency_hz for motion in found), _HIGHEST * rate)
+    rate = min(motion.rate_hz for motion in bandwidths)
+    wanted = rows_hz = min(_PASSED * max(motion.frequency_hz for motion in bandwidths), _HIGHEST * rate)
     choice = None
     if flexible:
         wanted = max(wanted, _REVERSALS * rate)

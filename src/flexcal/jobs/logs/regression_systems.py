@@ -63,23 +63,23 @@ def assemble_log_systems(
     """
     if jobs == 1:
         progress("reading", 0.0)
-        found = [
+        assembled = [
             _log_system(part, observation, treatment, batches)
             for part in with_progress(parts, "reading", progress)
         ]
         progress("reading", 1.0)
-        return found
+        return assembled
     from joblib import Parallel, delayed
 
     systems = Parallel(n_jobs=jobs, return_as="generator")(
         delayed(WorkerTask(_log_system))(part, observation, treatment, batches) for part in parts
     )
     progress("reading", 0.0)
-    found = []
+    assembled = []
     for system in systems:
-        found.append(system)
-        progress("reading", len(found) / len(parts))
-    return found
+        assembled.append(system)
+        progress("reading", len(assembled) / len(parts))
+    return assembled
 
 
 def split_hold_out(log: JointLog, treatment: Preprocessing, hold_out: float) -> tuple[Window, Window | None]:
@@ -97,12 +97,12 @@ def with_progress(parts: Sequence[LogSegment], stage: str, progress: Progress) -
     def told(number: int, until: float) -> Callable[[float], None]:
         return lambda share: progress(stage, (number + min(1.0, share / until)) / len(parts))
 
-    found = []
+    watched_parts = []
     for number, part in enumerate(parts):
         start, end = part.log.span
         until = max((min(end, part.window.end) - start) / (end - start), _LEAST)
-        found.append(replace(part, log=replace(part.log, watch=told(number, until))))
-    return found
+        watched_parts.append(replace(part, log=replace(part.log, watch=told(number, until))))
+    return watched_parts
 
 
 def _log_system(

@@ -28,12 +28,12 @@ def predict_log_torques(
 ) -> list[TorquePrediction]:
     """One a log, which the fit did not see from its time `held_out_from` on, s; `predicted` has each one's columns and parameters (p,)."""
     points = max(_FEWEST, _POINTS // len(logs))
-    found = []
+    predictions = []
     progress("report", 0.0)
     for log, border, (observation, parameters) in zip(logs, held_out_from, predicted, strict=True):
         prediction = predict_torques(
             observation, parameters, log, treatment.decimation, held_out_from=border, points=points
         )
-        found.append(prediction)
-        progress("report", len(found) / len(logs))
-    return found
+        predictions.append(prediction)
+        progress("report", len(predictions) / len(logs))
+    return predictions

@@ -43,9 +43,9 @@ def compare_folders(first: Path, second: Path) -> dict[str, Any]:
         raise InputError(
             f"{first} is of the robot '{one.robot}', {second} of '{two.robot}'; compare two runs of one robot."
         )
-    found = Comparison(one, two)
-    write_page(first / COMPARISON, comparison_page(found))
-    return found.document()
+    comparison = Comparison(one, two)
+    write_page(first / COMPARISON, comparison_page(comparison))
+    return comparison.document()
 
 
 def _names(first: Path, second: Path) -> tuple[str, str]:
@@ -77,7 +77,7 @@ def _left(folder: Path, name: str) -> Run:
     if results["kind"] in ("verification", "calibration"):
         points = read_points(folder, sigma=DEFAULT_SIGMA)
         verified = results["kind"] == "verification"
-        found = results["provenance"] if verified else common_origin(estimates)
+        origins = results["provenance"] if verified else common_origin(estimates)
         return Run(
             name=name,
             kind="verification" if verified else "calibration",
@@ -88,11 +88,11 @@ def _left(folder: Path, name: str) -> Run:
             fresh=verified and not results["fitted"],
             before=points.before,
             estimates=estimates,
-            data=_data(found),
-            origin=origin | found,
+            data=_data(origins),
+            origin=origin | origins,
         )
     if results["kind"] == "demo" and (folder / VERIFICATION).is_file():
-        found = common_origin(estimates)
+        origins = common_origin(estimates)
         fresh, _ = read_verification(folder / VERIFICATION)
         return Run(
             name=name,
@@ -104,8 +104,8 @@ def _left(folder: Path, name: str) -> Run:
             fresh=True,
             before=fresh.before,
             estimates=estimates,
-            data=_data(found),
-            origin=origin | found,
+            data=_data(origins),
+            origin=origin | origins,
         )
     raise InputError(f"{folder} is no folder of calibrate, verify or demo; only these can be compared.")
 

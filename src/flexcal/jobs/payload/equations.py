@@ -44,9 +44,10 @@ class PayloadLogEquations:
         base = BaseParameters.of(plain)
         prior = RobotPrior.of(plain, base, dynamics, sources)
         observations, systems = [], []
-        for log, held in zip(logs, loaded, strict=True):
+        for log, with_payload in zip(logs, loaded, strict=True):
             wide = Observation(
-                model, (*CLASSIC, FlexibilityCorrection.of(model, log, sources, None if held else 0.0))
+                model,
+                (*CLASSIC, FlexibilityCorrection.of(model, log, sources, None if with_payload else 0.0)),
             )
             observations.append(wide)
             systems += assemble_log_systems(
@@ -64,8 +65,8 @@ class PayloadLogEquations:
     def predictions(self, fit: PayloadFit) -> list[TorquePrediction]:
         """Torques of every log as the `fit` of these equations has them, beside the measured ones."""
         predicted = [
-            (observation, self.equations.coefficients(fit.unknowns, held))
-            for observation, held in zip(self.observations, self.equations.loaded, strict=True)
+            (observation, self.equations.coefficients(fit.unknowns, with_payload))
+            for observation, with_payload in zip(self.observations, self.equations.loaded, strict=True)
         ]
         return predict_log_torques(
             self.logs, [np.inf] * len(self.logs), predicted, self.treatment, progress=silent

@@ -82,14 +82,14 @@ class RobotPayload:
     @cached_property
     def _numbers(self) -> dict[str, Any]:
         """Everything but the verdict; `declaration` is the line of robot.yaml that says the same."""
-        fit, held = self.fit, self.declared.payload
+        fit, payload = self.fit, self.declared.payload
         joints = self.declared.joint_names
         return {
             "robot": self.declared.name,
             "frame": self.frame,
             "recordings": {"loaded": list(self.loaded), "free": list(self.free)},
             "parameters": quantities(fit.estimate),
-            "declared": None if held is None else declared_payload(held),
+            "declared": None if payload is None else declared_payload(payload),
             "declaration": self.declaration,
             "error_percent": {
                 "train": 100 * fit.error,
@@ -111,14 +111,14 @@ class RobotPayload:
     @property
     def declaration(self) -> str:
         """`payload:` of robot.yaml with what was found."""
-        found = self.fit.estimate
-        values = found.values
+        estimate = self.fit.estimate
+        values = estimate.values
         com = ", ".join(f"{values[f'payload.com_{key}']:.5g}" for key in "xyz")
-        text = f"frame: {self.frame}, mass: {values['payload.mass']:.5g}, com: [{com}], mass_std: {found.std('payload.mass'):.2g}"
-        if found.identifiable[found.parameters.index("payload.Ixx")]:
-            held = self.model.payload
-            assert held is not None
-            rows = ", ".join(f"[{', '.join(f'{entry:.4g}' for entry in row)}]" for row in held.inertia)
+        text = f"frame: {self.frame}, mass: {values['payload.mass']:.5g}, com: [{com}], mass_std: {estimate.std('payload.mass'):.2g}"
+        if estimate.identifiable[estimate.parameters.index("payload.Ixx")]:
+            payload = self.model.payload
+            assert payload is not None
+            rows = ", ".join(f"[{', '.join(f'{entry:.4g}' for entry in row)}]" for row in payload.inertia)
             text += f", inertia: [{rows}]"
         return f"payload: {{{text}}}"
 
@@ -280,12 +280,12 @@ def _require_plans(loaded: PlannedLogs, free: PlannedLogs) -> None:
 
 
 def _require_payloads(logs: Sequence[JointLog], loaded: Sequence[bool]) -> None:
-    for log, held in zip(logs, loaded, strict=True):
-        if held and log.payload == 0:
+    for log, carrying in zip(logs, loaded, strict=True):
+        if carrying and log.payload == 0:
             raise InputError(
                 f"{log.path}: its column 'payload' states that the robot held no payload; give it with --free, or correct the column."
             )
-        if not held and log.payload is not None and log.payload > 0:
+        if not carrying and log.payload is not None and log.payload > 0:
             raise InputError(
                 f"{log.path}: recorded with a payload of {log.payload:g} kg, but --free takes recordings without."
             )

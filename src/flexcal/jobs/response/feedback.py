@@ -26,8 +26,8 @@ def line_noise_share(share: np.ndarray, periods: int | None) -> np.ndarray:
 
 def references_free_of_feedback(pieces: Sequence[ExcitationRecord], at_once: Sequence[bool]) -> bool:
     """Whether the references of the records carry no noise of the outputs, so that they can be references."""
-    found = feedback([replace(piece, inputs=piece.references) for piece in pieces], at_once)
-    return found is not None and not found.acts
+    loop = feedback([replace(piece, inputs=piece.references) for piece in pieces], at_once)
+    return loop is not None and not loop.acts
 
 
 @dataclass(frozen=True)
@@ -78,9 +78,9 @@ class FeedbackCheck:
     def remark(self) -> str:
         """A sentence for the console and the page."""
         if self.reference:
-            found = f"{_SEEMS}; " if self.guessed else ""
+            lead = f"{_SEEMS}; " if self.guessed else ""
             return (
-                f"{found}the part of the input that {self.reference} explains takes its place, so that noise which a controller feeds back "
+                f"{lead}the part of the input that {self.reference} explains takes its place, so that noise which a controller feeds back "
                 "does not bias the response"
             )
         if self.acts is None:

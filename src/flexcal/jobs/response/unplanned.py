@@ -250,9 +250,15 @@ def _identified(
     command: str,
     progress: Progress,
 ) -> IdentifiedExcitation:
-    found = measure_spectra(measured, options.hold)
-    measured, period = found.measured, found.period
-    spectra = _in_band(found.whole, found.usable, options.band, files, detect_tones(found.pieces))
+    measured_spectra = measure_spectra(measured, options.hold)
+    measured, period = measured_spectra.measured, measured_spectra.period
+    spectra = _in_band(
+        measured_spectra.whole,
+        measured_spectra.usable,
+        options.band,
+        files,
+        detect_tones(measured_spectra.pieces),
+    )
     identified = identify_modes(spectra, local_response(spectra), modes=options.modes, progress=progress)
     masses = identify_masses(identified.fit, identified.response, options.masses)
     return IdentifiedExcitation(
@@ -263,7 +269,7 @@ def _identified(
         masses=masses,
         halves=_halves(spectra, identified),
         fed=FeedbackCheck.of(
-            found.loop,
+            measured_spectra.loop,
             identified.response,
             spectra.periods,
             [channel.name for channel in measured.references],
@@ -294,15 +300,15 @@ def _in_band(
         return kept
     if few is not None and few.alone:
         raise InputError(f"{files[0]}: {few.sentence}")
-    found = excited_band(whole, local_response(whole), usable)
-    if found is None and few is not None:
+    limits = excited_band(whole, local_response(whole), usable)
+    if limits is None and few is not None:
         raise InputError(f"{files[0]}: {few.sentence}")
-    if found is None:
+    if limits is None:
         raise InputError(
             f"{files[0]}: at hardly any frequency does the output follow the input; check that the columns belong together (--input, "
             "--output), or excite more strongly."
         )
-    return whole.between(*found)
+    return whole.between(*limits)
 
 
 def _halves(spectra: RecordSpectra, identified: IdentifiedModes) -> HalfDifference | None:

@@ -104,35 +104,35 @@ def dropped_parameters(dropped: Iterable[Dropped]) -> list[dict[str, Any]]:
     ]
 
 
-def identifiability_block(found: Identifiability) -> dict[str, Any]:
+def identifiability_block(identifiability: Identifiability) -> dict[str, Any]:
     """Number of parameters, rank, dropped parameters, decades of the gap, and the weakest of the directions that are seen."""
     return {
-        "parameters": len(found.names),
-        "rank": found.rank,
-        "gap_decades": found.gap,
-        "dropped": dropped_parameters(found.dropped),
+        "parameters": len(identifiability.names),
+        "rank": identifiability.rank,
+        "gap_decades": identifiability.gap,
+        "dropped": dropped_parameters(identifiability.dropped),
         "weak_directions": [
             {"relative_singular_value": value, "direction": direction}
-            for direction, value in found.weak_seen_directions()
+            for direction, value in identifiability.weak_seen_directions()
         ],
     }
 
 
-def identifiability_spectrum(found: Identifiability) -> dict[str, Any]:
+def identifiability_spectrum(identifiability: Identifiability) -> dict[str, Any]:
     """The parameters that are kept, and singular values and the diagonal of R, relative to the largest: what a figure of the rank shows."""
     return {
-        "kept": list(found.kept_names),
-        "singular_values": found.singular_values,
-        "diagonal": found.diagonal,
+        "kept": list(identifiability.kept_names),
+        "singular_values": identifiability.singular_values,
+        "diagonal": identifiability.diagonal,
     }
 
 
 def springs_block(estimate: Estimate, truth: Mapping[str, float] | None = None) -> dict[str, Any]:
     """{stiffness, damping} of every spring as quantities, by joint and drive, bearing_x or bearing_y."""
-    found: dict[str, Any] = {"stiffness": {}, "damping": {}}
+    springs: dict[str, Any] = {"stiffness": {}, "damping": {}}
     for name in estimate.parameters.names:
         owner, _, kind = name.rpartition(".")
         joint, _, spring = owner.rpartition(".")
-        if kind in found and joint:
-            found[kind].setdefault(joint, {})[spring] = estimate.quantity(name, (truth or {}).get(name))
-    return found
+        if kind in springs and joint:
+            springs[kind].setdefault(joint, {})[spring] = estimate.quantity(name, (truth or {}).get(name))
+    return springs

@@ -40,8 +40,8 @@ def read_fitted_responses(folder: Path) -> tuple[FittedResponse, ...]:
 
 
 def _response(file: NpzFile, pose: int) -> FittedResponse:
-    found = file.read({f"{name}_{pose}": form for name, form in _forms(pose).items()})
-    values: dict[str, Any] = {name: found[f"{name}_{pose}"] for name in _forms(pose)}
+    arrays = file.read({f"{name}_{pose}": form for name, form in _forms(pose).items()})
+    values: dict[str, Any] = {name: arrays[f"{name}_{pose}"] for name in _forms(pose)}
     return FittedResponse(
         pose=pose - 1,
         joints=tuple(values.pop("joints").tolist()),

@@ -127,14 +127,14 @@ def read_arm(folder: Path) -> ArmPoses:
         "pose": ArrayForm("whole", ("points",)),
         "tip": ArrayForm("real", ("points", 3)),
     }
-    found = file.read(
+    arrays = file.read(
         forms | {name: ArrayForm("real", ("points", 3)) for name in _of_models(file, "errors_")}
     )
-    triangles = found["triangles"]
-    if triangles.size and not 0 <= triangles.min() <= triangles.max() < found["surface"].shape[1]:
+    triangles = arrays["triangles"]
+    if triangles.size and not 0 <= triangles.min() <= triangles.max() < arrays["surface"].shape[1]:
         raise file.error("holds triangles of vertices that are not there")
-    errors = {name.removeprefix("errors_"): found.pop(name) for name in _of_models(file, "errors_")}
-    return ArmPoses(**found, errors=errors)
+    errors = {name.removeprefix("errors_"): arrays.pop(name) for name in _of_models(file, "errors_")}
+    return ArmPoses(**arrays, errors=errors)
 
 
 def write_loads(folder: Path, loads: GravityLoads) -> None:
@@ -150,9 +150,9 @@ def read_loads(folder: Path) -> GravityLoads | None:
         return None
     file = NpzFile(path, AGAIN)
     loads = ArrayForm("real", ("points", "joints"))
-    found = file.read({name: loads for name in ("torque", *_of_models(file, "along_"))})
+    arrays = file.read({name: loads for name in ("torque", *_of_models(file, "along_"))})
     return GravityLoads(
-        found.pop("torque"), {name.removeprefix("along_"): along for name, along in found.items()}
+        arrays.pop("torque"), {name.removeprefix("along_"): along for name, along in arrays.items()}
     )
 
 

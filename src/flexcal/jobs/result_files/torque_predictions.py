@@ -46,10 +46,10 @@ def read_predictions(folder: Path) -> tuple[TorquePrediction, ...]:
             name=str(name),
             stride=int(logs["strides"][k]),
             held_out_from=float(logs["held_out_from"][k]),
-            **{array: found[f"{array}_{k}"] for array in _ARRAYS},
+            **{array: arrays[f"{array}_{k}"] for array in _ARRAYS},
         )
         for k, name in enumerate(logs["names"])
-        for found in [file.read({f"{array}_{k}": form for array, form in _forms(k).items()})]
+        for arrays in [file.read({f"{array}_{k}": form for array, form in _forms(k).items()})]
     )
 
 

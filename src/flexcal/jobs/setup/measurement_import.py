@@ -158,20 +158,20 @@ def import_file(
     if "xyz" in values and misfit is None:
         why = "there are too few poses" if model.points else "robot.yaml declares no point under `points:`"
         remarks.append(f"{why}, so they were not compared with the nominal robot")
-    found = ImportedFile(
+    imported = ImportedFile(
         file, kind, tuple(guess.placed.values()), guess.left_out, columns, misfit, tuple(remarks), None, model
     )
     if misfit is not None and misfit.proposal and not unchecked:
-        return found
+        return imported
     check_joint_units(model, foreign.table, guess.placed["q"].signal(), values["q"])
     if kind == "poses":
         _check_poses(foreign, guess, model, columns, values)
     elif kind == "log":
         _check_time(foreign, guess, values["t"][:, 0])
-    if out is None or not (found.trusted or unchecked):
-        return found
+    if out is None or not (imported.trusted or unchecked):
+        return imported
     write_table(out, columns)
-    return replace(found, out=out)
+    return replace(imported, out=out)
 
 
 def _kind(
@@ -239,12 +239,12 @@ def _converted(
                     column,
                     f"{what}; complete or remove the line, or discard the column with --map {quantity}=none.",
                 )
-        found = placed.values(foreign.table)
+        quantity_values = placed.values(foreign.table)
         if quantity == "quaternion":
-            found = unit_quaternions(foreign.table, placed.signal(), found)
-        values[quantity] = found
+            quantity_values = unit_quaternions(foreign.table, placed.signal(), quantity_values)
+        values[quantity] = quantity_values
         names = standard_columns(quantity, model.n)
-        columns |= {name: found[:, i] for i, name in enumerate(names)}
+        columns |= {name: quantity_values[:, i] for i, name in enumerate(names)}
     if "pose" in columns:
         if "pose" in guess.placed:
             columns["pose"] = whole_numbers(foreign.table, guess.placed["pose"].columns[0], columns["pose"])

@@ -29,11 +29,11 @@ def write_point_position(robot: Path, name: str, xyz: np.ndarray) -> None:
     block = re.search(r"^points:.*?(?=^\S|\Z)", _blanked(text), flags=re.MULTILINE | re.DOTALL)
     own = re.compile(rf"(?:^|[\s{{,])[\"']?{re.escape(name)}[\"']?\s*:", flags=re.MULTILINE)
     entry = None if block is None else own.search(_blanked(text), block.start(), block.end())
-    found = None
+    match = None
     if entry is not None and block is not None:
-        found = re.compile(r"\bxyz\s*:\s*(\[[^\]]*\])").search(_blanked(text), entry.end(), block.end())
-    if found is not None:
-        changed = f"{text[: found.start(1)]}[{told}]{text[found.end(1) :]}"
+        match = re.compile(r"\bxyz\s*:\s*(\[[^\]]*\])").search(_blanked(text), entry.end(), block.end())
+    if match is not None:
+        changed = f"{text[: match.start(1)]}[{told}]{text[match.end(1) :]}"
         expected = replace(before, points=before.points | {name: replace(before.points[name], xyz=place)})
         write_text(robot, changed)
         if _structured(robot) == expected:
@@ -46,7 +46,7 @@ def write_point_position(robot: Path, name: str, xyz: np.ndarray) -> None:
 
 def _blanked(text: str) -> str:
     """The text with comments blanked, every character in its place."""
-    return re.sub(r"(?:(?<=\s)|^)#[^\n]*", lambda found: " " * len(found[0]), text, flags=re.MULTILINE)
+    return re.sub(r"(?:(?<=\s)|^)#[^\n]*", lambda match: " " * len(match[0]), text, flags=re.MULTILINE)
 
 
 def _structured(robot: Path) -> RobotConfig | None:

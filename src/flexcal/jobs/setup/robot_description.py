@@ -98,13 +98,13 @@ def _commented(urdf: str, arm: Arm, model: RobotModel) -> str:
     amplifier = f"{force}/A at the joint" + (" (N/A where it slides)" if turning and sliding else "")
     also = f"; of {', '.join(map(_text, sliding))}: kg, N s/m, N" if turning and sliding else ""
     columns = ", ".join(f"J{i}" for i in range(1, n + 1))
-    held = f"\n# Movable joints that are no part of the arm stand still, here (rad or m):\n{_locked(arm)}"
+    locked = f"\n# Movable joints that are no part of the arm stand still, here (rad or m):\n{_locked(arm)}"
     return f"""# {model.name}: {n} joints. Units are m, rad, kg, s, N m. Complete `points:` before you measure; all else may wait.
 robot: {_text(urdf)}
 
 # The joints, in the order of the columns q1 … q{n} of every file:
 {chr(10).join(rows)}
-{held if arm.locked else ""}
+{locked if arm.locked else ""}
 # What the instrument sees: the centre of the reflector, m along the axes of a frame of the URDF. {_text(arm.frame)} was guessed
 # from its name{others}. Measure xyz with a ruler, to a centimetre or so: the calibration finds the rest,
 # and 'flexcal import' and 'flexcal calibrate' write what they find here with --write-point.

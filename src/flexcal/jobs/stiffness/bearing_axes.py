@@ -45,13 +45,13 @@ def _remarks(
     if better is None or better == bearings.declared:
         return ()
     other = "after" if better == "before" else "before"
-    found = (
+    comparison = (
         f"the {what} fit bearing axes {_AXES[better]} better ({figures[better]}) "
         f"than axes {_AXES[other]} ({figures[other]})"
     )
     if bearings.declared is None:
-        return (f"{found}: these were used; `bearings: {better}` in robot.yaml declares them",)
-    return (f"{found}: write `bearings: {better}` in robot.yaml{again}",)
+        return (f"{comparison}: these were used; `bearings: {better}` in robot.yaml declares them",)
+    return (f"{comparison}: write `bearings: {better}` in robot.yaml{again}",)
 
 
 def bearings_block(axes: BearingAxes | None) -> dict[str, Any] | None:

@@ -155,7 +155,7 @@ def identify_robot_stiffness(
     estimate = replace(result.estimate, provenance=origin)
     seen = {response.pose for response in responses}
     missing = () if plan is None else tuple(k + 1 for k in range(len(plan.poses)) if k not in seen)
-    found = RobotStiffness(
+    identified = RobotStiffness(
         bare.name,
         result,
         plan is not None,
@@ -173,6 +173,6 @@ def identify_robot_stiffness(
         from flexcal.report.results import fitted_responses
 
         write_fitted_responses(out, fitted_responses(result, model))
-        write_results(out, found.document())
+        write_results(out, identified.document())
         report_folder(out)
-    return found
+    return identified

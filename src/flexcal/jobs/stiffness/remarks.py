@@ -60,15 +60,15 @@ def sensor_remarks(result: StiffnessResult, model: RobotModel) -> tuple[str, ...
     """What was found of every sensor on the arm."""
     remarks = []
     for name in result.sensors:
-        found = result.quantity(sensitivity_name(name))
-        std = "" if found["std"] is None else f" ± {found['std']:.2g}"
+        sensitivity = result.quantity(sensitivity_name(name))
+        std = "" if sensitivity["std"] is None else f" ± {sensitivity['std']:.2g}"
         remarks.append(
-            f"the sensor {name} on the arm reads {found['estimate']:.4g}{std} times what robot.yaml says of it; with that its readings are "
-            f"{100 * result.sensor_difference(name):.2g} % off the model's at the median line, as the motors' accelerations are "
-            f"{100 * result.motor_difference:.2g} %"
+            f"the sensor {name} on the arm reads {sensitivity['estimate']:.4g}{std} times what robot.yaml says of it; with that its "
+            f"readings are {100 * result.sensor_difference(name):.2g} % off the model's at the median line, as the motors' accelerations "
+            f"are {100 * result.motor_difference:.2g} %"
         )
         stated = model.sensors[name].config.sensitivity_std
-        if abs(np.log(float(found["estimate"] or np.nan))) > _ODD * stated:
+        if abs(np.log(float(sensitivity["estimate"] or np.nan))) > _ODD * stated:
             remarks.append(
                 f"that is more than {_ODD:g} times its sensitivity_std of {stated:g}: check the sensitivity, xyz and direction of {name}"
             )

@@ -26,7 +26,7 @@ from flexcal.units import MILLIMETRE
 
 def two_stage_document(run: TwoStageRun, exported: ExportedFile) -> dict[str, Any]:
     """The content of results.json."""
-    estimate, found, drift = (
+    estimate, identifiability, drift = (
         run.stiffness.estimate,
         run.calibration.identifiability,
         Drift.of(run.calibration),
@@ -43,7 +43,7 @@ def two_stage_document(run: TwoStageRun, exported: ExportedFile) -> dict[str, An
             "further_joints": list(further_joints(estimate, run.nominal)),
         }
         | {"reduced_chi2": estimate.reduced_chi2, "status": estimate.status, "message": estimate.message},
-        "identifiability": identifiability_block(found) | identifiability_spectrum(found),
+        "identifiability": identifiability_block(identifiability) | identifiability_spectrum(identifiability),
         "before": run.before.document(),
         "calibration": run.calibration.errors.in_millimetres(),
         "calibration_fit": {
@@ -97,8 +97,8 @@ def _measured(run: TwoStageRun) -> dict[str, Any]:
     """Errors of the rigid calibrations as the tracker reads them."""
     seen = run.measured_verification.position + run.measured_verification.errors
     return {
-        f"measured_rigid_{len(fit.poses)}": ErrorStatistics.of(seen - found.position).in_millimetres()
-        for fit, found in zip(run.rigid, run.rigid_verification, strict=True)
+        f"measured_rigid_{len(fit.poses)}": ErrorStatistics.of(seen - verification.position).in_millimetres()
+        for fit, verification in zip(run.rigid, run.rigid_verification, strict=True)
     }
 
 

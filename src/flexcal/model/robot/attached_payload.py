@@ -30,34 +30,36 @@ def with_payload(
     joint moves.
     """
     place = _moving_frame(model, frame)
-    held = Payload(frame, place.joint, place.rotation, place.translation, mass, 0.0, com, inertia)
+    payload = Payload(frame, place.joint, place.rotation, place.translation, mass, 0.0, com, inertia)
     return replace(
         model,
-        nominal_payload=held,
+        nominal_payload=payload,
         payload_mass=np.array([mass]),
         payload_com=np.array(com),
-        payload_inertia=held.moments,
+        payload_inertia=payload.moments,
     )
 
 
 def carried_inertias(model: RobotModel, payload: float | None = None) -> tuple[Inertia, ...]:
     """Inertia of every joint's link, the payload (kg, default: the declared one) merged into the link that carries it."""
-    held = model.payload
-    if held is None:
+    declared = model.payload
+    if declared is None:
         if payload:
             raise FlexcalError(
                 f"a payload of {payload:g} kg is given but {model.path} declares none; add `payload:`."
             )
         return model.inertias
-    mass = held.mass if payload is None else payload
+    mass = declared.mass if payload is None else payload
     if mass == 0:
         return model.inertias
-    link, own = model.inertias[held.joint], held.carried(mass)
+    link, own = model.inertias[declared.joint], declared.carried(mass)
     total = link.mass + mass
     com = (link.mass * link.com + mass * own.com) / total
     inertia = link.inertia + own.inertia
     inertia = inertia + parallel_axis(link.mass, link.com - com) + parallel_axis(mass, own.com - com)
-    return tuple(Inertia(total, com, inertia) if i == held.joint else y for i, y in enumerate(model.inertias))
+    return tuple(
+        Inertia(total, com, inertia) if i == declared.joint else y for i, y in enumerate(model.inertias)
+    )
 
 
 def with_point_at_frame(model: RobotModel, frame: str) -> RobotModel:

@@ -91,12 +91,12 @@ def unknown_parallel(model: RobotModel, joint: str) -> tuple[str, ...]:
     """What robot.yaml declares to act on a joint beside motor and friction without saying how much, out of `PARALLEL`."""
     config = model.config.dynamics
     springs = [entry for entry in config.joint_springs if entry.joint == joint]
-    found = ["spring_stiffness"] if any(entry.stiffness is None for entry in springs) else []
-    found += ["spring_torque"] if any(entry.rest is None for entry in springs) else []
-    found += (
+    unknown = ["spring_stiffness"] if any(entry.stiffness is None for entry in springs) else []
+    unknown += ["spring_torque"] if any(entry.rest is None for entry in springs) else []
+    unknown += (
         ["cable_torque"] if any(e.joint == joint and e.torque is None for e in config.cable_torques) else []
     )
-    return tuple(found)
+    return tuple(unknown)
 
 
 def parameter_locations(model: RobotModel) -> dict[str, tuple[str, tuple[int, ...]]]:

@@ -47,12 +47,12 @@ def uncertain_inertials(model: RobotModel, links: Collection[int]) -> list[str]:
 
 def uncertain_payload(model: RobotModel) -> tuple[str, ...]:
     """What is uncertain of the payload: its mass as robot.yaml's `mass_std` says, or what was identified of mass and centre of mass."""
-    held = model.nominal_payload
-    if held is None:
+    payload = model.nominal_payload
+    if payload is None:
         return ()
     names = ("payload.mass", "payload.com_x", "payload.com_y", "payload.com_z")
-    found = tuple(name for name in names if model.posterior.determines(name))
-    return found or (("payload.mass",) if held.mass_std > 0 else ())
+    identified = tuple(name for name in names if model.posterior.determines(name))
+    return identified or (("payload.mass",) if payload.mass_std > 0 else ())
 
 
 def sensor_parameters(sensor: ArmSensor, sample_time: float) -> tuple[Parameter, ...]:
@@ -94,8 +94,8 @@ def elastic_inertials(model: RobotModel, *, loaded: bool) -> list[Parameter]:
     elastic = {joint.index for joint in model.elastic}
     moved = [i for i in range(model.n) if not elastic.isdisjoint(model.path_to(i))]
     items = [declared_parameter(model, name) for name in uncertain_inertials(model, moved)]
-    held = model.payload
-    if loaded and held is not None and held.mass > 0 and uncertain_payload(model):
+    payload = model.payload
+    if loaded and payload is not None and payload.mass > 0 and uncertain_payload(model):
         items.append(declared_parameter(model, "payload.mass"))
     return items
 
@@ -115,9 +115,9 @@ def declared_parameter(model: RobotModel, name: str) -> Parameter:
 
 def _std(model: RobotModel, name: str, key: str) -> float:
     if name == "payload.mass":
-        held = model.nominal_payload
-        assert held is not None
-        return held.mass_std / held.mass if held.mass_std > 0 else float("inf")
+        payload = model.nominal_payload
+        assert payload is not None
+        return payload.mass_std / payload.mass if payload.mass_std > 0 else float("inf")
     if key in GEOMETRY:
         return LENGTH_TOLERANCE if key.startswith("length") else ANGLE_TOLERANCE
     return {

@@ -223,13 +223,13 @@ class RobotModel:
     @property
     def payload(self) -> Payload | None:
         """The declared payload with its current mass, centre of mass and inertia."""
-        held = self.nominal_payload
-        if held is None:
+        nominal = self.nominal_payload
+        if nominal is None:
             return None
         inertia = np.empty((3, 3))
         for value, (row, column) in zip(self.payload_inertia, _MOMENTS.values(), strict=True):
             inertia[row, column] = inertia[column, row] = value
-        return replace(held, mass=float(self.payload_mass[0]), com=self.payload_com, inertia=inertia)
+        return replace(nominal, mass=float(self.payload_mass[0]), com=self.payload_com, inertia=inertia)
 
     @cached_property
     def reach(self) -> float:

@@ -120,9 +120,9 @@ def _check_bodies(model: RobotModel, estimate: Estimate, path: Path) -> None:
 
 def _with_backlash_joints(model: RobotModel, estimate: Estimate) -> RobotModel:
     declared = set(model.config.geometry.backlash)
-    found = [name for name in model.joint_names if f"{name}.backlash" in estimate.parameters]
-    if declared.issuperset(found):
+    estimated = [name for name in model.joint_names if f"{name}.backlash" in estimate.parameters]
+    if declared.issuperset(estimated):
         return model
-    joints = tuple(name for name in model.joint_names if name in declared.union(found))
+    joints = tuple(name for name in model.joint_names if name in declared.union(estimated))
     geometry = replace(model.config.geometry, backlash=joints)
     return replace(model, config=replace(model.config, geometry=geometry))

@@ -46,14 +46,14 @@ def carried_mass(model: RobotModel, payload: np.ndarray | None, samples: int) ->
     Where the payload was found to weigh more or less than declared, the values of the file are as much off. Raises `FlexcalError` for a
     payload without a declaration.
     """
-    nominal, found = model.nominal_payload, float(model.payload_mass[0])
+    nominal, identified = model.nominal_payload, float(model.payload_mass[0])
     if payload is None:
-        return np.full(samples, found)
+        return np.full(samples, identified)
     if payload.any() and nominal is None:
         raise FlexcalError(
             f"the poses name a payload but {model.path} declares none; add `payload:` with its centre of mass."
         )
-    return payload * (found / nominal.mass if nominal is not None and nominal.mass > 0 else 1.0)
+    return payload * (identified / nominal.mass if nominal is not None and nominal.mass > 0 else 1.0)
 
 
 def tool_at_rest(

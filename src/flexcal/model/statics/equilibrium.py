@@ -84,7 +84,7 @@ def _solve(
     sensitivities: bool,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Elastic deflection (samples, n, 3), compliance, regressor and coupling of `Equilibrium`."""
-    held = model.payload
+    declared = model.payload
     try:
         deflection, compliance, regressor, coupling, step = model.tree.equilibrium(
             axes,
@@ -93,8 +93,8 @@ def _solve(
             np.ascontiguousarray(model.mass),
             np.ascontiguousarray(model.mass[:, None] * model.com),
             payload,
-            held.joint if held else -1,
-            np.ascontiguousarray(held.com_in_link if held else np.zeros(3)),
+            declared.joint if declared else -1,
+            np.ascontiguousarray(declared.com_in_link if declared else np.zeros(3)),
             model.gravity,
             q,
             sensitivities,

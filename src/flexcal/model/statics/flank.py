@@ -37,13 +37,16 @@ def gravity_torque_std(
         rows.append(regressor[:, :, k, 0] + regressor[:, :, k, 1:] @ model.com[k])
         rows += [model.mass[k] * regressor[:, :, k, c] for c in (1, 2, 3)]
         declared += [model.prior.mass * model.mass[k], *[model.prior.com] * 3]
-    held = model.payload
-    if held is not None and held.mass > 0:
-        own = regressor[:, :, held.joint]
+    declared_payload = model.payload
+    if declared_payload is not None and declared_payload.mass > 0:
+        own = regressor[:, :, declared_payload.joint]
         names += ["payload.mass", "payload.com_x", "payload.com_y", "payload.com_z"]
-        rows.append((masses / held.mass)[:, None] * (own[:, :, 0] + own[:, :, 1:] @ held.com_in_link))
-        rows += [masses[:, None] * (own[:, :, 1:] @ held.rotation[:, c]) for c in range(3)]
-        declared += [held.mass_std, 0.0, 0.0, 0.0]
+        rows.append(
+            (masses / declared_payload.mass)[:, None]
+            * (own[:, :, 0] + own[:, :, 1:] @ declared_payload.com_in_link)
+        )
+        rows += [masses[:, None] * (own[:, :, 1:] @ declared_payload.rotation[:, c]) for c in range(3)]
+        declared += [declared_payload.mass_std, 0.0, 0.0, 0.0]
     covariance = np.diag(np.square(declared))
     known = [i for i, name in enumerate(names) if model.posterior.determines(name)]
     parameters = model.posterior.parameters.subset([names[i] for i in known])

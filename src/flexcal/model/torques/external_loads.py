@@ -38,24 +38,24 @@ def sensor_jacobian(model: RobotModel, q: np.ndarray) -> np.ndarray:
             rotation = rotation @ axis_rotations(axis, moved)
     place = position + rotation @ sensor.translation
     rotation = sensor.sign * (rotation @ sensor.rotation)
-    found = np.zeros((*q.shape, 6))
+    jacobian = np.zeros((*q.shape, 6))
     for i in carrying:
         along = np.matmul(np.broadcast_to(axes[i], place.shape)[:, None], rotation)[:, 0]
         if model.joints[i].kind == "prismatic":
-            found[:, i, :3] = along
+            jacobian[:, i, :3] = along
         else:
             lever = np.cross(axes[i], place - origins[i])
-            found[:, i, :3], found[:, i, 3:] = np.matmul(lever[:, None], rotation)[:, 0], along
-    return found
+            jacobian[:, i, :3], jacobian[:, i, 3:] = np.matmul(lever[:, None], rotation)[:, 0], along
+    return jacobian
 
 
 def declared_torque(model: RobotModel, q: np.ndarray) -> np.ndarray:
     """Torque (samples, n) of springs and cables on the joints, as far as robot.yaml says how much: less what motors give against it."""
-    found = np.zeros_like(q)
+    torque = np.zeros_like(q)
     for spring in model.config.dynamics.joint_springs:
         joint = model.joint_index(spring.joint)
         if spring.stiffness is not None:
-            found[:, joint] -= spring.stiffness * (q[:, joint] - (spring.rest or 0.0))
+            torque[:, joint] -= spring.stiffness * (q[:, joint] - (spring.rest or 0.0))
     for cable in model.config.dynamics.cable_torques:
-        found[:, model.joint_index(cable.joint)] -= cable.torque or 0.0
-    return found
+        torque[:, model.joint_index(cable.joint)] -= cable.torque or 0.0
+    return torque

@@ -25,9 +25,9 @@ def torque_regressor(model: RobotModel, q: np.ndarray, dq: np.ndarray, ddq: np.n
     """
     q = joint_batch(model, q)
     shape = (model.n, len(LINK_PARAMETERS) * model.n)
-    found = np.zeros((shape[0] * shape[1], len(q)))
-    write_torque_regressor(model, q, dq, ddq, np.arange(len(found)).reshape(shape), found)
-    return found.reshape(*shape, len(q)).transpose(2, 0, 1)
+    regressor = np.zeros((shape[0] * shape[1], len(q)))
+    write_torque_regressor(model, q, dq, ddq, np.arange(len(regressor)).reshape(shape), regressor)
+    return regressor.reshape(*shape, len(q)).transpose(2, 0, 1)
 
 
 def write_torque_regressor(

@@ -77,10 +77,10 @@ def find_arm(path: Path, tip: str | None = None) -> Arm:
         chain = tuple(name for name in ways[tip] if name in movable)
         if not chain:
             raise InputError(f"{path}: the link '{tip}' moves with no joint; name one beyond the arm.")
-    held = [name for name in chain if name in mimics]
-    if held:
-        raise joints[held[0]].error(
-            f"joint '{held[0]}' is on the way to the tool and mimics another one, which flexcal does not handle; "
+    mimicking = [name for name in chain if name in mimics]
+    if mimicking:
+        raise joints[mimicking[0]].error(
+            f"joint '{mimicking[0]}' is on the way to the tool and mimics another one, which flexcal does not handle; "
             "use a URDF in which it is fixed or moves by itself."
         )
     frames = [link for link in ways if tuple(n for n in ways[link] if n in movable) == chain and link != tip]
@@ -126,8 +126,12 @@ def _only_chain(
 def _rank(link: str, ways: dict[str, tuple[str, ...]]) -> tuple[int, bool, int]:
     """Usual names first, a gripper's last, then the farthest from the base."""
     name = f"_{link.lower()}_".replace("-", "_")
-    found = [i for i, usual in enumerate(_TOOL_FRAMES) if f"_{usual}_" in name]
-    return (found[0] if found else len(_TOOL_FRAMES), bool(_GRIPPER.search(link)), -len(ways[link]))
+    usual_names = [i for i, usual in enumerate(_TOOL_FRAMES) if f"_{usual}_" in name]
+    return (
+        usual_names[0] if usual_names else len(_TOOL_FRAMES),
+        bool(_GRIPPER.search(link)),
+        -len(ways[link]),
+    )
 
 
 def _at_rest(joint: Element) -> float:

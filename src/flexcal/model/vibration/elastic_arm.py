@@ -61,9 +61,9 @@ class ElasticArm:
 
         turn = self.turns[joint]
         total = pin.Inertia(link.mass, link.com, link.inertia)
-        held = self.robot.payload
-        if held is not None and held.joint == joint and self.payload > 0:
-            carried = held.carried(self.payload)
+        payload = self.robot.payload
+        if payload is not None and payload.joint == joint and self.payload > 0:
+            carried = payload.carried(self.payload)
             total = total + pin.Inertia(carried.mass, carried.com, carried.inertia)
         self.model.inertias[self.bodies[joint]] = pin.SE3(turn.T, np.zeros(3)).act(total)
 

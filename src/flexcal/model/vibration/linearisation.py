@@ -234,12 +234,12 @@ def _load_by_inertia(
 ) -> np.ndarray:
     """∂(gravity load)/∂(mass or centre of mass) of each elastic coordinate (d,)."""
     if owner == "payload":
-        held = robot.payload
-        assert held is not None
-        block = rest.regressor[0][:, 4 * held.joint : 4 * held.joint + 4]
+        payload = robot.payload
+        assert payload is not None
+        block = rest.regressor[0][:, 4 * payload.joint : 4 * payload.joint + 4]
         if key == "mass":
-            return block[:, 0] + block[:, 1:] @ held.com_in_link
-        return arm.payload * (block[:, 1:] @ held.rotation[:, "xyz".index(key[-1])])
+            return block[:, 0] + block[:, 1:] @ payload.com_in_link
+        return arm.payload * (block[:, 1:] @ payload.rotation[:, "xyz".index(key[-1])])
     i = [joint.link for joint in robot.joints].index(owner)
     block = rest.regressor[0][:, 4 * i : 4 * i + 4]
     if key == "mass":

@@ -25,10 +25,10 @@ def check_bearings(block: Mapping[str, Any] | None) -> tuple[Check, ...]:
     means = [
         millimetres(ErrorStatistics.of_millimetres(block["errors"][key]).mean) for key in (better, worse)
     ]
-    found = f"with {_WHERE[better]} the mean error of a first fit is {means[0]} mm, with {_WHERE[worse]} {means[1]} mm"
+    figures = f"with {_WHERE[better]} the mean error of a first fit is {means[0]} mm, with {_WHERE[worse]} {means[1]} mm"
     if block["declared"] in (None, better):
-        return (Check(_QUESTION, f"Yes: {found}.", "good", "bearings"),)
-    return (Check(_QUESTION, f"No: {found}. Declare the former, and calibrate again.", "bad", "bearings"),)
+        return (Check(_QUESTION, f"Yes: {figures}.", "good", "bearings"),)
+    return (Check(_QUESTION, f"No: {figures}. Declare the former, and calibrate again.", "bad", "bearings"),)
 
 
 def check_response_bearings(block: Mapping[str, Any] | None) -> tuple[Check, ...]:
@@ -38,7 +38,7 @@ def check_response_bearings(block: Mapping[str, Any] | None) -> tuple[Check, ...
     better = block["preferred"]
     worse = "after" if better == "before" else "before"
     chi2 = [f"{block['reduced_chi2'][key]:.2f}" for key in (better, worse)]
-    found = f"with {_WHERE[better]} the reduced chi-square is {chi2[0]}, with {_WHERE[worse]} {chi2[1]}"
+    figures = f"with {_WHERE[better]} the reduced chi-square is {chi2[0]}, with {_WHERE[worse]} {chi2[1]}"
     if block["declared"] in (None, better):
-        return (Check(_QUESTION, f"Yes: {found}.", "good", "bearings"),)
-    return (Check(_QUESTION, f"No: {found}. Declare the former, and identify again.", "bad", "bearings"),)
+        return (Check(_QUESTION, f"Yes: {figures}.", "good", "bearings"),)
+    return (Check(_QUESTION, f"No: {figures}. Declare the former, and identify again.", "bad", "bearings"),)

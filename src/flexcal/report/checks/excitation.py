@@ -76,20 +76,20 @@ def _check_feedback(feedback: Mapping[str, Any] | None) -> Check:
     return Check(question, f"No. {answer} {cure}", "bad" if feedback["bias"] > _BIASED else "care")
 
 
-def _check_resonances(found: Any) -> Check:
+def _check_resonances(resonances: Any) -> Check:
     question = "Are the resonances determined?"
-    if not found:
+    if not resonances:
         return Check(question, "There is none in the excited band.", "unknown")
-    lost = [item for item in found if not item["frequency_hz"]["identifiable"]]
-    vague = [item for item in found if not item["damping"]["identifiable"]]
+    lost = [item for item in resonances if not item["frequency_hz"]["identifiable"]]
+    vague = [item for item in resonances if not item["damping"]["identifiable"]]
     if lost:
-        return Check(question, f"{len(found) - len(lost)} of {len(found)}.", "care")
+        return Check(question, f"{len(resonances) - len(lost)} of {len(resonances)}.", "care")
     if vague:
         where = ", ".join(f"{significant(item['frequency_hz']['estimate'], 3)} Hz" for item in vague)
         return Check(question, f"Their frequencies; not the damping at {where}.", "care")
     return Check(
         question,
-        f"All {len(found)}, with their damping." if len(found) > 1 else "Yes, with its damping.",
+        f"All {len(resonances)}, with their damping." if len(resonances) > 1 else "Yes, with its damping.",
         "good",
     )
 

@@ -131,7 +131,7 @@ def _check_others(others: Mapping[str, float]) -> Check:
     question = "Were the robot's other estimates made with this payload?"
     if not others:
         return Check(question, "None was made with another one.", "good")
-    found = ", ".join(f"'{name}' with {mass:.4g} kg" for name, mass in others.items())
+    payloads = ", ".join(f"'{name}' with {mass:.4g} kg" for name, mass in others.items())
     return Check(
-        question, f"Not {found}; if the robot held this payload then, make these estimates again.", "care"
+        question, f"Not {payloads}; if the robot held this payload then, make these estimates again.", "care"
     )

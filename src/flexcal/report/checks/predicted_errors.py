@@ -11,8 +11,8 @@ from flexcal.report.layout import Check
 
 def prediction_checks(scale: ErrorScale | None, fitted: Sequence[str]) -> tuple[Check, ...]:
     """The checks behind the verdict: `scale` is None where nothing was measured, `fitted` names the files that the fit has used."""
-    found = None if scale is None else scale.document()
-    checks = [check_claimed_uncertainty(found).named("claimed_uncertainty", independent=True)]
+    document = None if scale is None else scale.document()
+    checks = [check_claimed_uncertainty(document).named("claimed_uncertainty", independent=True)]
     if scale is None:
         return tuple(checks)
     if fitted:

@@ -17,10 +17,10 @@ SHOWN = 4000
 """Points drawn; of more, every so manieth."""
 
 
-def accuracy_space(found: AccuracyMap) -> go.Figure:
+def accuracy_space(accuracy: AccuracyMap) -> go.Figure:
     """Points in the robot's base frame, coloured by the distance (mm) that 95 % of errors stay below."""
-    rows = slice(None, None, max(1, -(-len(found.q) // SHOWN)))
-    at, error = found.position[rows], found.p95[rows] / MILLIMETRE
+    rows = slice(None, None, max(1, -(-len(accuracy.q) // SHOWN)))
+    at, error = accuracy.position[rows], accuracy.p95[rows] / MILLIMETRE
     figure = canvas(560, legend=False)
     figure.add_trace(
         go.Scatter3d(
@@ -62,15 +62,15 @@ _POINTS = 8
 _VIEWS = {"from above": (0, 1), "from the side": (0, 2), "from the front": (1, 2)}
 
 
-def accuracy_views(found: AccuracyMap) -> go.Figure:
+def accuracy_views(accuracy: AccuracyMap) -> go.Figure:
     """For each cell of three views of the volume (base frame) the 95 % error in mm, averaged over the poses behind it."""
-    cells = int(np.clip(np.sqrt(len(found.q) / _POINTS), 3, _CELLS))
+    cells = int(np.clip(np.sqrt(len(accuracy.q) / _POINTS), 3, _CELLS))
     titles = [f"{'xyz'[up]} / m, {view}" for view, (_, up) in _VIEWS.items()]
     figure = panels(1, 3, 340, titles, legend=False, column_gap=0.1)
-    error = found.p95 / MILLIMETRE
+    error = accuracy.p95 / MILLIMETRE
     largest = 0.0
     for column, (across, up) in enumerate(_VIEWS.values(), start=1):
-        x, y = found.position[:, across], found.position[:, up]
+        x, y = accuracy.position[:, across], accuracy.position[:, up]
         count, x_edges, y_edges = np.histogram2d(x, y, bins=cells)
         total = np.histogram2d(x, y, bins=[x_edges, y_edges], weights=error)[0]
         mean = np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0)

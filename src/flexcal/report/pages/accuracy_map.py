@@ -151,21 +151,21 @@ def _numbers(study: MapStudy) -> Section:
 
 
 def _space(study: MapStudy) -> Section:
-    found = study.map
-    drawn = min(len(found.q), SHOWN)
+    accuracy = study.map
+    drawn = min(len(accuracy.q), SHOWN)
     blocks: tuple[Block, ...] = (
         FigureBlock(
             "figure-views",
             "Three views of the volume",
-            accuracy_views(found),
+            accuracy_views(accuracy),
             "Colour: 95 % bound of the error, averaged over all poses behind a cell.",
             "Predicted error in three views of the volume.",
         ),
         FigureBlock(
             "figure-space",
             "In three dimensions",
-            accuracy_space(found),
-            f"{drawn} of {len(found.q)} poses, each in its own orientation of the tool. Drag to turn.",
+            accuracy_space(accuracy),
+            f"{drawn} of {len(accuracy.q)} poses, each in its own orientation of the tool. Drag to turn.",
             f"Predicted error of {drawn} poses in space.",
         ),
     )
@@ -188,7 +188,7 @@ def _sources(study: MapStudy) -> Section:
 
 def _observed(study: MapStudy) -> Section:
     assert study.verification is not None and study.scale is not None
-    found = study.verification
+    verification = study.verification
     scale = study.scale
     rows = (
         ("observed over predicted size", f"{scale.ratio:.2f}"),
@@ -204,7 +204,7 @@ def _observed(study: MapStudy) -> Section:
         FigureBlock(
             "figure-predicted",
             "Observed against predicted errors",
-            predicted_quantiles(found),
+            predicted_quantiles(verification),
             "Sorted errors at the verification poses against the quantiles that the covariance of the parameters and the instrument's "
             "noise predict. Points on the dashed line: the prediction was right. Above it: errors are larger than predicted.",
             "Sorted observed errors against predicted quantiles.",

@@ -148,7 +148,7 @@ def calibration_checks(
     results: Mapping[str, Any], estimate: Estimate, points: MeasuredPoints
 ) -> tuple[Check, ...]:
     """The checks behind the verdict; `results` is the document of results.json."""
-    found, errors = determined(results), points.statistics(CALIBRATED)
+    identifiable, errors = determined(results), points.statistics(CALIBRATED)
     validated = results["cross_validation"]
     left_out = None if validated is None else validated["mean_mm"] * MILLIMETRE
     share = 1.0 if validated is None else validated["parameters"] / (3 * errors.poses)
@@ -157,7 +157,7 @@ def calibration_checks(
         check_error_budget(
             estimate, results["variances"], is_implausible=results["fit"]["is_implausible"]
         ).named("residual"),
-        check_rank(found.parameters, found.rank, found.gap).named("rank"),
+        check_rank(identifiable.parameters, identifiable.rank, identifiable.gap).named("rank"),
         check_drift(results["drift"]).named("drift"),
         check_outliers(len(estimate.outliers), errors).named("outliers"),
         *check_bearings(results.get("bearings")),

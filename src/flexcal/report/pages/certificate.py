@@ -116,17 +116,17 @@ def _conditions(results: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def _judgement(results: Mapping[str, Any]) -> str:
-    found = results["prediction"]
+    prediction = results["prediction"]
     words = {
         "right": "The predicted uncertainty holds.",
         "optimistic": "The predicted uncertainty was too small.",
         "unknown": "The predicted uncertainty cannot be judged: these numbers contain instrument noise of unknown size.",
         "cautious": "The predicted uncertainty was larger than needed.",
-    }[found["verdict"]]
+    }[prediction["verdict"]]
     return (
-        f"{words} After compensation {100 * found['inside_95_percent']:.0f} % of the measurements lie within the bound predicted for 95 % "
-        f"of them; errors are {found['ratio']:.2f} times as large as the calibration predicts (95 % "
-        f"interval {found['ratio_low']:.2f} to {found['ratio_high']:.2f})."
+        f"{words} After compensation {100 * prediction['inside_95_percent']:.0f} % of the measurements lie within the bound predicted "
+        f"for 95 % of them; errors are {prediction['ratio']:.2f} times as large as the calibration predicts (95 % "
+        f"interval {prediction['ratio_low']:.2f} to {prediction['ratio_high']:.2f})."
     )
 
 

@@ -64,8 +64,8 @@ def _verdict(results: Mapping[str, Any]) -> Verdict:
 
 def _table(results: Mapping[str, Any]) -> Table:
     rows = []
-    found = zip(results["parameters"].items(), results["declared_gains"], results["gains"], strict=True)
-    for (name, item), declared, gain in found:
+    gains = zip(results["parameters"].items(), results["declared_gains"], results["gains"], strict=True)
+    for (name, item), declared, gain in gains:
         known = item["identifiable"]
         rows.append(
             (

@@ -54,10 +54,10 @@ class DynamicsStudy:
 
 def held_out(results: Mapping[str, Any]) -> str:
     """The held-out data in words; empty for none."""
-    found = results.get("hold_out", {})
-    if found.get("logs"):
-        return " and ".join(PurePath(log).name for log in found["logs"])
-    return f"the last {100 * found['share']:.0f} % of every recording" if found.get("share") else ""
+    block = results.get("hold_out", {})
+    if block.get("logs"):
+        return " and ".join(PurePath(log).name for log in block["logs"])
+    return f"the last {100 * block['share']:.0f} % of every recording" if block.get("share") else ""
 
 
 def dynamics_page(study: DynamicsStudy) -> Page:

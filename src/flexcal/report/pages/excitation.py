@@ -78,8 +78,8 @@ def excitation_page(study: ExcitationStudy) -> Page:
 
 def _verdict(results: Mapping[str, Any]) -> Verdict:
     trust = Trust(excitation_checks(results))
-    found, of = results["resonances"], results["excitation"]
-    known = [item["frequency_hz"] for item in found if item["frequency_hz"]["identifiable"]]
+    resonances, of = results["resonances"], results["excitation"]
+    known = [item["frequency_hz"] for item in resonances if item["frequency_hz"]["identifiable"]]
     if known:
         first = known[0]
         half = (first["high"] - first["low"]) / 2
@@ -88,7 +88,7 @@ def _verdict(results: Mapping[str, Any]) -> Verdict:
             to_half_width(first["estimate"], half),
             "Hz",
             f"95 % interval {to_half_width(first['low'], half)} to {to_half_width(first['high'], half)} Hz; "
-            f"{len(found)} in the band.",
+            f"{len(resonances)} in the band.",
         )
     else:
         lowest = Fact("Where is the first resonance?", NOTHING, "", "None was found in the excited band.")

@@ -77,9 +77,9 @@ def payload_page(study: PayloadStudy) -> Page:
 
 def _logs(study: PayloadStudy) -> dict[str, TorquePrediction]:
     recordings = study.results["recordings"]
-    held = ["with payload"] * len(recordings["loaded"]) + ["without"] * len(recordings["free"])
-    found = zip(recording_labels(study.predictions), held, study.predictions, strict=True)
-    return {f"{label}, {kind}": log for label, kind, log in found}
+    kinds = ["with payload"] * len(recordings["loaded"]) + ["without"] * len(recordings["free"])
+    labelled_logs = zip(recording_labels(study.predictions), kinds, study.predictions, strict=True)
+    return {f"{label}, {kind}": log for label, kind, log in labelled_logs}
 
 
 def _verdict(study: PayloadStudy) -> Verdict:

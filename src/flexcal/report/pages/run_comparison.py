@@ -36,26 +36,26 @@ _FEW = 20
 _ANSWERS: dict[Status, str] = {"good": "Yes", "care": "With care", "bad": "No", "unknown": "Unknown"}
 
 
-def comparison_page(found: Comparison) -> Page:
+def comparison_page(comparison: Comparison) -> Page:
     """The page before it becomes HTML."""
-    first, second = found.first, found.second
-    sections = [_errors(found)]
-    if found.changes:
-        sections.append(_parameters(found))
+    first, second = comparison.first, comparison.second
+    sections = [_errors(comparison)]
+    if comparison.changes:
+        sections.append(_parameters(comparison))
     sections.append(_provenance(first, second))
     return Page(
         title=f"{first.name} and {second.name}: comparison",
         subtitle=f"Two runs of {first.kind} on the robot {first.robot}",
-        verdict=comparison_verdict(found),
+        verdict=comparison_verdict(comparison),
         sections=sections,
-        document=found.document(),
+        document=comparison.document(),
     )
 
 
-def comparison_verdict(found: Comparison) -> Verdict:
+def comparison_verdict(comparison: Comparison) -> Verdict:
     """Which of the two is more accurate, by how much, and whether that is more than chance."""
-    first, second, difference = found.first, found.second, found.difference
-    checks = _checks(found)
+    first, second, difference = comparison.first, comparison.second, comparison.difference
+    checks = _checks(comparison)
     status = worst(checks)
     better, worse = (second, first) if difference.value < 0 else (first, second)
     size = millimetres(abs(difference.value))
@@ -103,8 +103,8 @@ def comparison_verdict(found: Comparison) -> Verdict:
     return Verdict(status, headline, sentence, facts, tuple(ranges), f"Error of the robot at {where}", checks)
 
 
-def _checks(found: Comparison) -> tuple[Check, ...]:
-    first, second = found.first, found.second
+def _checks(comparison: Comparison) -> tuple[Check, ...]:
+    first, second = comparison.first, comparison.second
     seen = [run.name for run in (first, second) if not run.fresh]
     few = min(len(run.errors) for run in (first, second))
     return (
@@ -119,9 +119,9 @@ def _checks(found: Comparison) -> tuple[Check, ...]:
         Check(
             "Were both measured at the same points?",
             "Yes: they are compared point by point, and what all points share cancels out."
-            if found.difference.paired
+            if comparison.difference.paired
             else "No: a run with easier points looks better, which the interval does not take into account.",
-            "good" if found.difference.paired else "care",
+            "good" if comparison.difference.paired else "care",
         ),
         Check(
             "Were enough points measured?",
@@ -131,8 +131,8 @@ def _checks(found: Comparison) -> tuple[Check, ...]:
     )
 
 
-def _errors(found: Comparison) -> Section:
-    first, second, difference = found.first, found.second, found.difference
+def _errors(comparison: Comparison) -> Section:
+    first, second, difference = comparison.first, comparison.second, comparison.difference
     rows = []
     for run in (first, second):
         if run.before is not None:
@@ -172,8 +172,8 @@ def _errors(found: Comparison) -> Section:
     )  # fmt: skip
 
 
-def _parameters(found: Comparison) -> Section:
-    shared = found.shared
+def _parameters(comparison: Comparison) -> Section:
+    shared = comparison.shared
     words = (
         f"Both runs used {', '.join(shared)}, so their estimates are not independent: they share their noise, and differences come from "
         f"the model, the options or other measurements. The root of the summed variances is a scale here, not a test."
@@ -182,26 +182,26 @@ def _parameters(found: Comparison) -> Section:
         f"the summed variances in {100 * LEVEL:.0f} of 100 parameters."
     )
     blocks: list[PageBlock] = []
-    for block in found.changes:
-        blocks += _changes(found, block)
+    for block in comparison.changes:
+        blocks += _changes(comparison, block)
     return Section(
         "parameters", "Parameters that changed by more than their uncertainty", words, tuple(blocks)
     )
 
 
 def _changes(comparison: Comparison, block: Block) -> Sequence[PageBlock]:
-    first, second, found = comparison.first, comparison.second, comparison.changes[block]
-    beyond = found.beyond
-    words = f"Of {len(found.changes)} parameters that both determine, {len(beyond)} changed by more than their joint uncertainty."
-    if not comparison.shared and found.changes:
-        chance = "less than 0.1 %" if found.probability < 1e-3 else f"{100 * found.probability:.2g} %"
+    first, second, changes = comparison.first, comparison.second, comparison.changes[block]
+    beyond = changes.beyond
+    words = f"Of {len(changes.changes)} parameters that both determine, {len(beyond)} changed by more than their joint uncertainty."
+    if not comparison.shared and changes.changes:
+        chance = "less than 0.1 %" if changes.probability < 1e-3 else f"{100 * changes.probability:.2g} %"
         words += (
-            f" By chance, about {LEVEL * len(found.changes):.1f}; it makes all of them together as different in {chance} of "
+            f" By chance, about {LEVEL * len(changes.changes):.1f}; it makes all of them together as different in {chance} of "
             "all cases."
         )
-    if found.others:
+    if changes.others:
         words += (
-            f" {len(found.others)} more cannot be compared: the runs dropped different parameters, so these estimate different "
+            f" {len(changes.others)} more cannot be compared: the runs dropped different parameters, so these estimate different "
             "combinations."
         )
     rows = []

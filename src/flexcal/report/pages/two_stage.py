@@ -103,7 +103,12 @@ def two_stage_verdict(study: TwoStageStudy) -> Verdict:
 
 def two_stage_checks(study: TwoStageStudy) -> tuple[Check, ...]:
     """The checks behind the verdict: those that a real robot would have too."""
-    found, geometry, determined, fresh = study.stiffness, study.geometry, study.determined, study.verification
+    stiffness_study, geometry, determined, fresh = (
+        study.stiffness,
+        study.geometry,
+        study.determined,
+        study.verification,
+    )
     stiffness, damping = study.springs("stiffness"), study.springs("damping")
     bad_data = study.results["calibration_fit"]["is_implausible"]
     return (
@@ -112,9 +117,9 @@ def two_stage_checks(study: TwoStageStudy) -> tuple[Check, ...]:
         ),
         check_claimed_uncertainty(study.results["prediction"]).named("claimed_uncertainty", independent=True),
         check_error_budget(geometry, study.results["variances"], is_implausible=bad_data).named("residual"),
-        check_responses(found),
+        check_responses(stiffness_study),
         check_drift(study.results["calibration_fit"]["drift"]).named("drift"),
-        check_springs(found, stiffness, damping).named("springs"),
+        check_springs(stiffness_study, stiffness, damping).named("springs"),
         check_rank(determined.parameters, determined.rank, determined.gap).named("rank"),
         check_flanks(fresh).named("flanks"),
     )

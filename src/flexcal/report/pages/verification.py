@@ -120,11 +120,11 @@ def _refitted(results: Mapping[str, Any]) -> str:
 
 def verification_checks(results: Mapping[str, Any], points: MeasuredPoints) -> tuple[Check, ...]:
     """The checks behind the verdict; `results` is the document of results.json."""
-    found = points.verification
-    flanks = (check_flanks(found).named("flanks"),) if results["backlash"] else ()
+    verification = points.verification
+    flanks = (check_flanks(verification).named("flanks"),) if results["backlash"] else ()
     return (
         check_unseen(results["fitted"]).named("unseen_poses", independent=True),
-        check_enough(found.all.poses).named("enough_poses"),
+        check_enough(verification.all.poses).named("enough_poses"),
         check_claimed_uncertainty(results["prediction"]).named("claimed_uncertainty", independent=True),
         *flanks,
         *(

@@ -121,12 +121,12 @@ def parameter_changes(first: Estimate, second: Estimate) -> ParameterChanges:
 
 def _absorbed(estimate: Estimate) -> Mapping[str, set[str]]:
     """What each kept parameter took up, by name."""
-    found: dict[str, set[str]] = {}
+    absorbed: dict[str, set[str]] = {}
     for dropped in estimate.dropped:
         for kept, coefficient in dropped.absorbed_by:
             if coefficient:
-                found.setdefault(kept, set()).add(dropped.name)
-    return found
+                absorbed.setdefault(kept, set()).add(dropped.name)
+    return absorbed
 
 
 def _chance(scores: np.ndarray, correlation: np.ndarray) -> float:

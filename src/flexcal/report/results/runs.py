@@ -108,9 +108,9 @@ class Comparison:
             "shared": list(self.shared),
             "parameters": {
                 block: {
-                    "compared": len(found.changes),
-                    "not_comparable": list(found.others),
-                    "probability": found.probability,
+                    "compared": len(changes.changes),
+                    "not_comparable": list(changes.others),
+                    "probability": changes.probability,
                     "changed": [
                         {
                             "name": c.name,
@@ -119,9 +119,9 @@ class Comparison:
                             "std": list(c.std),
                             "score": c.score,
                         }
-                        for c in found.beyond
+                        for c in changes.beyond
                     ],
                 }
-                for block, found in self.changes.items()
+                for block, changes in self.changes.items()
             },
         }

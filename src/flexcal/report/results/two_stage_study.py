@@ -78,9 +78,9 @@ class TwoStageStudy:
     @cached_property
     def rigid(self) -> tuple[RigidFit, ...]:
         """Fits of the same robot without elasticity, the fairest one first."""
-        found = self.results["rigid_fits"]
+        fits = self.results["rigid_fits"]
         return tuple(
-            RigidFit(f["poses"], f["rank"], self.errors(f"measured_rigid_{f['poses']}")) for f in found
+            RigidFit(f["poses"], f["rank"], self.errors(f"measured_rigid_{f['poses']}")) for f in fits
         )
 
     def errors(self, model: str) -> ErrorStatistics:

@@ -10,7 +10,7 @@ from flexcal.report.results import PublishedValues, TwoStageStudy
 def comparison_section(study: TwoStageStudy) -> Section:
     """The numbers of the run beside the paper's."""
     paper = study.paper
-    fresh, found = study.verification, study.determined
+    fresh, identifiable = study.verification, study.determined
     errors = [
         ("calibration poses, before (the robot's own)", study.points.before, None),
         (
@@ -30,9 +30,13 @@ def comparison_section(study: TwoStageStudy) -> Section:
         published = statistics_cells(theirs)[1:] if paper else ()
         rows.append((label, str(ours.poses), *statistics_cells(ours), *published))
     counts = [
-        ("geometric parameters modelled", str(found.parameters), _number(paper, "parameters")),
-        ("geometric parameters determined", str(found.rank), _number(paper, "rank")),
-        ("smallest singular value, relative", f"{found.singular_values[found.rank - 1]:.2g}", NOTHING),
+        ("geometric parameters modelled", str(identifiable.parameters), _number(paper, "parameters")),
+        ("geometric parameters determined", str(identifiable.rank), _number(paper, "rank")),
+        (
+            "smallest singular value, relative",
+            f"{identifiable.singular_values[identifiable.rank - 1]:.2g}",
+            NOTHING,
+        ),
     ]
     blocks: list[Block] = [
         Table("table-numbers", "Errors", tuple(columns), tuple(rows), strong=(4,)),

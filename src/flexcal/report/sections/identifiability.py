@@ -15,18 +15,20 @@ _NOTHING = 1e-9
 """Amounts (SI) below this are rounding errors of a column that is zero."""
 
 
-def identifiability_blocks(found: IdentifiableParameters, paper: PublishedValues | None) -> tuple[Block, ...]:
+def identifiability_blocks(
+    identifiable: IdentifiableParameters, paper: PublishedValues | None
+) -> tuple[Block, ...]:
     """The gap, the dropped parameters and the weakest directions that were kept."""
-    dropped = found.parameters - found.rank
+    dropped = identifiable.parameters - identifiable.rank
     words = (
-        f"Of {found.parameters} geometric parameters, the measured points determine {found.rank} combinations. The other {dropped} would "
-        "move the tool exactly as some of the kept ones do: a longer first link and a higher base, for example, are not separately "
-        "identifiable. They keep their nominal values and are absorbed by the kept ones, which does not affect predictions."
+        f"Of {identifiable.parameters} geometric parameters, the measured points determine {identifiable.rank} combinations. The other "
+        f"{dropped} would move the tool exactly as some of the kept ones do: a longer first link and a higher base, for example, are not "
+        "separately identifiable. They keep their nominal values and are absorbed by the kept ones, which does not affect predictions."
     )
     paragraphs = [words]
-    if paper is not None and paper.rank is not None and paper.rank != found.rank:
+    if paper is not None and paper.rank is not None and paper.rank != identifiable.rank:
         paragraphs.append(
-            f"The paper keeps {paper.rank} of {paper.parameters}. Exact derivatives give {found.rank}; derivatives by one-sided "
+            f"The paper keeps {paper.rank} of {paper.parameters}. Exact derivatives give {identifiable.rank}; derivatives by one-sided "
             "differences blur the gap below, which the figure shows to be wide, and can make a dependent parameter look independent."
         )
     blocks: list[Block] = [
@@ -34,17 +36,19 @@ def identifiability_blocks(found: IdentifiableParameters, paper: PublishedValues
         FigureBlock(
             "figure-rank",
             "Singular values of the identification Jacobian",
-            singular_values(found.singular_values, found.diagonal, found.rank, found.gap),
+            singular_values(
+                identifiable.singular_values, identifiable.diagonal, identifiable.rank, identifiable.gap
+            ),
             "Each mark is one direction in the space of parameters, by how far it moves the measured points, relative to the strongest. "
             "Blue directions are determined; grey ones are numerically zero. The wider the gap between them, the less the rank depends "
             "on a threshold.",
-            f"Singular values and the diagonal of R of {found.parameters} parameters; {found.rank} are kept, {dropped} are smaller by "
-            f"{found.gap:.0f} decades.",
+            f"Singular values and the diagonal of R of {identifiable.parameters} parameters; {identifiable.rank} are kept, {dropped} are "
+            f"smaller by {identifiable.gap:.0f} decades.",
         ),
     ]
     if dropped:
-        blocks.append(dropped_table(found.dropped))
-    blocks.append(_weak_table(found))
+        blocks.append(dropped_table(identifiable.dropped))
+    blocks.append(_weak_table(identifiable))
     return tuple(blocks)
 
 
@@ -72,11 +76,11 @@ def _amount(coefficient: float) -> str:
     return "" if text == "1" else "−" if text == "−1" else f"{text} × "
 
 
-def _weak_table(found: IdentifiableParameters) -> Table:
+def _weak_table(identifiable: IdentifiableParameters) -> Table:
     return Table(
         "table-weak",
         "Least determined combinations of the kept parameters",
         ("combination", "strength, relative to the strongest"),
-        tuple((name, f"{value:.1e}") for name, value in found.weak),
+        tuple((name, f"{value:.1e}") for name, value in identifiable.weak),
         "These have the widest intervals; more or better spread poses strengthen them.",
     )

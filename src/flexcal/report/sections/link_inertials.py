@@ -52,19 +52,21 @@ def _gain_table(study: TwoStageStudy) -> Table:
     both = (study.results["cad_alone"], study.results)
     springs = [_stiffnesses(results) for results in both]
     errors = [
-        np.array([abs(q["estimate"] / q["truth"] - 1) for q in found.values() if q["truth"] is not None])
-        for found in springs
+        np.array([abs(q["estimate"] / q["truth"] - 1) for q in estimates.values() if q["truth"] is not None])
+        for estimates in springs
     ]
     rows: list[tuple[str, ...]] = [
         ("stage 1: largest stiffness error", *(_percent(float(e.max())) for e in errors)),
         ("stage 1: median stiffness error", *(_percent(float(np.median(e))) for e in errors)),
     ]
-    for name in (name for name in study.springs("stiffness") if all(name in found for found in springs)):
-        stds = (_relative_std(found[name]) for found in springs)
+    for name in (
+        name for name in study.springs("stiffness") if all(name in estimates for estimates in springs)
+    ):
+        stds = (_relative_std(estimates[name]) for estimates in springs)
         rows.append((f"stage 1: std of {spring_label(name)}", *(_percent(std) for std in stds)))
     fresh = [results["verification"] for results in both]
-    every = [ErrorStatistics.of_millimetres(found["elastic"]) for found in fresh]
-    certain = [ErrorStatistics.of_millimetres(found["elastic_unambiguous"]) for found in fresh]
+    every = [ErrorStatistics.of_millimetres(verification["elastic"]) for verification in fresh]
+    certain = [ErrorStatistics.of_millimetres(verification["elastic_unambiguous"]) for verification in fresh]
     rows += [
         ("stage 2: mean error at fresh poses / mm", *(millimetres(v.mean) for v in every)),
         ("stage 2: P90 at fresh poses / mm", *(millimetres(v.p90) for v in every)),
@@ -72,7 +74,7 @@ def _gain_table(study: TwoStageStudy) -> Table:
         ("stage 2: maximum, flank certain / mm", *(millimetres(v.max) for v in certain)),
         (
             "stage 2: predicted rms / mm",
-            *(document_millimetres(found["expected_rms_mm"]) for found in fresh),
+            *(document_millimetres(verification["expected_rms_mm"]) for verification in fresh),
         ),
     ]
     return Table(
@@ -85,8 +87,12 @@ def _gain_table(study: TwoStageStudy) -> Table:
 
 def _stiffnesses(results: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
     """The quantities of stage 1 by parameter name."""
-    found = results["stage1"]["stiffness"].items()
-    return {f"{joint}.{spring}.stiffness": q for joint, springs in found for spring, q in springs.items()}
+    springs_by_joint = results["stage1"]["stiffness"].items()
+    return {
+        f"{joint}.{spring}.stiffness": q
+        for joint, springs in springs_by_joint
+        for spring, q in springs.items()
+    }
 
 
 def _percent(share: float | None) -> str:
@@ -97,15 +103,15 @@ def _relative_std(quantity: Mapping[str, Any]) -> float | None:
     return None if quantity["std"] is None else quantity["std"] / quantity["estimate"]
 
 
-def _inertial_table(study: TwoStageStudy, found: Estimate) -> Table:
+def _inertial_table(study: TwoStageStudy, estimate: Estimate) -> Table:
     rows = []
-    for item in found.parameters:
+    for item in estimate.parameters:
         if item.unit not in _UNITS or item.prior_std == np.inf:
             continue
         factor, unit = _UNITS[item.unit]
         before = item.value if item.prior_mean is None else item.prior_mean
         prior = item.prior_std * (before if item.scale == "log" else 1.0)
-        std = found.std(item.name) or np.nan
+        std = estimate.std(item.name) or np.nan
         cells = [significant(factor * v, 3) for v in (before, prior, item.value, std)]
         true = study.truth.get(item.name)
         cells.append(NOTHING if true is None else significant(factor * true, 3))

@@ -58,9 +58,9 @@ def input_files(origin: Mapping[str, str]) -> dict[str, str]:
 
 def common_origin(estimates: Mapping[Block, Estimate]) -> dict[str, str]:
     """What all blocks say of their origin; of the same key in several blocks with different values, each under the block's name."""
-    found: dict[str, str] = {}
+    origin: dict[str, str] = {}
     for block, estimate in estimates.items():
         for key, value in estimate.provenance.items():
-            shown = key if found.get(key, value) == value else f"{key} ({block})"
-            found[shown] = value
-    return found
+            shown = key if origin.get(key, value) == value else f"{key} ({block})"
+            origin[shown] = value
+    return origin

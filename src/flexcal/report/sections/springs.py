@@ -88,8 +88,8 @@ def _row(
         )
         cells.append(NOTHING if interval is None or known is None else "yes" if inside else "no")
     if published is not None:
-        found = published.get(name)
-        cells.append(significant(None if found is None else factor * found))
+        published_value = published.get(name)
+        cells.append(significant(None if published_value is None else factor * published_value))
     return (spring_label(name), *cells)
 
 
