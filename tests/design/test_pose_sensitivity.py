@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from flexcal.design.optimality import TraceOptimal
-from flexcal.design.poses import Tolerances, base_sensitivity, geometry_jacobian, pose_sensitivity
+from flexcal.design.poses import GeometricTolerances, base_sensitivity, geometry_jacobian, pose_sensitivity
 from flexcal.design.poses.feasibility import tool_error_weight
 from flexcal.design.poses.selection import tool_error
 from flexcal.design.scene import MeasuringSetup, TrackerNoise
@@ -68,7 +68,7 @@ def test_noise_and_scale(tx90l, ur5, rng):
     np.testing.assert_allclose(pose_sensitivity(tx90l, q).jacobian[:, 0, 0], 1 / (15e-6 + 6e-6 * distance))
     away = pose_sensitivity(ur5, q).jacobian[:, 0, 0]
     np.testing.assert_allclose(away, 1 / (15e-6 + 6e-6 * 2 * ur5.reach))
-    tolerances = Tolerances(length=1e-3, angle=2e-3)
+    tolerances = GeometricTolerances(length=1e-3, angle=2e-3)
     stds = dict(
         zip(
             full.parameters.names,

@@ -3,7 +3,7 @@ from .candidates import random_candidates
 from .feasibility import PoseCandidates, pose_candidates
 from .geometry_sensitivity import (
     BaseSensitivity,
-    Tolerances,
+    GeometricTolerances,
     base_sensitivity,
     geometry_jacobian,
     pose_sensitivity,
@@ -17,12 +17,12 @@ from .working_volume import WorkingVolume, working_box, working_points
 __all__ = [
     "BaseSensitivity",
     "CriterionName",
+    "GeometricTolerances",
     "MeasurementOrder",
     "NextPoses",
     "PoseCandidates",
     "PoseCurve",
     "PoseDesign",
-    "Tolerances",
     "WorkingVolume",
     "base_sensitivity",
     "choose_poses",

@@ -16,7 +16,7 @@ from flexcal.units import MILLIMETRE
 
 
 @dataclass(frozen=True)
-class Tolerances:
+class GeometricTolerances:
     """How large geometric errors are, 1σ: lengths (m), angles and half gaps (rad), and the place of the instrument (m)."""
 
     length: float = 0.3 * MILLIMETRE
@@ -26,7 +26,7 @@ class Tolerances:
 
 BLOCK = 512
 """Poses whose rows are found together: what they need stays in the processor's cache."""
-TYPICAL = Tolerances()
+TYPICAL = GeometricTolerances()
 """A well-made industrial robot, and an instrument whose place was measured with a tape."""
 
 
@@ -59,7 +59,7 @@ def pose_sensitivity(
     model: RobotModel,
     q: np.ndarray,
     setup: MeasuringSetup = STANDARD,
-    tolerances: Tolerances = TYPICAL,
+    tolerances: GeometricTolerances = TYPICAL,
 ) -> Sensitivity:
     """Rows of every pose of `q` (samples, n) in the geometric errors (SI), whitened by the instrument's noise; prior: the tolerances.
 
@@ -85,7 +85,7 @@ def measuring_noise(model: RobotModel, q: np.ndarray, setup: MeasuringSetup = ST
     return setup.noise.std(apart)
 
 
-def _tolerance(name: str, tolerances: Tolerances) -> float:
+def _tolerance(name: str, tolerances: GeometricTolerances) -> float:
     if name.startswith("station."):
         return tolerances.station
     return tolerances.angle if unit_of(name) == "rad" else tolerances.length
