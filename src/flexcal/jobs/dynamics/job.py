@@ -63,13 +63,14 @@ def identify_robot_dynamics(
     }
     used = source if blocks else None
     origin = provenance([robot, bare.urdf, *logs], options, used, tuple(blocks))
+    everything = origin  # hashing goes through the whole logs
+    if validate:
+        everything = provenance([robot, bare.urdf, *logs, *validate], options, used, tuple(blocks))
     result = replace(
         identified,
         estimate=replace(identified.estimate, provenance=origin),
         estimates=target,
-        record=RunRecord(
-            provenance([robot, bare.urdf, *logs, *validate], options, used, tuple(blocks)), command
-        ),
+        record=RunRecord(everything, command),
     )
     store_block(source, target, blocks, "dynamics", result.estimate)
     if result.learned is not None:

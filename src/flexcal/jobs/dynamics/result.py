@@ -93,10 +93,9 @@ class DynamicsIdentification:
         """What the fit says, for people: errors of the torques, base parameters, remarks, verdict."""
         document = self.document()
         rows = [
-            f"{row['name']:<60.60} {row['estimate']:>12.5g} {'':>12} {row['unit']}"
-            if row["std"] is None
-            else f"{row['name']:<60.60} {row['estimate']:>12.5g} ± {row['std']:<10.2g} {row['unit']}"
+            f"{row['name']:<60.60} {row['estimate']:>12.5g} {std:<12} {row['unit']}"
             for row in document["base_parameters"]
+            for std in ["" if row["std"] is None else f"± {row['std']:.2g}"]
         ]
         return "\n".join(
             [self._headline, *rows, *document["remarks"], *document["notes"], self.trust.sentence]
