@@ -139,6 +139,7 @@ def identify_dynamics(
             learned = LearnedDynamics.of(rows, systems, unseen, estimate, progress)
         plain = observation if terms == CLASSIC else replace(observation, terms=CLASSIC)
         return DynamicsIdentification(
+            model=model.with_estimate(estimate),
             estimate=estimate,
             estimator=estimator.name,
             structural_rank=base.rank if plain is observation else BaseParameters.of(plain).rank,

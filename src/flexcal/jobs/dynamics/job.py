@@ -11,7 +11,7 @@ from flexcal.files.formats import provenance, read_estimates
 from flexcal.jobs.dynamics.identification import identify_dynamics
 from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
 from flexcal.jobs.dynamics.result import DynamicsIdentification
-from flexcal.jobs.result_files import RunRecord, estimates_target, store_block
+from flexcal.jobs.result_files import RunRecord, estimates_target
 from flexcal.model.robot import RobotModel, with_blocks
 from flexcal.progress import Progress, silent
 
@@ -72,9 +72,7 @@ def identify_robot_dynamics(
         estimates=target,
         record=RunRecord(everything, command),
     )
-    store_block(source, target, blocks, "dynamics", result.estimate)
-    if result.learned is not None:
+    if result.learned is not None and out is None:
         result.learned.store(target)
-    if out is not None:
-        result.write(out)
+    result.store(source, out, blocks)
     return result

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from html import escape
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -17,13 +15,11 @@ from flexcal.dynamics.estimators import EstimatorName
 from flexcal.dynamics.friction import FrictionSelection
 from flexcal.dynamics.regression import RegressionData
 from flexcal.dynamics.residual import LEARNED
-from flexcal.estimation import Estimate
-from flexcal.files.formats import write_estimates
-from flexcal.files.transaction import write_text
+from flexcal.files.formats import Block
 from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
 from flexcal.jobs.dynamics.remarks import dynamics_notes, dynamics_remarks, selection_remark
 from flexcal.jobs.logs import Preprocessing
-from flexcal.jobs.pages import REPORT, report_folder
+from flexcal.jobs.pages import Identification
 from flexcal.jobs.result_files import (
     ESTIMATES,
     NOT_RECORDED,
@@ -32,16 +28,15 @@ from flexcal.jobs.result_files import (
     header,
     quantities,
     write_predictions,
-    write_results,
 )
 from flexcal.model.parts import is_physically_consistent
-from flexcal.model.robot import RobotModel, torque_units
+from flexcal.model.robot import torque_units
 from flexcal.report.checks import Trust
 from flexcal.report.pages import dynamics_checks
 
 
-@dataclass(frozen=True, eq=False)
-class DynamicsIdentification:
+@dataclass(frozen=True, eq=False, repr=False)
+class DynamicsIdentification(Identification):
     """Result of `identify_dynamics`: the estimate, how well it predicts the torques it was made from and those it never saw.
 
     The last share `hold_out` of the time of every log was kept out of the fit, or the logs `validated` were. `motors` are the joints
@@ -52,7 +47,7 @@ class DynamicsIdentification:
     was stored in, None where it was not; `record` says what it comes from.
     """
 
-    estimate: Estimate
+    block: ClassVar[Block] = "dynamics"
     estimator: EstimatorName
     structural_rank: int
     train: RegressionData
@@ -73,17 +68,6 @@ class DynamicsIdentification:
     estimates: Path | None = None
     record: RunRecord = NOT_RECORDED
 
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__} of {self.train.observation.model.name}: {self._headline}>"
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(self.summary())}</pre>"
-
-    @property
-    def model(self) -> RobotModel:
-        """The robot with the estimate."""
-        return self.train.observation.model.with_estimate(self.estimate)
-
     @property
     def residuals(self) -> tuple[np.ndarray, ...]:
         """Measured minus predicted torques (M, n), N m, of every log, at the times of its prediction."""
@@ -98,11 +82,12 @@ class DynamicsIdentification:
             for std in ["" if row["std"] is None else f"± {row['std']:.2g}"]
         ]
         return "\n".join(
-            [self._headline, *rows, *document["remarks"], *document["notes"], self.trust.sentence]
+            [self.headline, *rows, *document["remarks"], *document["notes"], self.trust.sentence]
         )
 
     @property
-    def _headline(self) -> str:
+    def headline(self) -> str:
+        """Rank, estimator and relative errors of the torques."""
         percent = self._numbers["error_percent"]
         unseen = "" if percent["held_out"] is None else f", {percent['held_out']:.2f} % outside it"
         return (
@@ -110,21 +95,11 @@ class DynamicsIdentification:
             f"relative torque error {percent['train']:.2f} % in the fit{unseen}"
         )
 
-    def report(self, path: str | Path) -> Path:
-        """Write the result as one HTML page; returns its path."""
-        path = Path(path)
-        with TemporaryDirectory() as name:
-            folder = Path(name)
-            write_estimates(folder / ESTIMATES, "dynamics", self.estimate)
-            self.write(folder)
-            write_text(path, (folder / REPORT).read_text("utf-8"))
-        return path
-
-    def write(self, folder: Path) -> None:
-        """Leave results.json, predictions.npz and report.html in a folder that has the estimates already."""
-        write_results(folder, self.document())
+    def write_arrays(self, folder: Path) -> None:
+        """Leave predictions.npz in a folder, and learned_residual.npz where something was learned."""
         write_predictions(folder, self.predictions)
-        report_folder(folder)
+        if self.learned is not None:
+            self.learned.store(folder / ESTIMATES)
 
     @property
     def bodiless(self) -> tuple[str, ...]:

@@ -1,9 +1,12 @@
 from .comparison import compare_folders
 from .customer import customer_report
 from .report import REPORT, report_folder, two_stage_study
+from .result import Identification, Result
 
 __all__ = [
     "REPORT",
+    "Identification",
+    "Result",
     "compare_folders",
     "customer_report",
     "report_folder",

@@ -1,0 +1,87 @@
+"""What the results of all verbs have in common."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, ClassVar
+
+from flexcal.estimation import Estimate
+from flexcal.files.formats import Block, write_estimates
+from flexcal.files.transaction import write_text
+from flexcal.jobs.pages.report import REPORT, report_folder
+from flexcal.jobs.result_files import ESTIMATES, write_results
+from flexcal.model.robot import RobotModel
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Result(ABC):
+    """Result of a verb about the robot `model`: a short `repr`, a summary in text, the content of results.json, and the report."""
+
+    model: RobotModel
+
+    @property
+    @abstractmethod
+    def headline(self) -> str:
+        """The result in one line, without the robot's name."""
+
+    @abstractmethod
+    def summary(self) -> str:
+        """The result in a few lines of text, for people."""
+
+    @abstractmethod
+    def document(self) -> dict[str, Any]:
+        """The content of results.json."""
+
+    @abstractmethod
+    def write_arrays(self, folder: Path) -> None:
+        """Leave the arrays of the result in a folder, beside results.json."""
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {self.model.name}: {self.headline}>"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(self.summary())}</pre>"
+
+    def write(self, folder: str | Path) -> None:
+        """Leave results.json, report.html and the arrays that it shows in a folder, which is created where it is missing."""
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_results(folder, self.document())
+        self.write_arrays(folder)
+        report_folder(folder)
+
+    def report(self, path: str | Path) -> Path:
+        """Write the result as one HTML page; returns its path."""
+        path = Path(path)
+        with TemporaryDirectory() as folder:
+            self.write(folder)
+            write_text(path, (Path(folder) / REPORT).read_text("utf-8"))
+        return path
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Identification(Result):
+    """Result of a verb that estimates parameters: `estimate`, which `model` has, is the block `block` of estimates.yaml."""
+
+    block: ClassVar[Block]
+    estimate: Estimate
+
+    def write(self, folder: str | Path) -> None:
+        """As `Result.write`, with estimates.yaml, whose other blocks stay as they are."""
+        write_estimates(Path(folder) / ESTIMATES, self.block, self.estimate)
+        super().write(folder)
+
+    def store(self, source: Path, out: Path | None, others: Mapping[Block, Estimate]) -> None:
+        """Put the estimate into the robot's own estimates.yaml `source`, or all to the folder `out` with the `others` it began from."""
+        if out is None:
+            write_estimates(source, self.block, self.estimate)
+            return
+        if out / ESTIMATES != source:
+            for name, other in others.items():
+                write_estimates(out / ESTIMATES, name, other)
+        self.write(out)
