@@ -92,6 +92,9 @@ def test_the_payloads_inertia_grows_with_its_mass(tx90l: RobotModel) -> None:
     exact = linearise(bulky, q, derivatives=["payload.mass"]).derivatives["payload.mass"][0]
     ends = [linearise(bulky.with_values({"payload.mass": 6.0 + s}), q).mass for s in (1e-3, -1e-3)]
     np.testing.assert_allclose(exact, (ends[0] - ends[1]) / 2e-3, atol=1e-6 * np.abs(exact).max())
+    unloaded = linearise(bulky, q, 0.0, derivatives=["payload.mass"]).derivatives["payload.mass"][0]
+    ends = [linearise(bulky, q, mass).mass for mass in (1e-3, 0.0)]
+    np.testing.assert_allclose(unloaded, (ends[0] - ends[1]) / 1e-3, atol=1e-4 * np.abs(unloaded).max())
 
 
 def test_free_rotors_show_poles_and_zeros(tx90l: RobotModel) -> None:

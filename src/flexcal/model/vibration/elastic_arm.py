@@ -33,6 +33,9 @@ class ElasticArm:
         self.turns: list[np.ndarray] = []
         velocity: dict[tuple[int, int], int] = {}
         components = {e.index: e.components for e in robot.elastic}
+        hung = robot.payload
+        self._payload_joint = -1 if hung is None else hung.joint
+        self._carried = None if hung is None or self.payload <= 0 else hung.carried(self.payload)
         for i, joint in enumerate(robot.joints):
             frame = robot.bearing_frames.get(i)
             frame = bearing_frame(joint) if frame is None else frame
@@ -54,18 +57,18 @@ class ElasticArm:
         self.data: Any = self.model.createData()
         self.joint_velocity = np.array([velocity[i, 2] for i in range(robot.n)])
         self.elastic = np.array([velocity[axis] for axis in elastic_axes(robot)], dtype=int)
+        self._block = np.ix_(self.elastic, self.elastic)
+        self._upper = np.minimum(*self._block), np.maximum(*self._block)
 
-    def set_inertia(self, joint: int, link: Inertia) -> None:
-        """Give the link of a joint another inertia; the payload is added where it hangs on that link."""
+    def set_inertia(self, joint: int, link: Inertia, carried: Inertia | None = None) -> None:
+        """Give the link of a joint another inertia; the payload, or another one that is `carried`, is added where it hangs there."""
         import pinocchio as pin
 
-        turn = self.turns[joint]
-        total = pin.Inertia(link.mass, link.com, link.inertia)
-        payload = self.robot.payload
-        if payload is not None and payload.joint == joint and self.payload > 0:
-            carried = payload.carried(self.payload)
-            total = total + pin.Inertia(carried.mass, carried.com, carried.inertia)
-        self.model.inertias[self.bodies[joint]] = pin.SE3(turn.T, np.zeros(3)).act(total)
+        total = _pinocchio_inertia(link)
+        carried = self._carried if carried is None else carried
+        if joint == self._payload_joint and carried is not None:
+            total = total + _pinocchio_inertia(carried)
+        self.model.inertias[self.bodies[joint]] = pin.SE3(self.turns[joint].T, np.zeros(3)).act(total)
 
     def configuration(self, q: np.ndarray, deflection: np.ndarray) -> np.ndarray:
         """Pinocchio's configuration (nq,) of motors at `q` (n,) and the arm deflected by `deflection` (n, 3)."""
@@ -80,16 +83,15 @@ class ElasticArm:
         """Mass matrix (d, d) of the elastic coordinates, kg m²."""
         import pinocchio as pin
 
-        full = pin.crba(self.model, self.data, configuration)
-        full = np.triu(full) + np.triu(full, 1).T
-        return full[np.ix_(self.elastic, self.elastic)]
+        return pin.crba(self.model, self.data, configuration)[
+            self._upper
+        ]  # below the diagonal it is not filled
 
     def gravity_stiffness(self, configuration: np.ndarray) -> np.ndarray:
         """Gravity stiffness ∂g/∂q (d, d) of the elastic coordinates, N m/rad."""
         import pinocchio as pin
 
-        full = pin.computeGeneralizedGravityDerivatives(self.model, self.data, configuration)
-        return np.array(full)[np.ix_(self.elastic, self.elastic)]
+        return pin.computeGeneralizedGravityDerivatives(self.model, self.data, configuration)[self._block]
 
     def mass_matrix_derivatives(self, configuration: np.ndarray) -> np.ndarray:
         """∂M/∂q (d, d, d): the last index is the elastic coordinate that moves."""
@@ -102,7 +104,7 @@ class ElasticArm:
             push = rest.copy()
             push[at] = 1.0
             by_q = pin.computeRNEADerivatives(self.model, self.data, configuration, rest, push)[0]
-            columns.append((np.array(by_q) - weight)[np.ix_(self.elastic, self.elastic)])
+            columns.append((np.array(by_q) - weight)[self._block])
         return np.stack(columns, axis=1)
 
     def gravity_stiffness_derivatives(self, configuration: np.ndarray) -> np.ndarray:
@@ -150,6 +152,12 @@ class ElasticArm:
 
     def _joint_of(self, velocity: int) -> int:
         return next(i for i in range(1, self.model.njoints) if self.model.joints[i].idx_v == velocity)
+
+
+def _pinocchio_inertia(body: Inertia) -> Any:
+    import pinocchio as pin
+
+    return pin.Inertia(body.mass, body.com, body.inertia)
 
 
 def moved_inertia(link: Inertia, mass: float, com: np.ndarray) -> Inertia:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -87,7 +87,7 @@ def linearise(
     motions: dict[str, np.ndarray] = {}
     if derivatives:
         motions = {name: _rest_motion(robot, arm, rest, axes, name) for name in derivatives}
-        result = _derivatives(robot, arm, at, rest, axes, springs, derivatives)
+        result = _derivatives(robot, arm, at, motions, axes, springs)
     sensed = assemble_sensor_outputs(arm, at, sensors, count, motions) if sensors else None
     return Linearisation(tuple(e.name for e in robot.driven), mass, damping, stiffness, result, sensed)
 
@@ -122,10 +122,9 @@ def _derivatives(
     robot: RobotModel,
     arm: ElasticArm,
     at: np.ndarray,
-    rest: Equilibrium,
+    motions: dict[str, np.ndarray],
     axes: list[tuple[int, int]],
     springs: dict[tuple[int, int], tuple[np.ndarray, float, float]],
-    names: Sequence[str],
 ) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
     count, d = len(robot.driven), len(axes)
     size = count + d
@@ -142,7 +141,7 @@ def _derivatives(
         return by_motion_mass @ motion, by_motion_stiffness @ motion
 
     result = {}
-    for name in names:
+    for name, motion in motions.items():
         owner, _, key = name.rpartition(".")
         joint_name, _, spring = owner.rpartition(".")
         if key in ("stiffness", "damping") and spring in SPRINGS:
@@ -151,7 +150,7 @@ def _derivatives(
             if key == "damping":
                 result[name] = (zero, pattern, zero)
                 continue
-            mass, stiffness = moved(_rest_motion(robot, arm, rest, axes, name))
+            mass, stiffness = moved(motion)
             result[name] = (widened(mass), zero, pattern + widened(stiffness))
         elif key == "held_inertia":
             k = count + axes.index((robot.joint_index(owner), 2))
@@ -165,7 +164,7 @@ def _derivatives(
             result[name] = (unit, zero, zero) if key == "rotor_inertia" else (zero, unit, zero)
         elif key in MASS_AND_COM:
             mass, stiffness = _by_inertia(robot, arm, at, owner, key)
-            more_mass, more_stiffness = moved(_rest_motion(robot, arm, rest, axes, name))
+            more_mass, more_stiffness = moved(motion)
             result[name] = (widened(mass + more_mass), zero, widened(stiffness + more_stiffness))
         else:
             raise FlexcalError(f"the linearised robot has no derivative with respect to '{name}'.")
@@ -206,25 +205,23 @@ def _by_inertia(
     robot: RobotModel, arm: ElasticArm, at: np.ndarray, owner: str, key: str
 ) -> tuple[np.ndarray, np.ndarray]:
     """∂M and ∂K (d, d) by a mass or centre of mass; both are at most quadratic in it, so central differences are exact."""
-    results = []
     step = 0.05 * (robot.value(f"{owner}.mass") if key == "mass" else 1.0)
     step = step if step > 0 else 1.0
+    shift = np.zeros(3) if key == "mass" else step * np.eye(3)["xyz".index(key[-1])]
+    payload = robot.payload if owner == "payload" else None
+    i = [joint.link for joint in robot.joints].index(owner) if payload is None else payload.joint
+    link, carried, results = robot.inertias[i], None, []
     for sign in (1, -1):
-        if owner == "payload" and key == "mass":
-            other = ElasticArm(robot, arm.payload + sign * step)
-        elif owner == "payload":
-            name = f"payload.{key}"
-            other = ElasticArm(robot.with_values({name: robot.value(name) + sign * step}), arm.payload)
+        changed = link
+        if payload is not None:
+            mass = max(arm.payload, step) + sign * step if key == "mass" else arm.payload  # linear in it
+            carried = replace(payload, com=payload.com + sign * shift).carried(mass)
         else:
-            i = [joint.link for joint in robot.joints].index(owner)
-            link = robot.inertias[i]
-            shift = np.zeros(3) if key == "mass" else step * np.eye(3)["xyz".index(key[-1])]
             mass = link.mass + sign * step if key == "mass" else link.mass
-            arm.set_inertia(i, moved_inertia(link, mass, link.com + sign * shift))
-            results.append((arm.mass_matrix(at), arm.gravity_stiffness(at)))
-            arm.set_inertia(i, link)
-            continue
-        results.append((other.mass_matrix(at), other.gravity_stiffness(at)))
+            changed = moved_inertia(link, mass, link.com + sign * shift)
+        arm.set_inertia(i, changed, carried)
+        results.append((arm.mass_matrix(at), arm.gravity_stiffness(at)))
+    arm.set_inertia(i, link)
     (m_plus, k_plus), (m_minus, k_minus) = results
     return (m_plus - m_minus) / (2 * step), (k_plus - k_minus) / (2 * step)
 
