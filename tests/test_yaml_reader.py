@@ -24,7 +24,7 @@ class Spring:
 
     def __post_init__(self) -> None:
         if self.stiffness <= 0:
-            raise FlexcalError(f"the stiffness is {self.stiffness}; give a positive one.")
+            raise FlexcalError("E-TEST-001", f"the stiffness is {self.stiffness}; give a positive one.")
 
 
 @dataclass(frozen=True)
@@ -201,7 +201,7 @@ def test_lines_of_plain_data(tmp_path: Path) -> None:
     assert file.data == {"a": 1, "b": [{"c": 3}, {"d": 4}]}
     assert file.line("b", 1, "d") == 4
     assert file.line("b", 0, "unknown") == 3
-    assert str(file.error(("b", 1), "wrong.")) == f"{tmp_path / 'a.yaml'} line 4: wrong."
+    assert str(file.error("E-TEST-001", ("b", 1), "wrong.")) == f"{tmp_path / 'a.yaml'} line 4: wrong."
 
 
 def test_round_trip(tmp_path: Path) -> None:

@@ -8,7 +8,23 @@ from pathlib import Path
 
 
 class FlexcalError(Exception):
-    """An error that the user can correct; the message is one sentence that says what is wrong, where, and what to do."""
+    """An error that the user can correct: `str` is one sentence that says what is wrong, where, and what to do.
+
+    `code` names the sentence, as in `E-URDF-017`, whatever file, joint or number stands in it. Every error has its own, the documentation
+    lists them, and none is used again for another. An error that is raised in place of another, to say where, keeps the code of that.
+    """
+
+    code: str
+
+    def __init__(self, code: str, sentence: str):
+        super().__init__(
+            code, sentence
+        )  # the arguments, with which the error is made again in another process
+        self.code = code
+        self.sentence = sentence
+
+    def __str__(self) -> str:
+        return self.sentence
 
 
 class InputError(FlexcalError):
@@ -16,9 +32,9 @@ class InputError(FlexcalError):
 
 
 def unreadable(path: Path, problem: Exception, remedy: str = "check the name and the folder") -> InputError:
-    """The error of a file that cannot be read, with the system's reason on one line, and what to do."""
+    """Error of a file that cannot be read, with the system's reason on one line, and what to do."""
     reason = getattr(problem, "strerror", None) or " ".join(str(problem).split())
-    return InputError(f"{path} cannot be read ({reason}); {remedy}.")
+    return InputError("E-FILE-001", f"{path} cannot be read ({reason}); {remedy}.")
 
 
 @contextmanager
@@ -29,4 +45,4 @@ def naming(path: Path) -> Iterator[None]:
     except InputError:
         raise
     except FlexcalError as problem:
-        raise InputError(f"{path}: {problem}") from problem
+        raise InputError(problem.code, f"{path}: {problem}") from problem

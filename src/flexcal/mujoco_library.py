@@ -21,7 +21,7 @@ def step_address() -> int:
             address = ctypes.cast(ctypes.CDLL(str(library)).mj_step, ctypes.c_void_p).value
             if address:
                 return address
-    raise FlexcalError(f"no MuJoCo library lies in {folder}; reinstall the package mujoco.")
+    raise FlexcalError("E-CELL-011", f"no MuJoCo library lies in {folder}; reinstall the package mujoco.")
 
 
 def log_mujoco_warnings() -> None:

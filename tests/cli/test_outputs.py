@@ -74,7 +74,7 @@ def test_what_an_earlier_run_left_goes(tmp_path: Path) -> None:
     assert sorted(p.name for p in tmp_path.iterdir()) == [LEDGER, "other", "x0", "x1", "x2"]
 
 
-@pytest.mark.parametrize("problem", [InputError("no"), KeyboardInterrupt()])
+@pytest.mark.parametrize("problem", [InputError("E-TEST-001", "no"), KeyboardInterrupt()])
 def test_a_verb_that_fails_leaves_nothing(tmp_path: Path, problem: BaseException) -> None:
     with pytest.raises(type(problem)), outputs("demo", tmp_path / "a" / "b", ("x*", "y")):
         write_text(tmp_path / "a" / "b" / "x1", "1")
@@ -89,7 +89,7 @@ def test_a_verb_that_fails_changes_nothing(tmp_path: Path) -> None:
     with pytest.raises(InputError), outputs("demo", tmp_path, ("x", "y")):
         write_text(tmp_path / "x", "2")
         write_text(tmp_path / "y", "2")
-        raise InputError("no")
+        raise InputError("E-TEST-001", "no")
     assert snapshot(tmp_path) == before
     with outputs("demo", tmp_path, ("x", "y")):
         write_text(tmp_path / "x", "3")

@@ -235,7 +235,7 @@ def test_it_starts_from_cad_where_no_robot_can_be_built_of_the_data(
     usual = instrumental_variables(data, rows).parameters.coordinates()
 
     def refuse(data: RegressionData) -> Estimate:
-        raise FlexcalError("no physically feasible parameters were found.")
+        raise FlexcalError("E-TEST-001", "no physically feasible parameters were found.")
 
     monkeypatch.setattr(simulated_iteration, "feasible_least_squares", refuse)
     assert instrumental_variables(data, rows).parameters.coordinates() == pytest.approx(usual, abs=1e-8)

@@ -262,7 +262,7 @@ def test_a_wrong_jacobian_is_suspected():
 def test_steps_into_the_impossible_are_taken_back():
     def residual(x):
         if x[0] <= 0:
-            raise FlexcalError("no equilibrium")
+            raise FlexcalError("E-TEST-001", "no equilibrium")
         return np.array([np.log(x[0]) + 3.0, 0.1])
 
     problem = Problem(

@@ -45,30 +45,38 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except BaseException as problem:
             told, status = _told(problem, stopping)
             with suppress(OSError):
-                print(f"flexcal: {sentence(told)}", file=sys.stderr)
+                print(f"flexcal: {told}", file=sys.stderr)
             return status
 
 
 def _told(problem: BaseException, stopping: StopSignal) -> tuple[str, int]:
-    """What to say of an exception in a sentence, and the exit status; raises it again where it is none that is expected."""
+    """What to say of an exception on a line, and the exit status; raises it again where it is none that is expected."""
     if stopping.number is not None:  # an extension module that is interrupted raises what it likes
-        return stopping.sentence, stopping.status
-    if isinstance(problem, FlexcalError):
-        return str(problem), FAILED
-    if isinstance(problem, FileNotFoundError) and problem.filename is None and not _folder_is_there():
-        return "the current folder has been removed; change to one that is there.", FAILED
-    if isinstance(problem, MemoryError):
-        what = f" ({problem})" if str(problem) else ""
-        return (
-            f"there is not enough memory{what}; give fewer rows or logs, or take a machine with more.",
-            FAILED,
-        )
-    if isinstance(problem, OSError):
-        where = f"{problem.filename}: " if problem.filename else ""
-        return f"{where}{problem.strerror or problem}.", FAILED
+        return sentence(stopping.sentence), stopping.status
+    error = _user_error(problem)
+    if error is not None:
+        return f"{sentence(error)} [{error.code}]", FAILED
     if _was_interrupted(problem):
         return "interrupted; no file is left half-written.", INTERRUPTED
     raise problem
+
+
+def _user_error(problem: BaseException) -> FlexcalError | None:
+    """The exception as an error that the user can correct; None where it is none."""
+    if isinstance(problem, FlexcalError):
+        return problem
+    if isinstance(problem, FileNotFoundError) and problem.filename is None and not _folder_is_there():
+        return FlexcalError("E-CLI-015", "the current folder has been removed; change to one that is there.")
+    if isinstance(problem, MemoryError):
+        what = f" ({problem})" if str(problem) else ""
+        return FlexcalError(
+            "E-CLI-016",
+            f"there is not enough memory{what}; give fewer rows or logs, or take a machine with more.",
+        )
+    if isinstance(problem, OSError):
+        where = f"{problem.filename}: " if problem.filename else ""
+        return FlexcalError("E-CLI-017", f"{where}{problem.strerror or problem}.")
+    return None
 
 
 def _folder_is_there() -> bool:
@@ -93,7 +101,7 @@ def _run(arguments: list[str]) -> int:
         if len(arguments) > 1 and arguments[1] in ("-h", "--help") and f"\n  {arguments[0]} " in overview():
             print(overview(arguments[0]))
             return 0
-        raise FlexcalError(unknown_verb(arguments))
+        raise FlexcalError("E-CLI-018", unknown_verb(arguments))
     return _carry_out(verb, arguments[len(verb.words) :])
 
 

@@ -24,8 +24,9 @@ def desired_pose(model: RobotModel, nominal: RobotModel, targets: ToolTargets) -
     short = [name for name in dict.fromkeys(targets.target.tolist()) if joints_before(model, name) < _POSE]
     if targets.rotation is not None and short:
         raise FlexcalError(
+            "E-COMP-001",
             f"{model.name} has {joints_before(model, short[0])} joints before '{short[0]}' and cannot take every orientation; "
-            "leave qw, qx, qy, qz out."
+            "leave qw, qx, qy, qz out.",
         )
     position, rotation = targets.position, targets.rotation
     if targets.station is not None:

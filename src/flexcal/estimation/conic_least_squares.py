@@ -113,5 +113,6 @@ def _bordered(matrix: np.ndarray, corner: float) -> np.ndarray:
 
 def _failure(reason: str) -> FlexcalError:
     return FlexcalError(
-        f"no physically feasible parameters were found (solver: {reason}); use --estimator wls to inspect the data."
+        "E-FIT-001",
+        f"no physically feasible parameters were found (solver: {reason}); use --estimator wls to inspect the data.",
     )

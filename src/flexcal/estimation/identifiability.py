@@ -88,7 +88,7 @@ def analyse(
     scaled, scale = _scaled(jacobian, names, scale)
     unknown = [name for name in prefer if name not in names]
     if unknown:
-        raise FlexcalError(f"prefer names {unknown[0]}, which is no column of this Jacobian.")
+        raise FlexcalError("E-FIT-002", f"prefer names {unknown[0]}, which is no column of this Jacobian.")
     kept, dropped, diagonal = _select(scaled, [names.index(name) for name in prefer], tolerance)
     regrouping = np.zeros((len(kept), len(names)))
     regrouping[np.arange(len(kept)), kept] = 1.0
@@ -148,16 +148,22 @@ def _scaled(
     jacobian = np.asarray(jacobian, dtype=float)
     size = len(names)
     if jacobian.ndim != 2 or jacobian.shape[1] != size:
-        raise FlexcalError(f"The Jacobian has shape {jacobian.shape}; {size} names need (rows, {size}).")
+        raise FlexcalError(
+            "E-FIT-003", f"The Jacobian has shape {jacobian.shape}; {size} names need (rows, {size})."
+        )
     if not np.all(np.isfinite(jacobian)):
         bad = names[int(np.argmin(np.all(np.isfinite(jacobian), axis=0)))]
-        raise FlexcalError(f"The Jacobian's column for {bad} is not finite; check the model there.")
+        raise FlexcalError(
+            "E-FIT-004", f"The Jacobian's column for {bad} is not finite; check the model there."
+        )
     if scale is None:
         norms = np.linalg.norm(jacobian, axis=0)
         scale = 1.0 / np.where(norms > 0, norms, 1.0)
     scale = np.asarray(scale, dtype=float)
     if scale.shape != (size,) or not np.all(scale > 0) or not np.all(np.isfinite(scale)):
-        raise FlexcalError(f"scale must hold one positive number for each of the {size} columns.")
+        raise FlexcalError(
+            "E-FIT-005", f"scale must hold one positive number for each of the {size} columns."
+        )
     factor = np.asarray(np.linalg.qr(jacobian * scale, mode="r"))
     padded = np.zeros((size, size))
     padded[: factor.shape[0]] = factor

@@ -106,7 +106,8 @@ def loss_named(loss: Loss | str) -> Loss:
         return loss
     if loss not in _LOSSES:
         raise FlexcalError(
-            f"There is no loss '{loss}'; use {', '.join(_LOSSES)} or an object such as Huber(1.345)."
+            "E-FIT-006",
+            f"There is no loss '{loss}'; use {', '.join(_LOSSES)} or an object such as Huber(1.345).",
         )
     return _LOSSES[loss]
 

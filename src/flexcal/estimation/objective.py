@@ -29,8 +29,9 @@ class Grouping:
         groups = np.asarray(groups)
         if groups.shape != (rows,) or not np.issubdtype(groups.dtype, np.integer):
             raise FlexcalError(
+                "E-FIT-007",
                 f"groups must hold one integer for each of the {rows} residual rows, "
-                f"not an array of shape {groups.shape} and type {groups.dtype}."
+                f"not an array of shape {groups.shape} and type {groups.dtype}.",
             )
         labels, number, sizes = np.unique(groups, return_inverse=True, return_counts=True)
         return cls(labels, number, sizes)
@@ -73,16 +74,19 @@ class Objective:
         rows = self.grouping.number.size
         if np.shape(residual) != (rows,) or np.shape(jacobian) != (rows, len(names)):
             raise FlexcalError(
+                "E-FIT-008",
                 f"linearise returned shapes {np.shape(residual)} and {np.shape(jacobian)}; "
-                f"{rows} rows and {len(names)} parameters need ({rows},) and ({rows}, {len(names)})."
+                f"{rows} rows and {len(names)} parameters need ({rows},) and ({rows}, {len(names)}).",
             )
         if not np.all(np.isfinite(residual)):
             row = int(np.argmin(np.isfinite(residual)))
-            raise FlexcalError(f"The residual's row {row} is not finite; check the data and the model there.")
+            raise FlexcalError(
+                "E-FIT-009", f"The residual's row {row} is not finite; check the data and the model there."
+            )
         if not np.all(np.isfinite(jacobian)):
             name = names[int(np.argmin(np.all(np.isfinite(jacobian), axis=0)))]
             raise FlexcalError(
-                f"The derivative of the residual by {name} is not finite; check the model there."
+                "E-FIT-010", f"The derivative of the residual by {name} is not finite; check the model there."
             )
         return residual, jacobian
 

@@ -34,27 +34,33 @@ class Parameter:
 
     def __post_init__(self) -> None:
         if self.scale not in ("linear", "log"):
-            raise FlexcalError(f"Parameter {self.name}: scale is '{self.scale}', must be 'linear' or 'log'.")
+            raise FlexcalError(
+                "E-FIT-011", f"Parameter {self.name}: scale is '{self.scale}', must be 'linear' or 'log'."
+            )
         if not math.isfinite(self.value):
             raise FlexcalError(
-                f"Parameter {self.name}: the start value is {self.value}; give a finite number."
+                "E-FIT-012", f"Parameter {self.name}: the start value is {self.value}; give a finite number."
             )
         if not self.lower <= self.value <= self.upper:
             raise FlexcalError(
+                "E-FIT-013",
                 f"Parameter {self.name}: the start value {self.value:g} {self.unit} is outside its bounds "
-                f"[{self.lower:g}, {self.upper:g}]; move the value or the bounds."
+                f"[{self.lower:g}, {self.upper:g}]; move the value or the bounds.",
             )
         if not self.prior_std > 0:
-            raise FlexcalError(f"Parameter {self.name}: prior_std is {self.prior_std}; it must be positive.")
+            raise FlexcalError(
+                "E-FIT-014", f"Parameter {self.name}: prior_std is {self.prior_std}; it must be positive."
+            )
         if self.prior_mean is not None and not math.isfinite(self.prior_mean):
             raise FlexcalError(
-                f"Parameter {self.name}: prior_mean is {self.prior_mean}; give a finite number."
+                "E-FIT-015", f"Parameter {self.name}: prior_mean is {self.prior_mean}; give a finite number."
             )
         mean = self.value if self.prior_mean is None else self.prior_mean
         if self.scale == "log" and min(self.value, mean) <= 0:
             raise FlexcalError(
+                "E-FIT-016",
                 f"Parameter {self.name}: a log scale needs a positive value and prior mean, "
-                f"not {self.value:g} and {mean:g} {self.unit}."
+                f"not {self.value:g} and {mean:g} {self.unit}.",
             )
 
     def coordinate(self, value: float) -> float:
@@ -84,7 +90,9 @@ class Parameters:
         if len(index) != len(items):
             names = [item.name for item in items]
             twice = sorted({name for name in names if names.count(name) > 1})
-            raise FlexcalError(f"Parameter names must be unique; given more than once: {', '.join(twice)}.")
+            raise FlexcalError(
+                "E-FIT-017", f"Parameter names must be unique; given more than once: {', '.join(twice)}."
+            )
         object.__setattr__(self, "items", items)
         object.__setattr__(self, "_index", index)
 
@@ -119,7 +127,7 @@ class Parameters:
         except KeyError:
             close = get_close_matches(name, self.names, n=3, cutoff=0.4)
             hint = f"did you mean {' or '.join(close)}?" if close else f"there are {len(self)} parameters."
-            raise FlexcalError(f"There is no parameter '{name}'; {hint}") from None
+            raise FlexcalError("E-FIT-018", f"There is no parameter '{name}'; {hint}") from None
 
     def subset(self, names: Iterable[str]) -> Parameters:
         """The named parameters, in the order of `names`."""

@@ -42,7 +42,8 @@ class Problem:
         covariance = np.asarray(self.prior_covariance, dtype=float)
         if covariance.shape != (size, size):
             raise FlexcalError(
-                f"prior_covariance has shape {covariance.shape}; {size} parameters need ({size}, {size})."
+                "E-FIT-019",
+                f"prior_covariance has shape {covariance.shape}; {size} parameters need ({size}, {size}).",
             )
         known = np.flatnonzero(np.isfinite(np.diag(covariance)))
         block = covariance[np.ix_(known, known)]
@@ -50,13 +51,15 @@ class Problem:
         if not np.all(std > 0):
             names = [self.parameters.names[i] for i in known[std <= 0]]
             raise FlexcalError(
-                f"prior_covariance gives {', '.join(names)} no variance; fix such parameters in the model."
+                "E-FIT-020",
+                f"prior_covariance gives {', '.join(names)} no variance; fix such parameters in the model.",
             )
         try:
             factor = np.linalg.cholesky(block / np.outer(std, std))
         except np.linalg.LinAlgError:
             raise FlexcalError(
-                "prior_covariance is not positive definite; two parameters are tied exactly, so estimate only one of them."
+                "E-FIT-021",
+                "prior_covariance is not positive definite; two parameters are tied exactly, so estimate only one of them.",
             ) from None
         rows = np.zeros((known.size, size))
         rows[:, known] = np.linalg.solve(factor, np.diag(1.0 / std))

@@ -27,11 +27,13 @@ class Sensitivity:
         size = len(self.parameters)
         if self.jacobian.ndim != 3 or self.jacobian.shape[2] != size:
             raise FlexcalError(
-                f"The sensitivity has shape {self.jacobian.shape}; {size} parameters need (candidates, rows, {size})."
+                "E-FIT-022",
+                f"The sensitivity has shape {self.jacobian.shape}; {size} parameters need (candidates, rows, {size}).",
             )
         if self.prior_information.shape != (size, size):
             raise FlexcalError(
-                f"prior_information has shape {self.prior_information.shape}, not ({size}, {size})."
+                "E-FIT-023",
+                f"prior_information has shape {self.prior_information.shape}, not ({size}, {size}).",
             )
         self.prior_rows()
 
@@ -49,7 +51,9 @@ class Sensitivity:
         root[root == 0] = 1.0
         values, vectors = np.linalg.eigh(self.prior_information / np.outer(root, root))
         if np.min(values, initial=0.0) < -1e-9 * max(1.0, float(np.max(np.abs(values), initial=0.0))):
-            raise FlexcalError("prior_information has a negative eigenvalue; an information matrix cannot.")
+            raise FlexcalError(
+                "E-FIT-024", "prior_information has a negative eigenvalue; an information matrix cannot."
+            )
         return np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T * root
 
     def factor(self, chosen: Sequence[int] | np.ndarray | None = None) -> np.ndarray:
@@ -71,8 +75,9 @@ class Sensitivity:
         identifiability = analyse(factor, self.parameters.names)
         if identifiability.rank < len(self.parameters):
             raise FlexcalError(
+                "E-FIT-025",
                 f"The chosen measurements determine {identifiability.rank} of {len(self.parameters)} parameters "
-                f"(not, for one, {identifiability.weak_directions(1)[0][1]}); choose more, or give a prior."
+                f"(not, for one, {identifiability.weak_directions(1)[0][1]}); choose more, or give a prior.",
             )
         root = solve_triangular(factor, np.eye(len(self.parameters)))
         return root @ root.T

@@ -46,7 +46,9 @@ def solve(
     """
     chosen, parameters = loss_named(loss), problem.parameters
     if covariance not in ("posterior", "sandwich"):
-        raise FlexcalError(f"There is no covariance '{covariance}'; use 'posterior' or 'sandwich'.")
+        raise FlexcalError(
+            "E-FIT-026", f"There is no covariance '{covariance}'; use 'posterior' or 'sandwich'."
+        )
     points = _starts(parameters, starts)
     objective, optima = None, []
     failure: FlexcalError | None = None
@@ -68,7 +70,7 @@ def solve(
         except FlexcalError as error:
             failure = error
     if objective is None or not optima:
-        raise failure or FlexcalError("There is no start to solve from; starts has no rows.")
+        raise failure or FlexcalError("E-FIT-027", "There is no start to solve from; starts has no rows.")
     best = min(optima, key=lambda optimum: optimum.cost)
     reached = ""
     if starts is not None:
@@ -103,11 +105,12 @@ def solve(
 def _starts(parameters: Parameters, starts: np.ndarray | None) -> np.ndarray:
     """Starts (s, p) within the bounds; raises FlexcalError when their shape does not fit."""
     if not len(parameters):
-        raise FlexcalError("There are no parameters to estimate; give the problem at least one.")
+        raise FlexcalError("E-FIT-028", "There are no parameters to estimate; give the problem at least one.")
     points = parameters.coordinates()[None] if starts is None else np.asarray(starts, dtype=float)
     if points.ndim != 2 or points.shape[1] != len(parameters):
         raise FlexcalError(
-            f"starts has shape {points.shape}; {len(parameters)} parameters need (starts, {len(parameters)})."
+            "E-FIT-029",
+            f"starts has shape {points.shape}; {len(parameters)} parameters need (starts, {len(parameters)}).",
         )
     return np.clip(points, *parameters.bounds())
 

@@ -74,8 +74,9 @@ def sandwich(objective: Objective, optimum: Optimum, at: Uncertainty) -> np.ndar
     groups, rows = objective.grouping.labels.size, optimum.residual.size
     if groups <= at.effective + 1:
         raise FlexcalError(
+            "E-FIT-030",
             f"A sandwich covariance needs more groups than parameters: {groups} groups for "
-            f"{at.effective:.1f} effective parameters; use finer groups or covariance='posterior'."
+            f"{at.effective:.1f} effective parameters; use finer groups or covariance='posterior'.",
         )
     weights = optimum.weights[objective.grouping.number]
     scores = objective.grouping.sums(optimum.jacobian @ at.root * (weights * optimum.residual)[:, None])

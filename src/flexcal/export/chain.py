@@ -13,7 +13,8 @@ def chain_to(model: RobotModel, point: str | None, format_name: str) -> tuple[st
     """
     if not model.points:
         raise FlexcalError(
-            f"{format_name} are of the chain from the base to a point, and {model.path} declares none; add one under `points:`."
+            "E-EXPORT-001",
+            f"{format_name} are of the chain from the base to a point, and {model.path} declares none; add one under `points:`.",
         )
     target = model.point(point)
     return target.name, model.path_to(target.joint)

@@ -49,8 +49,9 @@ def render_mjcf(model: RobotModel) -> RenderedModel:
         compiled = spec.compile()
     except ValueError as problem:
         raise FlexcalError(
+            "E-EXPORT-002",
             f"MuJoCo cannot build {model.name} ({' '.join(str(problem).split())}): every moving link needs a mass and an inertia that a "
-            f"body can have; complete {model.urdf.name}, or identify dynamics with --estimator sdp."
+            f"body can have; complete {model.urdf.name}, or identify dynamics with --estimator sdp.",
         ) from problem
     text = _with_all_digits(spec.to_xml(), compiled)
     remarks = ["Looks and collision bodies stay in the URDF."]

@@ -45,7 +45,9 @@ def mjcf_spec(
     log_mujoco_warnings()
     motors = set(range(model.n)) if free is None else set(free)
     if len(motors) < model.n and q is None:
-        raise FlexcalError("joints are to be locked but no pose is given; pass q, one value per joint.")
+        raise FlexcalError(
+            "E-EXPORT-003", "joints are to be locked but no pose is given; pass q, one value per joint."
+        )
     at = np.zeros(model.n) if q is None else np.asarray(q, dtype=float)
     spec = mujoco.MjSpec()
     spec.modelname = model.name

@@ -31,7 +31,8 @@ def render_sdf(model: RobotModel, nominal: RobotModel) -> RenderedModel:
     twice = [name for name in names if names.count(name) > 1]
     if twice:
         raise FlexcalError(
-            f"the name '{twice[0]}' would stand for two things in the SDF; rename the point, link or joint."
+            "E-EXPORT-004",
+            f"the name '{twice[0]}' would stand for two things in the SDF; rename the point, link or joint.",
         )
     bodiless = bodiless_links(model, nominal.inertias)
     root = ET.Element("sdf", version=VERSION)

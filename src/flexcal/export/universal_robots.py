@@ -37,7 +37,8 @@ def render_kinematics(model: RobotModel, nominal: RobotModel) -> RenderedModel:
     point, chain = chain_to(model, None, "Placements of joints")
     if chain != (0, 1, 2, 3, 4, 5) or model.n != 6 or {j.kind for j in model.joints} != {"revolute"}:
         raise FlexcalError(
-            f"a kinematics file is of one chain of six revolute joints, which {model.name} is not; export urdf or mdh instead."
+            "E-EXPORT-005",
+            f"a kinematics file is of one chain of six revolute joints, which {model.name} is not; export urdf or mdh instead.",
         )
     root = _base_of_description(nominal)
     before = dh_chain(_seen_from(root, chain_axes(nominal, point, chain)), hayati=True)

@@ -96,7 +96,8 @@ def _add_points(model: RobotModel, root: ET.Element) -> None:
     for name in model.points:
         if name in links:
             raise FlexcalError(
-                f"the point '{name}' has the name of a link of {model.urdf.name}; rename it under `points:`."
+                "E-EXPORT-006",
+                f"the point '{name}' has the name of a link of {model.urdf.name}; rename it under `points:`.",
             )
         carrier, position, rotation = point_placement(model, name)
         ET.SubElement(root, "link", name=name)

@@ -41,11 +41,13 @@ class HardCell:
         self._check(plan.joint_count)
         if plan.torque == "instantaneous":
             raise FlexcalError(
-                "the hard cell's torque is held over a sample, not instantaneous; write `tau: held` in the plan."
+                "E-CELL-001",
+                "the hard cell's torque is held over a sample, not instantaneous; write `tau: held` in the plan.",
             )
         if not (self.robot.arm.rotor_inertia > 0).all():
             raise FlexcalError(
-                "the hard cell's motors need rotor inertias; add `drives: {rotor_inertia: […]}` to robot.yaml, in kg m² at the joint."
+                "E-CELL-002",
+                "the hard cell's motors need rotor inertias; add `drives: {rotor_inertia: […]}` to robot.yaml, in kg m² at the joint.",
             )
         if isinstance(plan, TrajectoryPlan):
             return trajectory_recordings(self.robot, self.described, plan, self.seed)
@@ -64,5 +66,6 @@ class HardCell:
     def _check(self, joints: int) -> None:
         if joints != self.robot.n:
             raise FlexcalError(
-                f"the plan's poses have {joints} joints but {self.described.name} has {self.robot.n}."
+                "E-CELL-003",
+                f"the plan's poses have {joints} joints but {self.described.name} has {self.robot.n}.",
             )

@@ -114,7 +114,8 @@ def run_loop(
     )
     if done < len(angle):
         raise FlexcalError(
-            f"the hard cell's loop diverged after {done * ticks:.3g} s; lower kp, kd or the excitation."
+            "E-CELL-004",
+            f"the hard cell's loop diverged after {done * ticks:.3g} s; lower kp, kd or the excitation.",
         )
     return angle, torque
 

@@ -84,10 +84,11 @@ def read_description(robot: Path) -> ArmDescription:
     names, n = [link.joint for link in turning], len(turning)
     if config.locked:
         raise FlexcalError(
-            f"{robot}: the hard cell has no locked joints; run the demonstration with the virtual cell."
+            "E-CELL-005",
+            f"{robot}: the hard cell has no locked joints; run the demonstration with the virtual cell.",
         )
     if not config.points:
-        raise FlexcalError(f"{robot} declares no point to measure; add `points:`.")
+        raise FlexcalError("E-CELL-006", f"{robot} declares no point to measure; add `points:`.")
     springs, dampers = np.full((n, 3), np.inf), np.zeros((n, 3))
     bearing = np.array([_upright(link.axis) for link in turning])
     for elastic in config.elastic:
@@ -143,7 +144,8 @@ def _read_links(urdf: Path) -> tuple[Link, ...]:
             name, kind = _name(joint, "child"), str(joint.get("type"))
             if kind not in ("revolute", "continuous", "fixed"):
                 raise FlexcalError(
-                    f"{urdf}: the hard cell has no {kind} joints as '{joint.get('name')}'; use the virtual cell."
+                    "E-CELL-007",
+                    f"{urdf}: the hard cell has no {kind} joints as '{joint.get('name')}'; use the virtual cell.",
                 )
             translation, rotation = _pose(joint.find("origin"))
             axis = None if kind == "fixed" else _unit(_numbers(joint.find("axis"), "xyz", (1.0, 0.0, 0.0)))
@@ -166,7 +168,8 @@ def _check_serial(urdf: Path, links: list[Link]) -> None:
             above = links[above].parent
         if above != carrier:
             raise FlexcalError(
-                f"{urdf}: the hard cell has no branches as at '{link.joint}'; use the virtual cell."
+                "E-CELL-008",
+                f"{urdf}: the hard cell has no branches as at '{link.joint}'; use the virtual cell.",
             )
         carrier = links.index(link)
 

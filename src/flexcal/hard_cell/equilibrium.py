@@ -76,5 +76,6 @@ def stand(
             torque_at_rest = arm.gravity(angles)
             return StaticEquilibrium(angles, torque_at_rest[motor], arm.point)
     raise FlexcalError(
-        "the hard cell's robot has no stable equilibrium: its springs are too soft for gravity; check the stiffness values."
+        "E-CELL-009",
+        "the hard cell's robot has no stable equilibrium: its springs are too soft for gravity; check the stiffness values.",
     )

@@ -79,8 +79,9 @@ def trajectory_recordings(
     """The recordings of a plan in its order."""
     if plan.kp is None or plan.kd is None:
         raise FlexcalError(
+            "E-CELL-010",
             "the plan has no gains, which the cell's controller needs; add `controller: {kp: […], kd: […], rate_hz: 4000}` to robot.yaml "
-            "and design it again."
+            "and design it again.",
         )
     payload = _payload(described, plan.payload)
     for number, label in enumerate(labels(plan)):

@@ -89,12 +89,14 @@ class VirtualCell:
         for spring in self.truth.elastic:
             if spring.index in moving and not self.truth.rotor_inertia[spring.index] > 0:
                 raise FlexcalError(
+                    "E-CELL-012",
                     f"{self.truth.path} gives {spring.name} no positive rotor inertia, and a motor before a drive spring cannot move "
-                    "without one; add `drives: {rotor_inertia: […]}` in kg m² at the joint."
+                    "without one; add `drives: {rotor_inertia: […]}` in kg m² at the joint.",
                 )
 
     def _check_width(self, joints: int) -> None:
         if joints != self.truth.n:
             raise FlexcalError(
-                f"the plan's poses have {joints} joints but {self.truth.name} has {self.truth.n}."
+                "E-CELL-013",
+                f"the plan's poses have {joints} joints but {self.truth.name} has {self.truth.n}.",
             )

@@ -67,7 +67,8 @@ def run_loop(
     step = 1 / (gains.rate_hz * gains.substeps)
     if not np.isclose(model.opt.timestep, step, rtol=1e-12):
         raise FlexcalError(
-            f"the plant steps by {model.opt.timestep:g} s but the controller needs {step:g} s; rebuild the plant."
+            "E-CELL-014",
+            f"the plant steps by {model.opt.timestep:g} s but the controller needs {step:g} s; rebuild the plant.",
         )
     data = mujoco.MjData(model)
     data.qpos[:] = start
@@ -103,6 +104,7 @@ def run_loop(
     )
     if done < shape[0]:
         raise FlexcalError(
-            f"the virtual robot's loop diverged after {done / gains.rate_hz:.3g} s; lower kp, kd or the excitation."
+            "E-CELL-015",
+            f"the virtual robot's loop diverged after {done / gains.rate_hz:.3g} s; lower kp, kd or the excitation.",
         )
     return log

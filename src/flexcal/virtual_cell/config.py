@@ -15,7 +15,7 @@ def _not_negative(config: DataclassInstance) -> None:
     for field in fields(config):
         value = getattr(config, field.name)
         if isinstance(value, int | float) and not value >= 0:
-            raise FlexcalError(f"{field.name} must not be negative, not {value}.")
+            raise FlexcalError("E-CELL-016", f"{field.name} must not be negative, not {value}.")
 
 
 @dataclass(frozen=True)
@@ -30,9 +30,11 @@ class LoopConfig:
 
     def __post_init__(self) -> None:
         if not self.rate_filter_hz > 0:
-            raise FlexcalError("the controller's rate_filter_hz must be positive.")
+            raise FlexcalError("E-CELL-017", "the controller's rate_filter_hz must be positive.")
         if self.substeps < 1:
-            raise FlexcalError(f"the controller needs at least one plant step per tick, not {self.substeps}.")
+            raise FlexcalError(
+                "E-CELL-018", f"the controller needs at least one plant step per tick, not {self.substeps}."
+            )
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,8 @@ class FrictionConfig:
         _not_negative(self)
         if min(self.coulomb_velocity, self.stribeck_velocity) < 1e-9:
             raise FlexcalError(
-                "friction's coulomb_velocity and stribeck_velocity must be positive, at least 1e-9 rad/s."
+                "E-CELL-019",
+                "friction's coulomb_velocity and stribeck_velocity must be positive, at least 1e-9 rad/s.",
             )
 
 
@@ -103,11 +106,13 @@ class SpreadConfig:
         _not_negative(self)
         if not 0 <= self.backlash[0] <= self.backlash[1]:
             raise FlexcalError(
-                "the spread's backlash is [smallest, largest] half gap with 0 ≤ smallest ≤ largest."
+                "E-CELL-020",
+                "the spread's backlash is [smallest, largest] half gap with 0 ≤ smallest ≤ largest.",
             )
         if max(self.stiffness, self.damping) > _WIDEST:
             raise FlexcalError(
-                f"the spread's stiffness and damping are of logarithms, at most {_WIDEST:g} (1σ); give for example 0.15."
+                "E-CELL-021",
+                f"the spread's stiffness and damping are of logarithms, at most {_WIDEST:g} (1σ); give for example 0.15.",
             )
 
 
@@ -132,7 +137,7 @@ class MismatchConfig:
     def __post_init__(self) -> None:
         _not_negative(self)
         if not self.hysteresis_width > 0:
-            raise FlexcalError("the mismatch's hysteresis_width must be positive.")
+            raise FlexcalError("E-CELL-022", "the mismatch's hysteresis_width must be positive.")
 
 
 @dataclass(frozen=True)

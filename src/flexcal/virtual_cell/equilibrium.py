@@ -67,6 +67,7 @@ def _balance(
         if np.abs(move).max() < TOLERANCE:
             return position, gravity_force(plant, data, position)
     raise FlexcalError(
+        "E-CELL-023",
         "the virtual robot has no stable equilibrium: its springs are too soft for gravity; check the stiffnesses in robot.yaml and in "
-        "cell.yaml or the truth."
+        "cell.yaml or the truth.",
     )

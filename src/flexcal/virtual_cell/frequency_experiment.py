@@ -46,7 +46,8 @@ def recordings(
     """The recordings of a plan in the order pose, realisation, experiment, sign; each a function of `seed` and its label alone."""
     if plan.torque == "instantaneous":
         raise FlexcalError(
-            "the virtual cell's torque is held over a sample, not instantaneous; write `tau: held` in the plan."
+            "E-CELL-024",
+            "the virtual cell's torque is held over a sample, not instantaneous; write `tau: held` in the plan.",
         )
     signs = (1, -1) if plan.signs else (1,)
     schedule = list(product(range(plan.realisations), range(len(plan.joints)), signs))

@@ -220,7 +220,8 @@ def _springs(model: RobotModel, config: CellConfig, names: tuple[str, ...]) -> n
     loose = [model.joint_names[i] for i in rigid if model.backlash[i] > 0]
     if loose:
         raise FlexcalError(
-            f"{loose[0]} has backlash but no drive spring; the virtual cell needs the spring beside the gap."
+            "E-CELL-025",
+            f"{loose[0]} has backlash but no drive spring; the virtual cell needs the spring beside the gap.",
         )
     return springs
 

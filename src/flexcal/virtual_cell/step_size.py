@@ -47,10 +47,13 @@ def resolved_plant(
                     missed = unresolved(plant)
             except (ValueError, UserWarning) as problem:  # MuJoCo's, and of a mass matrix that is singular
                 raise FlexcalError(
+                    "E-CELL-026",
                     f"the virtual robot of {truth.path} cannot be simulated ({' '.join(str(problem).split())}); correct its masses, "
-                    "inertias and springs, there or in the truth."
+                    "inertias and springs, there or in the truth.",
                 ) from problem
             if missed is None:
                 return plant, substeps
             phrase = f"plant steps of {step * 1e3:g} ms are too long for {missed}"
-    raise FlexcalError(f"{phrase}; raise the controller's substeps or rate, or friction's coulomb_velocity.")
+    raise FlexcalError(
+        "E-CELL-027", f"{phrase}; raise the controller's substeps or rate, or friction's coulomb_velocity."
+    )

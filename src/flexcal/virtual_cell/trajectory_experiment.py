@@ -29,12 +29,14 @@ def trajectory_recordings(
 
     if plan.torque == "instantaneous":
         raise FlexcalError(
-            "the virtual cell's torque is held over a sample, not instantaneous; write `tau: held` in the plan."
+            "E-CELL-028",
+            "the virtual cell's torque is held over a sample, not instantaneous; write `tau: held` in the plan.",
         )
     if plan.kp is None or plan.kd is None:
         raise FlexcalError(
+            "E-CELL-029",
             "the plan has no gains, which the virtual cell's controller needs; add `controller: {kp: […], kd: […], rate_hz: 4000}` to "
-            "robot.yaml and design it again."
+            "robot.yaml and design it again.",
         )
     everything = range(truth.n)
     samples = plan.periods * plan.samples_per_period

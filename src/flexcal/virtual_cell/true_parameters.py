@@ -97,10 +97,12 @@ def read_truth_of(path: str | Path, model: RobotModel) -> dict[str, float]:
     for name, (value, keys) in entries.items():
         if name not in model.values:
             hint = suggestion(name, list(model.values)) or "; give the truth of this robot."
-            raise file.error(keys, f"{model.path} has no parameter '{name}'{hint}")
+            raise file.error("E-CELL-030", keys, f"{model.path} has no parameter '{name}'{hint}")
         if value <= 0 if name.endswith(_POSITIVE) else value < 0 and name.endswith(_NOT_NEGATIVE):
             raise file.error(
-                keys, f"the true value of '{name}' is {value:g}, which is not possible; correct it."
+                "E-CELL-031",
+                keys,
+                f"the true value of '{name}' is {value:g}, which is not possible; correct it.",
             )
     values = {name: value for name, (value, _) in entries.items()}
     drawn = draw_truth(model, SpreadConfig(), np.random.default_rng(0))
@@ -116,7 +118,9 @@ def read_truth_of(path: str | Path, model: RobotModel) -> dict[str, float]:
 def _entries(file: YamlFile) -> dict[str, tuple[float, Keys]]:
     """Value and place of every name."""
     if not isinstance(file.data, Mapping) or not file.data:
-        raise file.error((), "a truth file holds parameter names and values; this one does not.")
+        raise file.error(
+            "E-CELL-032", (), "a truth file holds parameter names and values; this one does not."
+        )
     entries: dict[str, tuple[float, Keys]] = {}
     for key, item in file.data.items():
         if not _is_block(item):
@@ -125,7 +129,9 @@ def _entries(file: YamlFile) -> dict[str, tuple[float, Keys]]:
         table = item.get("values")
         if not isinstance(table, Mapping):
             raise file.error(
-                (key,), f"the block '{key}' has no `values:` table; add one of names and numbers."
+                "E-CELL-033",
+                (key,),
+                f"the block '{key}' has no `values:` table; add one of names and numbers.",
             )
         for name, entry in table.items():
             keys = (key, "values", name)
@@ -141,6 +147,8 @@ def _value(file: YamlFile, keys: Keys, entry: object) -> float:
     value = entry.get("estimate") if isinstance(entry, Mapping) else entry
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _LARGEST:
         raise file.error(
-            keys, f"the true value of '{keys[-1]}' is not a number; write one, or `{{estimate: 1.0}}`."
+            "E-CELL-034",
+            keys,
+            f"the true value of '{keys[-1]}' is not a number; write one, or `{{estimate: 1.0}}`.",
         )
     return float(value)

@@ -48,15 +48,18 @@ def repeatability(poses: PoseSet) -> list[PoseRepeatability]:
     `FlexcalError` for lengths, and where no pose was visited twice.
     """
     if poses.length is not None:
-        raise FlexcalError("lengths of a wire do not show where a point is; give points x, y, z.")
+        raise FlexcalError(
+            "E-CAL-001", "lengths of a wire do not show where a point is; give points x, y, z."
+        )
     number = _numbers(poses)
     order = np.argsort(number, kind="stable")
     groups = np.split(order, np.cumsum(np.bincount(number))[:-1])
     repeated = [_evaluate(poses, rows, number) for rows in groups if len(rows) > 1]
     if not repeated:
         raise FlexcalError(
+            "E-CAL-002",
             f"each of the {len(poses)} poses was visited once only (joint positions within {SAME_COMMAND:g} rad count as the same); "
-            f"visit some of them {CYCLES} times."
+            f"visit some of them {CYCLES} times.",
         )
     return repeated
 

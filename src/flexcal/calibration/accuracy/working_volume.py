@@ -76,7 +76,8 @@ def random_poses_in(
         return rng.uniform(lower, upper, (count, model.n))
     if not np.all(box[0] < box[1]):
         raise FlexcalError(
-            f"the working volume from {_told(box[0])} to {_told(box[1])} is no box; give every smallest coordinate before the largest."
+            "E-CAL-003",
+            f"the working volume from {_told(box[0])} to {_told(box[1])} is no box; give every smallest coordinate before the largest.",
         )
     accepted: list[np.ndarray] = []
     have = drawn = 0
@@ -90,8 +91,9 @@ def random_poses_in(
             break
         if have < _FEWEST * drawn and drawn >= 10 * _DRAWN:
             raise FlexcalError(
+                "E-CAL-004",
                 f"of {drawn} random poses of {model.name} {have} reach the working volume from {_told(box[0])} to {_told(box[1])} m (it "
-                f"reaches {model.reach:.3g} m); give a larger box in the robot's base frame, or a file of the poses to look at."
+                f"reaches {model.reach:.3g} m); give a larger box in the robot's base frame, or a file of the poses to look at.",
             )
     return np.concatenate(accepted)[:count]
 

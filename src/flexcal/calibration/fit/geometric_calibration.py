@@ -123,7 +123,8 @@ def calibrate(
     robust = loss != "auto" and not isinstance(loss_named(loss), Squares)
     if elasticity == "marginalised" and robust:
         raise FlexcalError(
-            "a robust loss weights poses individually, but marginalised elasticity correlates them; use re-estimated elasticity instead."
+            "E-CAL-005",
+            "a robust loss weights poses individually, but marginalised elasticity correlates them; use re-estimated elasticity instead.",
         )
     require_points(poses)
     _check_variety(model, poses)
@@ -184,14 +185,15 @@ def _calibration(fitted: FittedPoints) -> Calibration:
 
 def _check_variety(model: RobotModel, poses: PoseSet) -> None:
     if len(poses.q) < 2:
-        raise FlexcalError(f"there are {len(poses.q)} poses; a calibration needs many.")
+        raise FlexcalError("E-CAL-006", f"there are {len(poses.q)} poses; a calibration needs many.")
     spread = np.ptp(poses.q, axis=0)
     if spread.max() < 1e-6:
         raise FlexcalError(
-            f"all {len(poses.q)} poses are the same; measure poses that differ in every joint."
+            "E-CAL-007", f"all {len(poses.q)} poses are the same; measure poses that differ in every joint."
         )
     still = [joint.name for joint, range_ in zip(model.joints, spread, strict=True) if range_ < 1e-6]
     if still:
         raise FlexcalError(
-            f"{', '.join(still)} never moves in the {len(poses.q)} poses; move every joint, or its errors are not identifiable."
+            "E-CAL-008",
+            f"{', '.join(still)} never moves in the {len(poses.q)} poses; move every joint, or its errors are not identifiable.",
         )

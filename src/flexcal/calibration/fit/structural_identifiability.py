@@ -69,6 +69,7 @@ def require_enough(
         return
     rank = random_identifiability(model, poses, parameters, identifiability).rank
     raise FlexcalError(
+        "E-CAL-009",
         f"{len(poses)} poses give {rows} coordinates, too few for {rank} identifiable parameters; "
-        f"measure at least {rank // 3 + 1} poses, better three times as many."
+        f"measure at least {rank // 3 + 1} poses, better three times as many.",
     )

@@ -26,7 +26,8 @@ def require_both_flanks(model: RobotModel, flank: np.ndarray) -> None:
         seen = np.unique(flank[:, i])
         if not {-1.0, 1.0} <= set(seen):
             raise FlexcalError(
+                "E-CAL-010",
                 f"{model.joints[i].name} rests on one flank of its backlash at all {len(flank)} poses, so backlash and joint "
                 "offset are not identifiable separately; add poses loaded in the other direction, or take the joint out of "
-                "`geometry: backlash:`."
+                "`geometry: backlash:`.",
             )

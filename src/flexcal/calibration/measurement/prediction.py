@@ -27,10 +27,13 @@ from flexcal.progress import Progress, silent
 def require_points(poses: PoseSet, where: str = "the poses") -> None:
     """Raise `FlexcalError` for what is measured beside or in place of points and would be left out; `where` names the files."""
     if poses.length is not None:
-        raise FlexcalError(f"{where}: lengths of a wire cannot be used yet; give points x, y, z.")
+        raise FlexcalError(
+            "E-CAL-011", f"{where}: lengths of a wire cannot be used yet; give points x, y, z."
+        )
     if poses.quaternion_wxyz is not None:
         raise FlexcalError(
-            f"{where}: measured orientations cannot be used yet; take out the columns qw, qx, qy, qz to use the points alone."
+            "E-CAL-012",
+            f"{where}: measured orientations cannot be used yet; take out the columns qw, qx, qy, qz to use the points alone.",
         )
 
 
@@ -147,7 +150,7 @@ class Prediction:
             if key == "mass":
                 return block[:, :, 0] + block[:, :, 1:] @ self.model.com[i]
             return self.model.mass[i] * block[:, :, 1 + "xyz".index(key[-1])]
-        raise FlexcalError(f"the position of a point does not depend on '{name}'.")
+        raise FlexcalError("E-CAL-013", f"the position of a point does not depend on '{name}'.")
 
 
 def left_jacobian(vector: np.ndarray) -> np.ndarray:

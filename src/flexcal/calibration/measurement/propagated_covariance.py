@@ -168,7 +168,9 @@ def propagation(
     name = model.point(target).name
     names = [n for n in moving_parameters(model) if model.posterior.determines(n)]
     if not names:
-        raise FlexcalError(f"no estimated parameter of {model.name} that moves a point; calibrate it first.")
+        raise FlexcalError(
+            "E-CAL-014", f"no estimated parameter of {model.name} that moves a point; calibrate it first."
+        )
     mass = float(carried_mass(model, None if payload is None else np.array([payload]), 1)[0])
     place = model.stations[0] if station is None else station
     root = covariance_root(model, names)

@@ -43,12 +43,14 @@ def rigid_motion(source: np.ndarray, target: np.ndarray, name: str = "") -> tupl
     Raises `FlexcalError` where the points do not span a plane.
     """
     if len(source) < 3:
-        raise FlexcalError(f"station '{name}' has {len(source)} poses; at least 3 are needed to register it.")
+        raise FlexcalError(
+            "E-CAL-015", f"station '{name}' has {len(source)} poses; at least 3 are needed to register it."
+        )
     from_centre, to_centre = source.mean(axis=0), target.mean(axis=0)
     left, sizes, right = np.linalg.svd((target - to_centre).T @ (source - from_centre))
     if sizes[1] < 1e-9 * max(sizes[0], 1e-12):
         raise FlexcalError(
-            f"the points of station '{name}' lie on a line; measure poses distributed in space."
+            "E-CAL-016", f"the points of station '{name}' lie on a line; measure poses distributed in space."
         )
     sign = np.sign(np.linalg.det(left @ right))
     rotation = left @ np.diag([1.0, 1.0, sign]) @ right

@@ -76,7 +76,8 @@ def error_scale(verification: Verification, covariance: ErrorCovariance) -> Erro
     clear = ~verification.ambiguous
     if clear.sum() < 2:
         raise FlexcalError(
-            f"{int(clear.sum())} of the {len(clear)} verification poses have a certain backlash flank; at least two are needed."
+            "E-CAL-017",
+            f"{int(clear.sum())} of the {len(clear)} verification poses have a certain backlash flank; at least two are needed.",
         )
     roots, errors = covariance.roots[clear], verification.errors[clear]
     stacked = roots.reshape(-1, roots.shape[2])
@@ -86,7 +87,8 @@ def error_scale(verification: Verification, covariance: ErrorCovariance) -> Erro
     from_noise = float(np.trace(independent, axis1=1, axis2=2).sum())
     if from_parameters + from_noise <= 0:
         raise FlexcalError(
-            "there are no estimated parameters from which an error could be predicted; calibrate the robot first."
+            "E-CAL-018",
+            "there are no estimated parameters from which an error could be predicted; calibrate the robot first.",
         )
     mixed = float(np.sum(visits * np.matmul(independent, visits)))
     total = float((errors**2).sum())

@@ -56,8 +56,9 @@ def verify_refitted(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) ->
     own = np.eye(3) - blocks @ np.swapaxes(blocks, 1, 2)
     if np.linalg.eigvalsh(own).min() < _FREE:
         raise FlexcalError(
+            "E-CAL-019",
             f"{len(poses)} poses are too few to refit {' and '.join(_WORDS[name] for name in what)} and to verify with: "
-            f"{basis.shape[1]} of their {3 * len(poses)} coordinates go into that; measure {2 * basis.shape[1] // 3 + 4} or more."
+            f"{basis.shape[1]} of their {3 * len(poses)} coordinates go into that; measure {2 * basis.shape[1] // 3 + 4} or more.",
         )
 
     def left_out(values: np.ndarray) -> np.ndarray:

@@ -24,7 +24,7 @@ def refuse_unknown_options(verb: Verb, arguments: Sequence[str]) -> None:
         plain = name.replace("_", "-")
         if plain not in known:
             near = suggestion(plain, known) or f"; there are {', '.join(known)}."
-            raise InputError(f"'flexcal {verb.name}' has no option {name}{near}")
+            raise InputError("E-CLI-001", f"'flexcal {verb.name}' has no option {name}{near}")
 
 
 def parse_error(verb: Verb, said: str) -> InputError:
@@ -34,16 +34,16 @@ def parse_error(verb: Verb, said: str) -> InputError:
     if told and told[0].startswith("Missing from"):
         depth = min(len(line) - len(line.lstrip()) for line in told[1:])
         needed = [line.strip() for line in told[1:] if line[depth] != " "]
-        return InputError(f"'flexcal {verb.name}' needs {', '.join(needed)}; {explained}")
+        return InputError("E-CLI-002", f"'flexcal {verb.name}' needs {', '.join(needed)}; {explained}")
     if told and told[0].startswith("Unrecognized options:"):
         left = told[0].partition(":")[2].strip()
-        return InputError(f"'flexcal {verb.name}' does not take {left}; {explained}")
+        return InputError("E-CLI-003", f"'flexcal {verb.name}' does not take {left}; {explained}")
     sentence = " ".join(line.strip() for line in told).rstrip(".").replace(". Expected", "; expected")
     sentence = re.sub(
         r"invalid literal for int\(\) with base 10: ('.*?')", r"\1 is no whole number", sentence
     )
     sentence = re.sub(r"could not convert string to float: ('.*?')", r"\1 is no number", sentence)
-    return InputError(f"{sentence[:1].lower()}{sentence[1:]}; {explained}")
+    return InputError("E-CLI-004", f"{sentence[:1].lower()}{sentence[1:]}; {explained}")
 
 
 def _told(said: str) -> list[str]:

@@ -83,20 +83,25 @@ def require_robot(robot: Path, *others: Path) -> None:
     swapped = [path for path in others if path.suffix in (".yaml", ".yml")]
     if swapped:
         raise InputError(
-            f"{robot} stands where robot.yaml is expected; did you mean {swapped[0]} first, then {robot}?"
+            "E-CLI-005",
+            f"{robot} stands where robot.yaml is expected; did you mean {swapped[0]} first, then {robot}?",
         )
-    raise InputError(f"{robot} is no robot.yaml; name the YAML file that describes the robot first.")
+    raise InputError(
+        "E-CLI-006", f"{robot} is no robot.yaml; name the YAML file that describes the robot first."
+    )
 
 
 def require_robot_and_files(robot: Path, files: tuple[Path, ...], name: str) -> None:
     """Raise `InputError` where ROBOT is evidently something else, and where no file was given."""
     require_robot(robot, *files)
     if not files:
-        raise InputError(f"no {name} given; name at least one file after robot.yaml.")
+        raise InputError("E-CLI-007", f"no {name} given; name at least one file after robot.yaml.")
 
 
 def require_at_least(least: float, **values: float | None) -> None:
     """Raise `InputError` for the first named value that is smaller; None passes."""
     for name, value in values.items():
         if value is not None and not value >= least:
-            raise InputError(f"--{name.replace('_', '-')} is {value:g}; it must be at least {least:g}.")
+            raise InputError(
+                "E-CLI-008", f"--{name.replace('_', '-')} is {value:g}; it must be at least {least:g}."
+            )

@@ -30,7 +30,8 @@ def stored_files(*folders: Path) -> Iterator[None]:
             raise
         what = f"{type(problem).__name__}: {problem}"
         raise InputError(
-            f"{changed} is not as flexcal wrote it, and cannot be shown ({what[:200]}); run the verb that writes it again."
+            "E-CLI-009",
+            f"{changed} is not as flexcal wrote it, and cannot be shown ({what[:200]}); run the verb that writes it again.",
         ) from problem
 
 

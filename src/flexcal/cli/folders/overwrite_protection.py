@@ -50,7 +50,7 @@ def outputs(
             yield
         return
     if not names and out.is_dir():
-        raise InputError(f"{out} is a folder; name a file in it with --out.")
+        raise InputError("E-CLI-010", f"{out} is a folder; name a file in it with --out.")
     folder = out if names else out.parent
     own = [glob.escape(path.name) for path in (out, *([page_beside(out)] if page else []))]
     patterns = names or [*own, *(glob.escape(out.stem) + ending for ending in beside)]
@@ -80,7 +80,7 @@ class _Place:
             if isinstance(problem, FileExistsError | NotADirectoryError):
                 reason = "it is a file" if self.folder.is_file() else "it is no folder"
             raise InputError(
-                f"{self.folder} cannot be written to ({reason}); choose another --out."
+                "E-CLI-011", f"{self.folder} cannot be written to ({reason}); choose another --out."
             ) from problem
 
     def refuse_others(self, own: Stage) -> None:
@@ -89,8 +89,9 @@ class _Place:
             owner = living_owner(stage) if age(stage) < age(own.path) else None
             if owner is not None and self._overlap(owner.names):
                 raise InputError(
+                    "E-CLI-012",
                     f"'{owner.verb}' (process {owner.process}) is writing into {self.folder} just now; wait for its end, or give another "
-                    f"--out; or, where no such process runs, remove {stage}."
+                    f"--out; or, where no such process runs, remove {stage}.",
                 )
 
     def own_files(self) -> dict[Path, str]:
@@ -102,13 +103,15 @@ class _Place:
             digest, writer = known.get(path.name, ("", ""))
             if digest != _digest_on_disk(path):
                 raise InputError(
+                    "E-CLI-013",
                     f"{path} was not written by flexcal, or has been changed since, and such a file is never changed; "
-                    f"{'' if self.verb == _REPORT else 'give another --out, or '}move it away."
+                    f"{'' if self.verb == _REPORT else 'give another --out, or '}move it away.",
                 )
             if writer not in ("", self.verb, _REPORT) and self.verb != _REPORT:
                 raise InputError(
+                    "E-CLI-014",
                     f"{path} was written by 'flexcal {writer}', which another verb does not write over; "
-                    f"give 'flexcal {self.verb}' {self.kind} of its own with --out."
+                    f"give 'flexcal {self.verb}' {self.kind} of its own with --out.",
                 )
             digests[path] = digest
         return digests

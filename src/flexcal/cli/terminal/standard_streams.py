@@ -43,7 +43,7 @@ def buffered_output() -> Iterator[None]:
     if problem is not None and not isinstance(problem, BrokenPipeError):
         reason = problem.strerror or str(problem)
         raise FlexcalError(
-            f"standard output cannot be written ({reason}); the files of this run are in place."
+            "E-CLI-019", f"standard output cannot be written ({reason}); the files of this run are in place."
         ) from problem
 
 

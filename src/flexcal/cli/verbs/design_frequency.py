@@ -67,10 +67,13 @@ class DesignFrequency:
         require_at_least(0, seed=self.seed)
         require_at_least(1, choose=self.choose, candidates=self.candidates)
         if self.std is not None and not self.std > 0:
-            raise InputError(f"--std is {self.std:g}; it must be positive, such as 0.01 for 1 %.")
+            raise InputError(
+                "E-CLI-020", f"--std is {self.std:g}; it must be positive, such as 0.01 for 1 %."
+            )
         if self.choose is not None and (self.poses is not None or self.plan in ("default", "paper")):
             raise InputError(
-                "--choose is for --plan designed or quick without --poses; the others take the poses of a file."
+                "E-CLI-021",
+                "--choose is for --plan designed or quick without --poses; the others take the poses of a file.",
             )
         console = Console(self.json)
         with console.progress() as progress:

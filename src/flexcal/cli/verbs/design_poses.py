@@ -82,11 +82,11 @@ class DesignPoses:
         require_at_least(1, count=self.count, candidates=self.candidates)
         require_at_least(0, seed=self.seed, payload=self.payload)
         if self.wanted is not None and not self.wanted > 0:
-            raise InputError(f"--wanted is {self.wanted:g}; it must be a positive number of mm.")
+            raise InputError("E-CLI-022", f"--wanted is {self.wanted:g}; it must be a positive number of mm.")
         if self.random and self.pool is not None:
-            raise InputError("--random and --from exclude each other; give one of them.")
+            raise InputError("E-CLI-023", "--random and --from exclude each other; give one of them.")
         if self.random and self.measured:
-            raise InputError("--random and --measured exclude each other; give one of them.")
+            raise InputError("E-CLI-024", "--random and --measured exclude each other; give one of them.")
         console = Console(self.json)
         if self.random:
             self._draw(console)

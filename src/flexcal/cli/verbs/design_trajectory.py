@@ -80,7 +80,7 @@ class DesignTrajectory:
         )
         require_at_least(0, seed=self.seed)
         if self.rate is not None and not 1 <= self.rate <= 20_000:
-            raise InputError(f"--rate is {self.rate:g} Hz; give 1 to 20000.")
+            raise InputError("E-CLI-025", f"--rate is {self.rate:g} Hz; give 1 to 20000.")
         console = Console(self.json)
         request = TrajectoryRequest(
             count=self.count,

@@ -84,7 +84,7 @@ class IdentifyDynamics:
         require_at_least(1, jobs=self.jobs)
         share = _share(self.hold_out)
         if share and self.validate:
-            raise InputError("--hold-out and --validate exclude each other; give one of them.")
+            raise InputError("E-CLI-026", "--hold-out and --validate exclude each other; give one of them.")
         console = Console(self.json)
         with console.progress() as progress:
             dynamics = identify_robot_dynamics(
@@ -184,7 +184,9 @@ def _share(text: str) -> float:
     except ValueError:
         share = -1.0
     if kind != "last" or not 0 < share < 1:
-        raise InputError(f"--hold-out is '{text}'; write for example last:0.3, a share between 0 and 1.")
+        raise InputError(
+            "E-CLI-027", f"--hold-out is '{text}'; write for example last:0.3, a share between 0 and 1."
+        )
     return share
 
 

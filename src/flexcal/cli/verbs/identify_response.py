@@ -90,7 +90,8 @@ class IdentifyResponse:
         """Estimate, and print the uncertainty of the responses."""
         if not self.source:
             raise InputError(
-                "no records given; name robot.yaml and the folder of an experiment, or files of records."
+                "E-CLI-028",
+                "no records given; name robot.yaml and the folder of an experiment, or files of records.",
             )
         if any(path.suffix in _ROBOT or (path / "plan.yaml").is_file() for path in self.source):
             self._planned()
@@ -108,11 +109,13 @@ class IdentifyResponse:
                 require_robot(self.source[0], *self.source[1:])
                 files = " ".join(str(path) for path in self.source[1:])
                 raise InputError(
+                    "E-CLI-029",
                     f"{self.source[1]} is no folder with a plan; records without one need no robot: "
-                    f"'flexcal identify response {files}'."
+                    f"'flexcal identify response {files}'.",
                 )
             raise InputError(
-                "a planned experiment needs robot.yaml, then the folder with plan.yaml and the joint logs."
+                "E-CLI-030",
+                "a planned experiment needs robot.yaml, then the folder with plan.yaml and the joint logs.",
             )
         robot, folder = self.source
         require_robot(robot, folder)
@@ -146,11 +149,12 @@ class IdentifyResponse:
         )
         if self.method not in ("arithmetic", "local-polynomial"):
             raise InputError(
+                "E-CLI-031",
                 f"--method {self.method} is for planned experiments; without a plan it is the local polynomial method, which is H1 without "
-                "leakage; leave --method out."
+                "leakage; leave --method out.",
             )
         if self.rate is not None and not self.rate > 0:
-            raise InputError(f"--rate is {self.rate:g}; it must be positive.")
+            raise InputError("E-CLI-032", f"--rate is {self.rate:g}; it must be positive.")
         console = Console(self.json)
         with console.progress() as progress:
             identified = identify_excitation(
@@ -183,7 +187,9 @@ def _count(name: str, text: str | None, least: int, most: int) -> int | None:
     if text is None:
         return None
     if not text.isdigit() or not least <= int(text) <= most:
-        raise InputError(f"--{name} is {text}; it must be a whole number from {least} to {most}.")
+        raise InputError(
+            "E-CLI-033", f"--{name} is {text}; it must be a whole number from {least} to {most}."
+        )
     return int(text)
 
 
@@ -200,6 +206,6 @@ def _files(source: tuple[Path, ...]) -> list[Path]:
             if one.is_file() and one.suffix.lower() in (".csv", ".txt", ".tsv", ".dat", ".parquet", ".mat")
         )
         if not inside:
-            raise InputError(f"{path}: the folder holds neither plan.yaml nor files of records.")
+            raise InputError("E-CLI-034", f"{path}: the folder holds neither plan.yaml nor files of records.")
         files += inside
     return files

@@ -95,7 +95,7 @@ class Import:
             console.say(remark)
         self._say_fit(console, imported)
         if not imported.trusted and not self.unchecked:
-            raise InputError(self._doubt(imported))
+            raise InputError("E-CLI-035", self._doubt(imported))
         if self.write_point:
             self._write_point(console, imported)
         if self.write_signals:
@@ -131,7 +131,8 @@ class Import:
         fit = imported.misfit
         if fit is None or fit.doubtful:
             raise InputError(
-                f"{self.file}: these points do not determine the position of the reflector on the tool; leave --write-point out."
+                "E-CLI-036",
+                f"{self.file}: these points do not determine the position of the reflector on the tool; leave --write-point out.",
             )
         write_point_position(self.robot, fit.point, fit.moved)
         console.say(f"wrote the xyz of {fit.point} to {self.robot}")

@@ -35,7 +35,9 @@ class Report(ParticularsOptions):
     def out(self) -> Path:
         """The file that is written; raises `InputError` where DIR is a file."""
         if self.folder.is_file():
-            raise InputError(f"{self.folder} is no folder; give the folder that holds results.json.")
+            raise InputError(
+                "E-CLI-037", f"{self.folder} is no folder; give the folder that holds results.json."
+            )
         if self.customer:
             return self.folder / "customer.html"
         return self.folder / ("report.html" if self.compare is None else "comparison.html")
@@ -46,9 +48,11 @@ class Report(ParticularsOptions):
 
         console = Console(self.json)
         if self.customer and self.compare is not None:
-            raise InputError("--customer and --compare exclude each other; give one of them.")
+            raise InputError("E-CLI-038", "--customer and --compare exclude each other; give one of them.")
         if not self.customer and self.particulars != NOT_GIVEN:
-            raise InputError("particulars of the measurement are for the customer's sheets; add --customer.")
+            raise InputError(
+                "E-CLI-039", "particulars of the measurement are for the customer's sheets; add --customer."
+            )
         if self.customer:
             self._for_customer(console)
             return

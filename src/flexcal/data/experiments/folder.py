@@ -39,10 +39,11 @@ def existing_file(folder: Path, name: str) -> Path:
     files = [folder / (name + ending) for ending in ENDINGS if (folder / (name + ending)).is_file()]
     if not files:
         raise InputError(
-            f"{folder / name}.csv (or .parquet) is missing; record it, or give the folder that has it."
+            "E-EXP-001",
+            f"{folder / name}.csv (or .parquet) is missing; record it, or give the folder that has it.",
         )
     if len(files) > 1:
-        raise InputError(f"{folder / name} is there as .csv and as .parquet; remove one.")
+        raise InputError("E-EXP-002", f"{folder / name} is there as .csv and as .parquet; remove one.")
     return files[0]
 
 
@@ -63,12 +64,16 @@ def write_recordings(
     left = set(labels(plan))
     for recording in recordings:
         if recording.label is None or recording.label not in left:
-            raise FlexcalError(f"{recording.name} is not in the plan, or there twice; record the plan again.")
+            raise FlexcalError(
+                "E-EXP-003", f"{recording.name} is not in the plan, or there twice; record the plan again."
+            )
         left.remove(recording.label)
         write_recording(folder / (recording.label.name + ending), recording)
     if left:
         missing = min(label.name for label in left)
-        raise FlexcalError(f"{len(left)} recordings of the plan are missing, for example {missing}.")
+        raise FlexcalError(
+            "E-EXP-004", f"{len(left)} recordings of the plan are missing, for example {missing}."
+        )
     write_plan(folder / PLAN, plan)
 
 

@@ -31,13 +31,15 @@ class FolderCell:
         self.model = model
         if not self.path.is_dir():
             raise InputError(
-                f"{self.path} is no folder; give the folder that holds {PLAN} and the measurements."
+                "E-EXP-005",
+                f"{self.path} is no folder; give the folder that holds {PLAN} and the measurements.",
             )
         self.plan: Plan = read_plan(self.path / PLAN)
         joints = self.plan.joint_count
         if joints != model.n:
             raise InputError(
-                f"{self.path / PLAN}: the plan is for {joints} joints, but the robot has {model.n}; check robot.yaml."
+                "E-EXP-006",
+                f"{self.path / PLAN}: the plan is for {joints} joints, but the robot has {model.n}; check robot.yaml.",
             )
 
     def record(self, plan: MultisinePlan | TrajectoryPlan | None = None) -> Iterator[Recording]:
@@ -48,7 +50,9 @@ class FolderCell:
         """
         own = self.plan
         if isinstance(own, PosePlan):
-            raise InputError(f"{self.path / PLAN} is a plan of kind '{own.kind}', which has no joint logs.")
+            raise InputError(
+                "E-EXP-007", f"{self.path / PLAN} is a plan of kind '{own.kind}', which has no joint logs."
+            )
         self._check_same(plan)
         files = [(existing_file(self.path, label.name), label) for label in labels(own)]
         fill = FILL if isinstance(own, TrajectoryPlan) else 0.0
@@ -63,7 +67,8 @@ class FolderCell:
         own = self.plan
         if not isinstance(own, PosePlan):
             raise InputError(
-                f"{self.path / PLAN} is a plan of kind '{own.kind}', which has no measured poses."
+                "E-EXP-008",
+                f"{self.path / PLAN} is a plan of kind '{own.kind}', which has no measured poses.",
             )
         self._check_same(plan)
         file = existing_file(self.path, POSES)
@@ -73,14 +78,16 @@ class FolderCell:
         planned = own.q[np.sort(np.unique(own.numbers, return_index=True)[1])]
         if len(q) != len(planned):
             raise InputError(
-                f"{file}: there are {len(q)} poses, but the plan has {len(planned)}; measure them all."
+                "E-EXP-009",
+                f"{file}: there are {len(q)} poses, but the plan has {len(planned)}; measure them all.",
             )
         apart = np.abs(q - planned)
         if apart.max() > _SAME:
             row, joint = (int(i) for i in np.argwhere(apart > _SAME)[0])
             raise InputError(
+                "E-EXP-010",
                 f"{file}, column q{joint + 1}: measured pose {poses.pose[first[row]]} lies {apart[row, joint]:.3g} from the planned one; "
-                "measure in the order of the plan, or give the plan that was measured."
+                "measure in the order of the plan, or give the plan that was measured.",
             )
         return poses
 
@@ -91,6 +98,7 @@ class FolderCell:
         keys = [key for key in {**mine, **yours} if key != "name" and mine.get(key) != yours.get(key)]
         if keys:
             raise InputError(
+                "E-EXP-011",
                 f"{self.path / PLAN} is another plan than the one asked for ({', '.join(keys)} differ); "
-                "use the folder's own plan, or measure again."
+                "use the folder's own plan, or measure again.",
             )

@@ -91,44 +91,58 @@ class MultisinePlan:
 
     def _check_shapes(self) -> None:
         if self.poses.ndim != 2 or 0 in self.poses.shape:
-            raise FlexcalError("poses must be a list of poses, each a list with one angle per joint (rad).")
+            raise FlexcalError(
+                "E-PLAN-001", "poses must be a list of poses, each a list with one angle per joint (rad)."
+            )
         n = self.poses.shape[1]
         if not self.joints or len(set(self.joints)) != len(self.joints):
-            raise FlexcalError("joints must name at least one excited axis, and each only once.")
+            raise FlexcalError(
+                "E-PLAN-002", "joints must name at least one excited axis, and each only once."
+            )
         wrong = [joint for joint in self.joints if not 0 <= joint < n]
         if wrong:
-            raise FlexcalError(f"joints names axis {wrong[0] + 1}, but the poses have {n} joints.")
+            raise FlexcalError(
+                "E-PLAN-003", f"joints names axis {wrong[0] + 1}, but the poses have {n} joints."
+            )
         for name, gains in (("kp", self.kp), ("kd", self.kd)):
             if gains.shape != (n,):
                 raise FlexcalError(
-                    f"{name} has {gains.size} gains, but the poses have {n} joints; give one each."
+                    "E-PLAN-004",
+                    f"{name} has {gains.size} gains, but the poses have {n} joints; give one each.",
                 )
         if self.lines.ndim != 1 or self.detection_lines.ndim != 1 or not self.lines.size:
-            raise FlexcalError("lines must be a list with at least one multiple of the base frequency.")
+            raise FlexcalError(
+                "E-PLAN-005", "lines must be a list with at least one multiple of the base frequency."
+            )
         shape = (len(self.joints), self.lines.size)
         if self.amplitude.shape != shape:
             raise FlexcalError(
-                f"amplitude has the shape {self.amplitude.shape}, but {shape[0]} axes and {shape[1]} lines need {shape}."
+                "E-PLAN-006",
+                f"amplitude has the shape {self.amplitude.shape}, but {shape[0]} axes and {shape[1]} lines need {shape}.",
             )
 
     def _check_values(self) -> None:
         lines = np.concatenate([self.lines, self.detection_lines])
         if lines.min() < 1 or np.unique(lines).size != lines.size or np.any(np.diff(self.lines) < 0):
             raise FlexcalError(
-                "lines must be ascending multiples of the base frequency from 1, and none a detection line too."
+                "E-PLAN-007",
+                "lines must be ascending multiples of the base frequency from 1, and none a detection line too.",
             )
         check_schedule(self)
         if 2 * lines.max() * self.base_frequency_hz >= self.rate_hz:
             raise FlexcalError(
+                "E-PLAN-008",
                 f"the line {lines.max()} lies at {lines.max() * self.base_frequency_hz:g} Hz, not below half the rate of "
-                f"{self.rate_hz:g} Hz; lower the band or raise rate_hz."
+                f"{self.rate_hz:g} Hz; lower the band or raise rate_hz.",
             )
         if self.realisations < 1:
-            raise FlexcalError(f"realisations is {self.realisations}; at least one is needed.")
+            raise FlexcalError("E-PLAN-009", f"realisations is {self.realisations}; at least one is needed.")
         if self.reference_amplitude < 0 or self.reference_frequency_hz < 0:
-            raise FlexcalError("reference_amplitude and reference_frequency_hz must not be negative.")
+            raise FlexcalError(
+                "E-PLAN-010", "reference_amplitude and reference_frequency_hz must not be negative."
+            )
         for name in ("reference_amplitude", "reference_frequency_hz"):
             if 0 < getattr(self, name) < 1e-9:
                 raise FlexcalError(
-                    f"{name} is {getattr(self, name):g}, too little to move; write 0 for none."
+                    "E-PLAN-011", f"{name} is {getattr(self, name):g}, too little to move; write 0 for none."
                 )

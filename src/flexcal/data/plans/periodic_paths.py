@@ -31,16 +31,19 @@ class FourierPaths:
         for name in ("centre", "sine", "cosine"):
             object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=np.float64))
         if self.centre.ndim != 2 or 0 in self.centre.shape:
-            raise FlexcalError("centre must be a list of trajectories, each a list with one angle per joint.")
+            raise FlexcalError(
+                "E-PLAN-012", "centre must be a list of trajectories, each a list with one angle per joint."
+            )
         for name in ("sine", "cosine"):
             shape = getattr(self, name).shape
             if len(shape) != 3 or shape[:2] != self.centre.shape or not shape[2]:
                 raise FlexcalError(
+                    "E-PLAN-013",
                     f"{name} has shape {shape}; {self.centre.shape[0]} trajectories of {self.centre.shape[1]} joints need "
-                    f"({self.centre.shape[0]}, {self.centre.shape[1]}, harmonics)."
+                    f"({self.centre.shape[0]}, {self.centre.shape[1]}, harmonics).",
                 )
         if self.sine.shape != self.cosine.shape:
-            raise FlexcalError("sine and cosine must have the same number of harmonics.")
+            raise FlexcalError("E-PLAN-014", "sine and cosine must have the same number of harmonics.")
 
     @classmethod
     def of_coefficients(cls, coefficients: np.ndarray) -> FourierPaths:
@@ -73,7 +76,8 @@ class SplinePaths:
         shape = self.control.shape
         if len(shape) != 3 or 0 in shape or shape[2] <= SPLINE_DEGREE + 1:
             raise FlexcalError(
-                f"control has shape {shape}; give (trajectories, joints, control points), at least {SPLINE_DEGREE + 2} of these."
+                "E-PLAN-015",
+                f"control has shape {shape}; give (trajectories, joints, control points), at least {SPLINE_DEGREE + 2} of these.",
             )
 
     @classmethod

@@ -29,17 +29,19 @@ class PeriodicSchedule(Protocol):
 def check_schedule(plan: PeriodicSchedule) -> None:
     """Raise `FlexcalError` for values that no experiment can have."""
     if not (plan.base_frequency_hz > 0 and plan.rate_hz > 0):
-        raise FlexcalError("base_frequency_hz and rate_hz must be positive.")
+        raise FlexcalError("E-PLAN-016", "base_frequency_hz and rate_hz must be positive.")
     if plan.rate_hz / plan.base_frequency_hz * max(plan.periods, 1) > _MAX_SAMPLES:
         raise FlexcalError(
+            "E-PLAN-017",
             f"{plan.periods} periods at base_frequency_hz {plan.base_frequency_hz:g} last {plan.periods / plan.base_frequency_hz:.3g} s, "
-            f"longer than a recording at {plan.rate_hz:g} Hz can be; raise base_frequency_hz."
+            f"longer than a recording at {plan.rate_hz:g} Hz can be; raise base_frequency_hz.",
         )
     if not 0 <= plan.settle_periods < plan.periods:
         raise FlexcalError(
-            f"settle_periods is {plan.settle_periods} of {plan.periods} periods; keep at least one."
+            "E-PLAN-018",
+            f"settle_periods is {plan.settle_periods} of {plan.periods} periods; keep at least one.",
         )
     if plan.payload is not None and plan.payload < 0:
-        raise FlexcalError(f"the payload is {plan.payload:g} kg; it must not be negative.")
+        raise FlexcalError("E-PLAN-019", f"the payload is {plan.payload:g} kg; it must not be negative.")
     if plan.seed < 0:
-        raise FlexcalError(f"the seed is {plan.seed}; it must not be negative.")
+        raise FlexcalError("E-PLAN-020", f"the seed is {plan.seed}; it must not be negative.")

@@ -30,6 +30,7 @@ def read_plan(path: str | Path) -> Plan:
     kind = file.data.get("kind") if isinstance(file.data, dict) else None
     if not isinstance(kind, str) or kind not in _KINDS:
         raise file.error(
+            "E-PLAN-021",
             ("kind",),
             f"this is no plan, whose kind is one of {', '.join(_KINDS)}; give what 'flexcal design' wrote, "
             "or add for example 'kind: multisine'.",
@@ -43,7 +44,8 @@ def read_plan_of(path: str | Path, kind: type[P]) -> P:
     if not isinstance(plan, kind):
         wanted = next(name for name, cls in _KINDS.items() if cls is kind)
         raise InputError(
-            f"{path} line 1: this is a plan of kind '{plan.kind}', but one of kind '{wanted}' is needed here."
+            "E-PLAN-022",
+            f"{path} line 1: this is a plan of kind '{plan.kind}', but one of kind '{wanted}' is needed here.",
         )
     return plan
 
@@ -60,7 +62,9 @@ def write_plan(path: str | Path, plan: Plan) -> None:
     """
     if Path(path).suffix == ".csv":
         if not isinstance(plan, PosePlan):
-            raise InputError(f"{path}: only a plan of poses can be a CSV file; end the name in .yaml.")
+            raise InputError(
+                "E-PLAN-023", f"{path}: only a plan of poses can be a CSV file; end the name in .yaml."
+            )
         write_pose_table(Path(path), plan)
         return
     write_yaml(path, plan)

@@ -33,15 +33,16 @@ def read_pose_table(path: Path) -> PosePlan:
     for name in joints or ("q1",):
         if name not in file.columns:
             raise file.error(
-                f"the column '{name}' is missing; a plan of poses has pose, q1 … qn, and payload or not."
+                "E-PLAN-024",
+                f"the column '{name}' is missing; a plan of poses has pose, q1 … qn, and payload or not.",
             )
     for name in file.columns:
         if name not in ("pose", "payload", *_OF_COMMANDS, *joints):
-            raise file.error(f"the column '{name}' is not known in a plan of poses; remove it.")
+            raise file.error("E-PLAN-025", f"the column '{name}' is not known in a plan of poses; remove it.")
     texts = tuple(name for name in _OF_COMMANDS if name in file.columns)
     table = file.read(texts)
     if "target" in texts and len(set(table.columns["target"].tolist())) > 1:
-        raise file.error("the poses are of several targets; measure one target at a time.")
+        raise file.error("E-PLAN-026", "the poses are of several targets; measure one target at a time.")
     pose = _numbers(table) if "pose" in file.columns else None
     try:
         return PosePlan(
@@ -51,7 +52,7 @@ def read_pose_table(path: Path) -> PosePlan:
             pose=pose,
         )
     except FlexcalError as problem:
-        raise InputError(f"{path}: {problem}") from problem
+        raise InputError(problem.code, f"{path}: {problem}") from problem
 
 
 def _numbers(table: Table) -> np.ndarray | None:

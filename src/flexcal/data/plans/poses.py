@@ -34,24 +34,30 @@ class PosePlan:
     def __post_init__(self) -> None:
         q = np.asarray(self.q, dtype=np.float64)
         if q.ndim != 2 or 0 in q.shape:
-            raise FlexcalError("q must be a list of poses, each a list with one angle per joint (rad).")
+            raise FlexcalError(
+                "E-PLAN-027", "q must be a list of poses, each a list with one angle per joint (rad)."
+            )
         object.__setattr__(self, "q", q)
         if self.payload is not None:
             payload = np.asarray(self.payload, dtype=np.float64)
             if payload.shape not in ((), (q.shape[0],)):
                 raise FlexcalError(
-                    f"payload has {payload.size} masses for {q.shape[0]} poses; give one each."
+                    "E-PLAN-028", f"payload has {payload.size} masses for {q.shape[0]} poses; give one each."
                 )
             if payload.min() < 0:
-                raise FlexcalError(f"the payload is {payload.min():g} kg; it must not be negative.")
+                raise FlexcalError(
+                    "E-PLAN-029", f"the payload is {payload.min():g} kg; it must not be negative."
+                )
             object.__setattr__(self, "payload", np.broadcast_to(payload, q.shape[0]).copy())
         if self.pose is not None:
             pose = np.asarray(self.pose, dtype=np.int64)
             if pose.shape != (q.shape[0],):
-                raise FlexcalError(f"pose has {pose.size} numbers for {q.shape[0]} poses; give one each.")
+                raise FlexcalError(
+                    "E-PLAN-030", f"pose has {pose.size} numbers for {q.shape[0]} poses; give one each."
+                )
             object.__setattr__(self, "pose", pose)
         if self.seed < 0:
-            raise FlexcalError(f"the seed is {self.seed}; it must not be negative.")
+            raise FlexcalError("E-PLAN-031", f"the seed is {self.seed}; it must not be negative.")
 
     def __len__(self) -> int:
         return self.q.shape[0]

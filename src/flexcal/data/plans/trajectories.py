@@ -72,7 +72,7 @@ class TrajectoryPlan:
 
     def _check_gains(self) -> None:
         if (self.kp is None) != (self.kd is None):
-            raise FlexcalError("the plan has one of kp and kd; give both or neither.")
+            raise FlexcalError("E-PLAN-032", "the plan has one of kp and kd; give both or neither.")
         for name in ("kp", "kd"):
             gains = getattr(self, name)
             if gains is None:
@@ -81,7 +81,8 @@ class TrajectoryPlan:
             object.__setattr__(self, name, gains)
             if gains.shape != (self.joint_count,):
                 raise FlexcalError(
-                    f"{name} has {gains.size} gains, but there are {self.joint_count} joints; give one each."
+                    "E-PLAN-033",
+                    f"{name} has {gains.size} gains, but there are {self.joint_count} joints; give one each.",
                 )
 
     def _check_values(self) -> None:
@@ -89,6 +90,7 @@ class TrajectoryPlan:
         ticks = self.rate_hz / self.base_frequency_hz
         if abs(ticks - round(ticks)) > 1e-9 * ticks:
             raise FlexcalError(
+                "E-PLAN-034",
                 f"a period of {1 / self.base_frequency_hz:g} s is no whole number of samples at {self.rate_hz:g} Hz; "
-                "change base_frequency_hz."
+                "change base_frequency_hz.",
             )

@@ -24,10 +24,11 @@ class PosePool:
     def __post_init__(self) -> None:
         if self.q.ndim != 2 or self.pose.shape != self.q.shape[:1]:
             raise FlexcalError(
-                f"a pool of {self.pose.size} poses has joint positions of shape {self.q.shape}."
+                "E-POSES-001",
+                f"a pool of {self.pose.size} poses has joint positions of shape {self.q.shape}.",
             )
         if np.unique(self.pose).size < self.pose.size:
-            raise FlexcalError("a pool holds every pose once; give every pose its own number.")
+            raise FlexcalError("E-POSES-002", "a pool holds every pose once; give every pose its own number.")
 
     def __len__(self) -> int:
         return len(self.q)

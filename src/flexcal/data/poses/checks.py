@@ -22,18 +22,22 @@ SAME_POSE = 0.02
 def check_motion(poses: PoseSet, model: RobotModel, where: str) -> None:
     """Raise `InputError` where there is one pose only, all are equal, or a joint never moves; `where` names the files."""
     if len(np.unique(poses.pose)) < 2:
-        raise InputError(f"{where}: there is one pose only; measure more poses, in which every joint moves.")
+        raise InputError(
+            "E-POSES-003", f"{where}: there is one pose only; measure more poses, in which every joint moves."
+        )
     travel = np.ptp(poses.q, axis=0)
     if (travel < STILL).all():
         raise InputError(
-            f"{where}: all poses are equal (columns q1…q{len(travel)}); measure poses in which every joint moves."
+            "E-POSES-004",
+            f"{where}: all poses are equal (columns q1…q{len(travel)}); measure poses in which every joint moves.",
         )
     still = np.flatnonzero(travel < STILL)
     if still.size:
         listed = ", ".join(f"{model.joint_names[i]} (column q{i + 1})" for i in still)
         word = "joints never move" if still.size > 1 else "joint never moves"
         raise InputError(
-            f"{where}: the {word}: {listed}; add poses in which all joints take different angles."
+            "E-POSES-005",
+            f"{where}: the {word}: {listed}; add poses in which all joints take different angles.",
         )
 
 
@@ -45,6 +49,7 @@ def check_same_pose(pose: np.ndarray, q: np.ndarray, table: Table) -> None:
         row, joint = (int(i) for i in np.argwhere(differs)[0])
         original = int(first[inverse[row]])
         raise table.error(
+            "E-POSES-006",
             row,
             f"q{joint + 1}",
             f"pose {numbers[inverse[row]]} stands at {q[row, joint]:g} here, but at {q[original, joint]:g} "
@@ -78,4 +83,4 @@ def check_metres(poses: PoseSet, model: RobotModel, table: Table, signal: Signal
         advice = "these look like millimetres: convert them to m, or declare 'unit: mm' under `signals:`."
     else:
         advice = "correct or remove the line."
-    raise table.error(row, column, f"{place}, but the robot reaches {reach:.3g} m; {advice}")
+    raise table.error("E-POSES-007", row, column, f"{place}, but the robot reaches {reach:.3g} m; {advice}")

@@ -19,7 +19,7 @@ _HIGHEST = 2.0**53
 def first_point(file: TableFile, model: RobotModel) -> str:
     """The default target; raises `InputError` where robot.yaml declares none."""
     if not model.points:
-        raise file.error("robot.yaml declares no point; add the measured one under `points:`.")
+        raise file.error("E-POSES-008", "robot.yaml declares no point; add the measured one under `points:`.")
     return next(iter(model.points))
 
 
@@ -29,7 +29,8 @@ def payload_column(table: Table, signals: dict[str, Signal], model: RobotModel) 
         return None
     if model.payload is None:
         raise table.file.error(
-            "there is a column 'payload', but robot.yaml declares none; add `payload:` with its centre of mass."
+            "E-POSES-009",
+            "there is a column 'payload', but robot.yaml declares none; add `payload:` with its centre of mass.",
         )
     payload = signals["payload"].values(table)
     check_positive(table, signals["payload"], payload, zero=True)
@@ -43,7 +44,9 @@ def target_column(table: Table, model: RobotModel) -> np.ndarray:
         if name not in model.points:
             known = list(model.points)
             hint = suggestion(name, known) or f"; known are {', '.join(known) or 'none'}."
-            raise table.error(row, "target", f"there is no point '{name}' under `points:`{hint}")
+            raise table.error(
+                "E-POSES-010", row, "target", f"there is no point '{name}' under `points:`{hint}"
+            )
     return target
 
 
@@ -54,6 +57,7 @@ def check_positive(table: Table, signal: Signal, values: np.ndarray, *, zero: bo
         row, column = (int(i) for i in np.argwhere(wrong)[0])
         word = "not negative" if zero else "positive"
         raise table.error(
+            "E-POSES-011",
             row,
             signal.column_of(column),
             f"{signal.quantity} is {values[row, column]:g}, but must be {word}; correct it.",
@@ -64,11 +68,16 @@ def whole_numbers(table: Table, column: str, values: np.ndarray) -> np.ndarray:
     """Numbers (N,) of poses, which stand in `column`, as integers; raises `InputError` at the first that is none."""
     if (values != np.rint(values)).any():
         row = int(np.argmax(values != np.rint(values)))
-        raise table.error(row, column, f"{values[row]:g} is no whole number; number the poses.")
+        raise table.error(
+            "E-POSES-012", row, column, f"{values[row]:g} is no whole number; number the poses."
+        )
     if (np.abs(values) > _HIGHEST).any():
         row = int(np.argmax(np.abs(values) > _HIGHEST))
         raise table.error(
-            row, column, f"{values[row]:g} is too large for the number of a pose; number the poses."
+            "E-POSES-013",
+            row,
+            column,
+            f"{values[row]:g} is too large for the number of a pose; number the poses.",
         )
     return values.astype(np.int64)
 
@@ -79,6 +88,7 @@ def unit_quaternions(table: Table, signal: Signal, quaternion: np.ndarray) -> np
     if (np.abs(norm - 1) > 1e-3).any():
         row = int(np.argmax(np.abs(norm - 1) > 1e-3))
         raise table.error(
+            "E-POSES-014",
             row,
             signal.columns[0],
             f"the quaternion has the norm {norm[row]:.4g}, not 1; check the columns qw, qx, qy, qz.",

@@ -83,7 +83,7 @@ def read_pose_pool(path: str | Path, model: RobotModel) -> PosePool:
         sentence = (
             f"{payload[row]:g} kg follow {payload[0]:g} kg; choose from poses with one payload at a time."
         )
-        raise table.error(row, signals["payload"].columns[0], sentence)
+        raise table.error("E-POSES-015", row, signals["payload"].columns[0], sentence)
     return PosePool(q[first], pose[first], None if payload is None else float(payload[0]))
 
 
@@ -102,7 +102,8 @@ def write_poses(path: str | Path, poses: PoseSet) -> None:
         if not np.isfinite(values).all():
             row = int(np.argmin(np.isfinite(values).all(axis=1)))
             raise InputError(
-                f"{path}: {quantity} of row {row + 1} is not finite, so the poses are not written."
+                "E-POSES-016",
+                f"{path}: {quantity} of row {row + 1} is not finite, so the poses are not written.",
             )
         names = standard_columns(quantity, poses.q.shape[1])
         columns |= {name: values[:, i] for i, name in enumerate(names)}
@@ -122,7 +123,7 @@ def _read(path: Path, model: RobotModel) -> PoseSet:
     _check_measured(file, model, place)
     signals = assign(file, model, ("pose", "q", place), _NUMBERS, texts)
     if "sigma" in signals and "sigma_xyz" in signals:
-        raise file.error("sigma and sigma_x, sigma_y, sigma_z are both there; keep one.")
+        raise file.error("E-POSES-017", "sigma and sigma_x, sigma_y, sigma_z are both there; keep one.")
     stamps = timestamp_columns(signals)
     (table,) = with_seconds([file.read((*texts, *stamps))], stamps)
     values = {name: signal.values(table) for name, signal in signals.items()}
@@ -163,7 +164,9 @@ def _place(file: TableFile, model: RobotModel) -> str:
     length = mapped["length"].columns if "length" in mapped else ()
     wire = "length" in file.columns or (length and set(length) <= set(file.columns))
     if wire and {"x", "y", "z"} & set(file.columns):
-        raise file.error("there are both 'length' and x, y, z; keep the columns of one instrument.")
+        raise file.error(
+            "E-POSES-018", "there are both 'length' and x, y, z; keep the columns of one instrument."
+        )
     return "length" if wire else "xyz"
 
 
@@ -177,12 +180,14 @@ def _check_measured(file: TableFile, model: RobotModel, place: str) -> None:
 
     if not there("q") and "pose" not in file.columns:
         raise file.error(
-            f"there is no column pose, nor q1 … q{model.n}; 'flexcal import' makes such a file of one with other columns."
+            "E-POSES-019",
+            f"there is no column pose, nor q1 … q{model.n}; 'flexcal import' makes such a file of one with other columns.",
         )
     if there("q") and not there(place):
         raise file.error(
+            "E-POSES-020",
             "there are joint positions, but no measured points x, y, z; measure these poses, and convert the measurements with "
-            "'flexcal import'."
+            "'flexcal import'.",
         )
 
 

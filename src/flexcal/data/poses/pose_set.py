@@ -49,7 +49,9 @@ class PoseSet:
 
     def __post_init__(self) -> None:
         if self.q.ndim != 2:
-            raise FlexcalError(f"q of a pose set has shape {self.q.shape}; (poses, joints) is needed.")
+            raise FlexcalError(
+                "E-POSES-021", f"q of a pose set has shape {self.q.shape}; (poses, joints) is needed."
+            )
         n_rows, n = self.q.shape
         shapes = {
             "position": (n_rows, 3),
@@ -67,7 +69,9 @@ class PoseSet:
         for name, shape in shapes.items():
             values = getattr(self, name)
             if values is not None and values.shape != shape:
-                raise FlexcalError(f"{name} of a pose set has shape {values.shape}; {shape} is needed.")
+                raise FlexcalError(
+                    "E-POSES-022", f"{name} of a pose set has shape {values.shape}; {shape} is needed."
+                )
 
     def __len__(self) -> int:
         return self.q.shape[0]
@@ -102,11 +106,12 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
     time, orientation or length.
     """
     if not sets:
-        raise FlexcalError("there are no poses to join; give at least one set.")
+        raise FlexcalError("E-POSES-023", "there are no poses to join; give at least one set.")
     if len({poses.q.shape[1] for poses in sets}) > 1:
         counts = ", ".join(str(poses.q.shape[1]) for poses in sets)
         raise FlexcalError(
-            f"the pose sets have different numbers of joints ({counts}); use sets of one robot."
+            "E-POSES-024",
+            f"the pose sets have different numbers of joints ({counts}); use sets of one robot.",
         )
     joined: dict[str, Any] = {}
     for field in fields(PoseSet):
@@ -115,7 +120,8 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
         if field.name == "sigma_given":
             if any(values) and not all(values):
                 raise FlexcalError(
-                    f"only {sum(values)} of {len(sets)} pose sets have sigma; give it for all, or for none."
+                    "E-POSES-025",
+                    f"only {sum(values)} of {len(sets)} pose sets have sigma; give it for all, or for none.",
                 )
             joined[field.name] = all(values)
         elif field.name == "pose":
@@ -124,7 +130,8 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
             joined[field.name] = np.concatenate(values)
         elif any(present):
             raise FlexcalError(
-                f"only {sum(present)} of {len(sets)} pose sets have {field.name}; give it for all, or for none."
+                "E-POSES-026",
+                f"only {sum(present)} of {len(sets)} pose sets have {field.name}; give it for all, or for none.",
             )
         else:
             joined[field.name] = None

@@ -43,11 +43,12 @@ def read_targets(path: str | Path, model: RobotModel) -> ToolTargets:
     signals = assign(file, model, ("pose",), ("q", "xyz", "quaternion", "payload"), texts)
     if "q" not in signals and "xyz" not in signals:
         raise file.error(
-            f"there are no target positions; add x, y, z, or q1…q{model.n} of the nominal command."
+            "E-POSES-027",
+            f"there are no target positions; add x, y, z, or q1…q{model.n} of the nominal command.",
         )
     for name in ("quaternion", "station"):
         if (name in signals or name in texts) and "xyz" not in signals:
-            raise file.error(f"there is '{name}' but no x, y, z; add them, or remove it.")
+            raise file.error("E-POSES-028", f"there is '{name}' but no x, y, z; add them, or remove it.")
     table = file.read(texts)
     values = {name: signal.values(table) for name, signal in signals.items()}
     if "q" in values:
@@ -134,14 +135,18 @@ def _check_once(table: Table, pose: np.ndarray) -> None:
     first = np.unique(pose, return_index=True)[1]
     if len(first) < len(pose):
         row = int(np.setdiff1d(np.arange(len(pose)), first)[0])
-        raise table.error(row, "pose", f"{pose[row]} stands twice; give every target its own number.")
+        raise table.error(
+            "E-POSES-029", row, "pose", f"{pose[row]} stands twice; give every target its own number."
+        )
 
 
 def _check_stations(table: Table, model: RobotModel) -> None:
     for row, name in enumerate(table.columns["station"].tolist()):
         if name not in model.stations:
             known = ", ".join(model.stations)
-            raise table.error(row, "station", f"there is no station '{name}' in robot.yaml; it has {known}.")
+            raise table.error(
+                "E-POSES-030", row, "station", f"there is no station '{name}' in robot.yaml; it has {known}."
+            )
 
 
 def _check_metres(table: Table, columns: tuple[str, ...], position: np.ndarray, reach: float) -> None:
@@ -158,4 +163,6 @@ def _check_metres(table: Table, columns: tuple[str, ...], position: np.ndarray, 
         place = (
             f"the point lies {distance[row]:.4g} m from the robot's base, but the robot reaches {reach:.3g} m"
         )
-        raise table.error(row, columns[int(np.argmax(np.abs(position[row])))], f"{place}; {advice}")
+        raise table.error(
+            "E-POSES-031", row, columns[int(np.argmax(np.abs(position[row])))], f"{place}; {advice}"
+        )

@@ -32,9 +32,11 @@ class ToolTargets:
 
     def __post_init__(self) -> None:
         if self.q is None and self.position is None:
-            raise FlexcalError("targets need joint positions or points; give q or position.")
+            raise FlexcalError("E-POSES-032", "targets need joint positions or points; give q or position.")
         if self.position is None and (self.rotation is not None or self.station is not None):
-            raise FlexcalError("an orientation or a station of targets needs points; give position.")
+            raise FlexcalError(
+                "E-POSES-033", "an orientation or a station of targets needs points; give position."
+            )
         rows = len(self.pose)
         shapes: dict[str, tuple[int, ...]] = {
             "target": (rows,),
@@ -46,9 +48,13 @@ class ToolTargets:
         for name, shape in shapes.items():
             values = getattr(self, name)
             if values is not None and values.shape != shape:
-                raise FlexcalError(f"{name} of targets has shape {values.shape}; {shape} is needed.")
+                raise FlexcalError(
+                    "E-POSES-034", f"{name} of targets has shape {values.shape}; {shape} is needed."
+                )
         if self.q is not None and (self.q.ndim != 2 or len(self.q) != rows):
-            raise FlexcalError(f"q of targets has shape {self.q.shape}; ({rows}, joints) is needed.")
+            raise FlexcalError(
+                "E-POSES-035", f"q of targets has shape {self.q.shape}; ({rows}, joints) is needed."
+            )
 
     def __len__(self) -> int:
         return len(self.pose)

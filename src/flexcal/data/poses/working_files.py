@@ -47,6 +47,7 @@ def _require_first_point(table: Table, model: RobotModel) -> None:
         row = int(np.argmax(other))
         named = table.columns["target"][row]
         raise table.error(
+            "E-POSES-036",
             row,
             "target",
             f"working points are those of {first}, the first under `points:`, not of {named}; remove the row, or give q1…q{model.n}.",

@@ -28,7 +28,7 @@ class Decimation:
 
     def __post_init__(self) -> None:
         if self.factor < 1:
-            raise FlexcalError(f"the decimation is {self.factor}; it must be 1 or more.")
+            raise FlexcalError("E-LOG-001", f"the decimation is {self.factor}; it must be 1 or more.")
         _ = self.stages
 
     @classmethod
@@ -49,7 +49,8 @@ class Decimation:
             stage = next((k for k in range(_LARGEST_STAGE, 1, -1) if left % k == 0), None)
             if stage is None:
                 raise FlexcalError(
-                    f"the decimation {self.factor} has a prime factor above {_LARGEST_STAGE}; take a number that divides by less."
+                    "E-LOG-002",
+                    f"the decimation {self.factor} has a prime factor above {_LARGEST_STAGE}; take a number that divides by less.",
                 )
             stages.append(stage)
             left //= stage

@@ -22,9 +22,11 @@ class RecordingLabel:
 
     def __post_init__(self) -> None:
         if self.sign not in (-1, 1):
-            raise FlexcalError(f"the sign of a recording is +1 or -1, not {self.sign}.")
+            raise FlexcalError("E-LOG-003", f"the sign of a recording is +1 or -1, not {self.sign}.")
         if min(self.pose, self.realisation, self.experiment) < 0:
-            raise FlexcalError("pose, realisation and experiment of a recording are counted from 0.")
+            raise FlexcalError(
+                "E-LOG-004", "pose, realisation and experiment of a recording are counted from 0."
+            )
 
     @property
     def name(self) -> str:
@@ -73,9 +75,13 @@ class Recording:
 
     def __post_init__(self) -> None:
         if not 0 < self.time_step < np.inf:
-            raise FlexcalError(f"the time step of a recording is {self.time_step} s; it must be positive.")
+            raise FlexcalError(
+                "E-LOG-005", f"the time step of a recording is {self.time_step} s; it must be positive."
+            )
         if self.q.ndim != 2:
-            raise FlexcalError(f"q of a recording has shape {self.q.shape}; (samples, joints) is needed.")
+            raise FlexcalError(
+                "E-LOG-006", f"q of a recording has shape {self.q.shape}; (samples, joints) is needed."
+            )
         for name in (
             "torque",
             "arm",
@@ -89,20 +95,25 @@ class Recording:
             values = getattr(self, name)
             if values is not None and values.shape != self.q.shape:
                 raise FlexcalError(
-                    f"{name} of a recording has shape {values.shape}, but q has {self.q.shape}."
+                    "E-LOG-007", f"{name} of a recording has shape {values.shape}, but q has {self.q.shape}."
                 )
         for name in ("force", "moment"):
             values = getattr(self, name)
             if values is not None and values.shape != (len(self), 3):
-                raise FlexcalError(f"{name} of a recording has shape {values.shape}, not ({len(self)}, 3).")
+                raise FlexcalError(
+                    "E-LOG-008", f"{name} of a recording has shape {values.shape}, not ({len(self)}, 3)."
+                )
         if self.sensor_readings.shape != (len(self), len(self.sensors)):
             raise FlexcalError(
-                f"readings of {len(self.sensors)} sensors have shape {self.sensor_readings.shape}, but q has {self.q.shape}."
+                "E-LOG-009",
+                f"readings of {len(self.sensors)} sensors have shape {self.sensor_readings.shape}, but q has {self.q.shape}.",
             )
         for name in ("temperature", "payload"):
             values = getattr(self, name)
             if values is not None and values.shape != self.q.shape[:1]:
-                raise FlexcalError(f"{name} of a recording has shape {values.shape}, not ({len(self)},).")
+                raise FlexcalError(
+                    "E-LOG-010", f"{name} of a recording has shape {values.shape}, not ({len(self)},)."
+                )
 
     def __len__(self) -> int:
         return self.q.shape[0]

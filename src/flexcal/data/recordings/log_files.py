@@ -71,6 +71,7 @@ def read_recording(
         later = others[0][0]
         several = f" (the first of {len(others)})" if len(others) > 1 else ""
         raise table.error(
+            "E-LOG-011",
             int(np.argmax(t > later.start - 0.5 * later.time_step)),
             signals["t"].columns[0],
             f"a gap of {later.gap:.6g} s{several} precedes this sample, where {base.time_step:.6g} s is usual; "
@@ -97,7 +98,7 @@ def read_recording_blocks(
         empty = False
         yield _recording(path, signals, values, base, label, model)
     if empty:
-        raise file.error("the file has a header but no rows; add some.")
+        raise file.error("E-LOG-012", "the file has a header but no rows; add some.")
 
 
 def write_recording(path: str | Path, recording: Recording) -> None:
@@ -113,7 +114,8 @@ def write_recording(path: str | Path, recording: Recording) -> None:
         values = values.reshape(len(recording), -1)
         if not np.isfinite(values).all():
             raise InputError(
-                f"{path}: {field} of the recording holds a value that is not finite, so it is not written."
+                "E-LOG-013",
+                f"{path}: {field} of the recording holds a value that is not finite, so it is not written.",
             )
         names = standard_columns(quantity, recording.q.shape[1])
         columns |= {name: values[:, i] for i, name in enumerate(names)}
@@ -164,7 +166,8 @@ def _check_payload(
 ) -> None:
     if model.payload is None:
         raise table.file.error(
-            "there is a column 'payload', but robot.yaml declares none; add `payload:` with the frame to which it is attached."
+            "E-LOG-014",
+            "there is a column 'payload', but robot.yaml declares none; add `payload:` with the frame to which it is attached.",
         )
     first = payload[0] if before is None else before
     wrong = (payload < 0) | (payload != first)
@@ -175,7 +178,7 @@ def _check_payload(
             if payload[row] < 0
             else f"{payload[row]:g} kg follow {first:g} kg; a log has one payload, so cut it there into two files."
         )
-        raise table.error(row, signal.columns[0], sentence)
+        raise table.error("E-LOG-015", row, signal.columns[0], sentence)
 
 
 def _recording(
@@ -216,11 +219,12 @@ def _recording(
 def _check_time(table: Table, signal: Signal, t: np.ndarray, before: float | None) -> None:
     """Of the time stamps `t` (N,) after one at `before` (None: they begin the log)."""
     if before is None and len(t) < 2:
-        raise table.error(0, None, "this is the only sample; a log needs at least two.")
+        raise table.error("E-LOG-016", 0, None, "this is the only sample; a log needs at least two.")
     latest = np.maximum.accumulate(t if before is None else np.maximum(t, before))
     if (latest - t > LATE).any():
         row = int(np.argmax(latest - t > LATE))
         raise table.error(
+            "E-LOG-017",
             row,
             signal.columns[0],
             f"the time runs backwards: {t[row]:.9g} s follows {latest[row]:.9g} s; sort or repair the log, or cut it there into two "
@@ -231,6 +235,7 @@ def _check_time(table: Table, signal: Signal, t: np.ndarray, before: float | Non
     if equal.max() > MOST_EQUAL or (before is None and len(equal) < 2):
         run = int(np.argmax(equal))
         raise table.error(
+            "E-LOG-018",
             int(changes[run]) + 1,
             signal.columns[0],
             f"the time stands still: {equal[run]} rows have {t[changes[run]]:.9g} s; write the time with more digits, or repair the log.",
@@ -248,5 +253,5 @@ def _check_rate(table: Table, signal: Signal, step: float) -> None:
         f"if it is in {unit}, declare 'unit: {unit}' for t under `signals:`." if unit else "check its unit."
     )
     raise table.error(
-        0, signal.columns[0], f"one sample every {step:.6g} s is outside 1 Hz to 20 kHz; {guess}"
+        "E-LOG-019", 0, signal.columns[0], f"one sample every {step:.6g} s is outside 1 Hz to 20 kHz; {guess}"
     )

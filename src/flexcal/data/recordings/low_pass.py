@@ -33,8 +33,9 @@ class LowPass:
     def __post_init__(self) -> None:
         if not 0 < self.cutoff_hz < 0.5 / self.time_step:
             raise FlexcalError(
+                "E-LOG-020",
                 f"a cut-off of {self.cutoff_hz:g} Hz is not between 0 and {0.5 / self.time_step:g} Hz, half the sampling rate; "
-                "correct `cutoff_hz:` in robot.yaml, or the time, which is in seconds."
+                "correct `cutoff_hz:` in robot.yaml, or the time, which is in seconds.",
             )
 
     @property
@@ -77,7 +78,8 @@ class LowPass:
         count = self.support + beyond
         if not self.fits(len(values), beyond):
             raise TooFewSamples(
-                f"{len(values)} samples are too few for a cut-off of {self.cutoff_hz:g} Hz; {count + 1} are needed."
+                "E-LOG-021",
+                f"{len(values)} samples are too few for a cut-off of {self.cutoff_hz:g} Hz; {count + 1} are needed.",
             )
         return 2 * values[0] - values[count:0:-1]
 

@@ -84,7 +84,7 @@ def uniform_blocks(
         repairs += new.repairs
         if clock is None:
             if new.t.size < 2:
-                raise FlexcalError("a recording needs at least two samples.")
+                raise FlexcalError("E-LOG-022", "a recording needs at least two samples.")
             clock = clock_of(new.t, new.values[:, :positions], fill)
             even = _EvenTimes(clock) if clock.even else None
             pending = Samples(np.zeros(0), new.values[:0])

@@ -41,7 +41,7 @@ def check_joint_units(model: RobotModel, table: Table, signal: Signal, q: np.nda
         if likely
         else "check the unit and the order of the columns."
     )
-    raise table.error(row, signal.column_of(column), f"{limits}; {advice}")
+    raise table.error("E-TABLE-001", row, signal.column_of(column), f"{limits}; {advice}")
 
 
 def check_joint_limits(
@@ -72,4 +72,6 @@ def check_joint_limits(
         what = f"{pose}, at {q[row, joint]:.5g} {unit}, leaves less than the {need[joint]:.3g} {unit} that it needs to the {limits}"
     else:
         what = f"{pose}, at {q[row, joint]:.5g} {unit}, is outside the {limits}"
-    raise table.error(int(rows[row]), columns[joint], f"{what}; choose another pose, or correct the URDF.")
+    raise table.error(
+        "E-TABLE-002", int(rows[row]), columns[joint], f"{what}; choose another pose, or correct the URDF."
+    )

@@ -91,8 +91,9 @@ class Signal:
         if self.matrix is not None:
             if self.matrix.shape[0] != self.matrix.shape[1] or np.linalg.cond(self.matrix) > 1e12:
                 raise InputError(
+                    "E-TABLE-003",
                     f"the matrix of signals.{self.quantity} has no inverse, so {', '.join(self.columns)} cannot be written; "
-                    f"give the targets in {', '.join(standard_columns(self.quantity, len(self.offset)))}."
+                    f"give the targets in {', '.join(standard_columns(self.quantity, len(self.offset)))}.",
                 )
             raw = np.linalg.solve(self.matrix, raw.T).T
         return {name: raw[:, i] / self.factor[i] for i, name in enumerate(self.columns)}
@@ -154,7 +155,7 @@ def assign(
             hint = (
                 suggestion(column, [*known, *texts]) or "; rename it, map it under `signals:`, or remove it."
             )
-            raise file.error(f"the column '{column}' is not known{hint}")
+            raise file.error("E-TABLE-004", f"the column '{column}' is not known{hint}")
     return assigned
 
 
@@ -165,7 +166,8 @@ def _choose(file: TableFile, quantity: str, n: int, mapped: Signal | None, requi
             return mapped
         if len(missing) < len(mapped.columns):
             raise file.error(
-                f"the column '{missing[0]}', which `signals:` names for {quantity}, is missing; add it."
+                "E-TABLE-005",
+                f"the column '{missing[0]}', which `signals:` names for {quantity}, is missing; add it.",
             )
     standard = standard_signal(quantity, n)
     if quantity in JOINT_QUANTITIES:
@@ -177,7 +179,9 @@ def _choose(file: TableFile, quantity: str, n: int, mapped: Signal | None, requi
         instead = f" (or {', '.join(mapped.columns)} of `signals:`)" if mapped is not None else ""
         near = suggestion(missing[0], [name for name in file.columns if name not in standard.columns])
         elsewhere = ", or map it under `signals:`" if quantity in JOINT_QUANTITIES and mapped is None else ""
-        raise file.error(f"the column '{missing[0]}'{instead} is missing{near or f'; add it{elsewhere}.'}")
+        raise file.error(
+            "E-TABLE-006", f"the column '{missing[0]}'{instead} is missing{near or f'; add it{elsewhere}.'}"
+        )
     return None
 
 
@@ -188,19 +192,21 @@ def _check_joint_count(file: TableFile, quantity: str, n: int) -> None:
     count = len(numbers)
     if count and sorted(numbers) == list(range(1, count + 1)) and count != n:
         raise file.error(
+            "E-TABLE-007",
             f"there are {count} columns {quantity}1…{quantity}{count}, but the robot has {n} joints; "
-            f"give {quantity}1…{quantity}{n}, or check that this is the right robot.yaml."
+            f"give {quantity}1…{quantity}{n}, or check that this is the right robot.yaml.",
         )
 
 
 def _mapped(model: RobotModel, name: str, config: SignalConfig) -> Signal:
-    def wrong(key: str, sentence: str) -> InputError:
-        return read_yaml_file(model.path).error(("signals", name, key), f"signals.{name}: {sentence}")
+    def wrong(code: str, key: str, sentence: str) -> InputError:
+        return read_yaml_file(model.path).error(code, ("signals", name, key), f"signals.{name}: {sentence}")
 
     sensors = {sensor.column: SENSOR_UNITS[sensor.order] for sensor in model.sensors.values()}
     known = {**UNITS, **sensors}
     if name not in known:
         raise wrong(
+            "E-TABLE-008",
             "",
             f"this quantity is not known{suggestion(name, list(known)) or '; known are ' + ', '.join(known) + '.'}",
         )
@@ -209,28 +215,38 @@ def _mapped(model: RobotModel, name: str, config: SignalConfig) -> Signal:
     if config.unit is not None:
         if config.unit not in known[name]:
             listed = ", ".join(known[name]) or "none"
-            raise wrong("unit", f"the unit '{config.unit}' does not fit; possible are {listed}.")
+            raise wrong(
+                "E-TABLE-009", "unit", f"the unit '{config.unit}' does not fit; possible are {listed}."
+            )
         unit = known[name][config.unit]
         if config.unit in ("A", "mA") and config.gain is None and config.matrix is None:
             raise wrong(
-                "unit", "currents become torques only by a gain; add `gain:` with N m/A, one per column."
+                "E-TABLE-010",
+                "unit",
+                "currents become torques only by a gain; add `gain:` with N m/A, one per column.",
             )
     if len(set(config.columns)) != k:
-        raise wrong("columns", "a column stands twice; name each once.")
+        raise wrong("E-TABLE-011", "columns", "a column stands twice; name each once.")
     if config.gain is not None and len(config.gain) != k:
-        raise wrong("gain", f"there are {len(config.gain)} gains for {k} columns; give one each.")
+        raise wrong(
+            "E-TABLE-012", "gain", f"there are {len(config.gain)} gains for {k} columns; give one each."
+        )
     if config.offset is not None and len(config.offset) != m:
-        raise wrong("offset", f"there are {len(config.offset)} offsets for {m} values; give one each.")
+        raise wrong(
+            "E-TABLE-013", "offset", f"there are {len(config.offset)} offsets for {m} values; give one each."
+        )
     matrix = None
     if config.matrix is not None:
         matrix = read_matrix(model.path.parent / config.matrix)
         if matrix.shape != (m, k):
             raise wrong(
+                "E-TABLE-014",
                 "matrix",
                 f"{config.matrix} is {matrix.shape[0]} × {matrix.shape[1]}, but {m} × {k} is needed.",
             )
     elif k != m:
         raise wrong(
+            "E-TABLE-015",
             "columns",
             f"{k} columns are named, but {m} are needed ({', '.join(standard_columns(name, model.n))}).",
         )
@@ -256,12 +272,16 @@ def read_matrix(path: str | Path) -> np.ndarray:
                 rows[-1].append(float(cell))
             except ValueError:
                 raise InputError(
-                    f"{path} line {number}, column {column}: '{cell.strip()}' is not a number; correct it."
+                    "E-TABLE-016",
+                    f"{path} line {number}, column {column}: '{cell.strip()}' is not a number; correct it.",
                 ) from None
         if len(rows[-1]) != len(rows[0]) or not np.isfinite(rows[-1]).all():
             raise InputError(
-                f"{path} line {number}: {len(rows[0])} finite numbers are needed here; correct it."
+                "E-TABLE-017",
+                f"{path} line {number}: {len(rows[0])} finite numbers are needed here; correct it.",
             )
     if not rows:
-        raise InputError(f"{path} line 1: the file is empty; write the matrix, one row a line.")
+        raise InputError(
+            "E-TABLE-018", f"{path} line 1: the file is empty; write the matrix, one row a line."
+        )
     return np.array(rows)

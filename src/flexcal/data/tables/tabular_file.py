@@ -38,10 +38,10 @@ class Table:
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
 
-    def error(self, row: int, column: str | None, sentence: str) -> InputError:
+    def error(self, code: str, row: int, column: str | None, sentence: str) -> InputError:
         """An `InputError` that places `sentence` at a row (index in this table) and a column."""
         place = f"{self.file.path} {self.file.row_word} {self.first + row}"
-        return InputError(f"{place}{f', column {column}' if column else ''}: {sentence}")
+        return InputError(code, f"{place}{f', column {column}' if column else ''}: {sentence}")
 
 
 @dataclass(frozen=True)
@@ -56,16 +56,16 @@ class TableFile:
     def row_word(self) -> str:
         return "line" if self.path.suffix == ".csv" else "row"
 
-    def error(self, sentence: str) -> InputError:
+    def error(self, code: str, sentence: str) -> InputError:
         """An `InputError` about the header."""
         place = f" line {self.first - 1}" if self.path.suffix == ".csv" else ""
-        return InputError(f"{self.path}{place}: {sentence}")
+        return InputError(code, f"{self.path}{place}: {sentence}")
 
     def read(self, texts: Collection[str] = ()) -> Table:
         """All rows; `texts` are the columns that hold names. Raises `InputError` with row and column of the first fault."""
         blocks = list(self.blocks(texts, None))
         if not blocks:
-            raise self.error("the file has a header but no rows; add some.")
+            raise self.error("E-TABLE-019", "the file has a header but no rows; add some.")
         return blocks[0]
 
     def blocks(self, texts: Collection[str] = (), rows: int | None = 1_000_000) -> Iterator[Table]:
@@ -95,7 +95,8 @@ class TableFile:
             for column in self.columns:
                 if column not in texts and not schema[column].is_numeric():
                     raise self.error(
-                        f"the column '{column}' holds {schema[column]}, not numbers; convert it."
+                        "E-TABLE-020",
+                        f"the column '{column}' holds {schema[column]}, not numbers; convert it.",
                     )
             scan = scan.with_columns(
                 [pl.col(c).cast(pl.String if c in texts else pl.Float64) for c in self.columns]
@@ -115,7 +116,8 @@ class TableFile:
                     return
         except pl.exceptions.PolarsError as problem:
             raise InputError(
-                f"{self.path}: not a readable Parquet file ({_one_line(problem)}); export it again."
+                "E-TABLE-021",
+                f"{self.path}: not a readable Parquet file ({_one_line(problem)}); export it again.",
             ) from problem
 
 
@@ -126,9 +128,11 @@ def open_table(path: str | Path) -> TableFile:
     """
     path = Path(path)
     if path.is_dir():
-        raise InputError(f"{path} is a folder; name a table{tables_in(path)}.")
+        raise InputError("E-TABLE-022", f"{path} is a folder; name a table{tables_in(path)}.")
     if path.suffix not in (".csv", ".parquet"):
-        raise InputError(f"{path}: a table must end in .csv or .parquet; convert it or rename it.")
+        raise InputError(
+            "E-TABLE-023", f"{path}: a table must end in .csv or .parquet; convert it or rename it."
+        )
     with _open(path) as stream:
         if path.suffix == ".csv":
             columns, first = _csv_header(path, stream)
@@ -137,7 +141,7 @@ def open_table(path: str | Path) -> TableFile:
             file = TableFile(path, _parquet_columns(path), 1)
     twice = [name for i, name in enumerate(file.columns) if name in file.columns[:i]]
     if twice:
-        raise file.error(f"the column '{twice[0]}' stands twice; rename or remove one.")
+        raise file.error("E-TABLE-024", f"the column '{twice[0]}' stands twice; rename or remove one.")
     return file
 
 
@@ -147,7 +151,7 @@ def write_table(path: str | Path, columns: Mapping[str, np.ndarray]) -> None:
 
     path = Path(path)
     if path.suffix not in (".csv", ".parquet"):
-        raise InputError(f"{path}: a table must end in .csv or .parquet; give another name.")
+        raise InputError("E-TABLE-025", f"{path}: a table must end in .csv or .parquet; give another name.")
     frame = pl.DataFrame({name: pl.Series(values) for name, values in columns.items()})
     with atomic_path(path) as temporary, temporary.open("wb") as stream:
         if path.suffix == ".csv":
@@ -186,12 +190,14 @@ def _parquet_columns(path: Path) -> tuple[str, ...]:
     try:
         str(path).encode("utf-8")
     except UnicodeEncodeError:
-        raise InputError(f"{path}: the path of a Parquet file must be UTF-8; rename what is not.") from None
+        raise InputError(
+            "E-TABLE-026", f"{path}: the path of a Parquet file must be UTF-8; rename what is not."
+        ) from None
     try:
         return tuple(pl.read_parquet_schema(current_path(path)))
     except (pl.exceptions.PolarsError, OSError) as problem:
         raise InputError(
-            f"{path}: not a readable Parquet file ({_one_line(problem)}); export it again."
+            "E-TABLE-027", f"{path}: not a readable Parquet file ({_one_line(problem)}); export it again."
         ) from problem
 
 
@@ -202,23 +208,27 @@ def _csv_header(path: Path, stream: BinaryIO) -> tuple[tuple[str, ...], int]:
             continue
         if "\r" in text:
             raise InputError(
-                f"{path} line {number}: lines end with CR alone; save the file with other line ends, or let 'flexcal import' read it."
+                "E-TABLE-028",
+                f"{path} line {number}: lines end with CR alone; save the file with other line ends, or let 'flexcal import' read it.",
             )
         names = tuple(_row(path, number, text))
         if len(names) == 1 and any(mark in text for mark in ";\t"):
             raise InputError(
-                f"{path} line {number}: the columns are not separated by commas; save it with commas, or let 'flexcal import' read it."
+                "E-TABLE-029",
+                f"{path} line {number}: the columns are not separated by commas; save it with commas, or let 'flexcal import' read it.",
             )
         if all(_is_number(name) for name in names):
             raise InputError(
-                f"{path} line {number}: the header with the names of the columns is missing; add it."
+                "E-TABLE-030",
+                f"{path} line {number}: the header with the names of the columns is missing; add it.",
             )
         if "" in names:
             raise InputError(
-                f"{path} line {number}: column {names.index('') + 1} has no name; name or remove it."
+                "E-TABLE-031",
+                f"{path} line {number}: column {names.index('') + 1} has no name; name or remove it.",
             )
         return names, number + 1
-    raise InputError(f"{path} line 1: the file is empty; it needs a header and rows.")
+    raise InputError("E-TABLE-032", f"{path} line 1: the file is empty; it needs a header and rows.")
 
 
 def _decoded(path: Path, raw: bytes, line: int) -> str:
@@ -226,7 +236,8 @@ def _decoded(path: Path, raw: bytes, line: int) -> str:
         return raw.decode("utf-8")
     except UnicodeDecodeError as problem:
         raise InputError(
-            f"{path} line {line}: not UTF-8 text; save the file as UTF-8, or let 'flexcal import' read it."
+            "E-TABLE-033",
+            f"{path} line {line}: not UTF-8 text; save the file as UTF-8, or let 'flexcal import' read it.",
         ) from problem
 
 
@@ -288,17 +299,18 @@ def _read_cells(file: TableFile, content: bytes, texts: Collection[str], line: i
         if not text and number == line + content.count(b"\n"):
             break
         if not text.strip():
-            raise InputError(f"{file.path} line {number}: the line is empty; remove it.")
+            raise InputError("E-TABLE-034", f"{file.path} line {number}: the line is empty; remove it.")
         row = _row(file.path, number, text)
         if len(row) != len(file.columns):
             raise InputError(
+                "E-TABLE-035",
                 f"{file.path} line {number}: there are {len(row)} values, but the header names {len(file.columns)} columns; "
-                "complete the line or remove it."
+                "complete the line or remove it.",
             )
         for name, cell in zip(file.columns, row, strict=True):
             fault = _fault(cell, name in texts)
             if fault:
-                raise InputError(f"{file.path} line {number}, column {name}: {fault}")
+                raise InputError("E-TABLE-036", f"{file.path} line {number}, column {name}: {fault}")
             cells[name].append(cell if name in texts else float(cell))
     return {
         name: np.array(values, dtype=str if name in texts else np.float64) for name, values in cells.items()
@@ -309,7 +321,9 @@ def _row(path: Path, line: int, text: str) -> list[str]:
     try:
         return [cell.strip() for cell in next(csv.reader([text]))]
     except csv.Error as problem:
-        raise InputError(f"{path} line {line}: the line cannot be read ({problem}); correct it.") from problem
+        raise InputError(
+            "E-TABLE-037", f"{path} line {line}: the line cannot be read ({problem}); correct it."
+        ) from problem
 
 
 def _measurable(values: np.ndarray) -> np.ndarray:
@@ -344,6 +358,7 @@ def _check_finite(table: Table, frame: pl.DataFrame) -> None:
     for name, values in table.columns.items():
         if frame[name].null_count():
             raise table.error(
+                "E-TABLE-038",
                 int(np.argmax(frame[name].is_null().to_numpy())),
                 name,
                 "the value is missing; complete or remove this row, and others like it.",
@@ -351,6 +366,7 @@ def _check_finite(table: Table, frame: pl.DataFrame) -> None:
         if values.dtype.kind == "f" and not _measurable(values).all():
             row = int(np.argmin(_measurable(values)))
             raise table.error(
+                "E-TABLE-039",
                 row,
                 name,
                 f"the value is {values[row]}, which is no measurement; remove this row, and others like it, or measure them again.",

@@ -96,7 +96,10 @@ class _Seconds:
                     "" if stamp is None or first is None else " with date and time zone as in the first row"
                 )
                 raise table.error(
-                    row, column, f"'{text}' is no time{like}; write it as 2026-03-01T12:00:00.123."
+                    "E-TABLE-040",
+                    row,
+                    column,
+                    f"'{text}' is no time{like}; write it as 2026-03-01T12:00:00.123.",
                 )
             since = (stamp[0] - first[0]) + (stamp[1] - first[1])
             if not first[2] and since - self._last < -_DAY / 2:

@@ -78,8 +78,9 @@ def within_preload(model: RobotModel, plan: MultisinePlan) -> MultisinePlan:
     shares = [amplitude_share(backlash_load(model, q, plan), plan.amplitude) for q in plan.poses]
     if min(shares) < LOWEST:
         raise FlexcalError(
+            "E-DESIGN-001",
             f"gravity does not load the drives with backlash in pose {int(np.argmin(shares)) + 1} enough: their gaps would stay closed "
-            f"only with {100 * min(shares):.0f} % of the excitation; choose another pose or a smaller reference motion."
+            f"only with {100 * min(shares):.0f} % of the excitation; choose another pose or a smaller reference motion.",
         )
     return replace(plan, amplitude=min(1.0, *shares) * plan.amplitude)
 

@@ -32,8 +32,9 @@ class FrequencyPoseCandidates:
         for name, low, high, free in zip(self.model.joint_names, self.lower, self.upper, need, strict=True):
             if low >= high:
                 raise FlexcalError(
+                    "E-DESIGN-002",
                     f"the limits of {name} leave less room than the {np.degrees(free):.3g}° that the motion under the excitation needs "
-                    "on either side; lower the reference motion."
+                    "on either side; lower the reference motion.",
                 )
 
     def random(self, count: int, rng: np.random.Generator, progress: Progress = silent) -> np.ndarray:
@@ -52,8 +53,9 @@ class FrequencyPoseCandidates:
                 break
         losses = ", ".join(f"{name} threw out {number}" for name, number in lost.items())
         raise FlexcalError(
+            "E-DESIGN-003",
             f"of {drawn} random poses of {self.model.name} only {len(accepted)} of the wanted {count} can be excited: {losses}; "
-            "lower the excitation or the reference motion, or hold a heavier payload."
+            "lower the excitation or the reference motion, or hold a heavier payload.",
         )
 
     def near(self, q: np.ndarray, count: int, spread: float, rng: np.random.Generator) -> np.ndarray:

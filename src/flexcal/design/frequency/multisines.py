@@ -54,11 +54,13 @@ def flat_multisine(
     """
     if not model.driven:
         raise InputError(
-            f"{model.path} declares no elastic joint, so there is nothing to excite; add `elastic:`."
+            "E-DESIGN-004",
+            f"{model.path} declares no elastic joint, so there is nothing to excite; add `elastic:`.",
         )
     if model.controller is None:
         raise InputError(
-            f"{model.path} declares no controller; add `controller: {{kp: […], kd: […], rate_hz: 4000}}`."
+            "E-DESIGN-005",
+            f"{model.path} declares no controller; add `controller: {{kp: […], kd: […], rate_hz: 4000}}`.",
         )
     lines = odd_lines(schedule.base_frequency_hz, *BAND_HZ)
     joints = tuple(e.index for e in model.driven)
@@ -66,7 +68,8 @@ def flat_multisine(
     if not np.all(np.isfinite(efforts) & (efforts > 0)):
         joint = model.joint_names[joints[int(np.argmin(np.isfinite(efforts) & (efforts > 0)))]]
         raise FlexcalError(
-            f"{model.urdf.name} gives {joint} no positive effort, of which the excitation is a share."
+            "E-DESIGN-006",
+            f"{model.urdf.name} gives {joint} no positive effort, of which the excitation is a share.",
         )
     amplitude = EXCITATION * efforts * np.sqrt(2 * len(joints) / len(lines))
     return MultisinePlan(

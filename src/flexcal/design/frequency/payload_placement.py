@@ -43,13 +43,15 @@ def payload_placements(
     payload = model.payload
     if payload is None or plan.payload == 0 or not payload.mass > 0:
         raise FlexcalError(
-            f"{model.path} declares no payload for this plan, so no placement can be evaluated; add `payload:`."
+            "E-DESIGN-007",
+            f"{model.path} declares no payload for this plan, so no placement can be evaluated; add `payload:`.",
         )
     axis = model.joints[payload.joint].axis
     if np.linalg.norm(np.cross(axis, payload.com_in_link)) < 1e-3:
         raise FlexcalError(
+            "E-DESIGN-008",
             f"the payload's centre of mass lies on the axis of {model.joint_names[payload.joint]}, so its direction has "
-            f"no effect; declare in {model.path} its offset from the axis."
+            f"no effect; declare in {model.path} its offset from the axis.",
         )
     places = []
     for number in range(DIRECTIONS):

@@ -72,8 +72,9 @@ def choose_frequency_poses(
     worst, std = largest_stiffness_std(screened, chosen)
     if std > LOG_STD_LIMIT:
         raise FlexcalError(
+            "E-DESIGN-009",
             f"{count} poses cannot determine {worst}: its predicted standard deviation is {100 * std:.0f} %; choose more poses, "
-            "or hold a payload off the wrist's axis."
+            "or hold a payload off the wrist's axis.",
         )
     return FrequencyPoseSelection(pool[chosen], pool, drawn, chosen, screened)
 

@@ -74,8 +74,9 @@ class PlannedResponses:
         name, reached = largest_stiffness_std(most.sensitivity)
         if reached > wanted:
             raise FlexcalError(
+                "E-DESIGN-010",
                 f"a standard deviation of {100 * wanted:g} % is not reached with any duration: {MOST} realisations leave "
-                f"{100 * reached:.2g} % for {name}; choose more poses or hold a payload off the wrist's axis."
+                f"{100 * reached:.2g} % for {name}; choose more poses or hold a payload off the wrist's axis.",
             )
         for _, realisations, kept in sorted(tried):
             planned = self._measured(realisations, kept)

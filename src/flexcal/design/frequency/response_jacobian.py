@@ -168,7 +168,8 @@ def pose_response(
     """
     if plan.joints != tuple(joint.index for joint in model.driven):
         raise FlexcalError(
-            f"the plan must excite exactly the elastic joints of {model.path}, in their order."
+            "E-DESIGN-011",
+            f"the plan must excite exactly the elastic joints of {model.path}, in their order.",
         )
     frequencies = plan.frequencies_hz
     rubbing = [f"{joint.name}.viscous" for joint in model.driven]

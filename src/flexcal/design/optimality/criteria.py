@@ -94,7 +94,8 @@ class SpectralCriterion:
     def __post_init__(self) -> None:
         if self.name not in SPECTRAL_NAMES:
             raise FlexcalError(
-                f"there is no spectral criterion '{self.name}'; there are {', '.join(SPECTRAL_NAMES)}."
+                "E-DESIGN-012",
+                f"there is no spectral criterion '{self.name}'; there are {', '.join(SPECTRAL_NAMES)}.",
             )
 
     def of_eigenvalues(self, eigenvalues: np.ndarray) -> np.ndarray:
@@ -170,7 +171,8 @@ def observability(
     stacked = rows.reshape(-1, rows.shape[2])
     if len(stacked) < stacked.shape[1]:
         raise FlexcalError(
-            f"{len(rows)} poses give {len(stacked)} rows, too few for {stacked.shape[1]} parameters; choose more poses."
+            "E-DESIGN-013",
+            f"{len(rows)} poses give {len(stacked)} rows, too few for {stacked.shape[1]} parameters; choose more poses.",
         )
     squares = np.linalg.svd(stacked, compute_uv=False) ** 2
     value = {name: float(SpectralCriterion(name).of_eigenvalues(squares)) for name in SPECTRAL_NAMES}
@@ -183,7 +185,8 @@ def _inverse(information: np.ndarray) -> np.ndarray:
         factor = np.linalg.cholesky(information)
     except np.linalg.LinAlgError as problem:
         raise FlexcalError(
-            "the measurements leave a combination of parameters undetermined; choose more of them or give a prior."
+            "E-DESIGN-014",
+            "the measurements leave a combination of parameters undetermined; choose more of them or give a prior.",
         ) from problem
     root = np.linalg.solve(factor, np.eye(len(information)))
     return root.T @ root

@@ -34,4 +34,6 @@ def exchange(
     check_selection(sensitivity, count, criterion, start)
     if isinstance(criterion, SpectralCriterion):
         return spectral_exchange(sensitivity, count, criterion, start=start, passes=passes, progress=progress)
-    raise FlexcalError(f"exchange knows D, trace and spectral criteria, not {criterion.name}.")
+    raise FlexcalError(
+        "E-DESIGN-015", f"exchange knows D, trace and spectral criteria, not {criterion.name}."
+    )

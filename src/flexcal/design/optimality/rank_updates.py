@@ -94,7 +94,8 @@ class RankUpdates:
             factor = np.linalg.cholesky(_symmetric(prior + pool))
         except np.linalg.LinAlgError as problem:
             raise FlexcalError(
-                "all candidates together leave a combination of parameters undetermined; reduce them to base parameters or give a prior."
+                "E-DESIGN-016",
+                "all candidates together leave a combination of parameters undetermined; reduce them to base parameters or give a prior.",
             ) from problem
         root = np.linalg.solve(factor, np.eye(self.size))
         self._flat = np.ascontiguousarray(flat @ root.T)
@@ -231,18 +232,22 @@ def check_selection(
     """Raise `FlexcalError` where `count` or `start` do not fit the candidates, or cannot determine the parameters."""
     candidates, rows, size = sensitivity.jacobian.shape
     if not 0 < count <= candidates:
-        raise FlexcalError(f"cannot choose {count} of {candidates} candidates; each serves once.")
+        raise FlexcalError(
+            "E-DESIGN-017", f"cannot choose {count} of {candidates} candidates; each serves once."
+        )
     if start is not None:
         least = count if isinstance(criterion, SpectralCriterion) else 0
         if not least <= len(start) <= count or len(set(start)) < len(start):
             wanted = "exactly" if least else "at most"
             raise FlexcalError(
-                f"start holds {len(start)} candidates for a set of {count}; give {wanted} {count} different ones."
+                "E-DESIGN-018",
+                f"start holds {len(start)} candidates for a set of {count}; give {wanted} {count} different ones.",
             )
     known = np.linalg.matrix_rank(sensitivity.prior_information) if criterion.uses_prior else 0
     if determine and count * rows + known < size:
         raise FlexcalError(
-            f"{count} measurements of {rows} rows cannot determine {size} parameters; choose at least {-(-(size - known) // rows)}."
+            "E-DESIGN-019",
+            f"{count} measurements of {rows} rows cannot determine {size} parameters; choose at least {-(-(size - known) // rows)}.",
         )
 
 

@@ -54,7 +54,7 @@ def pose_curve(
         most = min(total, 4 * len(design.plan))
         counts = np.unique(np.geomspace(least, most, 16).round().astype(int)).tolist()
     if min(counts) < 1 or max(counts) > total:
-        raise FlexcalError(f"counts must lie between 1 and the {total} candidates.")
+        raise FlexcalError("E-DESIGN-020", f"counts must lie between 1 and the {total} candidates.")
     progress("how many", 0.0)
     order = greedy(sensitivity, max(counts), TraceOptimal(design.tool_error_weight, "c")).chosen
     chosen = [tool_error(design.base, design.tool_error_weight, order[:k]) for k in counts]

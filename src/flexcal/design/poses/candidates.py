@@ -46,8 +46,9 @@ def random_candidates(
         if drawn >= _TRIES * count + 1000:
             losses = ", ".join(f"{name} threw out {number}" for name, number in lost.items())
             raise FlexcalError(
+                "E-DESIGN-021",
                 f"of {drawn} random poses of {model.name} only {have} of the wanted {count} are usable: {losses}; "
-                "relax the most restrictive one (station, acceptance, obstacles, floor, payload)."
+                "relax the most restrictive one (station, acceptance, obstacles, floor, payload).",
             )
         share = max(have / drawn, 0.02) if drawn else 0.5
         q = rng.uniform(lower, upper, (int(1.1 * (count - have) / share) + 16, model.n))

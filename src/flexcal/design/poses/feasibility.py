@@ -95,17 +95,19 @@ def _usable(
     """The poses of a pool that can be measured, of those `seen` (a mask); raises `FlexcalError` where they are fewer than `least`."""
     if not seen.any():
         raise FlexcalError(
+            "E-DESIGN-022",
             f"the instrument can measure none of the {len(given)} poses of the pool; check where `stations:` puts it, the "
             "acceptance of the "
-            "reflector, and obstacles in its line of sight."
+            "reflector, and obstacles in its line of sight.",
         )
     shown = given.subset(seen)
     usable = shown.subset(preloaded(checker.model, shown.q, setup.payload))
     if len(usable) < least:
         hidden = f", of which the instrument can measure {len(shown)}" if len(shown) < len(given) else ""
         raise FlexcalError(
+            "E-DESIGN-023",
             f"the pool holds {len(given)} poses{hidden}, and the flank of every backlash is certain in {len(usable)} of them; "
-            f"{least} cannot be chosen; give more poses or a smaller --count."
+            f"{least} cannot be chosen; give more poses or a smaller --count.",
         )
     return usable
 
@@ -115,7 +117,8 @@ def _check_flanks(model: RobotModel, q: np.ndarray, payload: float | None) -> No
     for i in preload_joints(model):
         if np.all(torque[:, i] > 0) or np.all(torque[:, i] < 0):
             raise FlexcalError(
+                "E-DESIGN-024",
                 f"gravity presses {model.joint_names[i]} onto the same flank in all {len(q)} usable poses, so its backlash is "
                 "not identifiable beside "
-                "its offset; relax the restrictions of the poses, or take it from `geometry: backlash:`."
+                "its offset; relax the restrictions of the poses, or take it from `geometry: backlash:`.",
             )

@@ -118,7 +118,8 @@ def base_sensitivity(full: Sensitivity) -> BaseSensitivity:
     if not np.all(np.isfinite(tolerance)):
         name = full.parameters.names[int(np.argmin(np.isfinite(tolerance)))]
         raise FlexcalError(
-            f"{name} has no tolerance; give every parameter a finite prior_std, it sets the scale."
+            "E-DESIGN-025",
+            f"{name} has no tolerance; give every parameter a finite prior_std, it sets the scale.",
         )
     # σ_min has a meaning in declared units only: the station is scaled like any other length
     scale = np.where([p.unit == "rad" for p in full.parameters], tolerance, _length_scale(full.parameters))

@@ -183,8 +183,9 @@ def choose_poses(
     rank = candidates.base.identifiability.rank
     if 3 * count < rank:
         raise FlexcalError(
+            "E-DESIGN-026",
             f"{count} poses cannot determine {rank} geometric parameters of {candidates.model.name}; "
-            f"choose at least {-(-rank // 3)}, better twice as many."
+            f"choose at least {-(-rank // 3)}, better twice as many.",
         )
     wanted = criterion_named(criterion, candidates.tool_error_weight)
     selection = exchange_on_shortlist(candidates.base.sensitivity, count, wanted, progress=progress)
@@ -201,8 +202,9 @@ def fewest_poses(candidates: PoseCandidates, most: int, wanted: float) -> int:
             return count
     reached = tool_error(candidates.base, weight, order)
     raise FlexcalError(
+        "E-DESIGN-027",
         f"{most} poses predict a tool error of {reached / MILLIMETRE:.4f} mm from tracker noise alone, not {wanted / MILLIMETRE:.4f} mm; "
-        "allow more poses, or a larger error."
+        "allow more poses, or a larger error.",
     )
 
 
@@ -233,7 +235,9 @@ def criterion_named(name: CriterionName, weight: np.ndarray) -> Criterion:
             return DOptimal()
         case "E" | "O1" | "O2" | "O3" | "O4" | "O5":
             return SpectralCriterion(name)
-    raise FlexcalError(f"there is no criterion '{name}'; choose one of {', '.join(get_args(CriterionName))}.")
+    raise FlexcalError(
+        "E-DESIGN-028", f"there is no criterion '{name}'; choose one of {', '.join(get_args(CriterionName))}."
+    )
 
 
 def _plan(q: np.ndarray, setup: MeasuringSetup, rng: np.random.Generator) -> PosePlan:

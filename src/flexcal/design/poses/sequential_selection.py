@@ -57,7 +57,9 @@ def next_poses(
     """
     merit = criterion_named(criterion, candidates.tool_error_weight)
     if not isinstance(merit, DOptimal | TraceOptimal):
-        raise FlexcalError(f"the criterion of the next poses must be c, A or D, not {criterion}.")
+        raise FlexcalError(
+            "E-DESIGN-029", f"the criterion of the next poses must be c, A or D, not {criterion}."
+        )
     before = candidates.base.sensitivity
     added, noisier = measured_information(candidates, measured)
     information = before.prior_information + added
@@ -105,9 +107,12 @@ def _rows(candidates: PoseCandidates, measured: PoseSet) -> tuple[np.ndarray, np
 def _check(model: RobotModel, measured: PoseSet, setup: MeasuringSetup) -> None:
     target, station = model.point(setup.point).name, setup.station or model.stations[0]
     if measured.length is not None:
-        raise FlexcalError("the next poses are chosen after measured points, not after lengths of a wire.")
+        raise FlexcalError(
+            "E-DESIGN-030", "the next poses are chosen after measured points, not after lengths of a wire."
+        )
     for word, names, own in (("target", measured.targets, target), ("station", measured.stations, station)):
         if names != (own,):
             raise FlexcalError(
-                f"the measured poses hold the {word} {', '.join(names)}, but the next ones are chosen for {own}; give those only."
+                "E-DESIGN-031",
+                f"the measured poses hold the {word} {', '.join(names)}, but the next ones are chosen for {own}; give those only.",
             )

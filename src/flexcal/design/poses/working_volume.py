@@ -44,14 +44,16 @@ def working_box(
     """
     if not np.all(lower < upper):
         raise FlexcalError(
-            f"the working volume from {_told(lower)} to {_told(upper)} is no box; give every smallest coordinate before the largest."
+            "E-DESIGN-032",
+            f"the working volume from {_told(lower)} to {_told(upper)} is no box; give every smallest coordinate before the largest.",
         )
     wanted = rng.uniform(lower, upper, (BOX_POINTS, 3))
     q, reached = _configurations(checker, wanted, rng, point)
     if not reached.any():
         raise FlexcalError(
+            "E-DESIGN-033",
             f"{checker.model.name} reaches no point of the working volume from {_told(lower)} to {_told(upper)} m without touching "
-            f"something, though it reaches {checker.model.reach:.3g} m; give it in m in the robot's base frame."
+            f"something, though it reaches {checker.model.reach:.3g} m; give it in m in the robot's base frame.",
         )
     return WorkingVolume(q[reached], wanted[reached], float(reached.mean()), np.stack([lower, upper]))
 
@@ -64,8 +66,9 @@ def working_points(
     if not reached.all():
         first = int(np.argmin(reached))
         raise FlexcalError(
+            "E-DESIGN-034",
             f"{checker.model.name} does not reach working point {first + 1} at {_told(points[first])} m without touching something "
-            f"({int(np.sum(~reached))} of {len(points)} points are like that); give them in m in the robot's base frame."
+            f"({int(np.sum(~reached))} of {len(points)} points are like that); give them in m in the robot's base frame.",
         )
     return WorkingVolume(q, points)
 

@@ -134,8 +134,9 @@ class CollisionChecker:
             if second in self._obstacles:
                 link, obstacle = self._names((first, second))
                 raise InputError(
+                    "E-DESIGN-035",
                     f"the obstacle {obstacle} touches {link} of {self.model.name} in every configuration; correct "
-                    "its position in its URDF, which is in the robot's base frame, or remove it from `obstacles:`."
+                    "its position in its URDF, which is in the robot's base frame, or remove it from `obstacles:`.",
                 )
 
     def _set_pairs(self, pairs: list[tuple[int, int]], margins: list[float]) -> Any:
@@ -194,8 +195,9 @@ def _shapes(pin_model: Any, urdf: Path) -> Any:
     except (ValueError, RuntimeError) as problem:
         reason = str(problem).strip().splitlines()[0]
         raise InputError(
+            "E-DESIGN-036",
             f"{urdf}: its collision shapes cannot be read ({reason}); put the meshes beside it, or the package into a folder "
-            "above it, or use primitives."
+            "above it, or use primitives.",
         ) from problem
     for item in geometry.geometryObjects:
         if isinstance(item.geometry, coal.BVHModelBase):
@@ -208,13 +210,19 @@ def _add_obstacle(geometry: Any, path: Path) -> None:
     import pinocchio as pin
 
     if not path.is_file():
-        raise InputError(f"{path}: there is no such obstacle; correct `obstacles:` in robot.yaml.")
+        raise InputError(
+            "E-DESIGN-037", f"{path}: there is no such obstacle; correct `obstacles:` in robot.yaml."
+        )
     try:
         model = pin.buildModelFromXML(read_elements(path).text())
     except (ValueError, RuntimeError) as problem:
-        raise InputError(f"{path}: not a valid URDF; correct it or remove it from `obstacles:`.") from problem
+        raise InputError(
+            "E-DESIGN-038", f"{path}: not a valid URDF; correct it or remove it from `obstacles:`."
+        ) from problem
     if model.njoints > 1:
-        raise InputError(f"{path}: an obstacle must not move, but this one has joints; make them fixed.")
+        raise InputError(
+            "E-DESIGN-039", f"{path}: an obstacle must not move, but this one has joints; make them fixed."
+        )
     for item in _shapes(model, path).geometryObjects:
         name = f"{path.stem}.{item.name}"
         geometry.addGeometryObject(pin.GeometryObject(name, 0, 0, item.placement, item.geometry))

@@ -24,7 +24,8 @@ def station_position(model: RobotModel, station: str | None = None) -> np.ndarra
     declared = model.config.stations
     if station is not None and station not in model.stations:
         raise FlexcalError(
-            f"there is no station '{station}' in {model.path}; there are {', '.join(model.stations)}."
+            "E-DESIGN-040",
+            f"there is no station '{station}' in {model.path}; there are {', '.join(model.stations)}.",
         )
     entry = declared.get(model.stations[0] if station is None else station)
     return None if entry is None or entry.xyz is None else np.array(entry.xyz)

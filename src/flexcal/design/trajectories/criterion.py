@@ -123,7 +123,8 @@ def excitation_criterion(
     nothing = np.zeros((columns.rank, columns.rank))
     if bool(of) != (criterion == "c"):
         raise InputError(
-            "name the parameters that the criterion c is of, and only for c; for example --criterion c --of link_3.mass."
+            "E-DESIGN-041",
+            "name the parameters that the criterion c is of, and only for c; for example --criterion c --of link_3.mass.",
         )
     faint = _FAINT * np.eye(columns.rank)
     if criterion in ("compound", "posterior", "c"):
@@ -208,5 +209,6 @@ def _require_visible(columns: BaseRegressor, unknowns: Unknowns, of: Sequence[st
             ]
             how = f"only together with {', '.join(others[:5])}" if others else "not at all"
             raise InputError(
-                f"the criterion is about {name}, which torques determine {how}; choose another parameter, or give a prior to the others."
+                "E-DESIGN-042",
+                f"the criterion is about {name}, which torques determine {how}; choose another parameter, or give a prior to the others.",
             )

@@ -29,8 +29,9 @@ def feasible_postures(program: ExcitationProblem) -> np.ndarray:
         return places[worst < 0]
     best = int(np.argmin(worst))
     raise FlexcalError(
+        "E-DESIGN-043",
         f"{model.name} has no feasible posture within its limits: at best, at q = {_written(places[best])}, "
-        f"{program.standing_limit(places[best])}; correct that limit."
+        f"{program.standing_limit(places[best])}; correct that limit.",
     )
 
 
@@ -38,7 +39,8 @@ def require_holding_torque(program: ExcitationProblem, q: np.ndarray) -> None:
     """Raise `InputError` that names the limit which a robot at rest in `q` (n,) passes."""
     if not program.standing(q[None]).max() < 0:
         raise InputError(
-            f"the start q = {_written(q)} is not possible: {program.standing_limit(q)}; choose another one."
+            "E-DESIGN-044",
+            f"the start q = {_written(q)} is not possible: {program.standing_limit(q)}; choose another one.",
         )
 
 
@@ -63,7 +65,8 @@ def feasible_start_motion(
                 return x
             swing /= 2
     raise FlexcalError(
-        f"no motion of {program.columns.model.name} was found within its limits, however small; widen its limits of torque, box or bodies."
+        "E-DESIGN-045",
+        f"no motion of {program.columns.model.name} was found within its limits, however small; widen its limits of torque, box or bodies.",
     )
 
 

@@ -148,13 +148,17 @@ def design_trajectories(
         columns, criterion, of, _sizes(columns, weights, limits), INDEPENDENT_HZ * duration
     )
     if sequence and criterion != "D":
-        raise InputError("a sequence is designed by the criterion D of each stage's parameters; choose D.")
+        raise InputError(
+            "E-DESIGN-046", "a sequence is designed by the criterion D of each stage's parameters; choose D."
+        )
     program = ExcitationProblem(
         space, columns, goal, weights, limits, Clearance(CollisionChecker(model), NEAR)
     )
     if after is not None:
         if after.payload != payload or after.joint_count != model.n:
-            raise InputError("the plan before is for another robot or payload; design both alike.")
+            raise InputError(
+                "E-DESIGN-047", "the plan before is for another robot or payload; design both alike."
+            )
         time = np.arange(space.instants) / (space.instants * after.base_frequency_hz)
         for number in range(len(after)):
             goal = goal.after(program.information(np.array(after.motion(number, time))))
@@ -204,16 +208,18 @@ def design_trajectories(
 
 def _periods(duration: float, frequency: float) -> int:
     if not (duration > 0 and frequency > 0):
-        raise InputError("duration and base frequency must be positive.")
+        raise InputError("E-DESIGN-048", "duration and base frequency must be positive.")
     periods = duration * frequency
     if periods < 1 - 1e-9:
         raise InputError(
+            "E-DESIGN-049",
             f"a duration of {duration:g} s is too short for the base frequency {frequency:g} Hz, whose period is {1 / frequency:g} s; "
-            "make one of them larger."
+            "make one of them larger.",
         )
     if abs(periods - round(periods)) > 1e-6:
         raise InputError(
-            f"{duration:g} s are {periods:g} periods of {frequency:g} Hz; choose a duration of whole periods."
+            "E-DESIGN-050",
+            f"{duration:g} s are {periods:g} periods of {frequency:g} Hz; choose a duration of whole periods.",
         )
     return round(periods)
 

@@ -18,13 +18,15 @@ def require_stated_limits(model: RobotModel) -> None:
         lacking = [joint.name for joint in model.joints if not getattr(joint, key) > 0]
         if lacking:
             raise InputError(
+                "E-DESIGN-051",
                 f"{model.urdf}: {_listed(lacking)} {'have' if len(lacking) > 1 else 'has'} no limit of {key}, so no motion can be designed "
-                f"within it; write `{key}=` ({unit}) of the data sheet into <limit>."
+                f"within it; write `{key}=` ({unit}) of the data sheet into <limit>.",
             )
     if not model.mass.any():
         raise InputError(
+            "E-DESIGN-052",
             f"{model.urdf}: no link has a mass, so motor torques along a motion are unknown; add <inertial> to the links, even with rough "
-            "values."
+            "values.",
         )
 
 

@@ -31,13 +31,15 @@ def drive_gains(data: RegressionData, payloads: Sequence[float]) -> Estimate:
     payload, names = data.observation.model.payload, data.observation.model.joint_names
     if payload is None or not any(payloads) or all(payloads):
         raise FlexcalError(
-            "drive gains need recordings both with and without the payload that robot.yaml declares."
+            "E-DYN-001",
+            "drive gains need recordings both with and without the payload that robot.yaml declares.",
         )
     masses = sorted({mass for mass in payloads if mass > 0})
     if len(masses) > 1:
         raise FlexcalError(
+            "E-DYN-002",
             f"payloads of {masses[0]:g} and {masses[1]:g} kg are two payloads with different centres of mass and inertias; give "
-            "recordings of one payload."
+            "recordings of one payload.",
         )
     terms = _Terms(data, payloads, payload.joint)
     noise = noise_levels(data)
@@ -92,7 +94,8 @@ def _settled(terms: _Terms, noise: Sequence[float], kept: Sequence[int]) -> np.n
         if np.all(np.abs(values[terms.gains] - before) <= _SETTLED * np.abs(before)):
             return values
     raise FlexcalError(
-        f"the drive gains do not converge in {_ITERATIONS} steps; record for longer, or with a heavier payload."
+        "E-DYN-003",
+        f"the drive gains do not converge in {_ITERATIONS} steps; record for longer, or with a heavier payload.",
     )
 
 

@@ -74,7 +74,9 @@ def perturbed_logs(recorded: RecordedRows) -> list[PerturbedLog]:
     model = recorded.observation.model
     logs = [experiment for experiment in recorded.experiments if isinstance(experiment, JointLog)]
     if len(logs) < len(recorded.experiments):
-        raise FlexcalError("total least squares needs the positions as they were logged, with their noise.")
+        raise FlexcalError(
+            "E-DYN-004", "total least squares needs the positions as they were logged, with their noise."
+        )
     return [
         PerturbedLog(log, model, position_noise(log, model), _SEED + number)
         for number, log in enumerate(logs)

@@ -50,7 +50,8 @@ def huber_least_squares(data: RegressionData, recorded: RecordedRows) -> Estimat
                 iterations=iteration,
             )
     raise FlexcalError(
-        f"the weights of the rows do not converge in {_ITERATIONS} iterations; use --estimator wls."
+        "E-DYN-005",
+        f"the weights of the rows do not converge in {_ITERATIONS} iterations; use --estimator wls.",
     )
 
 

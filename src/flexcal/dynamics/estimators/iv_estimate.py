@@ -51,9 +51,10 @@ def instrumental_fit(
     weakest = float(np.linalg.svd(np.linalg.qr(regressors)[0][:size], compute_uv=False)[-1])
     if not weakest > _WEAKEST:
         raise FlexcalError(
+            "E-DYN-006",
             f"an instrumental variable is hardly correlated with its column (correlation {weakest:.1g}); record longer and with "
             "more excitation, with a "
-            "heavier payload where gains are sought, or check `controller:` in robot.yaml."
+            "heavier payload where gains are sought, or check `controller:` in robot.yaml.",
         )
     root = scale[size:-1, None] * np.linalg.inv(regressors[:size])
     parameters = start.copy()

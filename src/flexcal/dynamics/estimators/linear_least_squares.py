@@ -64,7 +64,8 @@ class Unknowns:
         freedom = system.rows - len(self.kept)
         if freedom <= 0:
             raise FlexcalError(
-                f"{system.rows} equations do not determine {len(self.kept)} parameters; record for longer."
+                "E-DYN-007",
+                f"{system.rows} equations do not determine {len(self.kept)} parameters; record for longer.",
             )
         return freedom
 

@@ -109,7 +109,7 @@ def maximum_likelihood(data: RegressionData, recorded: RecordedRows) -> Estimate
             message = f"maximum likelihood from {periods} periods; mean squared error {cost / freedom:.3g} of the noise"
             return unknowns.estimate(parameters, level * covariance, known, cost, freedom, message, iteration)
     raise FlexcalError(
-        f"the noise estimate does not converge in {_ITERATIONS} iterations; use --estimator wls."
+        "E-DYN-008", f"the noise estimate does not converge in {_ITERATIONS} iterations; use --estimator wls."
     )
 
 
@@ -118,8 +118,9 @@ def _require_memory(recorded: RecordedRows) -> None:
     needed, there = _HELD * samples * recorded.observation.model.n, physical_memory()
     if there is not None and needed > there:
         raise FlexcalError(
+            "E-DYN-009",
             f"maximum likelihood holds the motion of all logs in memory, {needed / 1e9:.1f} GB for {samples} samples, and this machine has "
-            f"{there / 1e9:.1f} GB; give it fewer periods, or take --estimator wls."
+            f"{there / 1e9:.1f} GB; give it fewer periods, or take --estimator wls.",
         )
 
 

@@ -129,8 +129,9 @@ class RecordedRows:
                 yield joined
         if empty:
             raise FlexcalError(
+                "E-DYN-010",
                 f"{experiment.name}: it is too short, or its parts between gaps are, for the simulation that this estimator needs; use "
-                "--estimator wls, or record it without gaps."
+                "--estimator wls, or record it without gaps.",
             )
 
 

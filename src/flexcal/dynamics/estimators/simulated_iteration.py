@@ -39,7 +39,9 @@ def simulated_iteration(data: RegressionData, step: Callable[[np.ndarray], Estim
         if np.all((np.abs(moved) <= room)[seen]):
             return replace(estimate, iterations=iteration)
         robot[kept] += moved if iteration <= _WHOLE else 0.5 * moved
-    raise FlexcalError(f"{name} does not converge in {_ITERATIONS} simulations; use --estimator wls.")
+    raise FlexcalError(
+        "E-DYN-011", f"{name} does not converge in {_ITERATIONS} simulations; use --estimator wls."
+    )
 
 
 def _first(data: RegressionData) -> np.ndarray:

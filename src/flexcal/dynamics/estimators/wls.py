@@ -31,9 +31,10 @@ def noise_levels(data: RegressionData) -> list[float]:
         if np.isnan(sigma):
             label = data.observation.labels[s.equation]
             raise FlexcalError(
+                "E-DYN-012",
                 f"{s.triangle.rows} equations of {label} in experiment {s.experiment + 1} do not determine its noise beside "
                 f"{rank} parameters; "
-                "record for longer, or decimate less."
+                "record for longer, or decimate less.",
             )
         noise.append(_first(data, s) if s.undriven else s.floored(sigma))
     for _ in range(_ROUNDS if any(s.undriven for s in data.subsystems) else 0):

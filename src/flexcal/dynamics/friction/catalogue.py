@@ -37,7 +37,9 @@ def standard_terms(friction: tuple[str, ...]) -> tuple[DriveTerm, ...]:
     """Rotor inertia, the terms among `friction` outside the library, coupling and springs; raises `FlexcalError` for an unknown name."""
     for name in friction:
         if name not in FRICTION_TERMS:
-            raise FlexcalError(f"there is no friction term '{name}'; there are {', '.join(FRICTION_TERMS)}.")
+            raise FlexcalError(
+                "E-DYN-013", f"there is no friction term '{name}'; there are {', '.join(FRICTION_TERMS)}."
+            )
     return (
         RotorInertia(),
         *(_PLAIN[name] for name in _PLAIN if name in friction),

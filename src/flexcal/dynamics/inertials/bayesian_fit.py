@@ -41,7 +41,8 @@ def noise(rows: LinearisedEquations, estimate: Estimate, weighed: np.ndarray) ->
     freedom = near @ free
     if freedom.min() <= 2.0:
         raise FlexcalError(
-            "the recordings leave too few lines to estimate their noise; record more or longer trajectories."
+            "E-DYN-014",
+            "the recordings leave too few lines to estimate their noise; record more or longer trajectories.",
         )
     shapes = 1.0 / (1.0 + (rows.lines / np.array(_CORNERS)[:, None]) ** 2)[:, :, None]
     sums = np.maximum(near @ (squares / shapes), (_SMALLEST * rows.size) ** 2)
@@ -70,12 +71,14 @@ def identify_with_prior(model: RobotModel, plan: TrajectoryPlan, recordings: Ite
     """
     motions = [PeriodicMotion.of(log, plan, number, CUTOFF_HZ) for number, log in enumerate(recordings)]
     if not motions:
-        raise FlexcalError("there is no recording of a trajectory to identify from; give at least one.")
+        raise FlexcalError(
+            "E-DYN-015", "there is no recording of a trajectory to identify from; give at least one."
+        )
     parameters, own = unknowns(model)
     rows = LinearisedEquations.about(model, parameters, motions, plan.payload)
     silent = [name for name, size in zip(model.joint_names, rows.size, strict=True) if not size > 0]
     if silent:
-        raise FlexcalError(f"the torque of {silent[0]} is zero in all recordings; record it.")
+        raise FlexcalError("E-DYN-016", f"the torque of {silent[0]} is zero in all recordings; record it.")
     estimate = _fit(rows, rows.first_sigma())
     sigma = noise(rows, estimate, rows.first_sigma())
     for _ in range(ROUNDS):

@@ -41,7 +41,8 @@ def unknowns(model: RobotModel) -> tuple[Parameters, tuple[str, ...]]:
     ]
     if lacking:
         raise FlexcalError(
-            f"{model.path} gives {lacking[0]} no rotor inertia, which the prior needs; add `drives: {{rotor_inertia: […]}}`."
+            "E-DYN-017",
+            f"{model.path} gives {lacking[0]} no rotor inertia, which the prior needs; add `drives: {{rotor_inertia: […]}}`.",
         )
     own = [*uncertain_inertials(model, range(model.n)), *_drive_names(model)]
     beside = [f"{e.name}.{SPRINGS[c]}.stiffness" for e in model.elastic for c in sorted(e.components)]

@@ -46,7 +46,9 @@ class DriveSpring:
         """The columns, where `motor` is the number of the motor's equation; raises `FlexcalError` for a motion without arm side."""
         arm = motion.arm
         if arm is None:
-            raise FlexcalError(f"{motion.name} has no positions on the arm side of the elastic joints.")
+            raise FlexcalError(
+                "E-DYN-018", f"{motion.name} has no positions on the arm side of the elastic joints."
+            )
         name, at = model.joint_names[self.joint], (slice(None), self.joint)
         twist, rate = arm.q[at] - motion.q[at], arm.dq[at] - motion.dq[at]
         yield Column(f"{name}.arm_inertia", self.joint, arm.ddq[at])

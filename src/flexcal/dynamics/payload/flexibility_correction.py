@@ -162,7 +162,9 @@ def _slow(experiment: Experiment) -> list[Motion]:
         q, dq, ddq = (_low_passed(values, step)[some] for values in (whole.q, whole.dq, whole.ddq))
         slow_parts.append(Motion(whole.time[some], q, dq, ddq, whole.torque[some]))
     if not slow_parts:
-        raise FlexcalError(f"{experiment.name}: {longest:.2g} s of motion are too short; record for longer.")
+        raise FlexcalError(
+            "E-DYN-019", f"{experiment.name}: {longest:.2g} s of motion are too short; record for longer."
+        )
     return slow_parts
 
 

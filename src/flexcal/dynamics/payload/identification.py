@@ -88,20 +88,23 @@ def identify_payload(equations: PayloadEquations) -> PayloadFit:
     least = float(solution.values[0]) - quantile * float(np.sqrt(solution.covariance[0, 0]))
     if "payload.mass" in {entry.name for entry in solution.missing}:
         raise FlexcalError(
+            "E-DYN-020",
             "the payload's mass is not identifiable beside the robot's own inertia in this motion; move the joints that lift "
-            "it, or give --free logs."
+            "it, or give --free logs.",
         )
     most, robot = 2 * float(solution.values[0]) - least, float(equations.data.observation.model.mass.sum())
     if most < -_UNSEEN * robot:
         raise FlexcalError(
+            "E-DYN-021",
             f"the estimated mass of the payload is negative ({solution.values[0]:.3g} kg, 95 % interval {least:.3g} to {most:.3g} kg), "
             "as of no body: the robot's own dynamics were identified with a payload, are of another robot, or the torques have another "
-            "sign or scale in these logs."
+            "sign or scale in these logs.",
         )
     if not least > 0:
         raise FlexcalError(
+            "E-DYN-022",
             f"no payload can be told from zero: its estimated mass is {solution.values[0]:.3g} kg, with an upper 95 % limit of "
-            f"{most:.3g} kg; check that it was held, the signs of the torques and the robot's own dynamics."
+            f"{most:.3g} kg; check that it was held, the signs of the torques and the robot's own dynamics.",
         )
     nearest = nearest_body(solution.values, solution.root, solution.unseen)
     body = payload_from_link_frame(nearest.parameters)

@@ -37,8 +37,9 @@ def residual_noise(
         freedom = s.triangle.rows - taken
         if freedom <= 2.0:
             raise FlexcalError(
+                "E-DYN-023",
                 f"{s.triangle.rows} equations of {equations.data.observation.labels[joint]} in recording {experiment + 1} do not determine "
-                "its noise; record for longer, or decimate less."
+                "its noise; record for longer, or decimate less.",
             )
         levels.append(s.floored(float(np.linalg.norm(rows @ missed)) / np.sqrt(freedom)))
     return levels

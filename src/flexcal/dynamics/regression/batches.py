@@ -97,11 +97,12 @@ def batched(
             current.add(part)
     batches += [] if current is None else [current.batch()]
     if not all(np.isfinite(factor).all() for batch in batches for factor in batch.factors):
-        raise FlexcalError(f"the equations of {name} are not finite.")
+        raise FlexcalError("E-DYN-024", f"the equations of {name} are not finite.")
     if not batches:
         raise FlexcalError(
+            "E-DYN-025",
             f"no equations remain of {name}: it, or the part that is fitted or held out, is too short for its filters, "
-            "or the robot stands still in it."
+            "or the robot stands still in it.",
         )
     return ExperimentSystem(tuple(batches), length, last - first, masked)
 

@@ -57,7 +57,8 @@ def folds(
             result.append(Fold(fold, reduced(other), reduced(own)))
     if not result:
         raise FlexcalError(
-            "the recordings are too short to choose friction by cross-validation; record for longer, or declare 'friction: classic'."
+            "E-DYN-026",
+            "the recordings are too short to choose friction by cross-validation; record for longer, or declare 'friction: classic'.",
         )
     return result
 

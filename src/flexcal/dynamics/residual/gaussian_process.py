@@ -100,6 +100,7 @@ def require_scikit_learn() -> None:
 
     if find_spec("sklearn") is None:
         raise FlexcalError(
+            "E-DYN-027",
             "scikit-learn is not installed, and a learned residual torque needs it; install it with 'pip install scikit-learn' "
-            "(flexcal's extra 'learn')."
+            "(flexcal's extra 'learn').",
         )

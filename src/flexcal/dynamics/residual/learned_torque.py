@@ -48,7 +48,8 @@ class LearnedResidual:
         shapes = {values.shape for values in (q, dq, predicted)}
         if len(shapes) > 1 or q.shape[1:] != (len(self.motors),):
             raise FlexcalError(
-                f"q, dq and predicted have shapes {q.shape}, {dq.shape} and {predicted.shape}; give (samples, {len(self.motors)}) of each."
+                "E-DYN-028",
+                f"q, dq and predicted have shapes {q.shape}, {dq.shape} and {predicted.shape}; give (samples, {len(self.motors)}) of each.",
             )
         position, velocity = q @ self.shares.T, dq @ self.shares.T
         return self.of_motors(position, velocity, predicted @ np.linalg.inv(self.shares))

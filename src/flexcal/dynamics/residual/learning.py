@@ -59,7 +59,8 @@ def learn_residual(
     states, block = _thinned(recorded, systems, parameters)
     if len(states) < _FEWEST:
         raise FlexcalError(
-            f"{len(states)} rows are too few to learn a residual torque; the minimum is {_FEWEST}; record for longer."
+            "E-DYN-029",
+            f"{len(states)} rows are too few to learn a residual torque; the minimum is {_FEWEST}; record for longer.",
         )
     missed, left, std = np.full((3, *states.torque.shape), np.nan)
     progress("learning", 0.0)

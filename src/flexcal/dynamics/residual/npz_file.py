@@ -77,5 +77,7 @@ def read_learned_residual(path: str | Path, estimates: str | Path) -> LearnedRes
     )
     belongs_to = str(arrays["dynamics"])
     if belongs_to != block_sha256(estimates, "dynamics"):
-        raise InputError(f"{path} was learned with other dynamics than those of {estimates}; {again}.")
+        raise InputError(
+            "E-DYN-030", f"{path} was learned with other dynamics than those of {estimates}; {again}."
+        )
     return learned

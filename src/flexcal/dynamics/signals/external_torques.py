@@ -30,15 +30,17 @@ def external_torque(model: RobotModel, recording: Recording) -> np.ndarray | Non
 def _wrench(model: RobotModel, recording: Recording) -> np.ndarray:
     if model.force_sensor is None:
         raise InputError(
+            "E-DYN-031",
             f"{recording.name}: there are columns of a force sensor, but {model.path.name} declares none; add "
             "'force_sensor: {frame: FRAME, wrench: on_robot}' (or on_environment, for what the robot does to its surroundings), "
-            "or remove the columns."
+            "or remove the columns.",
         )
     if recording.force is None or recording.moment is None:
         lacking = "fx, fy, fz" if recording.force is None else "mx, my, mz"
         raise InputError(
+            "E-DYN-032",
             f"{recording.name}: the columns {lacking} are missing beside the others of the force sensor; add them (zeros only where "
-            "there are none)."
+            "there are none).",
         )
     return np.hstack([recording.force, recording.moment])
 

@@ -102,13 +102,14 @@ class JointLog:
                     highest = np.maximum(highest, motion.q.max(axis=0))
         except OSError as problem:
             raise FlexcalError(
+                "E-DYN-033",
                 f"{scratch} cannot take the filtered log ({problem.strerror or problem}); "
-                "set TMPDIR to a folder with room for 144 bytes a sample."
+                "set TMPDIR to a folder with room for 144 bytes a sample.",
             ) from problem
         except InputError:
             raise
         except FlexcalError as problem:
-            raise InputError(f"{path}: {problem}") from problem
+            raise InputError(problem.code, f"{path}: {problem}") from problem
         rests = highest - lowest < MOVES
         top_speed[rests] = 0.0
         used = tuple(span for span in spans if any(span[0] <= start <= span[1] for start in starts))

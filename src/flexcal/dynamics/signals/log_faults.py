@@ -54,13 +54,15 @@ class LogFaults:
         for name, torque in self._torques.seen.items():
             if moves and torque.span <= _ROUNDING * widest:
                 raise InputError(
-                    f"{self._path}: the torque of {name} is the same throughout; it was not measured: correct the log, or record again."
+                    "E-DYN-034",
+                    f"{self._path}: the torque of {name} is the same throughout; it was not measured: correct the log, or record again.",
                 )
             stay = torque.stay
             if stay is not None:
                 raise InputError(
+                    "E-DYN-035",
                     f"{self._path}: the torque of {name} stays at its extreme {stay.value:.6g} for {stay.samples} samples; "
-                    "drive or sensor saturates there: record a slower motion, or cut these rows out into files of their own."
+                    "drive or sensor saturates there: record a slower motion, or cut these rows out into files of their own.",
                 )
         slides = {joint.name for joint in self._model.joints if joint.kind == "prismatic"}
         for name, position in self._positions.seen.items():
@@ -68,8 +70,9 @@ class LogFaults:
             if stopped is not None:
                 unit = "m" if name in slides else "rad"
                 raise InputError(
+                    "E-DYN-036",
                     f"{self._path}: the position of {name} reaches its extreme {stopped.value:.6g} {unit} at full speed and stays "
-                    f"there for {stopped.samples} samples; the encoder is clipped: record within its range."
+                    f"there for {stopped.samples} samples; the encoder is clipped: record within its range.",
                 )
         if moves:
             self._check_rates()
@@ -97,8 +100,9 @@ class LogFaults:
             else:
                 advice = f"they are {slope:.3g} times as large, with a relative error of {np.sqrt(missed / size):.0%}"
             raise InputError(
+                "E-DYN-037",
                 f"{self._path}: the velocities of {joint.name} are inconsistent with its positions: {advice}; correct or remove "
-                "their column."
+                "their column.",
             )
 
 

@@ -78,7 +78,7 @@ class Motion:
         Raises `FlexcalError` where they were not measured.
         """
         if self.arm is None or self.arm.tilts is None:
-            raise FlexcalError(f"{self.name} has no tilts of the bearings.")
+            raise FlexcalError("E-DYN-038", f"{self.name} has no tilts of the bearings.")
         side = self.arm.tilts[component]
         return (side.q, side.dq, side.ddq)[order]
 

@@ -36,8 +36,9 @@ class PeriodicMotion:
             recording.time_step * plan.rate_hz, 1.0, rtol=1e-6
         ):
             raise FlexcalError(
+                "E-DYN-039",
                 f"{recording.name} has {len(recording)} samples every {recording.time_step:g} s; its plan asks for {size * periods} every "
-                f"{1 / plan.rate_hz:g} s."
+                f"{1 / plan.rate_hz:g} s.",
             )
         mean_q, mean_torque = (
             values[: size * periods].reshape(periods, size, -1)[plan.settle_periods :].mean(axis=0)
@@ -49,8 +50,9 @@ class PeriodicMotion:
         if (apart > allowed).any():
             joint = int(np.argmax(apart / allowed))
             raise FlexcalError(
+                "E-DYN-040",
                 f"{recording.name}: q{joint + 1} is up to {apart[joint]:.3g} from trajectory {number + 1} of its plan; record the planned "
-                "trajectories in their order."
+                "trajectories in their order.",
             )
         lines = int(cutoff_hz / plan.base_frequency_hz) + 1
         omega = 2 * np.pi * plan.base_frequency_hz * np.arange(lines)

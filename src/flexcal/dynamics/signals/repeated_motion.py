@@ -79,9 +79,10 @@ class RepeatedMotion:
         if count < FEWEST:
             what = f"shows {count} whole periods" if size else "contains no periodic motion"
             raise FlexcalError(
+                "E-DYN-041",
                 f"{experiment.name} {what}; maximum likelihood estimates the noise from the scatter between periods, of which "
                 f"it needs at least {FEWEST}: record more periods, and "
-                "some time for the filters, or take --estimator wls."
+                "some time for the filters, or take --estimator wls.",
             )
         return cls(tuple(motion.part(size * k, size * (k + 1)) for k in range(count)), experiment.cutoff_hz)
 

@@ -76,8 +76,9 @@ class ClosedLoop:
         self._advance(target)
         if not np.abs(target.path - q).max() < _LOST:
             raise FlexcalError(
+                "E-DYN-042",
                 f"{self._robot.name}: the simulated robot does not follow the recorded path at {target.time:.6g} s; check `controller:` "
-                "in robot.yaml, or use --estimator wls."
+                "in robot.yaml, or use --estimator wls.",
             )
         return q, dq, self._ddq
 

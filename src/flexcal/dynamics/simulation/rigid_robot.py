@@ -56,8 +56,9 @@ class RigidRobotSimulator:
         mass = mass + self.rotors
         if dpotrf(mass)[1] != 0:
             raise FlexcalError(
+                "E-DYN-043",
                 f"the estimate gives the robot a mass matrix that is not positive definite at q = {np.array2string(q, precision=3)} of "
-                f"{self.name}, so it cannot be simulated; use --estimator sdp, or record a motion that excites more."
+                f"{self.name}, so it cannot be simulated; use --estimator sdp, or record a motion that excites more.",
             )
         return mass
 

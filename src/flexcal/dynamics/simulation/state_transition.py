@@ -56,8 +56,9 @@ class StateTransitions:
         mass = steps.inertia[k] @ self.about
         if np.linalg.eigvalsh(mass)[0] <= 0:
             raise FlexcalError(
+                "E-DYN-044",
                 f"the mass matrix of {steps.observation.model.path} is not positive definite with the filter's parameters; give CAD "
-                "inertias and `drives: {rotor_inertia: […]}` nearer to the truth, or take --estimator wls."
+                "inertias and `drives: {rotor_inertia: […]}` nearer to the truth, or take --estimator wls.",
             )
         push = np.linalg.inv(mass)
         by_position, by_speed = self.slopes[:, k]

@@ -91,7 +91,8 @@ class MultiStart:
                 break
         if not ends:
             raise FlexcalError(
-                "The elastic robot could not be evaluated at any start; check the stiffnesses in robot.yaml."
+                "E-STIFF-001",
+                "The elastic robot could not be evaluated at any start; check the stiffnesses in robot.yaml.",
             )
         progress("searching", 1.0)
         return min(ends, key=lambda end: end[0])[1]

@@ -124,35 +124,44 @@ def check_responses(model: RobotModel, responses: Sequence[FrequencyResponse]) -
     elastic = [joint.name for joint in model.elastic]
     if not elastic:
         raise FlexcalError(
-            f"{model.path} declares no elastic joint; add `elastic:` with starting values of the stiffnesses."
+            "E-STIFF-002",
+            f"{model.path} declares no elastic joint; add `elastic:` with starting values of the stiffnesses.",
         )
     if not responses:
-        raise FlexcalError("There is no frequency response to identify from; give at least one pose.")
+        raise FlexcalError(
+            "E-STIFF-003", "There is no frequency response to identify from; give at least one pose."
+        )
     for response in responses:
         if list(response.joints) != [name for name in elastic if name in response.joints]:
             raise FlexcalError(
+                "E-STIFF-004",
                 f"The frequency response of pose {response.pose} is of {', '.join(response.joints)}, but the elastic joints of "
-                f"{model.path} are {', '.join(elastic)}; excite these, or some of them with the motors of the others braked, in this order."
+                f"{model.path} are {', '.join(elastic)}; excite these, or some of them with the motors of the others "
+                "braked, in this order.",
             )
         if response.joints != responses[0].joints:
             raise FlexcalError(
+                "E-STIFF-005",
                 f"The frequency response of pose {response.pose} is of {', '.join(response.joints)}, that of pose {responses[0].pose} of "
-                f"{', '.join(responses[0].joints)}; excite the same joints in all poses."
+                f"{', '.join(responses[0].joints)}; excite the same joints in all poses.",
             )
         unknown = [name for name in response.sensors if name not in model.sensors]
         if unknown:
             raise FlexcalError(
+                "E-STIFF-006",
                 f"The frequency response of pose {response.pose} has the sensor {unknown[0]}, which {model.path} does not declare; add it "
-                "under `sensors:` with its frame, xyz and direction."
+                "under `sensors:` with its frame, xyz and direction.",
             )
         if response.q_mean.shape != (model.n,):
             raise FlexcalError(
+                "E-STIFF-007",
                 f"The frequency response of pose {response.pose} has a mean position of {response.q_mean.size} joints, "
-                f"but the robot has {model.n}."
+                f"but the robot has {model.n}.",
             )
         if not (np.isfinite(response.stacked).all() and np.isfinite(response.stacked_covariance).all()):
             raise FlexcalError(
-                f"The frequency response of pose {response.pose} holds a NaN or an infinite number."
+                "E-STIFF-008",
+                f"The frequency response of pose {response.pose} holds a NaN or an infinite number.",
             )
 
 
@@ -168,7 +177,8 @@ def check_sensors(model: RobotModel, responses: Sequence[FrequencyResponse]) -> 
         ratios = ratios[np.abs(ratios) > 0]
         if not ratios.size:
             raise FlexcalError(
-                f"the readings of the sensor {name} do not change with the torques; check its cable and its column, or leave that out."
+                "E-STIFF-009",
+                f"the readings of the sensor {name} do not change with the torques; check its cable and its column, or leave that out.",
             )
         _check_gain(
             model, name, float(np.median(np.abs(ratios))), float(np.median(np.real(ratios) / np.abs(ratios)))
@@ -190,11 +200,13 @@ def _check_gain(model: RobotModel, name: str, size: float, cosine: float) -> Non
         ratio = f"{1 / size:.2g} times smaller" if size < 1 else f"{size:.2g} times larger"
         unit = " (they seem to be in g)" if 6 < 1 / size < 16 and model.sensors[name].order == 2 else ""
         raise FlexcalError(
+            "E-STIFF-010",
             f"{where} are {ratio} than those of the robot of {model.path}{unit}; give them in m/s², m/s or m, name their unit under "
-            f"`signals:`, or correct its quantity, frame, xyz or direction under `sensors:`."
+            f"`signals:`, or correct its quantity, frame, xyz or direction under `sensors:`.",
         )
     if cosine < -0.5:
         raise FlexcalError(
+            "E-STIFF-011",
             f"{where} are in the opposite direction to those of the robot of {model.path}; correct its direction or its frame under "
-            "`sensors:`."
+            "`sensors:`.",
         )

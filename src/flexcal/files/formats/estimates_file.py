@@ -47,9 +47,11 @@ class StoredValue:
 
     def __post_init__(self) -> None:
         if self.std is not None and self.std < 0:
-            raise FlexcalError(f"a standard deviation must not be negative, not {self.std:g}.")
+            raise FlexcalError("E-EST-001", f"a standard deviation must not be negative, not {self.std:g}.")
         if self.low is not None and self.high is not None and not self.low <= self.high:
-            raise FlexcalError(f"the interval from {self.low:g} to {self.high:g} has its ends exchanged.")
+            raise FlexcalError(
+                "E-EST-002", f"the interval from {self.low:g} to {self.high:g} has its ends exchanged."
+            )
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,9 @@ class StoredFit:
 
     def __post_init__(self) -> None:
         if min(self.rank, self.chi2, self.degrees_of_freedom, self.iterations) < 0:
-            raise FlexcalError("rank, chi2, degrees_of_freedom and iterations must not be negative.")
+            raise FlexcalError(
+                "E-EST-003", "rank, chi2, degrees_of_freedom and iterations must not be negative."
+            )
 
 
 @dataclass(frozen=True)
@@ -134,14 +138,15 @@ def write_estimates(path: str | Path, block: Block, estimate: Estimate) -> None:
     path = Path(path)
     if block not in BLOCKS:
         raise FlexcalError(
-            f"there is no block '{block}' in an estimates file; there are {', '.join(BLOCKS)}."
+            "E-EST-004", f"there is no block '{block}' in an estimates file; there are {', '.join(BLOCKS)}."
         )
     stored, arrays = _kept(path, block)
     covariance = np.asarray(estimate.covariance, dtype=np.float64)
     size = len(estimate.parameters)
     if covariance.shape != (size, size) or not np.isfinite(covariance).all():
         raise FlexcalError(
-            f"the covariance of the {block} must be finite and ({size}, {size}), not {covariance.shape}."
+            "E-EST-005",
+            f"the covariance of the {block} must be finite and ({size}, {size}), not {covariance.shape}.",
         )
     arrays[block] = (estimate.parameters.names, covariance)
     stored = replace(stored, **{block: _stored(estimate, covariance)})
@@ -207,7 +212,9 @@ def block_sha256(path: str | Path, block: Block) -> str:
     file = read_yaml_file(path)
     stored = file.structure(StoredEstimates).block(block)
     if stored is None:
-        raise file.error((), f"there is no block '{block}'; run the identification that makes it.")
+        raise file.error(
+            "E-EST-006", (), f"there is no block '{block}'; run the identification that makes it."
+        )
     content = to_plain({"values": stored.values, "dropped": stored.dropped})
     content["covariance"] = stored.covariance_sha256
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
@@ -219,7 +226,8 @@ def _kept(
     """What stays in a file when `block` is written: its content, and names and covariance of the other blocks."""
     if path.suffix not in (".yaml", ".yml"):
         raise InputError(
-            f"{path}: estimates are written to a .yaml file (with an .npz beside it); give such a name."
+            "E-EST-007",
+            f"{path}: estimates are written to a .yaml file (with an .npz beside it); give such a name.",
         )
     stored, arrays = StoredEstimates(), {}
     ours = {f"{name}.{part}" for name in BLOCKS for part in ("names", "covariance")}
@@ -239,24 +247,33 @@ def _covariance(file: YamlFile, name: Block, block: StoredBlock) -> np.ndarray:
     path = file.path.with_suffix(".npz")
     again = "run the identification again"
     if block.covariance_sha256 is None or block.fit is None:
-        raise file.error((name,), f"the block '{name}' has values only, so it is no estimate; {again}.")
+        raise file.error(
+            "E-EST-008", (name,), f"the block '{name}' has values only, so it is no estimate; {again}."
+        )
     forms = {
         f"{name}.names": ArrayForm("text", ("names",)),
         f"{name}.covariance": ArrayForm("real", ("names", "names")),
     }
     stored = NpzFile(path, f"it belongs to {file.path.name}: {again}")
     if f"{name}.names" not in stored or f"{name}.covariance" not in stored:
-        raise InputError(f"{path}: the names and covariance of the block '{name}' are missing; {again}.")
+        raise InputError(
+            "E-EST-009", f"{path}: the names and covariance of the block '{name}' are missing; {again}."
+        )
     names, covariance = stored.read(forms).values()
     size = len(block.values)
     if covariance.shape != (size, size):
         raise InputError(
-            f"{path}: {name}.covariance has the shape {covariance.shape}, not ({size}, {size}); {again}."
+            "E-EST-010",
+            f"{path}: {name}.covariance has the shape {covariance.shape}, not ({size}, {size}); {again}.",
         )
     if names.tolist() != list(block.values):
-        raise InputError(f"{path}: {name}.names are not the values of {file.path.name}; {again}.")
+        raise InputError(
+            "E-EST-011", f"{path}: {name}.names are not the values of {file.path.name}; {again}."
+        )
     if covariance.dtype != np.float64 or _sha256(covariance) != block.covariance_sha256:
-        raise InputError(f"{path}: {name}.covariance does not belong to {file.path.name}; {again}.")
+        raise InputError(
+            "E-EST-012", f"{path}: {name}.covariance does not belong to {file.path.name}; {again}."
+        )
     return covariance
 
 
@@ -266,11 +283,13 @@ def _estimate(file: YamlFile, name: Block, block: StoredBlock, covariance: np.nd
     try:
         parameters = Parameters(_parameter(key, value) for key, value in block.values.items())
     except FlexcalError as problem:
-        raise file.error((name, "values"), str(problem)) from problem
+        raise file.error(problem.code, (name, "values"), str(problem)) from problem
     for i, entry in enumerate(block.dropped):
         for unknown in {entry.name, *entry.absorbed_by} - set(parameters.names):
             raise file.error(
-                (name, "dropped", i), f"'{unknown}' is not among the values of this block; correct the name."
+                "E-EST-013",
+                (name, "dropped", i),
+                f"'{unknown}' is not among the values of this block; correct the name.",
             )
     return Estimate(
         parameters=parameters,

@@ -65,9 +65,9 @@ class NpzFile:
         """The names of the arrays."""
         return self._names
 
-    def error(self, sentence: str) -> InputError:
+    def error(self, code: str, sentence: str) -> InputError:
         """An `InputError` about this file."""
-        return InputError(f"{self.path} {sentence}; {self.remedy}.")
+        return InputError(code, f"{self.path} {sentence}; {self.remedy}.")
 
     def read(self, forms: Mapping[str, ArrayForm]) -> dict[str, np.ndarray]:
         """The arrays of these names and forms."""
@@ -81,16 +81,16 @@ class NpzFile:
         try:
             stored = np.load(current_path(self.path), allow_pickle=False)
             if not isinstance(stored, NpzArrays):
-                raise self.error("is no .npz file")
+                raise self.error("E-FILE-002", "is no .npz file")
             with stored:
                 yield stored
         except _UNREADABLE as problem:
             told = isinstance(problem, OSError) and problem.strerror
-            raise self.error(f"cannot be read ({told or type(problem).__name__})") from problem
+            raise self.error("E-FILE-003", f"cannot be read ({told or type(problem).__name__})") from problem
 
     def _array(self, stored: NpzArrays, name: str) -> np.ndarray:
         if name not in stored.files:
-            raise self.error(f"lacks the array '{name}'")
+            raise self.error("E-FILE-004", f"lacks the array '{name}'")
         archive = stored.zip
         assert archive is not None  # it is open
         member = archive.getinfo(f"{name}.npy" if f"{name}.npy" in archive.namelist() else name)
@@ -106,19 +106,21 @@ class NpzFile:
             for extent in shape:
                 count *= extent
             if dtype.hasobject or min(shape, default=0) < 0 or count * dtype.itemsize > member.file_size:
-                raise self.error(f"holds no array of numbers or texts as '{name}'")
+                raise self.error("E-FILE-005", f"holds no array of numbers or texts as '{name}'")
         return stored[name]
 
     def _checked(self, name: str, array: np.ndarray, form: ArrayForm) -> np.ndarray:
         kinds, what = _KINDS[form.kind]
         if array.dtype.kind not in kinds:
-            raise self.error(f"holds {array.dtype} as '{name}', not {what}")
+            raise self.error("E-FILE-006", f"holds {array.dtype} as '{name}', not {what}")
         extents = [self._lengths.get(axis) if isinstance(axis, str) else axis for axis in form.axes]
         fits = array.ndim == len(extents) and all(
             extent in (None, length) for extent, length in zip(extents, array.shape, strict=True)
         )
         if not fits:
-            raise self.error(f"holds '{name}' with the shape {array.shape}, which does not fit the rest")
+            raise self.error(
+                "E-FILE-007", f"holds '{name}' with the shape {array.shape}, which does not fit the rest"
+            )
         for axis, length in zip(form.axes, array.shape, strict=True):
             if isinstance(axis, str):
                 self._lengths[axis] = length
@@ -126,9 +128,9 @@ class NpzFile:
             with np.errstate(over="ignore"):
                 size = np.abs(array)
             if form.finite and not np.isfinite(size).all():
-                raise self.error(f"holds numbers in '{name}' that are not finite")
+                raise self.error("E-FILE-008", f"holds numbers in '{name}' that are not finite")
             if float(np.max(size, initial=0.0, where=np.isfinite(size))) > LARGEST:
-                raise self.error(f"holds numbers beyond {LARGEST:g} in '{name}'")
+                raise self.error("E-FILE-009", f"holds numbers beyond {LARGEST:g} in '{name}'")
         return array
 
 
@@ -142,5 +144,6 @@ def refuse_foreign(path: Path, ours: Set[str]) -> None:
         foreign = {"no arrays"}
     if foreign:
         raise InputError(
-            f"{path} was not written by flexcal (it holds {min(foreign)}), and such a file is never changed; move it away."
+            "E-FILE-010",
+            f"{path} was not written by flexcal (it holds {min(foreign)}), and such a file is never changed; move it away.",
         )

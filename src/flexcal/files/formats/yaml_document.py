@@ -51,10 +51,12 @@ def parse_document(path: Path, text: str) -> tuple[Any, dict[Keys, int]]:
         mark = problem.problem_mark or problem.context_mark
         place = f"line {mark.line + 1}, column {mark.column + 1}" if mark else "somewhere"
         what = " ".join(str(problem.problem or problem.context or "the text stops").split())
-        raise InputError(f"{path} {place}: not valid YAML ({what}); correct it there.") from None
+        raise InputError(
+            "E-YAML-004", f"{path} {place}: not valid YAML ({what}); correct it there."
+        ) from None
     except YAMLError as problem:
         what = " ".join(str(problem).split())
-        raise InputError(f"{path}: not valid YAML ({what}); correct it.") from None
+        raise InputError("E-YAML-005", f"{path}: not valid YAML ({what}); correct it.") from None
     finally:
         if loader is not None:
             loader.dispose()
@@ -82,12 +84,12 @@ class _Document:
 
         self._next()  # the stream's start
         if isinstance(self._next(), StreamEndEvent):
-            raise InputError(f"{self.path} line 1: the file is empty; write at least one key.")
+            raise InputError("E-YAML-006", f"{self.path} line 1: the file is empty; write at least one key.")
         data = self._value(self._next(), ())
         self._next()  # the document's end
         following = self._next()
         if isinstance(following, DocumentStartEvent):
-            raise self._error(following, "a second document begins; keep one in the file.")
+            raise self._error("E-YAML-007", following, "a second document begins; keep one in the file.")
         return data
 
     def _next(self) -> Event:
@@ -95,8 +97,8 @@ class _Document:
         assert event is not None  # no more is asked for after the stream's end
         return event
 
-    def _error(self, event: Event, sentence: str) -> InputError:
-        return InputError(f"{self.path} line {event.start_mark.line + 1}: {sentence}")
+    def _error(self, code: str, event: Event, sentence: str) -> InputError:
+        return InputError(code, f"{self.path} line {event.start_mark.line + 1}: {sentence}")
 
     def _value(self, event: Any, keys: Keys) -> Any:
         from yaml import AliasEvent, ScalarEvent, SequenceStartEvent
@@ -106,10 +108,12 @@ class _Document:
         if isinstance(event, AliasEvent):
             return self._repeated(event)
         if event.tag not in (None, "!") and event.tag not in _TAGS:
-            raise self._error(event, f"the tag '{event.tag}' is not understood; remove it.")
+            raise self._error("E-YAML-008", event, f"the tag '{event.tag}' is not understood; remove it.")
         if len(keys) > DEEPEST:
             raise self._error(
-                event, f"values nest more than {DEEPEST} deep; write them with fewer brackets or indents."
+                "E-YAML-009",
+                event,
+                f"values nest more than {DEEPEST} deep; write them with fewer brackets or indents.",
             )
         anchored = _Anchored()
         if event.anchor is not None:
@@ -128,14 +132,18 @@ class _Document:
         anchored = self.anchors.get(event.anchor)
         if anchored is None:
             raise self._error(
-                event, f"the alias '*{event.anchor}' has no anchor before it; write the value out."
+                "E-YAML-010",
+                event,
+                f"the alias '*{event.anchor}' has no anchor before it; write the value out.",
             )
         if not anchored.size:
-            raise self._error(event, "an alias refers to itself; write the value out.")
+            raise self._error("E-YAML-011", event, "an alias refers to itself; write the value out.")
         self.repeated += anchored.size
         self.values += anchored.size - 1
         if self.repeated > MOST_REPEATED:
-            raise self._error(event, f"aliases repeat more than {MOST_REPEATED} values; write them out.")
+            raise self._error(
+                "E-YAML-012", event, f"aliases repeat more than {MOST_REPEATED} values; write them out."
+            )
         return anchored.value
 
     def _list(self, keys: Keys) -> list[Any]:
@@ -152,11 +160,13 @@ class _Document:
         data: dict[str, Any] = {}
         while not isinstance(event := self._next(), MappingEndEvent):
             if not isinstance(event, ScalarEvent):
-                raise self._error(event, "a key must be a plain name, not a list or a mapping.")
+                raise self._error("E-YAML-013", event, "a key must be a plain name, not a list or a mapping.")
             key = str(event.value)
             if key in data:
                 first = self.lines[(*keys, key)]
-                raise self._error(event, f"the key '{key}' stands here and on line {first}; keep one.")
+                raise self._error(
+                    "E-YAML-014", event, f"the key '{key}' stands here and on line {first}; keep one."
+                )
             self.lines[(*keys, key)] = event.start_mark.line + 1
             data[key] = self._value(self._next(), (*keys, key))
         return data
@@ -171,7 +181,9 @@ class _Document:
             return _TRUTH[text]
         if len(text) > _LONGEST_NUMBER and (_DECIMAL.fullmatch(text) or _OTHER_BASE.fullmatch(text)):
             raise self._error(
-                event, f"a number has {len(text)} digits; write it with an exponent, such as 1e3."
+                "E-YAML-015",
+                event,
+                f"a number has {len(text)} digits; write it with an exponent, such as 1e3.",
             )
         if _DECIMAL.fullmatch(text):
             return int(text)

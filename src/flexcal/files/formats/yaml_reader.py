@@ -36,17 +36,17 @@ class YamlFile:
             keys = keys[:-1]
         return self.lines.get(keys, 1)
 
-    def error(self, keys: Sequence[str | int], sentence: str) -> InputError:
+    def error(self, code: str, keys: Sequence[str | int], sentence: str) -> InputError:
         """An `InputError` that places `sentence` at the file and line of `keys`."""
-        return InputError(f"{self.path} line {self.line(*keys)}: {sentence}")
+        return InputError(code, f"{self.path} line {self.line(*keys)}: {sentence}")
 
     def structure(self, cls: type[T]) -> T:
         """The document as a `cls`; raises `InputError` with file and line where it does not fit."""
         try:
             return structure(self.data, cls)
         except StructureError as problem:
-            keys, sentence = min(problem.failures, key=lambda failure: self.line(*failure[0]))
-            raise self.error(keys, sentence) from problem
+            failure = min(problem.failures, key=lambda failure: self.line(*failure.keys))
+            raise self.error(failure.code, failure.keys, failure.sentence) from problem
 
 
 def read_yaml(path: str | Path, cls: type[T]) -> T:
@@ -67,5 +67,7 @@ def read_yaml_file(path: str | Path) -> YamlFile:
     except OSError as problem:
         raise unreadable(path, problem) from problem
     except UnicodeDecodeError as problem:
-        raise InputError(f"{path} is not UTF-8 text (byte {problem.start}); save it as UTF-8.") from problem
+        raise InputError(
+            "E-YAML-016", f"{path} is not UTF-8 text (byte {problem.start}); save it as UTF-8."
+        ) from problem
     return YamlFile(path, *parse_document(path, text))

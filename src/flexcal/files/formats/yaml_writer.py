@@ -79,12 +79,13 @@ def _plain(value: Any, keys: Keys) -> Any:
         return value.as_posix()
     if isinstance(value, float) and not math.isfinite(value):
         raise FlexcalError(
-            f"{dotted(keys) or 'the value'} is {value}, which is not written; give a finite number."
+            "E-YAML-017",
+            f"{dotted(keys) or 'the value'} is {value}, which is not written; give a finite number.",
         )
     if value is None or isinstance(value, (str, bool, int, float)):
         return value
     raise FlexcalError(
-        f"{dotted(keys) or 'the value'} is a {type(value).__name__}, which has no form in YAML."
+        "E-YAML-018", f"{dotted(keys) or 'the value'} is a {type(value).__name__}, which has no form in YAML."
     )
 
 

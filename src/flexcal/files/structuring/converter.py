@@ -80,7 +80,7 @@ def _guarded(kind: type, hook: Any) -> Any:
         if not isinstance(value, kind):
             expected = "a list" if kind is list else "a mapping (key: value)"
             how = " (write [ ] around its entries, or a line with - before each)" if kind is list else ""
-            raise Fault(f"{expected} is expected{how}, not {describe(value)}")
+            raise Fault("E-YAML-023", f"{expected} is expected{how}, not {describe(value)}")
         return hook(value, cls)
 
     return structure
@@ -112,7 +112,7 @@ def _fixed_tuple_hook(cls: Any, converter: Converter) -> Any:
 
     def structure(value: list[Any], _: Any) -> tuple[Any, ...]:
         if len(value) != len(members):
-            raise Fault(f"{len(members)} items are expected, not {len(value)}")
+            raise Fault("E-YAML-024", f"{len(members)} items are expected, not {len(value)}")
         return tuple(
             _at(i, converter, item, member)
             for i, (item, member) in enumerate(zip(value, members, strict=True))

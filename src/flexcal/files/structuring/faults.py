@@ -3,23 +3,42 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import cast
+from typing import NamedTuple, cast
 
 from flexcal.errors import FlexcalError
 from flexcal.files.structuring.keys import Keys, dotted, file_key, known_keys
 from flexcal.files.structuring.wording import suggestion
 
 
-class StructureError(FlexcalError):
-    """Data that does not fit a class; `failures` pairs the keys leading to a fault with a sentence."""
+class Failure(NamedTuple):
+    """A value that does not fit: the keys that lead to it, and a code and sentence as of `FlexcalError`."""
 
-    def __init__(self, failures: list[tuple[Keys, str]]):
-        super().__init__(failures[0][1])
+    keys: Keys
+    code: str
+    sentence: str
+
+
+class StructureError(FlexcalError):
+    """Data that does not fit a class: all that does not; the first is the error's own code and sentence."""
+
+    def __init__(self, failures: list[Failure]):
+        super().__init__(failures[0].code, failures[0].sentence)
         self.failures = failures
+
+    def __reduce__(self) -> tuple[type[StructureError], tuple[list[Failure]]]:
+        return StructureError, (self.failures,)
 
 
 class Fault(ValueError):
-    """A value that does not fit its field; the message is a sentence without place."""
+    """A value that does not fit its field: a code, and a sentence without place."""
+
+    def __init__(self, code: str, sentence: str):
+        super().__init__(code, sentence)
+        self.code = code
+        self.sentence = sentence
+
+    def __str__(self) -> str:
+        return self.sentence
 
 
 class Nested(Exception):
@@ -31,8 +50,8 @@ class Nested(Exception):
         self.cause = cause
 
 
-def failures(problem: BaseException, keys: Keys) -> list[tuple[Keys, str] | None]:
-    """All failures in an exception of cattrs as (keys, sentence); None for one not the data's fault."""
+def failures(problem: BaseException, keys: Keys) -> list[Failure | None]:
+    """All failures in an exception of cattrs; None for one not the data's fault."""
     from cattrs.errors import (
         AttributeValidationNote,
         ClassValidationError,
@@ -44,9 +63,12 @@ def failures(problem: BaseException, keys: Keys) -> list[tuple[Keys, str] | None
         return failures(problem.cause, (*keys, problem.key))
     if isinstance(problem, ForbiddenExtraKeysError):
         known = known_keys(problem.cl)
-        return [((*keys, key), _unknown_key(key, keys, known)) for key in problem.extra_fields]
+        return [
+            Failure((*keys, key), "E-YAML-001", _unknown_key(key, keys, known))
+            for key in problem.extra_fields
+        ]
     if isinstance(problem, BaseExceptionGroup):
-        faults: list[tuple[Keys, str] | None] = []
+        faults: list[Failure | None] = []
         misspelt = any(isinstance(inner, ForbiddenExtraKeysError) for inner in problem.exceptions)
         for inner in problem.exceptions:
             place = keys
@@ -59,14 +81,19 @@ def failures(problem: BaseException, keys: Keys) -> list[tuple[Keys, str] | None
                 name = str(place[-1])
                 if misspelt:  # the unknown key, named by its own failure, is probably this one
                     continue
-                faults.append((keys, f"the key '{name}'{_inside(keys)} is missing; add '{name}: …'."))
+                faults.append(
+                    Failure(
+                        keys, "E-YAML-002", f"the key '{name}'{_inside(keys)} is missing; add '{name}: …'."
+                    )
+                )
             else:
                 faults.extend(failures(inner, place))
         return faults
     if isinstance(problem, (Fault, FlexcalError, ValueError, TypeError)):
         subject = f"{dotted(keys)}: " if keys else ""
         sentence = str(problem)
-        return [(keys, subject + sentence + ("" if sentence.endswith((".", "?")) else "."))]
+        code = problem.code if isinstance(problem, (Fault, FlexcalError)) else "E-YAML-003"
+        return [Failure(keys, code, subject + sentence + ("" if sentence.endswith((".", "?")) else "."))]
     return [None]
 
 

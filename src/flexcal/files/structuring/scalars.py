@@ -13,38 +13,38 @@ from flexcal.units import LARGEST
 def number(value: Any) -> float:
     """A finite number below `units.LARGEST`; raises `Fault`, as all below."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise Fault(f"a number is expected, not {describe(value)}")
+        raise Fault("E-YAML-025", f"a number is expected, not {describe(value)}")
     try:
         number = float(value)
     except OverflowError:
         number = math.inf
     if not math.isfinite(number):
-        raise Fault(f"a finite number is expected, not {describe(value)}")
+        raise Fault("E-YAML-026", f"a finite number is expected, not {describe(value)}")
     if abs(number) > LARGEST:
-        raise Fault(f"a number below {LARGEST:.0e} is expected, not {number:g}")
+        raise Fault("E-YAML-027", f"a number below {LARGEST:.0e} is expected, not {number:g}")
     return number
 
 
 def integer(value: Any) -> int:
     """A whole number of at most 8 bytes."""
     if isinstance(value, bool) or not isinstance(value, int):
-        raise Fault(f"a whole number is expected, not {describe(value)}")
+        raise Fault("E-YAML-028", f"a whole number is expected, not {describe(value)}")
     if not -(2**63) <= value < 2**63:
-        raise Fault(f"a whole number of at most 8 bytes is expected, not {value:.3g}")
+        raise Fault("E-YAML-029", f"a whole number of at most 8 bytes is expected, not {value:.3g}")
     return value
 
 
 def text(value: Any) -> str:
     """A text."""
     if not isinstance(value, str):
-        raise Fault(f"a text is expected, not {describe(value)}")
+        raise Fault("E-YAML-030", f"a text is expected, not {describe(value)}")
     return value
 
 
 def boolean(value: Any) -> bool:
     """True or false."""
     if not isinstance(value, bool):
-        raise Fault(f"true or false is expected, not {describe(value)}")
+        raise Fault("E-YAML-031", f"true or false is expected, not {describe(value)}")
     return value
 
 
@@ -56,4 +56,4 @@ def literal(value: Any, cls: Any) -> Any:
             return choice
     near = suggestion(value, [str(choice) for choice in choices]) if isinstance(value, str) else ""
     listed = ", ".join(f"'{choice}'" for choice in choices)
-    raise Fault(f"{describe(value)} is none of {listed}{near}")
+    raise Fault("E-YAML-032", f"{describe(value)} is none of {listed}{near}")

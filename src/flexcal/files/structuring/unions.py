@@ -30,7 +30,7 @@ def union_hook(cls: Any, converter: Converter) -> Any:
         )
         if not fitting:
             expected = " or ".join(_expected(member) for member in members if member is not NoneType)
-            raise Fault(f"{expected} is expected, not {describe(value)}")
+            raise Fault("E-YAML-033", f"{expected} is expected, not {describe(value)}")
         for member in fitting[:-1]:
             try:
                 return converter.structure(value, member)

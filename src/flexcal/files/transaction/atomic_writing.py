@@ -50,7 +50,7 @@ def _written(publication: FileTransaction, places: list[Path]) -> Iterator[tuple
     except OSError as problem:
         named = " and ".join(str(place) for place in places)
         raise InputError(
-            f"{named} could not be written ({_reason(problem)}); nothing there was changed."
+            "E-FILE-011", f"{named} could not be written ({_reason(problem)}); nothing there was changed."
         ) from problem
     finally:
         publication.drop(temporaries)
@@ -67,7 +67,7 @@ def _temporary(publication: FileTransaction, path: Path) -> Path:
         return publication.temporary(path)
     except OSError as problem:
         raise InputError(
-            f"{path} cannot be written ({_reason(problem)}); choose a folder that can."
+            "E-FILE-012", f"{path} cannot be written ({_reason(problem)}); choose a folder that can."
         ) from problem
 
 

@@ -24,7 +24,9 @@ def refuse_irregular(path: Path) -> None:
         return
     for holds, kind in _KINDS:
         if holds(mode):
-            raise InputError(f"{path} is {kind}, which is not replaced by a file; give another name.")
+            raise InputError(
+                "E-FILE-013", f"{path} is {kind}, which is not replaced by a file; give another name."
+            )
 
 
 def refuse_stream(path: Path) -> None:
@@ -38,4 +40,6 @@ def refuse_stream(path: Path) -> None:
         return
     for holds, kind in _STREAMS:
         if holds(mode):
-            raise InputError(f"{path} is {kind}, not a file; write its content to a file, and name that.")
+            raise InputError(
+                "E-FILE-014", f"{path} is {kind}, not a file; write its content to a file, and name that."
+            )

@@ -68,8 +68,9 @@ class Journal:
             elif change.staged.exists():
                 if seen(change.place) != change.seen:
                     raise InputError(
+                        "E-FILE-015",
                         f"{change.place} was changed after a run that was replacing it had been cut off; move it away, so that the next "
-                        f"command can finish with {change.staged.parent}, or remove that folder."
+                        f"command can finish with {change.staged.parent}, or remove that folder.",
                     )
                 change.staged.replace(change.place)
         for folder in {change.place.parent for change in self.changes}:

@@ -174,19 +174,21 @@ class FileTransaction:
                 for stage in self._stages.values():
                     stage.release()
                 raise InputError(
+                    "E-FILE-016",
                     f"all files of this run are written, but could not be put in place in {folders} ({reason}); the next flexcal that "
-                    "opens the folder does it."
+                    "opens the folder does it.",
                 ) from problem
             raise InputError(
-                f"{folders} could not be written to ({reason}); nothing there was changed."
+                "E-FILE-017", f"{folders} could not be written to ({reason}); nothing there was changed."
             ) from problem
 
     def _refuse_changed(self) -> None:
         for place, was in self._before.items():
             if place in self._waiting and seen(place) != was:
                 raise InputError(
+                    "E-FILE-018",
                     f"{place} was changed by another program while this run was at work; nothing there was changed by this run; run it "
-                    "again."
+                    "again.",
                 )
 
     def discard(self) -> None:

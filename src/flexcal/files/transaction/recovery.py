@@ -51,7 +51,7 @@ def _settle_stage(stage: Path) -> None:
             journal.carry_out()
         except (OSError, ValueError, LookupError, TypeError) as problem:
             reason = getattr(problem, "strerror", None) or type(problem).__name__
-            raise InputError(_unfinished(stage, reason)) from problem
+            raise InputError("E-FILE-019", _unfinished(stage, reason)) from problem
         for other in journal.stages:
             remove_stage(other)
     finally:

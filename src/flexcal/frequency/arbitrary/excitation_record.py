@@ -59,8 +59,9 @@ def equal_pieces(records: Sequence[ExcitationRecord]) -> list[ExcitationRecord]:
     steps = [record.time_step for record in records]
     if max(steps) > (1 + 1e-3) * min(steps):
         raise FlexcalError(
+            "E-FRF-001",
             f"{records[int(np.argmax(steps))].name} has a time step of {max(steps):g} s, {records[int(np.argmin(steps))].name} "
-            f"one of {min(steps):g} s; give records of one rate together."
+            f"one of {min(steps):g} s; give records of one rate together.",
         )
     lengths = [len(record) for record in records]
     limit = [length // (-(-length // LONGEST)) for length in lengths]
@@ -68,7 +69,8 @@ def equal_pieces(records: Sequence[ExcitationRecord]) -> list[ExcitationRecord]:
     size = max(size for size, total in used.items() if total >= _NEARLY_ALL * max(used.values()))
     if size < SHORTEST:
         raise FlexcalError(
-            f"{records[0].name} has {len(records[0])} samples without a gap; a frequency response needs {SHORTEST} or more."
+            "E-FRF-002",
+            f"{records[0].name} has {len(records[0])} samples without a gap; a frequency response needs {SHORTEST} or more.",
         )
     return [
         record.part(first, end)

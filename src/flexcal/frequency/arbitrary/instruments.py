@@ -37,13 +37,15 @@ def with_reference(spectra: RecordSpectra, references: np.ndarray) -> tuple[Reco
     n_r = references.shape[2]
     if n_r < n_u:
         raise FlexcalError(
-            f"{n_r} references cannot explain {n_u} inputs; name one reference for each input."
+            "E-FRF-003", f"{n_r} references cannot explain {n_u} inputs; name one reference for each input."
         )
     unknowns = (ORDER + 1) * (n_r + records)
     window = (_FREEDOM + unknowns) // records + 1
     window += 1 - window % 2
     if window > bins:
-        raise FlexcalError(f"{bins} bins are too few for {n_r} references; record longer, or more often.")
+        raise FlexcalError(
+            "E-FRF-004", f"{bins} bins are too few for {n_r} references; record longer, or more often."
+        )
     explained, share = np.empty_like(spectra.inputs), np.empty(bins)
     for first in range(0, bins, _CHUNK):
         at = np.arange(first, min(first + _CHUNK, bins))

@@ -87,7 +87,8 @@ def _window(spectra: RecordSpectra, lines: int) -> int:
         if records * share * (window - (ORDER + 1)) - unknowns >= _FREEDOM and window * share >= 3:
             return window
     raise FlexcalError(
-        f"a frequency response needs more excited lines than {lines} (records: {records}, inputs: {n_u}); record longer, or more often."
+        "E-FRF-005",
+        f"a frequency response needs more excited lines than {lines} (records: {records}, inputs: {n_u}); record longer, or more often.",
     )
 
 
@@ -113,7 +114,8 @@ def _windows(
     scale = np.sqrt((np.abs(instruments) ** 2).mean((1, 2)))[:, None, None, :]
     if not (scale > 0).all():
         raise FlexcalError(
-            "an input does not move at all at some frequencies; leave that column out with --input."
+            "E-FRF-006",
+            "an input does not move at all at some frequencies; leave that column out with --input.",
         )
     regressors = without_transient(windows.regressors(instruments / scale)).reshape(
         lines, records * window, -1
@@ -126,8 +128,9 @@ def _windows(
     degenerate = diagonal.min(-1) < _DEGENERATE * diagonal.max(-1)
     if degenerate.mean() > _MOST_DEGENERATE:
         raise FlexcalError(
+            "E-FRF-007",
             "the inputs cannot be told apart at most frequencies; record as many experiments with different excitation as there are "
-            "inputs, or name one of them with --input."
+            "inputs, or name one of them with --input.",
         )
     r = np.where(degenerate[:, None, None], np.eye(r.shape[-1]), r)
     coefficients = np.swapaxes(q, -1, -2).conj() @ columns

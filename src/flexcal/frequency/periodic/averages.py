@@ -37,7 +37,9 @@ def average_response(spectra: ExperimentSpectra, realisations: np.ndarray, avera
             return joint_input_output(spectra.outputs, spectra.torque, spectra.excitation)
         case "errors_in_variables":
             return errors_in_variables(spectra.outputs, spectra.torque, spectra.noise)
-    raise FlexcalError(f"there is no average {average!r}; choose one of {', '.join(get_args(Average))}.")
+    raise FlexcalError(
+        "E-FRF-008", f"there is no average {average!r}; choose one of {', '.join(get_args(Average))}."
+    )
 
 
 def arithmetic(realisations: np.ndarray) -> np.ndarray:

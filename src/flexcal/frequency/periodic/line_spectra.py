@@ -33,18 +33,20 @@ def kept_samples(plan: MultisinePlan, recording: Recording) -> slice:
     step = recording.time_step
     if plan.torque == "held" and step * plan.rate_hz > 1.0 + 1e-6:
         raise FlexcalError(
+            "E-FRF-009",
             f"{recording.name}: the log has a step of {step:g} s, longer than the {1.0 / plan.rate_hz:g} s for which the "
-            "torque is held; log at the control rate."
+            "torque is held; log at the control rate.",
         )
     try:
         samples = samples_per_period(plan.base_frequency_hz, step)
     except FlexcalError as problem:
-        raise FlexcalError(f"{recording.name}: {problem}") from problem
+        raise FlexcalError(problem.code, f"{recording.name}: {problem}") from problem
     needed = plan.periods * samples
     if len(recording) < needed:
         raise FlexcalError(
+            "E-FRF-010",
             f"{recording.name}: the log has {len(recording)} samples, fewer than the {needed} of {plan.periods} periods; "
-            "record the whole experiment."
+            "record the whole experiment.",
         )
     return slice(plan.settle_periods * samples, needed)
 
@@ -58,7 +60,9 @@ def spectrum(signal: np.ndarray, periods: int, lines: np.ndarray) -> np.ndarray:
     lines = np.asarray(lines)
     samples = signal.shape[0]
     if samples % periods:
-        raise FlexcalError(f"{samples} samples do not divide into {periods} periods; cut whole periods.")
+        raise FlexcalError(
+            "E-FRF-011", f"{samples} samples do not divide into {periods} periods; cut whole periods."
+        )
     if np.issubdtype(lines.dtype, np.integer):
         signal = signal.reshape(periods, samples // periods, *signal.shape[1:]).mean(0)
         bins = lines
@@ -66,7 +70,8 @@ def spectrum(signal: np.ndarray, periods: int, lines: np.ndarray) -> np.ndarray:
         bins = np.rint(lines * periods).astype(int)
         if not np.allclose(bins, lines * periods, atol=1e-6):
             raise FlexcalError(
-                f"A line is not a multiple of 1/{periods} of the base frequency; keep more periods."
+                "E-FRF-012",
+                f"A line is not a multiple of 1/{periods} of the base frequency; keep more periods.",
             )
     columns = np.ascontiguousarray(signal.reshape(signal.shape[0], -1).T)
     phasors = np.fft.rfft(columns, axis=1)[:, bins].T * (2.0 / signal.shape[0])
@@ -110,9 +115,10 @@ def noise_lines(plan: MultisinePlan) -> np.ndarray:
     clear = candidates[~_is_whole(candidates / _reference_ratio(plan))]
     if not clear.size:
         raise FlexcalError(
+            "E-FRF-013",
             f"the harmonics of the reference motion ({plan.reference_frequency_hz:g} Hz) fall on every line of this plan, so none shows "
             "the noise; choose reference_frequency_hz (m + 1/2) times the base frequency "
-            f"({plan.base_frequency_hz:g} Hz), with m = 8 for example."
+            f"({plan.base_frequency_hz:g} Hz), with m = 8 for example.",
         )
     return clear
 

@@ -51,8 +51,9 @@ def local_polynomial(inputs: np.ndarray, outputs: np.ndarray, count: int) -> Loc
     freedom = experiments * count - unknowns
     if freedom < outputs.shape[-1] or count > lines:
         raise FlexcalError(
+            "E-FRF-014",
             f"a window of {count} of {lines} lines in {experiments} experiments cannot determine {unknowns} unknowns and a "
-            "covariance; measure more lines or experiments."
+            "covariance; measure more lines or experiments.",
         )
     at = np.arange(lines)
     windows = LocalWindows.of(at, lines, count)
@@ -61,13 +62,15 @@ def local_polynomial(inputs: np.ndarray, outputs: np.ndarray, count: int) -> Loc
     scale = np.sqrt((np.abs(u) ** 2).mean((1, 2)))[:, None, None, :]
     if not (scale > 0.0).all():
         raise FlexcalError(
-            "an input of the local polynomial method carries no power at some line; excite every axis."
+            "E-FRF-015",
+            "an input of the local polynomial method carries no power at some line; excite every axis.",
         )
     q, r = np.linalg.qr(windows.regressors(u / scale).reshape(lines, experiments * count, unknowns))
     diagonal = np.abs(np.diagonal(r, axis1=-2, axis2=-1))
     if (diagonal.min(-1) < _RANK_TOLERANCE * diagonal.max(-1)).any():
         raise FlexcalError(
-            "the excitation near some line does not separate the inputs of the local polynomial method; measure more experiments."
+            "E-FRF-016",
+            "the excitation near some line does not separate the inputs of the local polynomial method; measure more experiments.",
         )
     projected = np.swapaxes(q, -1, -2).conj() @ y
     inverse = np.linalg.solve(r, np.broadcast_to(np.eye(unknowns), r.shape))[
@@ -91,7 +94,8 @@ def without_transient(
     """
     if quiet.size < TRANSIENT_BINS:
         raise FlexcalError(
-            f"{quiet.size} bins between the lines are too few to estimate a transient; record more periods or lines."
+            "E-FRF-017",
+            f"{quiet.size} bins between the lines are too few to estimate a transient; record more periods or lines.",
         )
     first = np.clip(np.searchsorted(quiet, lines) - TRANSIENT_BINS // 2, 0, quiet.size - TRANSIENT_BINS)
     window = quiet[first[:, None] + np.arange(TRANSIENT_BINS)]  # (L, W)
@@ -120,7 +124,8 @@ def local_polynomial_responses(
     """
     if has_reference(plan) and not plan.signs:
         raise FlexcalError(
-            "the local polynomial method cannot separate the reference motion from the response; measure both signs, or without it."
+            "E-FRF-018",
+            "the local polynomial method cannot separate the reference motion from the response; measure both signs, or without it.",
         )
     names = axis_names(plan, joint_names)
     for records in by_pose(plan, recordings, keep_whole):

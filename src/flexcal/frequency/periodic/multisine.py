@@ -19,7 +19,7 @@ _PEAK_SAMPLES_PER_LINE = 8  # time grid of the crest factor: samples per period 
 def orthogonal_matrix(n_u: int) -> np.ndarray:
     """The (n_u, n_u) unitary matrix T of eq. (24), T_pq = n_u^(-1/2) exp(j 2π (p-1)(q-1) / n_u), for any n_u ≥ 1."""
     if n_u < 1:
-        raise FlexcalError(f"a multisine needs at least one excited axis, not {n_u}.")
+        raise FlexcalError("E-FRF-019", f"a multisine needs at least one excited axis, not {n_u}.")
     index = np.arange(n_u)
     return np.exp(2j * np.pi / n_u * ((index[:, None] * index) % n_u)) / np.sqrt(n_u)
 
@@ -32,7 +32,8 @@ def odd_lines(base_frequency_hz: float, low_hz: float, high_hz: float) -> np.nda
     lines = lines[lines % 2 == 1]
     if not lines.size:
         raise FlexcalError(
-            f"no odd multiple of {base_frequency_hz} Hz lies in {low_hz}-{high_hz} Hz; widen the band."
+            "E-FRF-020",
+            f"no odd multiple of {base_frequency_hz} Hz lies in {low_hz}-{high_hz} Hz; widen the band.",
         )
     return lines
 
@@ -102,8 +103,9 @@ def synthesise(phasors: np.ndarray, lines: Sequence[int] | np.ndarray, samples: 
     lines = np.asarray(lines)
     if lines.size and 2 * lines.max() >= samples:
         raise FlexcalError(
+            "E-FRF-021",
             f"the line {lines.max()} needs more than {2 * lines.max()} samples a period, not {samples}; "
-            "raise the rate or lower the band."
+            "raise the rate or lower the band.",
         )
     bins = np.zeros((samples // 2 + 1, *phasors.shape[1:]), complex)
     bins[lines] = phasors * (samples / 2.0)
@@ -125,8 +127,9 @@ def samples_per_period(base_frequency_hz: float, time_step: float) -> int:
     samples = 1.0 / (base_frequency_hz * time_step)
     if abs(samples - round(samples)) > 1e-6 * samples:
         raise FlexcalError(
+            "E-FRF-022",
             f"a period of {1.0 / base_frequency_hz:g} s is not a whole number of samples of {time_step:g} s "
-            f"({samples:.6f}); choose a base frequency that divides the rate."
+            f"({samples:.6f}); choose a base frequency that divides the rate.",
         )
     return round(samples)
 

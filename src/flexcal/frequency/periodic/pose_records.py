@@ -39,7 +39,7 @@ class PoseRecords:
         """Sample time (s) of the recordings."""
         if self._time_step is None:
             raise FlexcalError(
-                f"there is no recording of pose {self.pose + 1}; record it or name another pose."
+                "E-FRF-023", f"there is no recording of pose {self.pose + 1}; record it or name another pose."
             )
         return self._time_step
 
@@ -59,8 +59,9 @@ class PoseRecords:
         if missing:
             first = RecordingLabel(self.pose, *missing[0])
             raise FlexcalError(
+                "E-FRF-024",
                 f"{len(missing)} of {len(self._expected)} recordings of pose {self.pose + 1} are missing, the first is "
-                f"{first.name}; record them."
+                f"{first.name}; record them.",
             )
 
     def add(self, recording: Recording) -> None:
@@ -70,24 +71,28 @@ class PoseRecords:
         key = (label.realisation, label.experiment, label.sign)
         if key not in self._expected or key in self._kept:
             state = "is there twice" if key in self._kept else "is not in the plan"
-            raise FlexcalError(f"{recording.name} {state}; remove it.")
+            raise FlexcalError("E-FRF-025", f"{recording.name} {state}; remove it.")
         if self._time_step is None:
             self._time_step = recording.time_step
         elif abs(recording.time_step - self._time_step) > 1e-9 * self._time_step:
             raise FlexcalError(
+                "E-FRF-026",
                 f"{recording.name}: its sample time is {recording.time_step:g} s, but that of recordings before it is "
-                f"{self._time_step:g} s; record them all at one rate."
+                f"{self._time_step:g} s; record them all at one rate.",
             )
         if self._sensors is None:
             self._sensors = recording.sensors
         elif recording.sensors != self._sensors:
             own, others = (" and ".join(names) or "none" for names in (recording.sensors, self._sensors))
             raise FlexcalError(
-                f"{recording.name}: the sensors on the arm are {own}, but in recordings before it {others}; record the same in all."
+                "E-FRF-027",
+                f"{recording.name}: the sensors on the arm are {own}, but in recordings before it {others}; record the same in all.",
             )
         kept = self._keep(self.plan, recording)
         if not all(np.isfinite(part).all() for part in kept):
-            raise FlexcalError(f"{recording.name} holds a NaN or an infinite number; record it again.")
+            raise FlexcalError(
+                "E-FRF-028", f"{recording.name} holds a NaN or an infinite number; record it again."
+            )
         self._kept[key] = kept
 
     def difference(self, part: int) -> np.ndarray:
@@ -119,10 +124,11 @@ def by_pose(
     for recording in recordings:
         if recording.label is None:
             raise FlexcalError(
-                f"{recording.name} cannot be assigned; give it its pose, realisation, experiment and sign."
+                "E-FRF-029",
+                f"{recording.name} cannot be assigned; give it its pose, realisation, experiment and sign.",
             )
         if recording.label.pose >= len(plan.poses):
-            raise FlexcalError(f"{recording.name} is not in the plan; remove it.")
+            raise FlexcalError("E-FRF-030", f"{recording.name} is not in the plan; remove it.")
         records = collected.get(recording.label.pose)
         if records is not None:
             records.add(recording)

@@ -155,27 +155,32 @@ class FrequencyResponse:
     def load(cls, path: str | Path) -> "FrequencyResponse":
         """Read what `save` wrote; `InputError` where the file is missing or something else."""
         if not current_path(path).exists():
-            raise InputError(f"{path} does not exist; run 'flexcal identify response' to make it.")
+            raise InputError(
+                "E-FRF-031", f"{path} does not exist; run 'flexcal identify response' to make it."
+            )
         file = NpzFile(Path(path), "give what 'flexcal identify response' wrote")
         if "covariance" not in file:
-            raise file.error("is not a frequency response")
+            raise file.error("E-FRF-032", "is not a frequency response")
         values = file.read(_FORMS)
         lines, axes = values["response"].shape[:2]
         if axes == 0 or lines == 0 or values["frequencies_hz"].min() <= 0:
-            raise file.error("holds no response at positive frequencies")
+            raise file.error("E-FRF-033", "holds no response at positive frequencies")
         if values["covariance"].shape[1:] != (axes**2, axes**2):
-            raise file.error(f"holds a covariance of another size than the response's ({axes}, {axes})")
+            raise file.error(
+                "E-FRF-034", f"holds a covariance of another size than the response's ({axes}, {axes})"
+            )
         more: dict[str, Any] = {}
         if "sensors" in file:
             sensed = file.read(_SENSED)
             if sensed["joint_covariance"].shape[1:] != (axes * (axes + len(sensed["sensors"])),) * 2:
                 raise file.error(
-                    "holds a joint_covariance of another size than the responses of axes and sensors"
+                    "E-FRF-035",
+                    "holds a joint_covariance of another size than the responses of axes and sensors",
                 )
             more = {**sensed, "sensors": tuple(sensed["sensors"].tolist())}
         payload = float(values["payload"])
         if np.isinf(payload):
-            raise file.error("holds an infinite payload")
+            raise file.error("E-FRF-036", "holds an infinite payload")
         return cls(
             frequencies_hz=values["frequencies_hz"],
             response=values["response"],
@@ -244,24 +249,27 @@ def response_of(
     lines = np.asarray(plan.lines)
     if members < 2 or (members - 1) * min(pooled_lines, lines.size) < SMALLEST_FREEDOM:
         raise FlexcalError(
+            "E-FRF-037",
             f"{members} realisations of {lines.size} lines leave too little scatter for a covariance with "
             f"{SMALLEST_FREEDOM} degrees of freedom; measure more realisations, pool more lines, or use "
-            "the local polynomial method (--method local-polynomial)."
+            "the local polynomial method (--method local-polynomial).",
         )
     # sensors add elements to the covariance: as many degrees of freedom for each as without
     pooled_lines = -(-pooled_lines * (len(joints) + len(records.sensors)) // len(joints))
     spectra = experiment_spectra(records, pooled_lines)
     if records.sensors and average not in ("arithmetic", "h1", "joint_input_output"):
         raise FlexcalError(
+            "E-FRF-038",
             f"the average '{average}' is of square matrices, but the sensors {', '.join(records.sensors)} recorded too; use "
-            "arithmetic, h1 or joint_input_output."
+            "arithmetic, h1 or joint_input_output.",
         )
     try:
         realisations = right_divide(spectra.outputs, spectra.torque)
         gain = input_gain(spectra.torque)
     except np.linalg.LinAlgError as problem:
         raise FlexcalError(
-            "the torque of the experiments leaves an axis unexcited at some line (Γ is singular)."
+            "E-FRF-039",
+            "the torque of the experiments leaves an axis unexcited at some line (Γ is singular).",
         ) from (problem)
     mean = realisations.mean(0)
     noise = output_noise(mean, spectra.noise)
@@ -306,5 +314,7 @@ def axis_names(plan: MultisinePlan, given: Sequence[str] | None) -> tuple[str, .
     """The names of the excited axes; raises `FlexcalError` where another number of them is given."""
     names = tuple(given) if given is not None else tuple(f"joint_{j + 1}" for j in plan.joints)
     if len(names) != len(plan.joints):
-        raise FlexcalError(f"{len(names)} joint names were given for {len(plan.joints)} excited axes.")
+        raise FlexcalError(
+            "E-FRF-040", f"{len(names)} joint names were given for {len(plan.joints)} excited axes."
+        )
     return names

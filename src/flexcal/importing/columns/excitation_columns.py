@@ -124,7 +124,8 @@ def response_columns(
         option = "--input COLUMN" if not chosen_inputs else "--output COLUMN=position"
         listed = ", ".join(column for column in foreign.numbers if column != time)
         raise InputError(
-            f"{foreign.table.file.path}: no column was recognised as {lacking}; say which with {option}; there are {listed}."
+            "E-IMPORT-001",
+            f"{foreign.table.file.path}: no column was recognised as {lacking}; say which with {option}; there are {listed}.",
         )
     guessed = [] if chosen_references else _guessed_references(foreign, free, len(chosen_inputs))
     free = {column: name for column, name in free.items() if column not in {c.channel.name for c in guessed}}
@@ -165,7 +166,8 @@ def _named(text: str, foreign: ForeignTable, option: str, *, is_output: bool) ->
         column, _, kind = column.rpartition("=")
         if kind not in KIND_NAMES:
             raise InputError(
-                f"{option} {text}: '{kind}' is none of {', '.join(KIND_NAMES)}{suggestion(kind, list(KIND_NAMES)) or '.'}"
+                "E-IMPORT-002",
+                f"{option} {text}: '{kind}' is none of {', '.join(KIND_NAMES)}{suggestion(kind, list(KIND_NAMES)) or '.'}",
             )
     if column not in foreign.numbers and column.endswith("]") and "[" in column:
         column, _, unit = column[:-1].rpartition("[")
@@ -174,7 +176,8 @@ def _named(text: str, foreign: ForeignTable, option: str, *, is_output: bool) ->
     if column not in foreign.numbers:
         near = suggestion(column, list(foreign.numbers)) or f"; there are {', '.join(foreign.numbers)}."
         raise InputError(
-            f"{option} {text}: {foreign.table.file.path} has no column of numbers '{column}'{near}"
+            "E-IMPORT-003",
+            f"{option} {text}: {foreign.table.file.path} has no column of numbers '{column}'{near}",
         )
     name = _parsed(column, foreign)
     if not is_output:
@@ -188,14 +191,16 @@ def _named(text: str, foreign: ForeignTable, option: str, *, is_output: bool) ->
             and recognised.channel.derivative != KIND_NAMES[kind]
         ):
             raise InputError(
-                f"{option} {text}: the unit of '{column}' is not that of a {kind}; leave one of them out."
+                "E-IMPORT-004",
+                f"{option} {text}: the unit of '{column}' is not that of a {kind}; leave one of them out.",
             )
         factor, said = (recognised.factor, recognised.channel.unit) if recognised is not None else (1.0, "")
         return ResponseColumn(Channel(column, said, KIND_NAMES[kind]), factor)
     if recognised is None:
         raise InputError(
+            "E-IMPORT-005",
             f"{option} {text}: whether '{column}' is a position, a velocity or an acceleration is not known; "
-            f"say it, as in {option} '{column}=acceleration'."
+            f"say it, as in {option} '{column}=acceleration'.",
         )
     return recognised
 

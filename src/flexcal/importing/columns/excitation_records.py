@@ -117,7 +117,9 @@ def _records(
         summary.add(base)
         records.append(_record(file.name, base.time_step, ordered[:, np.argsort(order)], columns))
     if not records:
-        raise InputError(f"{file}: no stretch without a gap has {SHORTEST} samples; record longer.")
+        raise InputError(
+            "E-IMPORT-006", f"{file}: no stretch without a gap has {SHORTEST} samples; record longer."
+        )
     if summary.sentence:
         notes.append(f"{summary.sentence} ({file.name})")
     return records, notes
@@ -131,7 +133,8 @@ def _record(name: str, step: float, values: np.ndarray, columns: ResponseColumns
 def _check(file: Path, table: ForeignTable, column: str) -> None:
     if column not in table.numbers:
         raise InputError(
-            f"{file}: there is no column of numbers '{column}', which the first file has; give files of one experiment."
+            "E-IMPORT-007",
+            f"{file}: there is no column of numbers '{column}', which the first file has; give files of one experiment.",
         )
     numbers = table.numbers[column]
     wrong = np.flatnonzero(~(np.abs(numbers) <= LARGEST))
@@ -140,7 +143,7 @@ def _check(file: Path, table: ForeignTable, column: str) -> None:
         what = f"the value is {numbers[row]:g}, which is no measurement"
         if np.isnan(numbers[row]):
             what = "there is no number"
-        raise table.table.error(row, column, f"{what}; complete the cell or remove the row.")
+        raise table.table.error("E-IMPORT-008", row, column, f"{what}; complete the cell or remove the row.")
 
 
 def _times(
@@ -149,7 +152,8 @@ def _times(
     if column is None or rate_hz is not None:
         if rate_hz is None:
             raise InputError(
-                f"{file}: no column of time was recognised; name it 't', or give the sampling rate with --rate HZ."
+                "E-IMPORT-009",
+                f"{file}: no column of time was recognised; name it 't', or give the sampling rate with --rate HZ.",
             )
         return np.arange(len(table)) / rate_hz, ""
     _check(file, table, column)
@@ -161,12 +165,16 @@ def _times(
     back = np.flatnonzero(np.diff(seconds) < -LATE)
     if back.size:
         raise table.table.error(
+            "E-IMPORT-010",
             int(back[0]) + 1,
             column,
             "the time runs backwards; remove the row, or give the rate of uniform samples with --rate HZ.",
         )
     if not seconds[-1] > 0:
         raise table.table.error(
-            0, column, "the time stands still; give the rate of uniform samples with --rate HZ."
+            "E-IMPORT-011",
+            0,
+            column,
+            "the time stands still; give the rate of uniform samples with --rate HZ.",
         )
     return seconds, "" if known or unit == "s" else f"{column} is taken to be in {unit}"

@@ -38,7 +38,7 @@ def apply_map(
         name, equals, source = entry.partition("=")
         name, source = name.strip(), source.strip()
         if not equals or not source:
-            raise InputError(f"--map {entry}: it is written NAME=COLUMN, as in q1=J1[deg].")
+            raise InputError("E-IMPORT-012", f"--map {entry}: it is written NAME=COLUMN, as in q1=J1[deg].")
         if name in _TEXTS:
             if source == "none":
                 texts.pop(name, None)
@@ -50,7 +50,8 @@ def apply_map(
         quantity = next((q for q, columns in names.items() if name in columns or name == q), None)
         if quantity is None and name in foreign.table.columns:
             raise InputError(
-                f"--map {entry}: flexcal's name comes first, then the file's column, as in q1={name}."
+                "E-IMPORT-013",
+                f"--map {entry}: flexcal's name comes first, then the file's column, as in q1={name}.",
             )
         if quantity is None:
             known = [column for columns in names.values() for column in columns]
@@ -58,11 +59,13 @@ def apply_map(
                 suggestion(name, known)
                 or f"; known are q1 … q{model.n}, x, y, z, t, tau1 … tau{model.n} and others."
             )
-            raise InputError(f"--map {entry}: there is no '{name}'{near}")
+            raise InputError("E-IMPORT-014", f"--map {entry}: there is no '{name}'{near}")
         if source == "none":
             placed.pop(quantity, None)
         elif name not in names[quantity]:
-            raise InputError(f"--map {entry}: say it for each of {', '.join(names[quantity])}.")
+            raise InputError(
+                "E-IMPORT-015", f"--map {entry}: say it for each of {', '.join(names[quantity])}."
+            )
         else:
             said.setdefault(quantity, {})[names[quantity].index(name)] = _source(
                 entry, quantity, source, foreign
@@ -96,7 +99,7 @@ def _source(
     assert match is not None
     gain = float(match[2] or 1.0) * (-1.0 if match[1] == "-" else 1.0)
     if not 0 < abs(gain) < float("inf"):
-        raise InputError(f"--map {entry}: the factor must be a finite number other than 0.")
+        raise InputError("E-IMPORT-016", f"--map {entry}: the factor must be a finite number other than 0.")
     rest, offset, unit = match[3].strip(), 0.0, None
     if source in foreign.numbers:
         rest, gain = source, 1.0
@@ -108,20 +111,28 @@ def _source(
             unit = unit_of(unit)
         if unit not in UNITS.get(quantity, {}):
             possible = ", ".join(UNITS.get(quantity, {})) or "none"
-            raise InputError(f"--map {entry}: the unit '{bracket[2]}' does not fit; possible are {possible}.")
+            raise InputError(
+                "E-IMPORT-017",
+                f"--map {entry}: the unit '{bracket[2]}' does not fit; possible are {possible}.",
+            )
     if rest in foreign.texts:
-        raise InputError(f"--map {entry}: the column '{rest}' holds texts, not numbers.")
+        raise InputError("E-IMPORT-018", f"--map {entry}: the column '{rest}' holds texts, not numbers.")
     if rest not in foreign.numbers:
         raise _no_column(entry, rest, foreign)
     if unit in ("A", "mA") and "*" not in source:
-        raise InputError(f"--map {entry}: currents become torques by a gain in N m/A, as in tau1=12.5*I1[A].")
+        raise InputError(
+            "E-IMPORT-019",
+            f"--map {entry}: currents become torques by a gain in N m/A, as in tau1=12.5*I1[A].",
+        )
     return rest, unit, gain, offset
 
 
 def _no_column(entry: str, column: str, foreign: ForeignTable) -> InputError:
     known = list(foreign.table.columns)
     near = suggestion(column, known) or f"; there are {', '.join(known)}."
-    return InputError(f"--map {entry}: {foreign.table.file.path} has no column '{column}'{near}")
+    return InputError(
+        "E-IMPORT-020", f"--map {entry}: {foreign.table.file.path} has no column '{column}'{near}"
+    )
 
 
 def _said(
@@ -136,7 +147,8 @@ def _said(
     missing = [name for i, name in enumerate(names) if i not in entries]
     if missing and guessed is None:
         raise InputError(
-            f"--map does not give {', '.join(missing)}, which was not recognised either; map it too."
+            "E-IMPORT-021",
+            f"--map does not give {', '.join(missing)}, which was not recognised either; map it too.",
         )
     assigned = []
     for i in range(len(names)):

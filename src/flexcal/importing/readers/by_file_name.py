@@ -51,7 +51,7 @@ def read_foreign(
 def _read(path: Path, joints: Sequence[str], sheet: str | None, topic: str | None) -> ForeignTable:
     suffix = path.suffix.lower()
     if not path.exists():
-        raise InputError(f"{path}: there is no such file; check the name and the folder.")
+        raise InputError("E-IMPORT-022", f"{path}: there is no such file; check the name and the folder.")
     for file in (path, *(sorted(path.iterdir()) if path.is_dir() else ())):
         refuse_stream(file)
     if suffix in _ROS or (path.is_dir() and (path / "metadata.yaml").is_file()):
@@ -60,7 +60,8 @@ def _read(path: Path, joints: Sequence[str], sheet: str | None, topic: str | Non
         return read_ros(path, joints, topic)
     if path.is_dir():
         raise InputError(
-            f"{path} is a folder without metadata.yaml, so no recording of ROS 2; name a file{tables_in(path)}."
+            "E-IMPORT-023",
+            f"{path} is a folder without metadata.yaml, so no recording of ROS 2; name a file{tables_in(path)}.",
         )
     if suffix in _TEXT:
         from flexcal.importing.readers.separated_text import read_text
@@ -83,4 +84,6 @@ def _read(path: Path, joints: Sequence[str], sheet: str | None, topic: str | Non
 
         return read_parquet(path)
     known = ", ".join((*_TEXT, *_EXCEL[:2], ".mat", ".parquet", _UFF[0], *_ROS))
-    raise InputError(f"{path}: files that end in '{suffix}' are not supported; supported are {known}.")
+    raise InputError(
+        "E-IMPORT-024", f"{path}: files that end in '{suffix}' are not supported; supported are {known}."
+    )

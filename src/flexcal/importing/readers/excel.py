@@ -22,23 +22,30 @@ def read_excel(path: Path, sheet: str | None) -> ForeignTable:
         import fastexcel
     except ImportError:
         raise InputError(
-            f"{path}: Excel files need fastexcel: pip install fastexcel; or save the sheet as CSV."
+            "E-IMPORT-025",
+            f"{path}: Excel files need fastexcel: pip install fastexcel; or save the sheet as CSV.",
         ) from None
     try:
         book = fastexcel.read_excel(path)
         names = book.sheet_names
         if sheet is not None and sheet not in names:
-            raise InputError(f"{path}: there is no sheet '{sheet}'; there are {', '.join(names)}.")
+            raise InputError(
+                "E-IMPORT-026", f"{path}: there is no sheet '{sheet}'; there are {', '.join(names)}."
+            )
         chosen = names[0] if sheet is None else sheet
         texts = _columns(book.load_sheet(chosen, header_row=None, dtypes="string"))
         rows = [[cell or "" for cell in row] for row in zip(*texts, strict=True)]
         if not rows:
-            raise InputError(f"{path}: the sheet '{chosen}' is empty; name another one with --sheet.")
+            raise InputError(
+                "E-IMPORT-027", f"{path}: the sheet '{chosen}' is empty; name another one with --sheet."
+            )
         header = find_header(path, rows, len(texts), "row")
         exact = _columns(book.load_sheet(chosen, header_row=None, skip_rows=header.first))
     except fastexcel.FastExcelError as problem:
         reason = " ".join(str(problem).split())[:200]
-        raise InputError(f"{path}: not a readable Excel file ({reason}); save it again.") from problem
+        raise InputError(
+            "E-IMPORT-028", f"{path}: not a readable Excel file ({reason}); save it again."
+        ) from problem
     columns = {name: _column(cells) for name, cells in zip(header.names, exact, strict=True)}
     first = header.first + 1
     others = [name for name in names if name != chosen]

@@ -22,7 +22,8 @@ def read_hdf5_mat(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
         import h5py
     except ImportError:
         raise InputError(
-            f"{path}: MAT-files of version 7.3 need h5py: pip install h5py; or save it again with save(…, '-v7')."
+            "E-IMPORT-029",
+            f"{path}: MAT-files of version 7.3 need h5py: pip install h5py; or save it again with save(…, '-v7').",
         ) from None
     variables: dict[str, np.ndarray] = {}
     others: list[str] = []
@@ -50,7 +51,7 @@ def read_hdf5_mat(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
     except (OSError, RuntimeError) as problem:
         reason = " ".join(str(problem).split())
         raise InputError(
-            f"{path}: not a readable MAT-file ({reason}); save it again with '-v7'."
+            "E-IMPORT-030", f"{path}: not a readable MAT-file ({reason}); save it again with '-v7'."
         ) from problem
     return {name: value for name, value in variables.items() if value.ndim}, others + [
         name for name, value in variables.items() if not value.ndim
@@ -71,7 +72,8 @@ def read_mat(path: Path) -> ForeignTable:
     lengths = Counter(length for value in variables.values() for length in set(value.shape) if length > 1)
     if not lengths:
         raise InputError(
-            f"{path}: it holds no columns of numbers; table objects are not supported: save their columns."
+            "E-IMPORT-031",
+            f"{path}: it holds no columns of numbers; table objects are not supported: save their columns.",
         )
     most = max(lengths.values())
     rows = max(length for length, count in lengths.items() if count == most)
@@ -101,7 +103,7 @@ def _variables(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
     except Exception as problem:  # a reader of a broken file may raise anything
         reason = " ".join(str(problem).split()) or type(problem).__name__
         raise InputError(
-            f"{path}: not a readable MAT-file ({reason}); save it again with '-v7'."
+            "E-IMPORT-032", f"{path}: not a readable MAT-file ({reason}); save it again with '-v7'."
         ) from problem
     variables: dict[str, np.ndarray] = {}
     others: list[str] = []

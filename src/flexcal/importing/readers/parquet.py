@@ -24,7 +24,7 @@ def table_of(path: Path, frame: pl.DataFrame, first: int) -> ForeignTable:
     import polars as pl
 
     if not len(frame):
-        raise InputError(f"{path}: the table has a header but no rows; add some.")
+        raise InputError("E-IMPORT-033", f"{path}: the table has a header but no rows; add some.")
     columns: dict[str, np.ndarray] = {}
     notes, times = [], []
     for name, series in zip(frame.columns, frame.get_columns(), strict=True):
@@ -61,5 +61,7 @@ def read_parquet(path: Path) -> ForeignTable:
         frame = pl.read_parquet(path)
     except (pl.exceptions.PolarsError, OSError) as problem:
         reason = " ".join(str(problem).split())
-        raise InputError(f"{path}: not a readable Parquet file ({reason}); export it again.") from problem
+        raise InputError(
+            "E-IMPORT-034", f"{path}: not a readable Parquet file ({reason}); export it again."
+        ) from problem
     return table_of(path, frame, 1)

@@ -44,7 +44,9 @@ def read_ros(path: Path, joints: Sequence[str], topic: str | None) -> ForeignTab
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
-        raise InputError(f"{path}: recordings of ROS need rosbags: pip install rosbags.") from None
+        raise InputError(
+            "E-IMPORT-035", f"{path}: recordings of ROS need rosbags: pip install rosbags."
+        ) from None
     if path.is_dir():
         read_yaml_file(path / _METADATA)  # its errors name the line
     notes: list[str] = []
@@ -58,10 +60,11 @@ def read_ros(path: Path, joints: Sequence[str], topic: str | None) -> ForeignTab
         raise
     except Exception as problem:  # whatever a reader of a foreign, perhaps broken file may raise
         raise InputError(
-            f"{path}: not a readable recording of ROS ({_reason(problem)}); record it again, with joint states and points alone."
+            "E-IMPORT-036",
+            f"{path}: not a readable recording of ROS ({_reason(problem)}); record it again, with joint states and points alone.",
         ) from problem
     if not states:
-        raise InputError(f"{path}: {_without_states(kinds, notes)}")
+        raise InputError("E-IMPORT-037", f"{path}: {_without_states(kinds, notes)}")
     best = max(states, key=lambda s: (len(set(s.names) & set(joints)), len(s.names), len(s.received)))
     notes += [
         f"the joint states of {', '.join(other.names)} on {other.topic} are left out"
@@ -95,11 +98,14 @@ def _point_topic(path: Path, kinds: dict[str, str], asked: str | None) -> str | 
     if asked is not None:
         if asked not in having:
             raise InputError(
-                f"{path}: there are no points on the topic '{asked}'; there are some on {', '.join(having) or 'none'}."
+                "E-IMPORT-038",
+                f"{path}: there are no points on the topic '{asked}'; there are some on {', '.join(having) or 'none'}.",
             )
         return asked
     if len(having) > 1:
-        raise InputError(f"{path}: several topics have points: {', '.join(having)}; name one with --topic.")
+        raise InputError(
+            "E-IMPORT-039", f"{path}: several topics have points: {', '.join(having)}; name one with --topic."
+        )
     return having[0] if having else None
 
 
@@ -189,7 +195,8 @@ def _poses(path: Path, states: _Stream, points: _Stream, notes: list[str]) -> Fo
     q, xyz, sigma, without = points_at_rest(t, states.fields["position"], at, points.fields["xyz"])
     if not len(q):
         raise InputError(
-            f"{path}: while there are points on {points.topic}, the robot never stands still for half a second; let it rest in every pose."
+            "E-IMPORT-040",
+            f"{path}: while there are points on {points.topic}, the robot never stands still for half a second; let it rest in every pose.",
         )
     columns: dict[str, np.ndarray] = {"pose": np.arange(1.0, len(q) + 1)}
     units: dict[str, str] = {}

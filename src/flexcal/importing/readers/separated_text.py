@@ -29,7 +29,8 @@ def read_text(path: Path) -> ForeignTable:
         return _read(path, _decoded(path).splitlines())
     except csv.Error as problem:
         raise InputError(
-            f"{path} holds a cell that cannot be read ({problem}); export the measurements again."
+            "E-IMPORT-041",
+            f"{path} holds a cell that cannot be read ({problem}); export the measurements again.",
         ) from problem
 
 
@@ -37,7 +38,7 @@ def _read(path: Path, lines: list[str]) -> ForeignTable:
     while lines and not lines[-1].strip():
         lines.pop()
     if not lines:
-        raise InputError(f"{path} line 1: the file is empty; it needs a header and rows.")
+        raise InputError("E-IMPORT-042", f"{path} line 1: the file is empty; it needs a header and rows.")
     half = lines[len(lines) // 2 :][-_LOOKED_AT:]
     last = [line for line in half if line.strip() and not line.startswith("#")] or lines
     separator, width = _separator(path, last)
@@ -113,8 +114,9 @@ def _separator(path: Path, rows: Sequence[str]) -> tuple[str, int]:
             if width > 1 and count >= share * len(rows):
                 return separator, width
     raise InputError(
+        "E-IMPORT-043",
         f"{path}: its last rows are not separated into as many values each by commas, semicolons, tabs or spaces; "
-        "export it again as CSV."
+        "export it again as CSV.",
     )
 
 
@@ -123,10 +125,11 @@ def _rows(path: Path, body: Sequence[str], first: int, separator: str, width: in
     for number, line in enumerate(body, start=first):
         cells = _cells(line, separator)
         if not any(cells):
-            raise InputError(f"{path} line {number}: the line is empty; remove it.")
+            raise InputError("E-IMPORT-044", f"{path} line {number}: the line is empty; remove it.")
         if len(cells) != width:
             raise InputError(
-                f"{path} line {number}: there are {len(cells)} values, but {width} columns; complete the line or remove it."
+                "E-IMPORT-045",
+                f"{path} line {number}: there are {len(cells)} values, but {width} columns; complete the line or remove it.",
             )
         rows.append(cells)
     return rows

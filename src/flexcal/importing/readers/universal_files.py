@@ -31,18 +31,21 @@ def read_uff(path: Path) -> ForeignTable:
     try:
         import pyuff
     except ImportError:
-        raise InputError(f"{path}: universal files need pyuff: pip install pyuff.") from None
+        raise InputError("E-IMPORT-046", f"{path}: universal files need pyuff: pip install pyuff.") from None
     _require_whole(path)
     try:
         file = pyuff.UFF(str(path))
         kinds = [int(kind) for kind in file.get_set_types()]
     except Exception as problem:  # of no class of its own
-        raise InputError(f"{path}: not a readable universal file; export it again.") from problem
+        raise InputError(
+            "E-IMPORT-047", f"{path}: not a readable universal file; export it again."
+        ) from problem
     sets = [_data_set(path, file, k) for k, kind in enumerate(kinds) if kind == _FUNCTION]
     timed = [item for item in sets if item is not None]
     if not timed:
         raise InputError(
-            f"{path}: it holds no time history (data set 58, function type 1); export the recording as such."
+            "E-IMPORT-048",
+            f"{path}: it holds no time history (data set 58, function type 1); export the recording as such.",
         )
     names = _names(timed)
     clocks = [np.asarray(item["x"], dtype=float) for item in timed]
@@ -69,7 +72,9 @@ def _require_whole(path: Path) -> None:
     except OSError as problem:
         raise unreadable(path, problem) from problem
     if len(_DELIMITER.findall(content)) % 2:
-        raise InputError(f"{path}: its last data set has no end, so the file was cut off; export it again.")
+        raise InputError(
+            "E-IMPORT-049", f"{path}: its last data set has no end, so the file was cut off; export it again."
+        )
 
 
 def _data_set(path: Path, file: Any, index: int) -> dict[str, Any] | None:
@@ -85,19 +90,22 @@ def _data_set(path: Path, file: Any, index: int) -> dict[str, Any] | None:
         )
     except Exception as problem:  # of no class of its own, and without a reason
         raise InputError(
-            f"{place} does not have the lines and fields of a data set 58; export the file again."
+            "E-IMPORT-050",
+            f"{place} does not have the lines and fields of a data set 58; export the file again.",
         ) from problem
     if not timed:
         return None
     padded = bool(item.get("binary")) and values > announced > 0
     if values != announced and not padded:
         raise InputError(
-            f"{place} announces {announced} values, but {values} can be read from it; export the file again."
+            "E-IMPORT-051",
+            f"{place} announces {announced} values, but {values} can be read from it; export the file again.",
         )
     x, data = np.asarray(item["x"], dtype=float)[:announced], np.asarray(item["data"])[:announced]
     if not (announced and np.isfinite(x).all()):
         raise InputError(
-            f"{place} has {'no finite time axis' if announced else 'no values'}; export the file again."
+            "E-IMPORT-052",
+            f"{place} has {'no finite time axis' if announced else 'no values'}; export the file again.",
         )
     return {**item, "x": x, "data": data}
 

@@ -32,7 +32,9 @@ def find_header(path: Path, rows: Sequence[Sequence[str]], width: int, row_word:
     """
     first = next((i for i, cells in enumerate(rows) if len(cells) == width and _is_data(cells)), None)
     if first is None:
-        raise InputError(f"{path}: there is no row of numbers in it; export the measurements again.")
+        raise InputError(
+            "E-IMPORT-053", f"{path}: there is no row of numbers in it; export the measurements again."
+        )
     above = [i for i in range(first) if any(cell for cell in rows[i])]
     if not above:
         return Header(tuple(f"c{k + 1}" for k in range(width)), {}, first, False, ())
@@ -43,12 +45,15 @@ def find_header(path: Path, rows: Sequence[Sequence[str]], width: int, row_word:
     place = f"{path} {row_word} {at + 1}"
     if len(rows[at]) != width:
         raise InputError(
-            f"{place}: the header has {len(rows[at])} names, but the rows have {width} values; make them as many."
+            "E-IMPORT-054",
+            f"{place}: the header has {len(rows[at])} names, but the rows have {width} values; make them as many.",
         )
     names = tuple(name or f"c{k + 1}" for k, name in enumerate(rows[at]))
     twice = [name for k, name in enumerate(names) if name in names[:k]]
     if twice:
-        raise InputError(f"{place}: the column '{twice[0]}' stands twice; rename or remove one.")
+        raise InputError(
+            "E-IMPORT-055", f"{place}: the column '{twice[0]}' stands twice; rename or remove one."
+        )
     notes = (f"what precedes the header in {row_word} {at + 1} was skipped",) if at > above[0] else ()
     return Header(names, units, first, True, notes)
 

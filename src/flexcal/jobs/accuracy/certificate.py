@@ -195,10 +195,11 @@ def certify_robot(
     not fit, or fewer than four targets were measured before and after.
     """
     if out.suffix != ".html":
-        raise InputError(f"{out} must end in .html; give another --out.")
+        raise InputError("E-RUN-001", f"{out} must end in .html; give another --out.")
     if before.resolve() == after.resolve():
         raise InputError(
-            f"{before} is given as --before and as --after; measure the compensated commands too."
+            "E-RUN-002",
+            f"{before} is given as --before and as --after; measure the compensated commands too.",
         )
     calibrated = calibrated_robot(robot, estimates, "certify")
     model = calibrated.probable
@@ -216,7 +217,8 @@ def certify_robot(
         off = {file: np.abs(poses.q - wanted.q[rows[file]]).max(axis=1) for file, poses in sets.items()}
         if np.median(off[before]) > np.median(off[after]):
             raise InputError(
-                f"{before} was measured farther from the nominal commands in {targets} than {after}; are --before and --after swapped?"
+                "E-RUN-003",
+                f"{before} was measured farther from the nominal commands in {targets} than {after}; are --before and --after swapped?",
             )
     common = np.intersect1d(wanted.pose[rows[before]], wanted.pose[rows[after]])
     every = np.union1d(wanted.pose[rows[before]], wanted.pose[rows[after]])
@@ -229,7 +231,8 @@ def certify_robot(
         del poses
     if not all(can_register(poses) for poses, _ in visited.values()):
         raise InputError(
-            f"{len(common)} targets were measured before and after; four or more that do not lie on a line are needed."
+            "E-RUN-004",
+            f"{len(common)} targets were measured before and after; four or more that do not lie on a line are needed.",
         )
     sample = StratifiedSample.of(visited[after][0])
     judged = slice(None) if sample is None else sample.rows
@@ -271,21 +274,24 @@ def _rows(file: Path, poses: PoseSet, targets: Path, wanted: ToolTargets) -> np.
     strange = np.flatnonzero(wanted.pose[rows] != poses.pose)
     if len(strange):
         raise InputError(
-            f"{file}: pose {poses.pose[strange[0]]} is no target of {targets}; keep the targets' numbers when measuring."
+            "E-RUN-005",
+            f"{file}: pose {poses.pose[strange[0]]} is no target of {targets}; keep the targets' numbers when measuring.",
         )
     other = np.flatnonzero(wanted.target[rows] != poses.target)
     if len(other):
         k = other[0]
         raise InputError(
-            f"{file}: pose {poses.pose[k]} was measured at '{poses.target[k]}', but its target is one of '{wanted.target[rows[k]]}'."
+            "E-RUN-006",
+            f"{file}: pose {poses.pose[k]} was measured at '{poses.target[k]}', but its target is one of '{wanted.target[rows[k]]}'.",
         )
     if wanted.q is not None:
         apart = np.abs(poses.q - wanted.q[rows])
         if apart.max() > _FAR:
             k, joint = (int(i) for i in np.argwhere(apart > _FAR)[0])
             raise InputError(
+                "E-RUN-007",
                 f"{file}: pose {poses.pose[k]} was measured {apart[k, joint]:.3g} from its target's q{joint + 1} in {targets}, so it is "
-                "another one; keep the targets' numbers when measuring."
+                "another one; keep the targets' numbers when measuring.",
             )
     return rows
 

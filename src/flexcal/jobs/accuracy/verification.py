@@ -229,9 +229,10 @@ def verification_poses(
     for station in poses.stations:
         if not placed_again and not is_station_identified(model, station):
             raise FlexcalError(
+                "E-RUN-008",
                 f"the station '{station}' was not calibrated, so its position is unknown; add poses measured from there to the "
                 "calibration, "
-                "or fit it to these poses: 'flexcal verify' with --refit station."
+                "or fit it to these poses: 'flexcal verify' with --refit station.",
             )
     return poses
 

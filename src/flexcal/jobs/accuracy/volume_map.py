@@ -164,7 +164,7 @@ def map_accuracy(
     `FlexcalError` where there is no calibration, files do not fit, or the robot does not reach.
     """
     if out.suffix not in (".html", ".csv", ".parquet"):
-        raise InputError(f"{out} must end in .html, .csv or .parquet; give another --out.")
+        raise InputError("E-RUN-009", f"{out} must end in .html, .csv or .parquet; give another --out.")
     require_distinct_files(verification)
     calibrated = calibrated_robot(robot, estimates, "map")
     model = calibrated.model
@@ -249,7 +249,9 @@ def _verified(
     if (moved := proposed_refit(calibrated.model, poses, verification)) is not None:
         (said,) = refit_remarks(verification, poses, None, moved)
         named = " and ".join(str(file) for file in files)
-        raise InputError(f"{named} cannot verify the map: {said}; give points measured as the calibration's.")
+        raise InputError(
+            "E-RUN-010", f"{named} cannot verify the map: {said}; give points measured as the calibration's."
+        )
     before = uncalibrated_model(calibrated.nominal, poses).errors(poses)
     with naming(files[0]):
         scale = error_scale(verification, covariance)

@@ -332,10 +332,12 @@ def _terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str, ...] | 
             model.joint_index(owner)
         if kind not in (PER_JOINT if owner else known):
             raise FlexcalError(
-                f"there is no geometry term '{term}'; there are {', '.join(known)}, or {AUTO} alone."
+                "E-RUN-011",
+                f"there is no geometry term '{term}'; there are {', '.join(known)}, or {AUTO} alone.",
             )
     if "backlash" in asked and not model.backlash_joints:
         raise FlexcalError(
-            f"the term backlash is asked for but {model.path} names no joint with it; add `geometry: {{backlash: [joint]}}`."
+            "E-RUN-012",
+            f"the term backlash is asked for but {model.path} names no joint with it; add `geometry: {{backlash: [joint]}}`.",
         )
     return tuple(dict.fromkeys(["kinematic", *asked]))

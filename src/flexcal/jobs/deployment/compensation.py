@@ -123,7 +123,7 @@ def compensate_robot(
     if target is not None:
         calibrated.nominal.point(target)
         if frame is not None:
-            raise InputError("--target and --frame exclude each other; give one of them.")
+            raise InputError("E-RUN-013", "--target and --frame exclude each other; give one of them.")
     model, nominal = (
         robot_ if frame is None else with_point_at_frame(robot_, frame)
         for robot_ in (calibrated.probable, calibrated.with_points)
@@ -132,7 +132,8 @@ def compensate_robot(
     for station in dict.fromkeys([] if targets.station is None else targets.station.tolist()):
         if not is_station_identified(model, station):
             raise InputError(
-                f"{file}: the station '{station}' was not calibrated, so its position is unknown; give points in the base frame."
+                "E-RUN-014",
+                f"{file}: the station '{station}' was not calibrated, so its position is unknown; give points in the base frame.",
             )
     _check_frame(file, nominal, targets)
     origin = None
@@ -140,12 +141,14 @@ def compensate_robot(
         origin = _start(nominal, start) if len(start) else best_posture(nominal, str(targets.target[0]))
     elif len(start):
         raise InputError(
-            f"{file} has joint positions, which are the start of the inverse kinematics; leave --start out."
+            "E-RUN-015",
+            f"{file} has joint positions, which are the start of the inverse kinematics; leave --start out.",
         )
     result = compensate(model, nominal, targets, start=origin, progress=progress)
     if not result.reached.any():
         raise FlexcalError(
-            f"{file}: none of the {len(targets)} targets can be compensated; pose {targets.pose[0]}: {result.reason[0]}."
+            "E-RUN-016",
+            f"{file}: none of the {len(targets)} targets can be compensated; pose {targets.pose[0]}: {result.reason[0]}.",
         )
     reached = targets.subset(result.reached)
     commands = ToolTargets(reached.pose, reached.target, result.q[result.reached], payload=reached.payload)
@@ -159,7 +162,7 @@ def _of_point(targets: ToolTargets, file: Path, name: str | None) -> ToolTargets
     if name is None:
         return targets
     if "target" in open_table(file).columns:
-        raise InputError(f"{file} has a column 'target'; leave --target and --frame out.")
+        raise InputError("E-RUN-017", f"{file} has a column 'target'; leave --target and --frame out.")
     return replace(targets, target=np.full(len(targets), name))
 
 
@@ -171,8 +174,9 @@ def _check_frame(file: Path, nominal: RobotModel, targets: ToolTargets) -> None:
     away = float(np.median(np.linalg.norm(targets.position - at, axis=1)))
     if away > _FAR * nominal.reach:
         raise InputError(
+            "E-RUN-018",
             f"{file}: x, y, z are {away:.3g} m (median) from where the nominal tool is at q1…q{nominal.n}; if they are in an instrument's "
-            "frame, name its station in a column 'station', else correct one of them or leave q out."
+            "frame, name its station in a column 'station', else correct one of them or leave q out.",
         )
 
 
@@ -180,12 +184,14 @@ def _start(model: RobotModel, values: Sequence[float]) -> np.ndarray:
     start, (lower, upper) = np.array(values, dtype=float), joint_limits(model)
     if len(start) != model.n:
         raise InputError(
-            f"--start has {len(start)} values, but {model.name} has {model.n} joints; give one each."
+            "E-RUN-019",
+            f"--start has {len(start)} values, but {model.name} has {model.n} joints; give one each.",
         )
     outside = np.flatnonzero((start < lower) | (start > upper) | ~np.isfinite(start))
     if len(outside):
         j = int(outside[0])
         raise InputError(
-            f"--start puts {model.joint_names[j]} at {start[j]:g}, outside its limits ({lower[j]:.4g} to {upper[j]:.4g}); use rad."
+            "E-RUN-020",
+            f"--start puts {model.joint_names[j]} at {start[j]:g}, outside its limits ({lower[j]:.4g} to {upper[j]:.4g}); use rad.",
         )
     return start

@@ -130,9 +130,13 @@ def _export(robot: Path, out: Path, estimates: Path | None, rendered: Render) ->
     path = stored_estimates(nominal, estimates)
     for own, what in ((nominal.urdf, "nominal URDF"), (robot, "robot.yaml"), (path, "estimates file")):
         if out.exists() and own.exists() and out.samefile(own):
-            raise InputError(f"{out} is the {what} of {robot}, which is never changed; give another --out.")
+            raise InputError(
+                "E-RUN-021", f"{out} is the {what} of {robot}, which is never changed; give another --out."
+            )
     if estimates is not None and not path.exists():
-        raise InputError(f"{path} does not exist; run 'flexcal calibrate' first, or leave --estimates out.")
+        raise InputError(
+            "E-RUN-022", f"{path} does not exist; run 'flexcal calibrate' first, or leave --estimates out."
+        )
     stored = path.exists()
     blocks = read_estimates(path) if stored else {}
     model = with_blocks(nominal, blocks, path) if stored else nominal

@@ -29,11 +29,13 @@ def require_flexible_drives(
     """
     if estimator not in _KNOWING:
         raise InputError(
-            f"--estimator {estimator} is for rigid robots; take one of {', '.join(_KNOWING)}, or leave --flexible out."
+            "E-RUN-023",
+            f"--estimator {estimator} is for rigid robots; take one of {', '.join(_KNOWING)}, or leave --flexible out.",
         )
     if not model.driven:
         raise InputError(
-            f"{model.path} declares no elastic joint, which --flexible needs; add it under `elastic:`, or leave --flexible out."
+            "E-RUN-024",
+            f"{model.path} declares no elastic joint, which --flexible needs; add it under `elastic:`, or leave --flexible out.",
         )
     springs = tuple(DriveSpring(joint.index) for joint in model.driven)
     elastic = {joint.name for joint in model.driven}
@@ -43,19 +45,22 @@ def require_flexible_drives(
         if len(ends & elastic) == 1:
             (one,), (other,) = ends & elastic, ends - elastic
             raise InputError(
+                "E-RUN-025",
                 f"{model.path}: {one} is elastic and coupled with {other}, which is not; declare both under `elastic:`, or leave "
-                "--flexible out."
+                "--flexible out.",
             )
         if ends <= elastic and ends & with_backlash:
             raise InputError(
+                "E-RUN-026",
                 f"{model.path}: {min(ends & with_backlash)} has backlash and a coupled motor, which the flexible model lacks; remove "
-                "it from `geometry: backlash:`, or leave --flexible out."
+                "it from `geometry: backlash:`, or leave --flexible out.",
             )
     for log in logs:
         if next(log_blocks(log, model)).arm is None:
             raise InputError(
+                "E-RUN-027",
                 f"{log}: the columns qa1…qa{model.n} (positions on the arm side) are missing, which --flexible needs; record them, "
-                "or leave --flexible out."
+                "or leave --flexible out.",
             )
     return springs
 
@@ -73,14 +78,16 @@ def require_flexible_bearings(model: RobotModel, logs: Sequence[Path]) -> tuple[
     for log, recording in zip(logs, first, strict=True):
         if recording.tilt_x is None or recording.tilt_y is None:
             raise InputError(
+                "E-RUN-028",
                 f"{log}: the columns qax1…qax{model.n} and qay1…qay{model.n} (tilts of the bearings about x and y) are not all there; "
-                "record both in all logs, with zeros at joints without bearings, or remove them."
+                "record both in all logs, with zeros at joints without bearings, or remove them.",
             )
         largest = max(float(np.abs(recording.tilt_x).max()), float(np.abs(recording.tilt_y).max()))
         if largest > _LARGEST_TILT:
             raise InputError(
+                "E-RUN-029",
                 f"{log}: a bearing tilts by {largest:.3g} rad (qax, qay), farther than bearings do; check the unit, and subtract what the "
-                "sensors read at rest."
+                "sensors read at rest.",
             )
     bearings = tuple(
         BearingSpring(joint.index, component)
@@ -90,11 +97,13 @@ def require_flexible_bearings(model: RobotModel, logs: Sequence[Path]) -> tuple[
     )
     if not bearings:
         raise InputError(
+            "E-RUN-030",
             f"{model.path} declares no bearings, but the logs have their tilts (qax, qay); add `bearing_x:` and `bearing_y:` to the "
-            "elastic joint."
+            "elastic joint.",
         )
     if model.force_sensor is not None:
         raise InputError(
-            f"{model.path} declares a force sensor, which the equations of the bearings' tilts lack; remove the columns qax and qay."
+            "E-RUN-031",
+            f"{model.path} declares a force sensor, which the equations of the bearings' tilts lack; remove the columns qax and qay.",
         )
     return bearings

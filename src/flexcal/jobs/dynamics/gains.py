@@ -178,6 +178,7 @@ def _declared(model: RobotModel) -> np.ndarray:
         matrix.shape != (model.n, model.n) or np.any(matrix != np.diag(np.diag(matrix)))
     ):
         raise InputError(
-            f"{model.path}: the matrix of signals.tau mixes columns, but drive gains need one column per joint."
+            "E-RUN-032",
+            f"{model.path}: the matrix of signals.tau mixes columns, but drive gains need one column per joint.",
         )
     return np.ones(model.n) if config is None or config.gain is None else np.array(config.gain)

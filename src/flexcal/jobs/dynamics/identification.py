@@ -168,8 +168,9 @@ def _without_columns(model: RobotModel, logs: JointLogs) -> RobotModel:
         return model
     if in_memory < len(logs):
         raise FlexcalError(
+            "E-RUN-033",
             f"{model.path} says how the columns of files are converted (`signals:`), so logs in memory cannot stand beside files; "
-            "give one kind."
+            "give one kind.",
         )
     return replace(model, config=replace(model.config, signals={}))
 
@@ -190,6 +191,7 @@ def _require_rigid_and_learnable(flexible: bool) -> None:
     require_scikit_learn()
     if flexible:
         raise InputError(
+            "E-RUN-034",
             "a residual torque is learned for rigid joints, as a function of the motors' states; leave out one of --learn-residual and "
-            "--flexible."
+            "--flexible.",
         )

@@ -75,7 +75,8 @@ def identify_robot_inertials(
     if not isinstance(plan, TrajectoryPlan):
         verb = "identify response" if plan.kind == "multisine" else "calibrate"
         raise InputError(
-            f"{folder / PLAN} is a plan of kind '{plan.kind}', not of trajectories; give the folder to 'flexcal {verb}'."
+            "E-RUN-035",
+            f"{folder / PLAN} is a plan of kind '{plan.kind}', not of trajectories; give the folder to 'flexcal {verb}'.",
         )
     files = [existing_file(folder, label.name) for label in labels(plan)]
     recordings, estimate = identify_inertials_from_recordings(
@@ -84,9 +85,10 @@ def identify_robot_inertials(
     error = trajectory_error(nominal.with_estimate(estimate), plan, recordings)
     if error > _SENSELESS:
         raise InputError(
+            "E-RUN-036",
             f"{folder}: the relative torque error of the fit is {100 * error:.0f} %, so the torques are not those of this robot's joints "
             f"in N m; check "
-            "signs, units and gear ratios under `signals:`."
+            "signs, units and gear ratios under `signals:`.",
         )
     origin = provenance([robot, nominal.urdf, folder / PLAN, *files], {})
     estimate = replace(estimate, provenance=origin)

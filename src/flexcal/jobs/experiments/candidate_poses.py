@@ -125,6 +125,7 @@ def box_corners(text: str) -> np.ndarray:
             raise ValueError
     except ValueError:
         raise InputError(
-            f"--working {text} is no box; write smallest and largest x, y and z in m like 0.4:0.9,-0.3:0.3,0.2:0.8, or name a file."
+            "E-RUN-037",
+            f"--working {text} is no box; write smallest and largest x, y and z in m like 0.4:0.9,-0.3:0.3,0.2:0.8, or name a file.",
         ) from None
     return corners

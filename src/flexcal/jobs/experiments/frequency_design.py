@@ -192,7 +192,7 @@ def _require_all(model: RobotModel, kind: PlanName, poses: Path | None) -> None:
             "choose the poses"
         )
     if missing:
-        raise InputError(f"{model.path} " + "; it ".join(missing) + ".")
+        raise InputError("E-RUN-038", f"{model.path} " + "; it ".join(missing) + ".")
 
 
 def _curve(choice: FrequencyPoseSelection, seed: int) -> np.ndarray:

@@ -72,10 +72,10 @@ def measure(
     model = RobotModel.from_yaml(robot, estimates=False)
     plan = read_plan_for_robot(plan_file, model)
     if cell != VIRTUAL and Path(cell).resolve() == out.resolve():
-        raise InputError(f"{out} is the folder measured before; give another --out.")
+        raise InputError("E-RUN-039", f"{out} is the folder measured before; give another --out.")
     before = out / PLAN
     if before.is_file() and yaml_text(read_plan_for_robot(before, model)) != yaml_text(plan):
-        raise InputError(f"{out} holds what was measured by another plan; give another --out.")
+        raise InputError("E-RUN-040", f"{out} holds what was measured by another plan; give another --out.")
     drawn: dict[str, float] = {}
     source: Cell
     if cell == VIRTUAL:

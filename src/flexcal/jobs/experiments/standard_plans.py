@@ -53,12 +53,13 @@ def read_frequency_poses(
     columns = [f"q{i}_deg" for i in range(1, model.n + 1)]
     if file.columns != ("plan", "pose", *columns):
         raise file.error(
-            f"the columns are {', '.join(file.columns)}, but for {model.path} they must be plan, pose, {', '.join(columns)}."
+            "E-RUN-041",
+            f"the columns are {', '.join(file.columns)}, but for {model.path} they must be plan, pose, {', '.join(columns)}.",
         )
     table = file.read(("plan", "pose"))
     rows = np.flatnonzero(table.columns["plan"] == kind)
     if not len(rows):
-        raise InputError(f"{path}: there is no pose of the plan '{kind}'.")
+        raise InputError("E-RUN-042", f"{path}: there is no pose of the plan '{kind}'.")
     poses = np.stack([table.columns[column] for column in columns], axis=1)[rows] * DEGREE
     check_joint_limits(model, table, rows, columns, poses, room)
     return poses

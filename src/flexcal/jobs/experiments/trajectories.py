@@ -72,7 +72,8 @@ class TrajectoryRequest:
         """
         if self.start and len(self.start) != nominal.n:
             raise InputError(
-                f"the start has {len(self.start)} positions, but {nominal.name} has {nominal.n} joints; give one each."
+                "E-RUN-043",
+                f"the start has {len(self.start)} positions, but {nominal.name} has {nominal.n} joints; give one each.",
             )
 
         def onward(search: int) -> Progress:

@@ -15,12 +15,13 @@ def require_distinct_files(files: Sequence[Path], unseen: Sequence[Path] = ()) -
         for k, file in enumerate(given):
             if twin := _twin(file, given[:k]):
                 told = "is given twice" if _same_place(file, twin) else f"holds the same as {twin}"
-                raise InputError(f"{file} {told}; it would be used twice; name it once.")
+                raise InputError("E-RUN-044", f"{file} {told}; it would be used twice; name it once.")
     for file in unseen:
         if twin := _twin(file, files):
             told = "is fitted" if _same_place(file, twin) else f"holds the same as {twin}, which is fitted,"
             raise InputError(
-                f"{file} {told} and is given under --validate too; validation needs recordings outside the fit."
+                "E-RUN-045",
+                f"{file} {told} and is given under --validate too; validation needs recordings outside the fit.",
             )
 
 

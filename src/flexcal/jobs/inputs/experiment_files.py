@@ -25,7 +25,9 @@ def robot_file(plan: Path, given: Path | None) -> Path:
     for folder in (plan.parent, Path()):
         if (folder / "robot.yaml").is_file():
             return folder / "robot.yaml"
-    raise InputError(f"there is no robot.yaml beside {plan} nor in the current folder; name it with --robot.")
+    raise InputError(
+        "E-RUN-046", f"there is no robot.yaml beside {plan} nor in the current folder; name it with --robot."
+    )
 
 
 def example_robot(name: str) -> Path:
@@ -35,7 +37,8 @@ def example_robot(name: str) -> Path:
         if (place / name / "robot.yaml").is_file():
             return place / name / "robot.yaml"
     raise InputError(
-        f"the example '{name}' is not here; run in flexcal's folder, or name a robot.yaml with --robot."
+        "E-RUN-047",
+        f"the example '{name}' is not here; run in flexcal's folder, or name a robot.yaml with --robot.",
     )
 
 
@@ -44,7 +47,8 @@ def read_plan_for_robot(path: Path, model: RobotModel) -> Plan:
     plan = read_plan(path)
     if plan.joint_count != model.n:
         raise InputError(
-            f"{path}: the plan is for {plan.joint_count} joints, but {model.path} has {model.n}; give the plan of this robot."
+            "E-RUN-048",
+            f"{path}: the plan is for {plan.joint_count} joints, but {model.path} has {model.n}; give the plan of this robot.",
         )
     return plan
 
@@ -56,7 +60,8 @@ def read_responses(paths: Sequence[Path], model: RobotModel) -> tuple[list[Path]
         there = sorted(path.glob("response_pose_*.npz")) if path.is_dir() else [path]
         if not there:
             raise InputError(
-                f"{path} holds no frequency responses (response_pose_1.npz …); run 'flexcal identify response' first."
+                "E-RUN-049",
+                f"{path} holds no frequency responses (response_pose_1.npz …); run 'flexcal identify response' first.",
             )
         files += there
     require_distinct_files(files)
@@ -64,7 +69,8 @@ def read_responses(paths: Sequence[Path], model: RobotModel) -> tuple[list[Path]
     for file, response in zip(files, responses, strict=True):
         if response.q_mean.size != model.n:
             raise InputError(
-                f"{file} is of a robot of {response.q_mean.size} joints, but {model.path} has {model.n}; give the responses of this robot."
+                "E-RUN-050",
+                f"{file} is of a robot of {response.q_mean.size} joints, but {model.path} has {model.n}; give the responses of this robot.",
             )
     order = sorted(range(len(files)), key=lambda i: responses[i].pose)
     return [files[i] for i in order], [responses[i] for i in order]
@@ -82,5 +88,7 @@ def common_plan(paths: Sequence[Path]) -> MultisinePlan | None:
     plans = [read_plan_of(path, MultisinePlan) for path in paths]
     for path, plan in zip(paths[1:], plans[1:], strict=True):
         if to_plain(plan) != to_plain(plans[0]):
-            raise InputError(f"{path} is another plan than {paths[0]}; identify from responses of one plan.")
+            raise InputError(
+                "E-RUN-051", f"{path} is another plan than {paths[0]}; identify from responses of one plan."
+            )
     return plans[0] if plans else None

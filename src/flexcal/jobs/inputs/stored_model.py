@@ -77,14 +77,14 @@ def stored_estimates(nominal: RobotModel, estimates: Path | None) -> Path:
     expected = f"--estimates takes the {ESTIMATES} that 'flexcal calibrate' or another identification wrote, or the folder with it"
     if estimates.is_dir():
         if not (estimates / ESTIMATES).is_file():
-            raise InputError(f"{estimates} holds no {ESTIMATES}; {expected}.")
+            raise InputError("E-RUN-052", f"{estimates} holds no {ESTIMATES}; {expected}.")
         return estimates / ESTIMATES
     if estimates.suffix not in ("", ".yaml", ".yml"):
-        raise InputError(f"{estimates} is no {ESTIMATES}; {expected}.")
+        raise InputError("E-RUN-053", f"{estimates} is no {ESTIMATES}; {expected}.")
     if estimates.is_file():
         blocks = read_yaml_file(estimates).data
         if not isinstance(blocks, dict) or not set(BLOCKS) & set(blocks):
-            raise InputError(f"{estimates} holds no estimates; {expected}.")
+            raise InputError("E-RUN-054", f"{estimates} holds no estimates; {expected}.")
     return estimates
 
 
@@ -102,11 +102,13 @@ def calibrated_robot(robot: Path, estimates: Path | None, task: str) -> Calibrat
     stored = stored_estimates(nominal, estimates)
     if not stored.exists():
         raise InputError(
-            f"{stored} does not exist, so there is nothing to {task}; run 'flexcal calibrate {nominal.path} POSES…' first."
+            "E-RUN-055",
+            f"{stored} does not exist, so there is nothing to {task}; run 'flexcal calibrate {nominal.path} POSES…' first.",
         )
     blocks = read_estimates(stored)
     if "calibration" not in blocks:
         raise InputError(
-            f"{stored}: there is no calibration in it; run 'flexcal calibrate {robot} POSES…' first."
+            "E-RUN-056",
+            f"{stored}: there is no calibration in it; run 'flexcal calibrate {robot} POSES…' first.",
         )
     return CalibratedRobot(nominal, with_blocks(nominal, blocks, stored), stored, blocks)

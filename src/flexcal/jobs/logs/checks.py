@@ -19,8 +19,9 @@ def _payload(log: JointLog, model: RobotModel) -> float:
         return 0.0
     if log.payload is None:
         raise InputError(
+            "E-RUN-057",
             f"{log.path}: a payload is declared in {model.path.name}, but the log does not say whether it was held; add a column "
-            "'payload' (kg; 0 without it)."
+            "'payload' (kg; 0 without it).",
         )
     return log.payload
 
@@ -30,8 +31,9 @@ def require_unloaded(logs: Sequence[JointLog], model: RobotModel) -> None:
     for log, payload in zip(logs, payload_masses(logs, model), strict=True):
         if payload > 0:
             raise InputError(
+                "E-RUN-058",
                 f"{log.path}: recorded with a payload of {payload:g} kg, but the robot's own dynamics need logs without; give both kinds "
-                "to 'flexcal identify gains'."
+                "to 'flexcal identify gains'.",
             )
 
 
@@ -40,8 +42,9 @@ def require_wrenches(logs: Sequence[JointLog], model: RobotModel) -> None:
     for log in logs:
         if model.force_sensor is not None and not log.wrench:
             raise InputError(
+                "E-RUN-059",
                 f"{log.path}: robot.yaml declares a force sensor, but the columns fx, fy, fz, mx, my, mz are missing, so what acts beyond "
-                "it is unknown; add them, or remove `force_sensor:` if nothing is beyond it."
+                "it is unknown; add them, or remove `force_sensor:` if nothing is beyond it.",
             )
 
 
@@ -50,8 +53,9 @@ def require_no_wrenches(logs: Sequence[JointLog]) -> None:
     for log in logs:
         if log.wrench:
             raise InputError(
+                "E-RUN-060",
                 f"{log.path}: the force sensor's columns (fx, …) contain the payload, which would be taken out of the torques with them; "
-                "remove these columns."
+                "remove these columns.",
             )
 
 
@@ -82,4 +86,4 @@ def weight_faults(logs: Sequence[JointLog], model: RobotModel) -> Iterator[str]:
 def require_joint_torques(logs: Sequence[JointLog], model: RobotModel) -> None:
     """Raises `InputError` for the first of the `weight_faults`."""
     for fault in weight_faults(logs, model):
-        raise InputError(f"{fault}{_OVERRIDE}.")
+        raise InputError("E-RUN-061", f"{fault}{_OVERRIDE}.")

@@ -56,7 +56,8 @@ def choose_preprocessing(
     for log, motion in zip(logs, bandwidths, strict=True):
         if motion.frequency_hz == 0:
             raise InputError(
-                f"{log}: the positions show no motion above their noise; record a motion that excites all joints."
+                "E-RUN-062",
+                f"{log}: the positions show no motion above their noise; record a motion that excites all joints.",
             )
     rate = min(motion.rate_hz for motion in bandwidths)
     wanted = rows_hz = min(_PASSED * max(motion.frequency_hz for motion in bandwidths), _HIGHEST * rate)

@@ -34,14 +34,17 @@ def compare_folders(first: Path, second: Path) -> dict[str, Any]:
     Raises `InputError` where one holds no calibration, verification or demo, they are of different kinds or robots, or both are the same.
     """
     if first.resolve() == second.resolve():
-        raise InputError(f"{first} and {second} are the same folder; give two.")
+        raise InputError("E-REPORT-001", f"{first} and {second} are the same folder; give two.")
     names = _names(first, second)
     one, two = _run(first, names[0]), _run(second, names[1])
     if one.kind != two.kind:
-        raise InputError(f"{first} is a {one.kind}, {second} a {two.kind}; compare two of the same kind.")
+        raise InputError(
+            "E-REPORT-002", f"{first} is a {one.kind}, {second} a {two.kind}; compare two of the same kind."
+        )
     if one.robot != two.robot or one.q.shape[1] != two.q.shape[1]:
         raise InputError(
-            f"{first} is of the robot '{one.robot}', {second} of '{two.robot}'; compare two runs of one robot."
+            "E-REPORT-003",
+            f"{first} is of the robot '{one.robot}', {second} of '{two.robot}'; compare two runs of one robot.",
         )
     comparison = Comparison(one, two)
     write_page(first / COMPARISON, comparison_page(comparison))
@@ -55,7 +58,7 @@ def _names(first: Path, second: Path) -> tuple[str, str]:
         one, two = ("/".join(p[-depth:]) for p in parts)
         if one != two:
             return one, two
-    raise InputError(f"{first} and {second} are the same folder; give two.")
+    raise InputError("E-REPORT-004", f"{first} and {second} are the same folder; give two.")
 
 
 def _run(folder: Path, name: str) -> Run:
@@ -68,7 +71,8 @@ def _run(folder: Path, name: str) -> Run:
 def _left(folder: Path, name: str) -> Run:
     if not (folder / RESULTS).is_file():
         raise InputError(
-            f"{folder} holds no {RESULTS}; give a folder that calibrate, verify or demo wrote with --out."
+            "E-REPORT-005",
+            f"{folder} holds no {RESULTS}; give a folder that calibrate, verify or demo wrote with --out.",
         )
     results = read_results(folder)
     path = folder / ESTIMATES
@@ -107,7 +111,9 @@ def _left(folder: Path, name: str) -> Run:
             data=_data(origins),
             origin=origin | origins,
         )
-    raise InputError(f"{folder} is no folder of calibrate, verify or demo; only these can be compared.")
+    raise InputError(
+        "E-REPORT-006", f"{folder} is no folder of calibrate, verify or demo; only these can be compared."
+    )
 
 
 def _data(origin: Mapping[str, str]) -> dict[str, str]:

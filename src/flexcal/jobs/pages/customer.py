@@ -32,8 +32,9 @@ def customer_report(folder: Path, particulars: MeasurementDetails) -> Path:
             trust = Trust(calibration_checks(results, study.estimate, points))
         else:
             raise InputError(
+                "E-REPORT-007",
                 f"{folder} holds no calibration or verification of measured points; give a folder that calibrate or verify "
-                "wrote with --out."
+                "wrote with --out.",
             )
         write_customer_report(path, CustomerStudy(results, points, trust, input_files(origin), particulars))
     except KeyError as problem:

@@ -62,7 +62,8 @@ def report_folder(folder: Path) -> Path:
     """
     if not current_path(folder / RESULTS).is_file():
         raise InputError(
-            f"{folder} holds no {RESULTS}; give the folder that demo, an identify verb, calibrate or verify wrote with --out."
+            "E-REPORT-008",
+            f"{folder} holds no {RESULTS}; give the folder that demo, an identify verb, calibrate or verify wrote with --out.",
         )
     results, path = read_results(folder), folder / REPORT
     kind: Kind = results["kind"]
@@ -91,7 +92,8 @@ def report_folder(folder: Path) -> Path:
             page = response_page(ResponseStudy(results, _responses(folder, results)))
         else:
             raise InputError(
-                f"{folder / RESULTS} holds no calibration, verification or identification; give the folder of one of these."
+                "E-REPORT-009",
+                f"{folder / RESULTS} holds no calibration, verification or identification; give the folder of one of these.",
             )
         write_page(path, page)
     except KeyError as problem:
@@ -102,7 +104,8 @@ def report_folder(folder: Path) -> Path:
 def missing_key_error(folder: Path, problem: KeyError) -> InputError:
     """Of a results.json that lacks a key."""
     return InputError(
-        f"{folder / RESULTS} lacks {problem}, as if another program or an older flexcal had written it; run the verb that writes it again."
+        "E-REPORT-010",
+        f"{folder / RESULTS} lacks {problem}, as if another program or an older flexcal had written it; run the verb that writes it again.",
     )
 
 
@@ -140,5 +143,5 @@ def _block(folder: Path, block: Block) -> Estimate:
     path = folder / ESTIMATES
     estimates = read_estimates(path)
     if block not in estimates:
-        raise InputError(f"{path} holds no {block}; run the verb that writes it again.")
+        raise InputError("E-REPORT-011", f"{path} holds no {block}; run the verb that writes it again.")
     return estimates[block]

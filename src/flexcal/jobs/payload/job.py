@@ -157,14 +157,17 @@ def identify_robot_payload(
     bare, frame = _held(nominal, frame)
     source = stored_estimates(bare, estimates)
     if estimates is not None and not source.exists():
-        raise InputError(f"{source} does not exist; give the estimates.yaml of 'flexcal identify dynamics'.")
+        raise InputError(
+            "E-RUN-063", f"{source} does not exist; give the estimates.yaml of 'flexcal identify dynamics'."
+        )
     blocks = read_estimates(source, without="payload") if source.exists() else {}
     target = estimates_target(source, out, "payload")
     if "dynamics" not in blocks and not free:
         raise InputError(
+            "E-RUN-064",
             f"{source} has no block 'dynamics', so payload and robot inertia are not identifiable separately; run 'flexcal identify "
             f"dynamics {robot} "
-            "LOGS…' on recordings without payload first, give its folder with --estimates, or such recordings with --free."
+            "LOGS…' on recordings without payload first, give its folder with --estimates, or such recordings with --free.",
         )
     _require_news(every, blocks)
     model = with_blocks(bare, blocks, source)
@@ -198,9 +201,10 @@ def identify_robot_payload(
         progress("payload", 1.0)
     if fit.error > _SENSELESS:
         raise InputError(
+            "E-RUN-065",
             f"{every[0]}: the relative torque error of the fit is {100 * fit.error:.0f} %, so the torques are not those of this robot in "
             f"N m; check "
-            "robot.yaml, and signs, units and gear ratios under `signals:`."
+            "robot.yaml, and signs, units and gear ratios under `signals:`.",
         )
     origin = provenance(
         [robot, bare.urdf, *loaded.plan_files, *unloaded.plan_files, *every],
@@ -240,7 +244,8 @@ def _held(model: RobotModel, frame: str) -> tuple[RobotModel, str]:
         return with_payload(model, place, 1.0, np.zeros(3), np.zeros((3, 3))), place
     if frame not in ("", declared.frame):
         raise InputError(
-            f"--frame is '{frame}', but {model.path} declares the payload in '{declared.frame}'; leave --frame out, or correct robot.yaml."
+            "E-RUN-066",
+            f"--frame is '{frame}', but {model.path} declares the payload in '{declared.frame}'; leave --frame out, or correct robot.yaml.",
         )
     return model, declared.frame
 
@@ -265,7 +270,9 @@ def _require_news(logs: Sequence[Path], blocks: Mapping[Block, Estimate]) -> Non
     for log in logs:
         if sha256_of(log) in used:
             raise InputError(
-                f"{log}: the block 'dynamics' was identified from this recording, which would be used twice; leave it out, or give another."
+                "E-RUN-067",
+                f"{log}: the block 'dynamics' was identified from this recording, which would be used twice; leave it "
+                "out, or give another.",
             )
 
 
@@ -273,19 +280,24 @@ def _require_plans(loaded: PlannedLogs, free: PlannedLogs) -> None:
     """Raises `InputError` for trajectories that were planned otherwise than they are given here."""
     if any(plan.payload == 0 for plan in loaded.plans):
         raise InputError(
-            "a folder among LOGS was planned without the payload; give it with --free, or design it with --loaded."
+            "E-RUN-068",
+            "a folder among LOGS was planned without the payload; give it with --free, or design it with --loaded.",
         )
     if any(plan.payload != 0 for plan in free.plans):
-        raise InputError("a folder under --free was planned with the payload; give it among LOGS.")
+        raise InputError(
+            "E-RUN-069", "a folder under --free was planned with the payload; give it among LOGS."
+        )
 
 
 def _require_payloads(logs: Sequence[JointLog], loaded: Sequence[bool]) -> None:
     for log, carrying in zip(logs, loaded, strict=True):
         if carrying and log.payload == 0:
             raise InputError(
-                f"{log.path}: its column 'payload' states that the robot held no payload; give it with --free, or correct the column."
+                "E-RUN-070",
+                f"{log.path}: its column 'payload' states that the robot held no payload; give it with --free, or correct the column.",
             )
         if not carrying and log.payload is not None and log.payload > 0:
             raise InputError(
-                f"{log.path}: recorded with a payload of {log.payload:g} kg, but --free takes recordings without."
+                "E-RUN-071",
+                f"{log.path}: recorded with a payload of {log.payload:g} kg, but --free takes recordings without.",
             )

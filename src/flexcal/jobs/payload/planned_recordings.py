@@ -41,7 +41,8 @@ def with_planned_torque(model: RobotModel, plans: Sequence[TrajectoryPlan]) -> R
     torques = sorted({plan.torque for plan in plans})
     if len(torques) > 1:
         raise InputError(
-            f"these folders have torques that are '{torques[0]}' and '{torques[1]}' over a sample; give recordings of one kind."
+            "E-RUN-072",
+            f"these folders have torques that are '{torques[0]}' and '{torques[1]}' over a sample; give recordings of one kind.",
         )
     if not torques:
         return model

@@ -105,7 +105,9 @@ def identify_response(
     if not isinstance(plan, MultisinePlan):
         what = "measured poses" if plan.kind == "poses" else "trajectories"
         verb = "calibrate" if plan.kind == "poses" else "identify inertials"
-        raise InputError(f"{folder} holds {what}, not a frequency experiment; give them to 'flexcal {verb}'.")
+        raise InputError(
+            "E-RUN-073", f"{folder} holds {what}, not a frequency experiment; give them to 'flexcal {verb}'."
+        )
     total = len(plan.poses) * plan.recordings_per_pose
     names = [model.joint_names[i] for i in plan.joints]
     recordings = _counted(cell.record(), total, progress)

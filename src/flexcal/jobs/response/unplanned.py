@@ -238,7 +238,7 @@ def identify_excitation(
     except InputError:
         raise
     except FlexcalError as problem:
-        raise InputError(f"{files[0]}: {problem}") from problem
+        raise InputError(problem.code, f"{files[0]}: {problem}") from problem
     _write(out, result)
     return result
 
@@ -290,23 +290,25 @@ def _in_band(
 ) -> RecordSpectra:
     if band:
         if len(band) != 2 or not 0 < band[0] < band[1]:
-            raise InputError("--band needs two frequencies in Hz, the lower one first.")
+            raise InputError("E-RUN-074", "--band needs two frequencies in Hz, the lower one first.")
         kept = whole.between(band[0], band[1])
         if len(kept.frequencies_hz) < 2:
             raise InputError(
+                "E-RUN-075",
                 f"--band {band[0]:g} {band[1]:g}: the records reach from {whole.frequencies_hz[0]:.3g} to "
-                f"{whole.frequencies_hz[-1]:.3g} Hz."
+                f"{whole.frequencies_hz[-1]:.3g} Hz.",
             )
         return kept
     if few is not None and few.alone:
-        raise InputError(f"{files[0]}: {few.sentence}")
+        raise InputError("E-RUN-076", f"{files[0]}: {few.sentence}")
     limits = excited_band(whole, local_response(whole), usable)
     if limits is None and few is not None:
-        raise InputError(f"{files[0]}: {few.sentence}")
+        raise InputError("E-RUN-077", f"{files[0]}: {few.sentence}")
     if limits is None:
         raise InputError(
+            "E-RUN-078",
             f"{files[0]}: at hardly any frequency does the output follow the input; check that the columns belong together (--input, "
-            "--output), or excite more strongly."
+            "--output), or excite more strongly.",
         )
     return whole.between(*limits)
 

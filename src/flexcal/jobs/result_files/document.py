@@ -81,9 +81,11 @@ def read_results(folder: Path) -> dict[str, Any]:
     except (OSError, ValueError, RecursionError) as problem:
         raise unreadable(path, problem, AGAIN) from problem
     if not isinstance(document, dict):
-        raise InputError(f"{path} holds no results of a verb; {AGAIN}.")
+        raise InputError("E-RUN-079", f"{path} holds no results of a verb; {AGAIN}.")
     if document.get("kind") not in get_args(Kind) or document.get("schema") != SCHEMA:
-        raise InputError(f"{path} is not of this version of flexcal (kind and schema {SCHEMA}); {AGAIN}.")
+        raise InputError(
+            "E-RUN-080", f"{path} is not of this version of flexcal (kind and schema {SCHEMA}); {AGAIN}."
+        )
     return document
 
 

@@ -89,7 +89,7 @@ def read_points(folder: Path, *, sigma: float) -> MeasuredPoints:
         errors = {model: vectors(f"{model}_d") for model in _MODELS if f"{model}_dx" in table.columns}
         ambiguous = table["ambiguous"].cast(pl.Boolean).to_numpy()
         if CALIBRATED not in errors or not joints or not len(table):
-            raise InputError(f"{path} lacks columns or rows; {AGAIN}.")
+            raise InputError("E-RUN-081", f"{path} lacks columns or rows; {AGAIN}.")
         return MeasuredPoints(poses, errors, ambiguous, column("parameter_rms"), column("scatter_rms"))
     except (pl.exceptions.PolarsError, OSError) as problem:
         raise unreadable(path, problem, AGAIN) from problem
@@ -99,7 +99,8 @@ def _numbers(path: Path, columns: pl.DataFrame) -> np.ndarray:
     values = columns.cast(pl.Float64).to_numpy()
     if (np.abs(values) > LARGEST).any():
         raise InputError(
-            f"{path} holds {values[np.abs(values) > LARGEST][0]:g}, which is no measurement; {AGAIN}."
+            "E-RUN-082",
+            f"{path} holds {values[np.abs(values) > LARGEST][0]:g}, which is no measurement; {AGAIN}.",
         )
     return values
 
@@ -132,7 +133,7 @@ def read_arm(folder: Path) -> ArmPoses:
     )
     triangles = arrays["triangles"]
     if triangles.size and not 0 <= triangles.min() <= triangles.max() < arrays["surface"].shape[1]:
-        raise file.error("holds triangles of vertices that are not there")
+        raise file.error("E-RUN-083", "holds triangles of vertices that are not there")
     errors = {name.removeprefix("errors_"): arrays.pop(name) for name in _of_models(file, "errors_")}
     return ArmPoses(**arrays, errors=errors)
 

@@ -188,7 +188,8 @@ def _kind(
         )
         example = "q1=COLUMN[deg]" if "q" not in guess.placed else "x=COLUMN[mm]"
         raise InputError(
-            f"{foreign.table.file.path}: {what} were not recognised ({left}); say which they are: --map {example} and so on."
+            "E-RUN-084",
+            f"{foreign.table.file.path}: {what} were not recognised ({left}); say which they are: --map {example} and so on.",
         )
     kind = "poses" if {"xyz", "length"} & guess.placed.keys() else "log" if "t" in guess.placed else "joints"
     wanted = {"poses": _POSES, "log": _LOG, "joints": ("pose", "q", "payload")}[kind]
@@ -235,6 +236,7 @@ def _converted(
                 if not np.isnan(numbers[row]):
                     what = f"the value is {numbers[row]:g}, which is no measurement"
                 raise foreign.table.error(
+                    "E-RUN-085",
                     row,
                     column,
                     f"{what}; complete or remove the line, or discard the column with --map {quantity}=none.",
@@ -284,12 +286,13 @@ def _check_poses(
 
 def _check_sigma(sigma: float, file: Path, kind: str, stated: set[str]) -> None:
     if not 0 < sigma < np.inf:
-        raise InputError(f"--sigma is {sigma / MILLIMETRE:g}; it must be positive, in mm.")
+        raise InputError("E-RUN-086", f"--sigma is {sigma / MILLIMETRE:g}; it must be positive, in mm.")
     if kind != "poses":
-        raise InputError(f"--sigma is of measured points, but {file} has none; leave it out.")
+        raise InputError("E-RUN-087", f"--sigma is of measured points, but {file} has none; leave it out.")
     if stated:
         raise InputError(
-            f"{file} contains sigma; leave --sigma out, or discard its own with --map {min(stated)}=none."
+            "E-RUN-088",
+            f"{file} contains sigma; leave --sigma out, or discard its own with --map {min(stated)}=none.",
         )
 
 
@@ -297,7 +300,10 @@ def _check_time(foreign: ForeignTable, guess: RecognisedColumns, t: np.ndarray) 
     if (np.diff(t) <= 0).any():
         row = int(np.argmax(np.diff(t) <= 0)) + 1
         raise foreign.table.error(
-            row, guess.placed["t"].columns[0], "the time does not increase; sort or repair the log."
+            "E-RUN-089",
+            row,
+            guess.placed["t"].columns[0],
+            "the time does not increase; sort or repair the log.",
         )
 
 

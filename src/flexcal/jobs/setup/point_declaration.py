@@ -40,7 +40,8 @@ def write_point_position(robot: Path, name: str, xyz: np.ndarray) -> None:
             return
         write_text(robot, text)
     raise InputError(
-        f"the xyz of the point '{name}' in {robot} could not be replaced; write xyz: [{told}] there by hand."
+        "E-RUN-090",
+        f"the xyz of the point '{name}' in {robot} could not be replaced; write xyz: [{told}] there by hand.",
     )
 
 

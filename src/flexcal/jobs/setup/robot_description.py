@@ -54,8 +54,9 @@ def init_robot(urdf: Path, out: Path, *, tip: str | None = None) -> InitialisedR
     file = out / "robot.yaml"
     if file.exists():
         raise InputError(
+            "E-RUN-091",
             f"{file} is there already and stays as it is: go on with 'flexcal design poses {file} --out {out / 'poses.yaml'}', "
-            f"with measurements at hand with 'flexcal import {file} FILE', or give --out DIR for a new one of {urdf}."
+            f"with measurements at hand with 'flexcal import {file} FILE', or give --out DIR for a new one of {urdf}.",
         )
     made = [folder for folder in (out, *out.parents) if not folder.exists()]
     link = relpath(urdf, out)

@@ -32,7 +32,9 @@ def add_signals(robot: Path, signals: Mapping[str, Mapping[str, Any]]) -> None:
     if declared is not None:
         if all(declared.get(quantity) == dict(entry) for quantity, entry in signals.items()):
             return
-        raise InputError(f"{robot} has `signals:` already, which is not changed; replace it by: {block}")
+        raise InputError(
+            "E-RUN-092", f"{robot} has `signals:` already, which is not changed; replace it by: {block}"
+        )
     text = current_path(robot).read_text(encoding="utf-8")
     write_text(robot, f"{text}{'' if text.endswith(chr(10)) else chr(10)}\n{block}")
     try:

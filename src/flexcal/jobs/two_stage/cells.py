@@ -38,7 +38,8 @@ def open_cell(
     if kind == "hard":
         if truth is not None:
             raise FlexcalError(
-                "a hard cell's robot has no truth in the form of estimates.yaml; leave out --truth or --cell hard."
+                "E-RUN-093",
+                "a hard cell's robot has no truth in the form of estimates.yaml; leave out --truth or --cell hard.",
             )
         cell = HardCell.drawn(robot, seed)
         write_truth(hidden, counterparts(cell.robot))

@@ -30,7 +30,8 @@ def joint_batch(model: RobotModel, q: np.ndarray) -> np.ndarray:
     batch = np.ascontiguousarray(np.atleast_2d(np.asarray(q, dtype=float)))
     if batch.ndim != 2 or batch.shape[1] != model.n:
         raise FlexcalError(
-            f"q has {batch.shape[-1]} columns but {model.name} has {model.n} joints; give (samples, {model.n})."
+            "E-MODEL-001",
+            f"q has {batch.shape[-1]} columns but {model.name} has {model.n} joints; give (samples, {model.n}).",
         )
     return batch
 

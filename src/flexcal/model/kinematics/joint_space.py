@@ -27,12 +27,14 @@ def joint_ranges(model: RobotModel) -> tuple[np.ndarray, np.ndarray]:
     for i, joint in enumerate(model.joints):
         if lower[i] >= upper[i]:
             raise FlexcalError(
-                f"the limits of {joint.name} in {model.urdf.name} cross ({lower[i]:g} to {upper[i]:g}); correct the URDF."
+                "E-MODEL-002",
+                f"the limits of {joint.name} in {model.urdf.name} cross ({lower[i]:g} to {upper[i]:g}); correct the URDF.",
             )
         if not np.isfinite(upper[i] - lower[i]):
             if joint.kind == "prismatic":
                 raise FlexcalError(
-                    f"the prismatic {joint.name} has no limits in {model.urdf.name}; give it some."
+                    "E-MODEL-003",
+                    f"the prismatic {joint.name} has no limits in {model.urdf.name}; give it some.",
                 )
             lower[i], upper[i] = -np.pi, np.pi
         else:

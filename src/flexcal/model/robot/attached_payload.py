@@ -46,7 +46,8 @@ def carried_inertias(model: RobotModel, payload: float | None = None) -> tuple[I
     if declared is None:
         if payload:
             raise FlexcalError(
-                f"a payload of {payload:g} kg is given but {model.path} declares none; add `payload:`."
+                "E-ROBOT-001",
+                f"a payload of {payload:g} kg is given but {model.path} declares none; add `payload:`.",
             )
         return model.inertias
     mass = declared.mass if payload is None else payload
@@ -72,7 +73,8 @@ def with_point_at_frame(model: RobotModel, frame: str) -> RobotModel:
         if declared.frame == frame and not declared.xyz.any():
             return model
         raise InputError(
-            f"{model.path} declares a point '{frame}' that is not at the origin of the frame '{frame}'; rename it there, or give --target."
+            "E-ROBOT-002",
+            f"{model.path} declares a point '{frame}' that is not at the origin of the frame '{frame}'; rename it there, or give --target.",
         )
     place = _moving_frame(model, frame)
     point = Point(frame, frame, place.joint, place.rotation, place.translation, np.zeros(3))
@@ -88,5 +90,7 @@ def _moving_frame(model: RobotModel, name: str) -> Frame:
     place = frames.get(name)
     if place is None or place.joint < 0:
         moving = ", ".join(other for other, known in frames.items() if known.joint >= 0)
-        raise InputError(f"no joint of {model.urdf.name} moves a frame '{name}'; name one of {moving}.")
+        raise InputError(
+            "E-ROBOT-003", f"no joint of {model.urdf.name} moves a frame '{name}'; name one of {moving}."
+        )
     return place

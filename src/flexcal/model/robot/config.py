@@ -22,7 +22,8 @@ class AcceptanceConfig:
     def __post_init__(self) -> None:
         if not any(self.axis) or not 0 < self.half_angle <= 3.1416:
             raise FlexcalError(
-                "an acceptance needs an axis of three numbers, not all zero, and a half_angle between 0 and 3.1416 rad."
+                "E-ROBOT-004",
+                "an acceptance needs an axis of three numbers, not all zero, and a half_angle between 0 and 3.1416 rad.",
             )
 
 
@@ -57,10 +58,11 @@ class ArmSensorConfig:
 
     def __post_init__(self) -> None:
         if not any(self.direction):
-            raise FlexcalError("a sensor's direction has three numbers, not all zero.")
+            raise FlexcalError("E-ROBOT-005", "a sensor's direction has three numbers, not all zero.")
         if not self.sensitivity_std > 0 or min(self.position_std, self.direction_std, self.flatness_std) < 0:
             raise FlexcalError(
-                "a sensor's sensitivity_std must be positive, its position_std, direction_std and flatness_std not negative."
+                "E-ROBOT-006",
+                "a sensor's sensitivity_std must be positive, its position_std, direction_std and flatness_std not negative.",
             )
 
 
@@ -76,10 +78,11 @@ class PayloadConfig:
 
     def __post_init__(self) -> None:
         if self.mass < 0 or self.mass_std < 0:
-            raise FlexcalError("the payload's mass and mass_std must not be negative.")
+            raise FlexcalError("E-ROBOT-007", "the payload's mass and mass_std must not be negative.")
         if self.mass == 0 and (self.mass_std > 0 or self.inertia is not None):
             raise FlexcalError(
-                "a payload of 0 kg has neither mass_std nor inertia; give the mass they belong to, or leave them out."
+                "E-ROBOT-008",
+                "a payload of 0 kg has neither mass_std nor inertia; give the mass they belong to, or leave them out.",
             )
 
 
@@ -105,15 +108,17 @@ class PriorConfig:
         for name in ("mass", "com", "torque_constant"):
             if getattr(self, name) < 0 or 0 < getattr(self, name) < _LEAST_PRIOR:
                 raise FlexcalError(
+                    "E-ROBOT-009",
                     "the prior's mass, com and torque_constant must not be negative (0: known exactly), and no less than "
-                    f"{_LEAST_PRIOR:g} otherwise; {name} is {getattr(self, name):g}."
+                    f"{_LEAST_PRIOR:g} otherwise; {name} is {getattr(self, name):g}.",
                 )
         single = {"rotor_inertia": self.rotor_inertia, "stiffness": self.stiffness}
         named = single | {"length": self.length, "angle": self.angle} | self.parameters
         for name, value in named.items():
             if value is not None and not value >= _LEAST_PRIOR:
                 raise FlexcalError(
-                    f"the prior's {name} must be positive, at least {_LEAST_PRIOR:g}, not {value:g}."
+                    "E-ROBOT-010",
+                    f"the prior's {name} must be positive, at least {_LEAST_PRIOR:g}, not {value:g}.",
                 )
 
 
@@ -127,7 +132,9 @@ class CouplingConfig:
 
     def __post_init__(self) -> None:
         if self.motor == self.joint or self.ratio == 0:
-            raise FlexcalError("a coupling is between two different joints, with a ratio other than 0.")
+            raise FlexcalError(
+                "E-ROBOT-011", "a coupling is between two different joints, with a ratio other than 0."
+            )
 
 
 @dataclass(frozen=True)
@@ -153,9 +160,13 @@ class SpringConfig:
 
     def __post_init__(self) -> None:
         if not self.stiffness > 0:
-            raise FlexcalError(f"a stiffness must be positive, not {self.stiffness:g} N m/rad.")
+            raise FlexcalError(
+                "E-ROBOT-012", f"a stiffness must be positive, not {self.stiffness:g} N m/rad."
+            )
         if self.damping < 0:
-            raise FlexcalError(f"a damping must not be negative, not {self.damping:g} N m s/rad.")
+            raise FlexcalError(
+                "E-ROBOT-013", f"a damping must not be negative, not {self.damping:g} N m s/rad."
+            )
 
 
 @dataclass(frozen=True)
@@ -175,7 +186,8 @@ class ElasticConfig:
     def __post_init__(self) -> None:
         if (self.bearing_x is None) != (self.bearing_y is None):
             raise FlexcalError(
-                f"the elastic joint '{self.joint}' has one bearing spring; give bearing_x and bearing_y or neither."
+                "E-ROBOT-014",
+                f"the elastic joint '{self.joint}' has one bearing spring; give bearing_x and bearing_y or neither.",
             )
 
 
@@ -190,12 +202,15 @@ class GeometryConfig:
         known = ("kinematic", "backlash", "gravity_compliance", "lateral_compliance", "transmission")
         if isinstance(self.terms, str) and self.terms != "auto":
             raise FlexcalError(
-                f"geometry terms must be 'auto' or a list out of {', '.join(known)}, not '{self.terms}'."
+                "E-ROBOT-015",
+                f"geometry terms must be 'auto' or a list out of {', '.join(known)}, not '{self.terms}'.",
             )
         for term in () if isinstance(self.terms, str) else self.terms:
             owner, _, kind = term.rpartition(".")
             if kind not in (known[2:4] if owner else known):
-                raise FlexcalError(f"unknown geometry term '{term}'; known are {', '.join(known)}.")
+                raise FlexcalError(
+                    "E-ROBOT-016", f"unknown geometry term '{term}'; known are {', '.join(known)}."
+                )
 
 
 @dataclass(frozen=True)
@@ -238,12 +253,13 @@ class DynamicsConfig:
     def __post_init__(self) -> None:
         if isinstance(self.friction, str) and self.friction not in ("auto", "classic"):
             raise FlexcalError(
-                f"friction must be 'auto', 'classic' or a list of terms, not '{self.friction}'."
+                "E-ROBOT-017",
+                f"friction must be 'auto', 'classic' or a list of terms, not '{self.friction}'.",
             )
         if self.cutoff_hz is not None and not self.cutoff_hz > 0:
-            raise FlexcalError(f"cutoff_hz must be positive, not {self.cutoff_hz:g} Hz.")
+            raise FlexcalError("E-ROBOT-018", f"cutoff_hz must be positive, not {self.cutoff_hz:g} Hz.")
         if self.decimation is not None and self.decimation < 1:
-            raise FlexcalError(f"decimation must be 1 or more, not {self.decimation}.")
+            raise FlexcalError("E-ROBOT-019", f"decimation must be 1 or more, not {self.decimation}.")
 
 
 @dataclass(frozen=True)
@@ -270,7 +286,7 @@ class StationConfig:
 
     def __post_init__(self) -> None:
         if self.line_of_sight and self.xyz is None:
-            raise FlexcalError("line_of_sight needs the station's xyz (m in the base frame).")
+            raise FlexcalError("E-ROBOT-020", "line_of_sight needs the station's xyz (m in the base frame).")
 
 
 @dataclass(frozen=True)
@@ -284,7 +300,8 @@ class BoxConfig:
         for axis, low, high in zip("xyz", self.lower, self.upper, strict=True):
             if not low < high:
                 raise FlexcalError(
-                    f"the box's limits cross along {axis} ({low:g} to {high:g} m); give `lower` and `upper` corners."
+                    "E-ROBOT-021",
+                    f"the box's limits cross along {axis} ({low:g} to {high:g} m); give `lower` and `upper` corners.",
                 )
 
 
@@ -301,7 +318,7 @@ class LimitsConfig:
 
     def __post_init__(self) -> None:
         if min(self.acceleration or (1.0,)) <= 0 or (self.speed is not None and not self.speed > 0):
-            raise FlexcalError("limits of acceleration and speed must be positive.")
+            raise FlexcalError("E-ROBOT-022", "limits of acceleration and speed must be positive.")
 
 
 @dataclass(frozen=True)
@@ -315,7 +332,8 @@ class ControllerConfig:
     def __post_init__(self) -> None:
         if min(self.kp, default=0.0) < 0 or min(self.kd, default=0.0) < 0 or not self.rate_hz > 0:
             raise FlexcalError(
-                "the controller's kp and kd must not be negative, and its rate_hz must be positive."
+                "E-ROBOT-023",
+                "the controller's kp and kd must not be negative, and its rate_hz must be positive.",
             )
 
 

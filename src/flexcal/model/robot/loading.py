@@ -52,7 +52,9 @@ def _parts(file: YamlFile, config: RobotConfig, urdf: Path, description: Descrip
             _joint(file, ("dynamics", key, k, "joint"), names, entry.joint)
             if entry.joint in {other.joint for other in entries[:k]}:
                 raise file.error(
-                    ("dynamics", key, k), f"the joint '{entry.joint}' stands twice under `{key}:`; keep one."
+                    "E-ROBOT-024",
+                    ("dynamics", key, k),
+                    f"the joint '{entry.joint}' stands twice under `{key}:`; keep one.",
                 )
     for key in ("kp", "kd") if config.controller is not None else ():
         _check_count(file, ("controller", key), getattr(config.controller, key), n)
@@ -67,11 +69,14 @@ def _parts(file: YamlFile, config: RobotConfig, urdf: Path, description: Descrip
         i = _joint(file, ("elastic", k, "joint"), names, entry.joint)
         if i in bearing_frames:
             raise file.error(
-                ("elastic", k), f"the joint '{entry.joint}' stands twice under `elastic:`; keep one."
+                "E-ROBOT-025",
+                ("elastic", k),
+                f"the joint '{entry.joint}' stands twice under `elastic:`; keep one.",
             )
         if points and i not in carrying:
             seen = ", ".join(points)
             raise file.error(
+                "E-ROBOT-026",
                 ("elastic", k),
                 f"no declared point ({seen}) is downstream of the elastic joint '{entry.joint}'; "
                 "declare a point that it moves, or remove the joint from `elastic:`.",
@@ -129,7 +134,9 @@ def _parts(file: YamlFile, config: RobotConfig, urdf: Path, description: Descrip
 
 def _joint(file: YamlFile, keys: tuple[str | int, ...], names: list[str], name: str) -> int:
     if name not in names:
-        raise file.error(keys, f"the URDF has no movable joint '{name}'; it has {', '.join(names)}.")
+        raise file.error(
+            "E-ROBOT-027", keys, f"the URDF has no movable joint '{name}'; it has {', '.join(names)}."
+        )
     return names.index(name)
 
 
@@ -138,10 +145,12 @@ def _frame(file: YamlFile, keys: tuple[str | int, ...], description: Description
     if frame is None:
         known = [f for f in description.frames if f != "universe"]
         near = suggestion(name, known) or f"; it has {', '.join(known)}."
-        raise file.error(keys, f"the URDF lacks the frame '{name}'{near}")
+        raise file.error("E-ROBOT-028", keys, f"the URDF lacks the frame '{name}'{near}")
     if frame.joint < 0:
         raise file.error(
-            keys, f"the frame '{name}' does not move with any joint; name one beyond the first joint."
+            "E-ROBOT-029",
+            keys,
+            f"the frame '{name}' does not move with any joint; name one beyond the first joint.",
         )
     return frame
 
@@ -160,7 +169,9 @@ def _sensor(file: YamlFile, description: Description, name: str, config: RobotCo
     frame = _frame(file, ("sensors", name, "frame"), description, entry.frame)
     if not re.fullmatch(r"\w+", name):
         raise file.error(
-            ("sensors", name), f"the sensor's name '{name}' may have letters, digits and _ only."
+            "E-ROBOT-030",
+            ("sensors", name),
+            f"the sensor's name '{name}' may have letters, digits and _ only.",
         )
     moves = entry.kind == "accelerometer"
     direction = np.array(entry.direction) / np.linalg.norm(entry.direction)
@@ -184,7 +195,9 @@ def _payload(file: YamlFile, description: Description, config: RobotConfig) -> P
     com = np.array(entry.com)
     inertia = np.zeros((3, 3)) if entry.inertia is None else np.array(entry.inertia)
     if np.linalg.eigvalsh(inertia)[0] < 0 or np.abs(inertia - inertia.T).max() > 0:
-        raise file.error(("payload", "inertia"), "the payload's inertia must be symmetric and positive.")
+        raise file.error(
+            "E-ROBOT-031", ("payload", "inertia"), "the payload's inertia must be symmetric and positive."
+        )
     return Payload(
         entry.frame, frame.joint, frame.rotation, frame.translation, entry.mass, entry.mass_std, com, inertia
     )
@@ -206,6 +219,7 @@ def _force_sensor(file: YamlFile, description: Description, config: RobotConfig)
 def _bearing_frame(file: YamlFile, k: int, entry: ElasticConfig, joint: Joint) -> np.ndarray:
     if joint.kind != "revolute":
         raise file.error(
+            "E-ROBOT-032",
             ("elastic", k, "joint"),
             f"the joint '{joint.name}' is prismatic; only revolute joints can be elastic.",
         )
@@ -214,6 +228,7 @@ def _bearing_frame(file: YamlFile, k: int, entry: ElasticConfig, joint: Joint) -
     frame = joint.rotation.T @ rpy_rotation(np.array(entry.frame_rpy))
     if frame[:, 2] @ joint.axis < 1 - 1e-6:
         raise file.error(
+            "E-ROBOT-033",
             ("elastic", k, "frame_rpy"),
             f"the z axis of frame_rpy is not the axis of '{joint.name}'; turn it so that it is, or leave frame_rpy out.",
         )
@@ -226,14 +241,20 @@ def _per_joint(file: YamlFile, config: RobotConfig, key: str, n: int) -> np.ndar
         return np.full(n, np.nan)
     _check_count(file, ("drives", key), values, n)
     if key != "ratio" and min(values) < 0:
-        raise file.error(("drives", key), f"{key} must not be negative, but is {min(values):g}.")
+        raise file.error(
+            "E-ROBOT-034", ("drives", key), f"{key} must not be negative, but is {min(values):g}."
+        )
     if key == "ratio" and 0 in values:
-        raise file.error(("drives", key), "a ratio of 0 is not possible; give motor turns per joint turn.")
+        raise file.error(
+            "E-ROBOT-035", ("drives", key), "a ratio of 0 is not possible; give motor turns per joint turn."
+        )
     return np.array(values)
 
 
 def _check_count(file: YamlFile, keys: tuple[str, str], values: Sequence[float], n: int) -> None:
     if len(values) != n:
         raise file.error(
-            keys, f"{keys[1]} has {len(values)} entries but the robot has {n} joints; give one per joint."
+            "E-ROBOT-036",
+            keys,
+            f"{keys[1]} has {len(values)} entries but the robot has {n} joints; give one per joint.",
         )

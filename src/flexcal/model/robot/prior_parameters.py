@@ -77,7 +77,9 @@ def springs_and_rotors(model: RobotModel) -> tuple[Parameter, ...]:
     rotors = [f"{joint.name}.rotor_inertia" for joint in model.driven]
     for name in (*names, *rotors):
         if not model.value(name) > 0:
-            raise FlexcalError(f"{model.path} gives no positive value of {name} to start from; add one.")
+            raise FlexcalError(
+                "E-ROBOT-037", f"{model.path} gives no positive value of {name} to start from; add one."
+            )
     declared_joints = {entry.joint for entry in model.config.elastic}
 
     def spring(name: str) -> Parameter:

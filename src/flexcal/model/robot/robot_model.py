@@ -126,7 +126,8 @@ class RobotModel:
             joint = self.joints[i]
             if joint.kind != "revolute":
                 raise FlexcalError(
-                    f"the joint '{joint.name}' is prismatic; only revolute joints can be elastic."
+                    "E-ROBOT-038",
+                    f"the joint '{joint.name}' is prismatic; only revolute joints can be elastic.",
                 )
             frames[i] = bearing_frame(joint)
             stiffness[i, 2], damping[i, 2] = constant, loss
@@ -242,7 +243,8 @@ class RobotModel:
         """Index of a joint by its URDF name; raises `FlexcalError` that lists the names."""
         if name not in self.joint_names:
             raise FlexcalError(
-                f"there is no movable joint '{name}' in {self.urdf.name}; there are {', '.join(self.joint_names)}."
+                "E-ROBOT-039",
+                f"there is no movable joint '{name}' in {self.urdf.name}; there are {', '.join(self.joint_names)}.",
             )
         return self.joint_names.index(name)
 
@@ -254,12 +256,14 @@ class RobotModel:
         """A target by name, the first declared one without; raises `FlexcalError` that lists the names."""
         if not self.points:
             raise FlexcalError(
-                f"{self.path} declares no point; add one under `points:` so that there is something to measure."
+                "E-ROBOT-040",
+                f"{self.path} declares no point; add one under `points:` so that there is something to measure.",
             )
         key = next(iter(self.points)) if name is None else name
         if key not in self.points:
             raise FlexcalError(
-                f"there is no point '{key}' under `points:` in {self.path}; there are {', '.join(self.points)}."
+                "E-ROBOT-041",
+                f"there is no point '{key}' under `points:` in {self.path}; there are {', '.join(self.points)}.",
             )
         return self.points[key]
 
@@ -267,8 +271,9 @@ class RobotModel:
         """Index of one of the instrument's places; raises `FlexcalError` that lists the names."""
         if name not in self.stations:
             raise FlexcalError(
+                "E-ROBOT-042",
                 f"there is no station '{name}' in {self.path}, which has {', '.join(self.stations)}; declare it under `stations:`, "
-                "and the others there too."
+                "and the others there too.",
             )
         return self.stations.index(name)
 
@@ -294,7 +299,9 @@ class RobotModel:
     def value(self, name: str) -> float:
         """One named value, SI; raises `FlexcalError` that suggests close names."""
         if name not in self.values:
-            raise FlexcalError(f"unknown parameter '{name}'{suggestion(name, list(self.values), 3) or '.'}")
+            raise FlexcalError(
+                "E-ROBOT-043", f"unknown parameter '{name}'{suggestion(name, list(self.values), 3) or '.'}"
+            )
         return self.values[name]
 
     def with_values(self, values: Mapping[str, float]) -> RobotModel:
@@ -331,7 +338,8 @@ class RobotModel:
     def _com_of(self, link: int, first_moment: float, mass: float) -> float:
         if mass == 0 and first_moment != 0:
             raise FlexcalError(
-                f"the link '{self.joints[link].link}' has no mass, so it can have no first moment."
+                "E-ROBOT-044",
+                f"the link '{self.joints[link].link}' has no mass, so it can have no first moment.",
             )
         return first_moment / mass if mass != 0 else 0.0
 

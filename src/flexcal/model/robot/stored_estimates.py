@@ -58,8 +58,9 @@ def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path)
         ]
         if unknown:
             raise InputError(
+                "E-ROBOT-045",
                 f"{path}: the block '{block}' has '{unknown[0]}', which the robot of {model.path} does not have; "
-                "identify again, or give the robot.yaml that belongs to it."
+                "identify again, or give the robot.yaml that belongs to it.",
             )
         _check_units(model, block, estimate, path)
         model = _with_backlash_joints(model.with_estimate(estimate), estimate)
@@ -73,7 +74,8 @@ def _check_units(model: RobotModel, block: Block, estimate: Estimate, path: Path
         units = (unit_in(model, parameter.name), unit_of(parameter.name))
         if parameter.name in model.values and parameter.unit not in units:
             raise InputError(
-                f"{path}: the block '{block}' has '{parameter.name}' in '{parameter.unit}', not in {units[0]}; identify again."
+                "E-ROBOT-046",
+                f"{path}: the block '{block}' has '{parameter.name}' in '{parameter.unit}', not in {units[0]}; identify again.",
             )
 
 
@@ -87,8 +89,9 @@ def _with_bearings(model: RobotModel, blocks: Mapping[Block, Estimate], path: Pa
         elif model.bearings != bearings:
             again = "calibrate" if block == "calibration" else f"identify {block}"
             raise InputError(
+                "E-ROBOT-047",
                 f"{path}: the block '{block}' was estimated with `bearings: {bearings}`, but the robot has `bearings: {model.bearings}` "
-                f"by {model.path} or by another block; run 'flexcal {again}' again."
+                f"by {model.path} or by another block; run 'flexcal {again}' again.",
             )
     return model
 
@@ -102,8 +105,9 @@ def _with_payload(model: RobotModel, estimate: Estimate, path: Path) -> RobotMod
         return with_payload(model, frame, values["payload.mass"], com, np.zeros((3, 3)))
     if declared.frame != frame:
         raise InputError(
+            "E-ROBOT-048",
             f"{path}: the payload was identified in the frame '{frame}', but {model.path} declares it in '{declared.frame}'; run "
-            "'flexcal identify payload' again, or correct the frame."
+            "'flexcal identify payload' again, or correct the frame.",
         )
     return model
 
@@ -113,8 +117,9 @@ def _check_bodies(model: RobotModel, estimate: Estimate, path: Path) -> None:
     broken = [link for link in links if not is_physically_consistent(estimate.values, link)]
     if broken:
         raise InputError(
+            "E-ROBOT-049",
             f"{path}: the inertials in the block 'dynamics' are not physically consistent for {', '.join(broken)}, as elastic "
-            "joints require; run 'flexcal identify dynamics' with --estimator sdp."
+            "joints require; run 'flexcal identify dynamics' with --estimator sdp.",
         )
 
 

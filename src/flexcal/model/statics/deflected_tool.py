@@ -51,7 +51,8 @@ def carried_mass(model: RobotModel, payload: np.ndarray | None, samples: int) ->
         return np.full(samples, identified)
     if payload.any() and nominal is None:
         raise FlexcalError(
-            f"the poses name a payload but {model.path} declares none; add `payload:` with its centre of mass."
+            "E-MODEL-004",
+            f"the poses name a payload but {model.path} declares none; add `payload:` with its centre of mass.",
         )
     return payload * (identified / nominal.mass if nominal is not None and nominal.mass > 0 else 1.0)
 

@@ -69,7 +69,8 @@ def payload_batch(model: RobotModel, payload: np.ndarray | float | None, samples
     masses = np.ascontiguousarray(np.broadcast_to(np.asarray(payload, dtype=float), (samples,)))
     if model.nominal_payload is None and masses.any():
         raise FlexcalError(
-            f"a payload is given but {model.path} declares none; add `payload:` with its frame and centre of mass."
+            "E-MODEL-005",
+            f"a payload is given but {model.path} declares none; add `payload:` with its frame and centre of mass.",
         )
     return masses
 
@@ -101,11 +102,12 @@ def _solve(
         )
     except ValueError as problem:
         raise FlexcalError(
-            f"{model.name}: {problem}; check the stiffnesses in robot.yaml and the payload."
+            "E-MODEL-006", f"{model.name}: {problem}; check the stiffnesses in robot.yaml and the payload."
         ) from problem
     if step > 1e-9:
         raise FlexcalError(
-            f"{model.name}: no stable equilibrium was found (last step {step:.1e} rad); check the stiffnesses."
+            "E-MODEL-007",
+            f"{model.name}: no stable equilibrium was found (last step {step:.1e} rad); check the stiffnesses.",
         )
     return deflection, compliance, regressor, coupling
 
@@ -208,7 +210,8 @@ def static_equilibrium(
     stiffness = np.array([model.stiffness[a] for a in axes])
     if not (np.isfinite(stiffness) & (stiffness > 0)).all():
         raise FlexcalError(
-            f"{model.name}: every stiffness must be positive and finite, not {stiffness.min():g} N m/rad."
+            "E-MODEL-008",
+            f"{model.name}: every stiffness must be positive and finite, not {stiffness.min():g} N m/rad.",
         )
     load = gravity_torque(model, q, masses)
     free = transmission_error(model, q) - load * model.gravity_compliance

@@ -19,7 +19,9 @@ def energy_regressor(model: RobotModel, q: np.ndarray, dq: np.ndarray) -> np.nda
     """
     q, dq = joint_batch(model, q), joint_batch(model, dq)
     if q.shape != dq.shape:
-        raise FlexcalError(f"q and dq have shapes {q.shape} and {dq.shape}; give as many samples of each.")
+        raise FlexcalError(
+            "E-MODEL-009", f"q and dq have shapes {q.shape} and {dq.shape}; give as many samples of each."
+        )
     geometry, still = np.ascontiguousarray(model.geometry), np.zeros((*q.shape, 3))
     rest = np.zeros_like(q)
     momentum = torque_regressor(model, q, rest, dq) - torque_regressor(model, q, rest, rest)  # M q̇

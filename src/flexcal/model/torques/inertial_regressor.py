@@ -50,7 +50,8 @@ def motion_batch(
     q, dq, ddq = (joint_batch(model, values) for values in (q, dq, ddq))
     if not q.shape == dq.shape == ddq.shape:
         raise FlexcalError(
-            f"q, dq and ddq have shapes {q.shape}, {dq.shape} and {ddq.shape}; give as many samples of each."
+            "E-MODEL-010",
+            f"q, dq and ddq have shapes {q.shape}, {dq.shape} and {ddq.shape}; give as many samples of each.",
         )
     return q, dq, ddq
 

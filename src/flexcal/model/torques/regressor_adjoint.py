@@ -24,7 +24,8 @@ def torque_regressor_adjoint(
     shape = (model.n, len(LINK_PARAMETERS) * model.n)
     if weights.shape != (len(q), *shape):
         raise FlexcalError(
-            f"weights have shape {weights.shape}; give one for every entry of W: {(len(q), *shape)}."
+            "E-MODEL-011",
+            f"weights have shape {weights.shape}; give one for every entry of W: {(len(q), *shape)}.",
         )
     rows = weights.transpose(1, 2, 0).reshape(shape[0] * shape[1], len(q))
     return placed_regressor_adjoint(model, q, dq, ddq, np.arange(len(rows)).reshape(shape), rows)
@@ -40,7 +41,7 @@ def placed_regressor_adjoint(
     q, dq, ddq = motion_batch(model, q, dq, ddq)
     if weights.ndim != 2 or weights.shape[1] != len(q):
         raise FlexcalError(
-            f"weights have shape {weights.shape}; give rows of {len(q)} numbers, one a sample."
+            "E-MODEL-012", f"weights have shape {weights.shape}; give rows of {len(q)} numbers, one a sample."
         )
     geometry, rows = np.ascontiguousarray(model.geometry), np.ascontiguousarray(weights, dtype=float)
     return model.tree.torque_regressor_adjoint(geometry, model.gravity, q, dq, ddq, places, rows)

@@ -23,11 +23,12 @@ def carried_links(robot: Element, locked: Container[str]) -> dict[str, str]:
     joints that mimic others, the `locked` ones are none of that.
     """
     if robot.tag != "robot":
-        raise robot.error(f"the root element is <{robot.tag}>, not <robot>; give a URDF file.")
+        raise robot.error("E-URDF-001", f"the root element is <{robot.tag}>, not <robot>; give a URDF file.")
     for child in robot.children:
         if child.tag.startswith("xacro:"):
             raise child.error(
-                f"<{child.tag}> is xacro, not URDF; expand the file with the xacro program first."
+                "E-URDF-002",
+                f"<{child.tag}> is xacro, not URDF; expand the file with the xacro program first.",
             )
     links = _named(robot, "link")
     joints = _named(robot, "joint")
@@ -41,13 +42,15 @@ def carried_links(robot: Element, locked: Container[str]) -> dict[str, str]:
         follows = joint.find("mimic") is not None and joint.attributes.get("type") != "fixed"
         if follows and name not in locked:
             raise joint.error(
-                f"joint '{name}' mimics another one, which flexcal does not handle; say where it stands under `locked:` in robot.yaml."
+                "E-URDF-003",
+                f"joint '{name}' mimics another one, which flexcal does not handle; say where it stands under `locked:` in robot.yaml.",
             )
         parent, child = _check_joint(joint, name, links)
         if child in parents:
             other = next(joint for joint, link in carried.items() if link == child)
             raise joint.error(
-                f"joint '{name}' carries the link '{child}', which joint '{other}' carries already; open the loop."
+                "E-URDF-004",
+                f"joint '{name}' carries the link '{child}', which joint '{other}' carries already; open the loop.",
             )
         carried[name], parents[child] = child, parent
     roots = [name for name in links if name not in parents]
@@ -57,22 +60,26 @@ def carried_links(robot: Element, locked: Container[str]) -> dict[str, str]:
             if roots
             else "every link hangs on a joint"
         )
-        raise robot.error(f"{what}, but a robot has one base; correct the joints' parents and children.")
+        raise robot.error(
+            "E-URDF-005", f"{what}, but a robot has one base; correct the joints' parents and children."
+        )
     for name, link in links.items():
         steps, at = 0, name
         while at in parents and steps <= len(links):
             steps, at = steps + 1, parents[at]
         if at in parents:
             raise link.error(
-                f"the link '{name}' is carried by itself; correct the joints' parents and children."
+                "E-URDF-006",
+                f"the link '{name}' is carried by itself; correct the joints' parents and children.",
             )
     moving = [
         name for name in carried if joints[name].attributes.get("type") != "fixed" and name not in locked
     ]
     if len(moving) > MOST_JOINTS:
         raise joints[moving[MOST_JOINTS]].error(
+            "E-URDF-007",
             f"the robot has {len(moving)} movable joints, but flexcal handles at most {MOST_JOINTS}; say where the others stand under "
-            "`locked:` in robot.yaml."
+            "`locked:` in robot.yaml.",
         )
     return {joint: carried[joint] for joint in _beyond(roots[0], carried, parents)}
 
@@ -94,14 +101,14 @@ def _named(robot: Element, tag: str) -> dict[str, Element]:
     for element in robot.all(tag):
         name = element.attributes.get("name", "")
         if not name:
-            raise element.error(f"a {tag} has no name; add the attribute 'name'.")
+            raise element.error("E-URDF-008", f"a {tag} has no name; add the attribute 'name'.")
         if name in result:
             raise element.error(
-                f"the {tag} '{name}' stands here and on line {result[name].line}; rename one."
+                "E-URDF-009", f"the {tag} '{name}' stands here and on line {result[name].line}; rename one."
             )
         result[name] = element
     if not result and tag == "link":
-        raise robot.error("the robot has no link; give a URDF with links and joints.")
+        raise robot.error("E-URDF-010", "the robot has no link; give a URDF with links and joints.")
     return result
 
 
@@ -109,16 +116,19 @@ def _check_inertial(inertial: Element, owner: str) -> None:
     _check_origin(inertial, owner)
     mass, inertia = inertial.find("mass"), inertial.find("inertia")
     if mass is None or inertia is None:
-        raise inertial.error(f"<inertial> of {owner} needs both <mass> and <inertia>; add what is missing.")
+        raise inertial.error(
+            "E-URDF-011", f"<inertial> of {owner} needs both <mass> and <inertia>; add what is missing."
+        )
     value = mass.numbers("value", 1, owner)[0]
     if value < 0:
-        raise mass.error(f"the mass of {owner} is {value:g} kg; it must not be negative.")
+        raise mass.error("E-URDF-012", f"the mass of {owner} is {value:g} kg; it must not be negative.")
     xx, xy, xz, yy, yz, zz = (inertia.numbers(key, 1, owner)[0] for key in _MOMENTS)
     moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     least = np.linalg.eigvalsh(moments)[0]
     if least < -_ROUNDING * np.abs(moments).max():
         raise inertia.error(
-            f"the inertia of {owner} is not positive (its least principal moment is {least:.3g} kg m²); correct its six numbers."
+            "E-URDF-013",
+            f"the inertia of {owner} is not positive (its least principal moment is {least:.3g} kg m²); correct its six numbers.",
         )
 
 
@@ -127,35 +137,42 @@ def _check_joint(joint: Element, name: str, links: dict[str, Element]) -> tuple[
     owner, kind = f"joint '{name}'", joint.attributes.get("type")
     if kind not in KINDS:
         what = f"is of the type '{kind}'" if kind else "has no type"
-        raise joint.error(f"{owner} {what}, which flexcal does not handle; use {', '.join(KINDS)}.")
+        raise joint.error(
+            "E-URDF-014", f"{owner} {what}, which flexcal does not handle; use {', '.join(KINDS)}."
+        )
     ends = []
     for tag in ("parent", "child"):
         end = joint.find(tag)
         link = None if end is None else end.attributes.get("link")
         if end is None or link is None:
-            raise joint.error(f'{owner} names no {tag} link; add <{tag} link="…"/>.')
+            raise joint.error("E-URDF-015", f'{owner} names no {tag} link; add <{tag} link="…"/>.')
         if link not in links:
-            raise end.error(f"the {tag} of {owner}, '{link}', is no link of this file; correct the name.")
+            raise end.error(
+                "E-URDF-016", f"the {tag} of {owner}, '{link}', is no link of this file; correct the name."
+            )
         ends.append(link)
     _check_origin(joint, owner)
     if kind == "fixed":
         return ends[0], ends[1]
     axis = joint.find("axis")
     if axis is not None and not np.linalg.norm(axis.numbers("xyz", 3, owner)) > 0:
-        raise axis.error(f"the axis of {owner} is 0 0 0, which has no direction; correct it.")
+        raise axis.error("E-URDF-017", f"the axis of {owner} is 0 0 0, which has no direction; correct it.")
     limit = joint.find("limit")
     if kind != "continuous":
         if limit is None:
             raise joint.error(
-                f'{owner} is {kind} but has no limits; add <limit lower="…" upper="…" effort="…" velocity="…"/>.'
+                "E-URDF-018",
+                f'{owner} is {kind} but has no limits; add <limit lower="…" upper="…" effort="…" velocity="…"/>.',
             )
         lower, upper = (limit.numbers(key, 1, owner)[0] for key in ("lower", "upper"))
         if not lower < upper:
-            raise limit.error(f"the limits of {owner}, {lower:g} to {upper:g}, leave no range; correct them.")
+            raise limit.error(
+                "E-URDF-019", f"the limits of {owner}, {lower:g} to {upper:g}, leave no range; correct them."
+            )
     if limit is not None:
         for key in ("effort", "velocity"):
             if limit.numbers(key, 1, owner)[0] < 0:
-                raise limit.error(f"the {key} limit of {owner} is negative; correct it.")
+                raise limit.error("E-URDF-020", f"the {key} limit of {owner} is negative; correct it.")
     return ends[0], ends[1]
 
 

@@ -51,21 +51,25 @@ def read_urdf(path: Path, locked: Mapping[str, float]) -> Description:
     import pinocchio as pin
 
     if not current_path(path).is_file():
-        raise InputError(f"{path}: there is no such URDF file; correct `robot:` in robot.yaml.")
+        raise InputError("E-URDF-021", f"{path}: there is no such URDF file; correct `robot:` in robot.yaml.")
     robot = read_elements(path)
     links = carried_links(robot, locked)
     with _silenced() as said:
         try:
             model = pin.buildModelFromXML(robot.text())
         except (ValueError, RuntimeError) as problem:
-            raise InputError(f"{path}: not a valid URDF ({_first_complaint(said)}); correct it.") from problem
+            raise InputError(
+                "E-URDF-022", f"{path}: not a valid URDF ({_first_complaint(said)}); correct it."
+            ) from problem
     _check_locked(path, model, locked)
     try:
         model = pin.buildReducedModel(model, *locked_joints(model, locked))
     except ValueError as problem:  # Pinocchio looks frames up by name, and joints and links are both frames
-        raise InputError(f"{path}: a joint and a link have one name ({problem}); rename one.") from problem
+        raise InputError(
+            "E-URDF-023", f"{path}: a joint and a link have one name ({problem}); rename one."
+        ) from problem
     if model.njoints < 2:
-        raise InputError(f"{path}: the URDF has no movable joint; a robot needs at least one.")
+        raise InputError("E-URDF-024", f"{path}: the URDF has no movable joint; a robot needs at least one.")
     order = [model.getJointId(name) for name in links if model.existJointName(name)]
     place = {i: k for k, i in enumerate([0, *order], start=-1)}
     joints = []
@@ -119,15 +123,17 @@ def _check_locked(path: Path, model: Any, locked: Mapping[str, float]) -> None:
     for name, position in locked.items():
         if not model.existJointName(name):
             raise InputError(
+                "E-URDF-025",
                 f"{path}: there is no movable joint '{name}' to lock; there are {', '.join(model.names[1:])}; "
-                "correct `locked:` in robot.yaml."
+                "correct `locked:` in robot.yaml.",
             )
         joint = model.joints[model.getJointId(name)]
         lower, upper = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
         if joint.nq == 1 and not lower <= position <= upper:
             raise InputError(
+                "E-URDF-026",
                 f"{path}: '{name}' is locked at {position:g}, but its limits are {lower:g} and {upper:g}; "
-                "correct `locked:` in robot.yaml."
+                "correct `locked:` in robot.yaml.",
             )
 
 

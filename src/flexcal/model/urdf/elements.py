@@ -43,15 +43,17 @@ class Element:
         inside = "".join(child.text() for child in self.children)
         return f"<{self.tag}{attributes}>{inside}</{self.tag}>" if inside else f"<{self.tag}{attributes}/>"
 
-    def error(self, sentence: str) -> InputError:
+    def error(self, code: str, sentence: str) -> InputError:
         """An `InputError` that places `sentence` at the element's line."""
-        return InputError(f"{self.path} line {self.line}: {sentence}")
+        return InputError(code, f"{self.path} line {self.line}: {sentence}")
 
     def numbers(self, attribute: str, count: int, owner: str) -> np.ndarray:
         """The `count` finite numbers of an attribute; raises `InputError` that names its `owner` where it is missing or holds others."""
         text = self.attributes.get(attribute)
         if text is None:
-            raise self.error(f"<{self.tag}> of {owner} lacks the attribute '{attribute}'; add it.")
+            raise self.error(
+                "E-URDF-027", f"<{self.tag}> of {owner} lacks the attribute '{attribute}'; add it."
+            )
         try:
             values = np.array([float(word) for word in text.split()])
         except ValueError:
@@ -60,7 +62,8 @@ class Element:
             what = "a number" if count == 1 else f"{count} numbers"
             quoted = text if len(text) <= _QUOTED else f"{text[:_QUOTED]}…"
             raise self.error(
-                f'{attribute}="{quoted}" in <{self.tag}> of {owner} is not {what}; write {what} with decimal points.'
+                "E-URDF-028",
+                f'{attribute}="{quoted}" in <{self.tag}> of {owner} is not {what}; write {what} with decimal points.',
             )
         return values
 
@@ -75,7 +78,8 @@ def read_elements(path: Path) -> Element:
         element = Element(path, tag, attributes, parser.CurrentLineNumber)
         if len(above) > _DEEPEST:
             raise element.error(
-                f"elements nest more than {_DEEPEST} deep, so this is no URDF; name the robot's URDF."
+                "E-URDF-029",
+                f"elements nest more than {_DEEPEST} deep, so this is no URDF; name the robot's URDF.",
             )
         (above[-1].children if above else roots).append(element)
         above.append(element)
@@ -90,13 +94,16 @@ def read_elements(path: Path) -> Element:
         parser.Parse(content, True)
     except expat.ExpatError as problem:
         if not content.lstrip(b"\xef\xbb\xbf\xff\xfe\x00 \t\r\n").startswith(b"<"):
-            raise InputError(f"{path}: this is no XML, so no URDF; name the robot's URDF.") from problem
+            raise InputError(
+                "E-URDF-030", f"{path}: this is no XML, so no URDF; name the robot's URDF."
+            ) from problem
         raise InputError(
+            "E-URDF-031",
             f"{path} line {problem.lineno}, column {problem.offset + 1}: not well-formed XML "
-            f"({expat.ErrorString(problem.code)}); correct it there."
+            f"({expat.ErrorString(problem.code)}); correct it there.",
         ) from problem
     except (ValueError, LookupError) as problem:
         raise InputError(
-            f"{path} line 1: its encoding is not supported ({problem}); save it as UTF-8."
+            "E-URDF-032", f"{path} line 1: its encoding is not supported ({problem}); save it as UTF-8."
         ) from problem
     return roots[0]

@@ -45,19 +45,20 @@ def find_arm(path: Path, tip: str | None = None) -> Arm:
     """
     if path.suffix == ".xacro":
         raise InputError(
-            f"{path}: this is xacro, not URDF; expand it first: xacro {path.name} > {path.stem.removesuffix('.urdf')}.urdf."
+            "E-URDF-033",
+            f"{path}: this is xacro, not URDF; expand it first: xacro {path.name} > {path.stem.removesuffix('.urdf')}.urdf.",
         )
     if path.is_dir():
-        raise InputError(f"{path} is a folder; name the robot's URDF in it.")
+        raise InputError("E-URDF-034", f"{path} is a folder; name the robot's URDF in it.")
     if not current_path(path).is_file():
-        raise InputError(f"{path}: there is no such file; name the robot's URDF.")
+        raise InputError("E-URDF-035", f"{path}: there is no such file; name the robot's URDF.")
     root = read_elements(path)
     joints = {joint.attributes.get("name", ""): joint for joint in root.all("joint")}
     mimics = {name for name, joint in joints.items() if joint.find("mimic") is not None}
     carried = carried_links(root, mimics)
     movable = [name for name in carried if joints[name].attributes["type"] != "fixed"]
     if not movable:
-        raise InputError(f"{path}: the URDF has no movable joint; a robot needs at least one.")
+        raise InputError("E-URDF-036", f"{path}: the URDF has no movable joint; a robot needs at least one.")
     above = {link: name for name, link in carried.items()}
     ways = {link: _way(link, above, joints) for link in above}
     if tip is None:
@@ -73,15 +74,18 @@ def find_arm(path: Path, tip: str | None = None) -> Arm:
     else:
         if tip not in ways:
             near = suggestion(tip, list(ways)) or f"; the links are {', '.join(ways)}."
-            raise InputError(f"{path}: there is no link '{tip}' beyond a joint{near}")
+            raise InputError("E-URDF-037", f"{path}: there is no link '{tip}' beyond a joint{near}")
         chain = tuple(name for name in ways[tip] if name in movable)
         if not chain:
-            raise InputError(f"{path}: the link '{tip}' moves with no joint; name one beyond the arm.")
+            raise InputError(
+                "E-URDF-038", f"{path}: the link '{tip}' moves with no joint; name one beyond the arm."
+            )
     mimicking = [name for name in chain if name in mimics]
     if mimicking:
         raise joints[mimicking[0]].error(
+            "E-URDF-039",
             f"joint '{mimicking[0]}' is on the way to the tool and mimics another one, which flexcal does not handle; "
-            "use a URDF in which it is fixed or moves by itself."
+            "use a URDF in which it is fixed or moves by itself.",
         )
     frames = [link for link in ways if tuple(n for n in ways[link] if n in movable) == chain and link != tip]
     ordered = ([] if tip is None else [tip]) + sorted(frames, key=lambda link: _rank(link, ways))
@@ -111,14 +115,16 @@ def _only_chain(
     longest = {c: link for c, link in ends.items() if not any(c == o[: len(c)] and c != o for o in ends)}
     if not longest:
         raise InputError(
-            f"{path}: every movable joint looks like a gripper's ({', '.join(sorted(beside))}); say where the arm ends with --tip LINK."
+            "E-URDF-040",
+            f"{path}: every movable joint looks like a gripper's ({', '.join(sorted(beside))}); say where the arm ends with --tip LINK.",
         )
     most = max(len(chain) for chain in longest)
     arms = [chain for chain in longest if len(chain) > _FEW or most <= 2 * _FEW]
     if len(arms) > 1:
         listed = ", ".join(f"{longest[chain]} ({len(chain)} joints)" for chain in arms)
         raise InputError(
-            f"{path}: the URDF has several chains; say which is the arm, as --tip LINK: {listed}."
+            "E-URDF-041",
+            f"{path}: the URDF has several chains; say which is the arm, as --tip LINK: {listed}.",
         )
     return arms[0]
 

@@ -59,7 +59,8 @@ def linearise(
     """
     if not robot.elastic:
         raise FlexcalError(
-            f"{robot.path} declares no elastic joint; add `elastic:` with starting values of the stiffnesses."
+            "E-MODEL-013",
+            f"{robot.path} declares no elastic joint; add `elastic:` with starting values of the stiffnesses.",
         )
     count, axes = len(robot.driven), elastic_axes(robot)
     size = count + len(axes)
@@ -72,7 +73,8 @@ def linearise(
     for r, joint in enumerate(robot.driven):
         if not robot.rotor_inertia[joint.index] > 0:
             raise FlexcalError(
-                f"{robot.path} gives no rotor inertia for the elastic joint {joint.name}; add `drives: rotor_inertia:`."
+                "E-MODEL-014",
+                f"{robot.path} gives no rotor inertia for the elastic joint {joint.name}; add `drives: rotor_inertia:`.",
             )
         mass[r, r] = robot.rotor_inertia[joint.index]
         damping[r, r] = np.nan_to_num(robot.viscous[joint.index])
@@ -167,7 +169,9 @@ def _derivatives(
             more_mass, more_stiffness = moved(motion)
             result[name] = (widened(mass + more_mass), zero, widened(stiffness + more_stiffness))
         else:
-            raise FlexcalError(f"the linearised robot has no derivative with respect to '{name}'.")
+            raise FlexcalError(
+                "E-MODEL-015", f"the linearised robot has no derivative with respect to '{name}'."
+            )
     return result
 
 
