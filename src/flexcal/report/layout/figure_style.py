@@ -36,9 +36,7 @@ def panels(
         horizontal_spacing=column_gap if columns > 1 else 0.0,
         vertical_spacing=(0.26 / rows if row_gap is None else row_gap) if rows > 1 else 0.0,
     )
-    _styled(figure, height, legend)
-    figure.update_annotations(font={"size": 12, "color": QUIET}, yshift=-2)
-    return figure
+    return _styled(figure, height, legend)
 
 
 def as_float32(values: np.ndarray | Sequence[float]) -> np.ndarray:
@@ -75,7 +73,13 @@ def _styled(figure: go.Figure, height: int, legend: bool) -> go.Figure:
         "title": {"font": {"size": 12, "color": QUIET}, "standoff": 6},
         "automargin": True,
     }
-    figure.update_layout(
+    layout = figure.layout.to_plotly_json()
+    for key in dict.fromkeys((*layout, "xaxis", "yaxis")):
+        if key.startswith(("xaxis", "yaxis")):
+            layout[key] = layout.get(key, {}) | axis | ({"zeroline": False} if key[0] == "x" else {})
+    for title in layout.get("annotations", ()):
+        title |= {"font": {"size": 12, "color": QUIET}, "yshift": -2}
+    figure.layout = layout | dict(
         template="none",
         height=height,
         font={"family": FONT, "size": 12, "color": INK},
@@ -98,8 +102,6 @@ def _styled(figure: go.Figure, height: int, legend: bool) -> go.Figure:
         hoverlabel={"bgcolor": PAGE, "bordercolor": AXIS, "font": {"family": FONT, "size": 12, "color": INK}},
         hovermode="closest",
     )
-    figure.update_xaxes(**axis, zeroline=False)
-    figure.update_yaxes(**axis)
     return figure
 
 
