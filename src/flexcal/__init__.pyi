@@ -34,7 +34,6 @@ from .dynamics.payload import identify_payload
 from .dynamics.regression import assemble_regression, experiment_system
 from .dynamics.residual import read_learned_residual
 from .dynamics.signals import JointLog, Window
-from .elasticity.identification import identify_stiffness
 from .errors import FlexcalError, InputError
 from .estimation import Estimate
 from .export import write_mjcf, write_urdf
@@ -47,12 +46,12 @@ from .frequency.periodic import (
 )
 from .jobs.dynamics import DynamicsIdentification, identify_dynamics
 from .jobs.experiments import exciting_plan, frequency_plan
+from .jobs.stiffness import StiffnessIdentification, identify_stiffness
 from .model.kinematics import point_kinematics
 from .model.parts import is_physically_consistent
 from .model.robot import RobotModel
 from .model.statics import gravity_torque, static_equilibrium, tool_at_rest
 from .model.torques import torque_regressor
-from .report.results import fitted_responses
 from .virtual_cell import CellConfig, VirtualCell, draw_truth
 
 __version__: str
@@ -90,6 +89,7 @@ __all__ = [
     "PowerModel",
     "Recording",
     "RobotModel",
+    "StiffnessIdentification",
     "ToolTargets",
     "TrajectoryPlan",
     "Verification",
@@ -105,7 +105,6 @@ __all__ = [
     "exciting_plan",
     "experiment_system",
     "feasible_least_squares",
-    "fitted_responses",
     "frequency_plan",
     "frequency_response",
     "frequency_responses",

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flexcal.data.plans import MultisinePlan
-from flexcal.elasticity.identification import identify_stiffness
+from flexcal.elasticity.identification import fit_springs
 from flexcal.elasticity.response_model import Tolerances
 from flexcal.elasticity.time_periodic import DriveTorque
 from flexcal.model.robot import RobotModel
@@ -42,7 +42,7 @@ def test_hardening_is_found_and_not_invented(stiff, poses, synthesise, rng, true
         response = synthesise(stiff.with_values(tangent), q[None], noise=0.03, rng=rng, step=8)[0]
         responses.append(replace(response, pose=len(responses)))
     plan = still_plan(stiff, poses["default"])
-    estimate = identify_stiffness(
+    estimate = fit_springs(
         stiff, responses, rng=rng, inertias_known=True, tolerances=Tolerances.none(), plan=plan
     ).estimate
     assert any(name.endswith("hardening") for name in estimate.parameters.names) == bool(true)

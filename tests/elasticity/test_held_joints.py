@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.elasticity.identification import identify_stiffness
+from flexcal.elasticity.identification import fit_springs
 from flexcal.model.robot import spring_names
 from flexcal.virtual_cell import CellConfig, FrictionConfig, MismatchConfig
 from flexcal.virtual_cell.equilibrium import rest
@@ -61,7 +61,7 @@ def like(stiff, poses, synthesise):
 def test_an_elastic_wrist_is_found(stiff, like, drawn, rng):
     truth = drawn(stiff, rng, inertias=False).with_values({f"joint_{i}.delay": 0.0 for i in (1, 2, 3)})
     responses = mujoco_responses(like, truth, rng, wrist=50e3)
-    result = identify_stiffness(stiff, responses, rng=rng, inertias_known=True)
+    result = fit_springs(stiff, responses, rng=rng, inertias_known=True)
     estimate = result.estimate
     assert estimate.misfit is None
     assert {name.split(".")[0] for name in result.springs} >= set(WRIST[:2])
@@ -82,7 +82,7 @@ def test_an_elastic_wrist_is_found(stiff, like, drawn, rng):
 def test_a_rigid_wrist_stays_rigid(stiff, like, drawn, rng):
     truth = drawn(stiff, rng, inertias=False)
     responses = mujoco_responses(like, truth, rng, wrist=0.0)
-    result = identify_stiffness(stiff, responses, rng=rng, inertias_known=True)
+    result = fit_springs(stiff, responses, rng=rng, inertias_known=True)
     assert result.springs == spring_names(stiff)
     assert result.estimate.misfit is None
 
@@ -90,9 +90,9 @@ def test_a_rigid_wrist_stays_rigid(stiff, like, drawn, rng):
 @pytest.mark.slow
 def test_a_mode_that_no_spring_of_the_model_has_is_a_misfit(stiff, like, shaken, rng):
     clean = mujoco_responses(like, stiff, rng, wrist=0.0)
-    calm = identify_stiffness(stiff, clean, rng=rng, inertias_known=True).estimate
+    calm = fit_springs(stiff, clean, rng=rng, inertias_known=True).estimate
     responses = [shaken(response, 0.6) for response in clean]
-    estimate = identify_stiffness(stiff, responses, rng=rng, inertias_known=True).estimate
+    estimate = fit_springs(stiff, responses, rng=rng, inertias_known=True).estimate
     misfit = estimate.misfit
     assert misfit is not None and misfit.severe
     assert misfit.axis == "joint_2"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flexcal.data.plans import MultisinePlan
-from flexcal.elasticity.identification import MultiStart, PopulationSearch, identify_stiffness
+from flexcal.elasticity.identification import MultiStart, PopulationSearch, fit_springs
 from flexcal.elasticity.response_model import (
     CovarianceWeighting,
     ResonanceWeighting,
@@ -37,7 +37,7 @@ def test_noiseless_recovery_from_far_starts(stiff, poses, synthesise, seed):
     """All 18 parameters to 1e-6 from ×÷3 starts."""
     rng = np.random.default_rng(seed)
     responses = synthesise(stiff, poses["default"][[0, 1, 3]], noise=1e-7, step=8)
-    result = identify_stiffness(
+    result = fit_springs(
         perturbed(stiff, rng), responses, rng=rng, inertias_known=True, tolerances=Tolerances.none()
     )
     assert result.estimate.converged
@@ -48,7 +48,7 @@ def test_noiseless_recovery_from_far_starts(stiff, poses, synthesise, seed):
 def test_delays_are_recovered(stiff, poses, synthesise, drawn, rng):
     truth = drawn(stiff, rng, inertias=False)
     responses = synthesise(truth, poses["default"][:3], noise=1e-3, rng=rng, step=8)
-    estimate = identify_stiffness(
+    estimate = fit_springs(
         stiff, responses, rng=rng, inertias_known=True, tolerances=Tolerances.none()
     ).estimate
     for joint in ("joint_1", "joint_2", "joint_3"):
@@ -62,14 +62,12 @@ def test_paper_plan_leaves_the_forearm_torsion_unidentified(tx90l, poses, synthe
     """Without a payload off the axis, bearing_y of joint_3 does not show; with the default plan everything stiff does."""
     truth = drawn(tx90l, rng, inertias=True)
     hidden = "joint_3.bearing_y.stiffness"
-    paper = identify_stiffness(
-        tx90l, synthesise(truth, poses["paper"], noise=0.1, rng=rng, payload=0.0), rng=rng
-    )
+    paper = fit_springs(tx90l, synthesise(truth, poses["paper"], noise=0.1, rng=rng, payload=0.0), rng=rng)
     quantity = paper.quantity(hidden, truth.value(hidden))
     assert quantity["identifiable"] is False
     assert quantity["std"] is None
     assert paper.quantity("joint_1.drive.stiffness")["identifiable"]
-    default = identify_stiffness(tx90l, synthesise(truth, poses["default"], noise=0.05, rng=rng), rng=rng)
+    default = fit_springs(tx90l, synthesise(truth, poses["default"], noise=0.05, rng=rng), rng=rng)
     assert all(default.quantity(n)["identifiable"] for n in spring_names(tx90l) if n.endswith(".stiffness"))
 
 
@@ -85,7 +83,7 @@ def test_inertials_known_from_before_count_as_known(tx90l, poses, synthesise, dr
     springs = [f"joint_{i}.{spring}.stiffness" for i in (1, 2, 3) for spring in ("drive", "bearing_x")]
 
     def fitted(robot, inertias_known):
-        estimate = identify_stiffness(
+        estimate = fit_springs(
             robot,
             responses,
             rng=np.random.default_rng(1),
@@ -104,9 +102,9 @@ def test_population_search_reaches_the_same_fit(stiff, poses, synthesise, drawn,
     truth = drawn(stiff, rng, inertias=False)
     responses = synthesise(truth, poses["default"][:2], noise=1e-2, rng=rng, step=12)
     common = {"inertias_known": True, "tolerances": Tolerances.none()}
-    one = identify_stiffness(stiff, responses, rng=rng, search=MultiStart(), **common)
+    one = fit_springs(stiff, responses, rng=rng, search=MultiStart(), **common)
     search = PopulationSearch(factor=1.6, population=54, generations=25)
-    other = identify_stiffness(stiff, responses, rng=rng, search=search, **common)
+    other = fit_springs(stiff, responses, rng=rng, search=search, **common)
     assert other.estimate.cost == pytest.approx(one.estimate.cost, rel=1e-3)
 
 
@@ -114,7 +112,7 @@ def test_result_describes_the_fit(stiff, poses, synthesise, drawn, rng):
     truth = drawn(stiff, rng, inertias=False)
     responses = synthesise(truth, poses["default"][:2], noise=1e-2, rng=rng, step=8)
     seen = []
-    result = identify_stiffness(
+    result = fit_springs(
         stiff, responses, rng=rng, inertias_known=True, tolerances=Tolerances.none(),
         progress=lambda what, share: seen.append((what, share)),
     )  # fmt: skip
@@ -144,7 +142,7 @@ def test_reference_motion_is_part_of_the_model(stiff, poses, synthesise, rng):
         moving.append(replace(response, response=response.response + shift))
     name = "joint_2.bearing_y.damping"
     fits = [
-        identify_stiffness(
+        fit_springs(
             stiff, moving, rng=rng, inertias_known=True, plan=plan, tolerances=Tolerances.none()
         ).estimate
         for plan in (plan, None)
@@ -159,7 +157,7 @@ def test_reference_motion_is_part_of_the_model(stiff, poses, synthesise, rng):
 def test_other_weightings_find_the_springs_too(stiff, poses, synthesise, drawn, rng, weighting):
     truth = drawn(stiff, rng, inertias=False)
     responses = synthesise(truth, poses["default"][:3], noise=1e-3, rng=rng, step=8)
-    result = identify_stiffness(
+    result = fit_springs(
         stiff, responses, rng=rng, inertias_known=True, tolerances=Tolerances.none(), weighting=weighting
     )
     for name in spring_names(stiff)[:9]:
@@ -174,7 +172,7 @@ def squared_errors(model, poses, synthesise, drawn, seeds, *, inertias):
         rng = np.random.default_rng(seed)
         truth = drawn(model, rng, inertias=inertias)
         responses = synthesise(truth, poses, noise=0.03, rng=rng, step=6)
-        estimate = identify_stiffness(
+        estimate = fit_springs(
             model, responses, rng=rng, inertias_known=not inertias, tolerances=Tolerances.none(),
             search=MultiStart(agreement=1),
         ).estimate  # fmt: skip
@@ -238,7 +236,7 @@ def test_half_gap_is_found(tx90l, poses, synthesise, rng):
         softer = tx90l.with_values({name: factor * tx90l.value(name) for name, factor in soft.items()})
         response = synthesise(softer, q[None], noise=0.01, rng=rng, step=8)[0]
         responses.append(replace(response, pose=len(responses)))
-    estimate = identify_stiffness(
+    estimate = fit_springs(
         tx90l, responses, rng=rng, inertias_known=True, tolerances=Tolerances.none(), plan=plan
     ).estimate
     for name in ("joint_2.drive.stiffness", "joint_3.drive.stiffness"):
@@ -253,8 +251,8 @@ def test_half_gap_is_found(tx90l, poses, synthesise, rng):
 def test_masses_that_take_up_a_misfit_have_no_intervals(stiff, synthesise, shaken, poses, rng):
     """A resonance that the model lacks moves masses by more than is known of them; without it none moves so far."""
     clean = synthesise(stiff, poses["default"][:3], noise=0.003, rng=rng)
-    calm = identify_stiffness(stiff, clean, rng=rng).estimate
-    moved = identify_stiffness(stiff, [shaken(r, 0.3) for r in clean], rng=rng).estimate
+    calm = fit_springs(stiff, clean, rng=rng).estimate
+    moved = fit_springs(stiff, [shaken(r, 0.3) for r in clean], rng=rng).estimate
     assert calm.misfit is None and calm.std("link_3.mass") is not None
     assert moved.misfit is not None and moved.misfit.inertials > 1.3
     assert moved.std("link_3.mass") is None and moved.covariance[moved.parameters.index("link_3.mass")].any()
@@ -271,7 +269,7 @@ def test_torque_constants_are_in_the_intervals(stiff, synthesise, poses, rng):
     for std in (0.0, 0.02):
         prior = replace(stiff.config.prior, torque_constant=std)
         robot = replace(stiff, config=replace(stiff.config, prior=prior))
-        estimate = identify_stiffness(robot, responses, rng=rng).estimate
+        estimate = fit_springs(robot, responses, rng=rng).estimate
         errors = np.array([np.log(estimate.values[name] / stiff.value(name)) for name in names])
         numbers = [estimate.parameters.index(name) for name in names]
         squares.append(np.mean(errors**2 / np.diag(estimate.covariance)[numbers]))

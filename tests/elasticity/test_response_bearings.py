@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from flexcal.elasticity.identification import identify_stiffness
+from flexcal.elasticity.identification import fit_springs
 from flexcal.elasticity.response_model import Tolerances
 from flexcal.model.parts import Bearings
 from flexcal.model.robot import RobotModel, spring_names
@@ -25,7 +25,7 @@ def test_undeclared_axes_are_those_of_the_robot(
     """And with them every stiffness is met."""
     truth = drawn(stiff, rng, inertias=False).with_bearings(true)
     responses = synthesise(truth, poses["default"][:4], noise=0.01, rng=rng, step=16)
-    found = identify_stiffness(stiff, responses, rng=rng, inertias_known=True, tolerances=Tolerances.none())
+    found = fit_springs(stiff, responses, rng=rng, inertias_known=True, tolerances=Tolerances.none())
     assert found.bearings is not None and found.bearings.taken == true
     assert found.robot(stiff).bearings == true
     names = [name for name in spring_names(stiff) if name.endswith(".stiffness")]
@@ -44,7 +44,7 @@ def test_axes_declared_wrongly_are_contradicted(
     """A stiffness would else be stated with an interval that it misses by far: by 0.17 to 6 in its logarithm over five robots."""
     truth = drawn(stiff, rng, inertias=True).with_bearings("before")
     responses = synthesise(truth, poses["default"], noise=0.05, rng=rng, step=8)
-    found = identify_stiffness(stiff.with_bearings("after"), responses, rng=rng)
+    found = fit_springs(stiff.with_bearings("after"), responses, rng=rng)
     assert found.bearings is not None and found.bearings.contradicted and found.bearings.taken == "after"
     missed = [
         abs(found.estimate.values[name] - truth.value(name)) > 3 * std

@@ -10,7 +10,7 @@ import pytest
 
 from flexcal.data.plans import MultisinePlan
 from flexcal.data.recordings import Recording
-from flexcal.elasticity.identification import identify_stiffness
+from flexcal.elasticity.identification import fit_springs
 from flexcal.elasticity.response_model import Tolerances
 from flexcal.frequency.periodic import frequency_responses, local_polynomial_responses
 from flexcal.jobs.experiments import frequency_plan
@@ -57,7 +57,7 @@ def test_nine_stiffnesses_and_the_delay(
     names = tx90l.joint_names[:3]
     responses = list(frequency_responses(plan, late(recordings, samples), joint_names=names))
     tight = replace(tx90l, config=replace(tx90l.config, geometry=GeometryConfig()))
-    fit = identify_stiffness(
+    fit = fit_springs(
         tight, responses, inertias_known=True, tolerances=Tolerances.none(), rng=np.random.default_rng(0)
     ).estimate
     for name, value in truth.items():
@@ -77,7 +77,7 @@ def test_nine_stiffnesses_from_one_realisation_that_starts_at_rest(
     short = replace(plan, realisations=1, settle_periods=0)
     responses = list(local_polynomial_responses(short, first, joint_names=tx90l.joint_names[:3]))
     tight = replace(tx90l, config=replace(tx90l.config, geometry=GeometryConfig()))
-    fit = identify_stiffness(
+    fit = fit_springs(
         tight, responses, inertias_known=True, tolerances=Tolerances.none(), rng=np.random.default_rng(0)
     ).estimate
     errors = {n: abs(fit.values[n] / v - 1) for n, v in truth.items() if n.endswith("stiffness")}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flexcal.data.plans import MultisinePlan, read_plan_of
-from flexcal.elasticity.identification import identify_stiffness
+from flexcal.elasticity.identification import fit_springs
 from flexcal.frequency.periodic import frequency_responses
 from flexcal.jobs.experiments import plan_frequency_experiments
 from flexcal.model.robot import RobotModel, spring_names
@@ -43,7 +43,7 @@ def test_two_poses_with_three_sensors(examples: Path, tmp_path: Path, seed: int)
     truth = model.with_values(draw_truth(model, SpreadConfig(), np.random.default_rng([seed, 0])))
     recordings = VirtualCell(truth, CellConfig(), seed, controller_model=model).record(plan)
     responses = list(frequency_responses(plan, recordings, joint_names=model.joint_names[:3]))
-    result = identify_stiffness(model, responses, rng=np.random.default_rng(seed), plan=plan)
+    result = fit_springs(model, responses, rng=np.random.default_rng(seed), plan=plan)
     estimate = result.estimate
     assert estimate.misfit is None and 0.9 < estimate.reduced_chi2 < 1.15
     assert set(result.springs) == set(spring_names(model))

@@ -22,7 +22,7 @@ from flexcal.calibration.verification import (
 )
 from flexcal.data.plans import MultisinePlan, write_plan
 from flexcal.data.poses import PoseSet
-from flexcal.elasticity.identification import StiffnessResult
+from flexcal.elasticity.identification import SpringFit
 from flexcal.estimation import Estimate, Parameter, Parameters
 from flexcal.export import write_urdf
 from flexcal.files.formats import Block, write_estimates
@@ -174,9 +174,7 @@ def simulate_run(nominal: RobotModel, seed: int = 1) -> TwoStageRun:
         [np.mean((np.abs(e) / r.std) ** 2, axis=0) for e, r in zip(errors, responses, strict=True)]
     )
     sensed = tuple(g[:, :0] for g in predicted)
-    stiffness = StiffnessResult(
-        estimate, responses, predicted, errors, misfit, spring_names(nominal), None, sensed
-    )
+    stiffness = SpringFit(estimate, responses, predicted, errors, misfit, spring_names(nominal), None, sensed)
     plan = MultisinePlan(
         name="default", poses=poses, joints=(0, 1, 2), payload=6.0, base_frequency_hz=0.25, lines=np.arange(13, 320, 2),
         amplitude=np.full((3, len(lines)), 8.0), periods=4, settle_periods=2, realisations=4, signs=True,

@@ -53,8 +53,10 @@ def estimates_entry_hint(robot: Path, estimates: Path) -> str:
     return f"for other verbs to use these estimates, replace the line {line} of {robot} by {entry}"
 
 
-def stored_lines(robot: Path, estimates: Path, out: Path | None) -> tuple[str, ...]:
+def stored_lines(robot: Path, estimates: Path | None, out: Path | None) -> tuple[str, ...]:
     """Which files hold the estimates and, in the folder `out`, the report; and how other verbs find estimates there."""
+    if estimates is None:
+        return ()
     if out is None:
         return (f"wrote {estimates}",)
     return f"wrote {estimates}", f"wrote {out / 'report.html'}", estimates_entry_hint(robot, estimates)

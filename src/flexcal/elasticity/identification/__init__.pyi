@@ -1,12 +1,12 @@
 from .bearing_axes import ResponseBearings
 from .search import MultiStart, PopulationSearch, Search
-from .stiffness import StiffnessResult, identify_stiffness
+from .spring_fit import SpringFit, fit_springs
 
 __all__ = [
     "MultiStart",
     "PopulationSearch",
     "ResponseBearings",
     "Search",
-    "StiffnessResult",
-    "identify_stiffness",
+    "SpringFit",
+    "fit_springs",
 ]

@@ -19,7 +19,7 @@ from flexcal.files.formats import Block
 from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
 from flexcal.jobs.dynamics.remarks import dynamics_notes, dynamics_remarks, selection_remark
 from flexcal.jobs.logs import Preprocessing
-from flexcal.jobs.pages import Identification
+from flexcal.jobs.pages import Identification, summary_row
 from flexcal.jobs.result_files import (
     ESTIMATES,
     NOT_RECORDED,
@@ -77,9 +77,8 @@ class DynamicsIdentification(Identification):
         """What the fit says, for people: errors of the torques, base parameters, remarks, verdict."""
         document = self.document()
         rows = [
-            f"{row['name']:<60.60} {row['estimate']:>12.5g} {std:<12} {row['unit']}"
+            summary_row(row["name"], row["estimate"], row["std"], row["unit"])
             for row in document["base_parameters"]
-            for std in ["" if row["std"] is None else f"± {row['std']:.2g}"]
         ]
         return "\n".join(
             [self.headline, *rows, *document["remarks"], *document["notes"], self.trust.sentence]

@@ -1,7 +1,7 @@
 from .comparison import compare_folders
 from .customer import customer_report
 from .report import REPORT, report_folder, two_stage_study
-from .result import Identification, Result
+from .result import Identification, Result, summary_row
 
 __all__ = [
     "REPORT",
@@ -10,5 +10,6 @@ __all__ = [
     "compare_folders",
     "customer_report",
     "report_folder",
+    "summary_row",
     "two_stage_study",
 ]

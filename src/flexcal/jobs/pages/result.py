@@ -85,3 +85,8 @@ class Identification(Result):
             for name, other in others.items():
                 write_estimates(out / ESTIMATES, name, other)
         self.write(out)
+
+
+def summary_row(name: str, value: float, std: float | None, unit: str) -> str:
+    """A parameter as a line of a summary; without a standard deviation where it is not identifiable."""
+    return f"{name:<60.60} {value:>12.5g} {'' if std is None else f'± {std:.2g}':<12} {unit}"

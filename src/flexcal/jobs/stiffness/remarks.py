@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexcal.elasticity.identification import StiffnessResult
+from flexcal.elasticity.identification import SpringFit
 from flexcal.estimation import Estimate
 from flexcal.jobs.stiffness.bearing_axes import response_bearings_remarks
 from flexcal.model.robot import RobotModel, mounting_names, sensitivity_name
@@ -28,7 +28,7 @@ def further_joints(estimate: Estimate, model: RobotModel) -> tuple[str, ...]:
     )
 
 
-def stiffness_remarks(result: StiffnessResult, model: RobotModel) -> tuple[str, ...]:
+def stiffness_remarks(result: SpringFit, model: RobotModel) -> tuple[str, ...]:
     """One sentence each, the most important last."""
     estimate, joints = result.estimate, further_joints(result.estimate, model)
     remarks: list[str] = []
@@ -56,7 +56,7 @@ def stiffness_remarks(result: StiffnessResult, model: RobotModel) -> tuple[str, 
     return (*remarks, *response_bearings_remarks(result.bearings))
 
 
-def sensor_remarks(result: StiffnessResult, model: RobotModel) -> tuple[str, ...]:
+def sensor_remarks(result: SpringFit, model: RobotModel) -> tuple[str, ...]:
     """What was found of every sensor on the arm."""
     remarks = []
     for name in result.sensors:

@@ -30,7 +30,7 @@ from flexcal.data.poses import write_poses
 from flexcal.data.recordings import Recording
 from flexcal.design.poses import design_poses, random_poses
 from flexcal.design.scene import MeasuringSetup
-from flexcal.elasticity.identification import StiffnessResult, identify_stiffness
+from flexcal.elasticity.identification import SpringFit, fit_springs
 from flexcal.estimation import Estimate
 from flexcal.export import write_urdf
 from flexcal.files.formats import Block, provenance, write_estimates
@@ -141,8 +141,8 @@ def run_two_stage(
     with watch.stage("stage1"):
         progress("stage1", 0.0)
 
-        def stage_one(robot: RobotModel, stage: str) -> StiffnessResult:
-            return identify_stiffness(
+        def stage_one(robot: RobotModel, stage: str) -> SpringFit:
+            return fit_springs(
                 robot,
                 responses,
                 inertias_known=inertias_known,

@@ -11,7 +11,7 @@ from flexcal.calibration.fit import Calibration
 from flexcal.calibration.verification import ErrorCovariance, UncalibratedErrors, Verification
 from flexcal.data.plans import MultisinePlan
 from flexcal.data.poses import PoseSet
-from flexcal.elasticity.identification import StiffnessResult
+from flexcal.elasticity.identification import SpringFit
 from flexcal.estimation import Estimate
 from flexcal.frequency.periodic import FrequencyResponse
 from flexcal.jobs.two_stage.cells import CellName
@@ -23,7 +23,7 @@ from flexcal.report.checks import Trust
 class CadInertialsRun:
     """Both stages fitted again, to the same data, with the inertials of CAD in place of those that trajectories identified."""
 
-    stiffness: StiffnessResult
+    stiffness: SpringFit
     calibration: Calibration
     verification: Verification
 
@@ -46,7 +46,7 @@ class TwoStageRun:
     informed: RobotModel
     plan: MultisinePlan
     responses: tuple[FrequencyResponse, ...]
-    stiffness: StiffnessResult
+    stiffness: SpringFit
     calibration: Calibration
     rigid: tuple[Calibration, ...]
     before: UncalibratedErrors

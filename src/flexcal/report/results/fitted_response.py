@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.elasticity.identification import StiffnessResult
+from flexcal.elasticity.identification import SpringFit
 from flexcal.model.robot import RobotModel
 
 
@@ -15,7 +15,7 @@ class FittedResponse:
     """L lines of n axes in the pose of number `pose` at `q_mean` (all joints,) rad, with `payload` kg.
 
     `frequencies_hz` (L,); `response` measured and `predicted` by the model (L, n, n) complex; `std`, and of it `noise_std` and
-    `distortion_std`, (L, n, n), 1σ of the measured one, with so many `degrees_of_freedom`; `misfit` (n, n) as in `StiffnessResult`.
+    `distortion_std`, (L, n, n), 1σ of the measured one, with so many `degrees_of_freedom`; `misfit` (n, n) as in `SpringFit`.
     Of S `sensors` on the arm, which read in `sensor_units`: `sensor_response` measured and `sensor_predicted` (L, S, n).
     """
 
@@ -37,7 +37,7 @@ class FittedResponse:
     sensor_predicted: np.ndarray
 
 
-def fitted_responses(result: StiffnessResult, robot: RobotModel) -> tuple[FittedResponse, ...]:
+def fitted_responses(result: SpringFit, robot: RobotModel) -> tuple[FittedResponse, ...]:
     """Of every pose of a fit; `robot` has the payload of those that say nothing of it."""
     declared = robot.payload.mass if robot.payload is not None else 0.0
     return tuple(

@@ -39,7 +39,7 @@ SPRING_VALUES = (".stiffness", ".damping", ".hardening")
 
 
 @dataclass(frozen=True, eq=False)
-class StiffnessResult:
+class SpringFit:
     """Result of stage 1.
 
     `estimate` holds springs and nuisances; `springs` their names in the order of the paper's Table 1, stiffness first. Per pose:
@@ -99,7 +99,7 @@ def _median_difference(pairs: Iterable[tuple[np.ndarray, np.ndarray]]) -> float:
     return float(np.median(np.concatenate(shares, axis=None)))
 
 
-def identify_stiffness(
+def fit_springs(
     model: RobotModel,
     responses: Sequence[FrequencyResponse],
     *,
@@ -110,7 +110,7 @@ def identify_stiffness(
     search: Search | None = None,
     tolerances: Tolerances | None = None,
     progress: Progress = silent,
-) -> StiffnessResult:
+) -> SpringFit:
     """Fit the linearised elastic robot to the measured responses of all poses, and say how well each spring is known.
 
     The cost is Eq. (26) on the log of the ratio Ĝ/G (linear where Ĝ is poorly known), by default weighed with the covariance of the
@@ -170,7 +170,7 @@ def identify_stiffness(
             for r, g in zip(responses, predicted, strict=True)
         ]
     )
-    return StiffnessResult(
+    return SpringFit(
         estimate,
         tuple(responses),
         predicted,
