@@ -17,9 +17,7 @@ class FlexcalError(Exception):
     code: str
 
     def __init__(self, code: str, sentence: str):
-        super().__init__(
-            code, sentence
-        )  # the arguments, with which the error is made again in another process
+        super().__init__(code, sentence)  # pickle makes the error again from these
         self.code = code
         self.sentence = sentence
 

@@ -101,7 +101,7 @@ def _run(arguments: list[str]) -> int:
         if len(arguments) > 1 and arguments[1] in ("-h", "--help") and f"\n  {arguments[0]} " in overview():
             print(overview(arguments[0]))
             return 0
-        raise FlexcalError("E-CLI-018", unknown_verb(arguments))
+        raise unknown_verb(arguments)
     return _carry_out(verb, arguments[len(verb.words) :])
 
 

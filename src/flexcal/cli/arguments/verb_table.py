@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
+from flexcal.errors import FlexcalError
 from flexcal.export import FORMATS
 
 
@@ -320,16 +321,20 @@ def command_class(verb: Verb) -> type[Any]:
     return getattr(import_module(f"flexcal.cli.verbs.{verb.module}"), verb.command)
 
 
-def unknown_verb(arguments: Sequence[str]) -> str:
-    """One sentence on a verb that does not exist, with the nearest that do."""
+def unknown_verb(arguments: Sequence[str]) -> FlexcalError:
+    """Error of a verb that does not exist, with the nearest that do."""
     word = arguments[0]
     groups = {verb.words[0] for verb in VERBS if len(verb.words) > 1}
     if word in groups:
         known = [verb.words[1] for verb in VERBS if verb.words[0] == word]
         if len(arguments) < 2 or arguments[1].startswith("-"):
-            return f"'{word}' needs to know what: {_either(f'flexcal {word} {what}' for what in known)}."
+            return FlexcalError(
+                "E-CLI-040",
+                f"'{word}' needs to know what: {_either(f'flexcal {word} {what}' for what in known)}.",
+            )
         near = difflib.get_close_matches(arguments[1], known, n=1, cutoff=0.4) or known
-        return f"there is no '{word} {arguments[1]}'; did you mean {_either(f'flexcal {word} {what}' for what in near)}?"
+        meant = _either(f"flexcal {word} {what}" for what in near)
+        return FlexcalError("E-CLI-041", f"there is no '{word} {arguments[1]}'; did you mean {meant}?")
     names = {verb.name: verb.name for verb in VERBS} | {verb.words[-1]: verb.name for verb in VERBS}
     names |= {group: group for group in groups} | _ALSO_CALLED
     tried = " ".join(arguments[:2])
@@ -337,7 +342,7 @@ def unknown_verb(arguments: Sequence[str]) -> str:
         word, names, n=1, cutoff=0.6
     )
     hint = f"did you mean 'flexcal {names[near[0]]}'?" if near else "'flexcal --help' lists the verbs."
-    return f"there is no verb '{word}'; {hint}"
+    return FlexcalError("E-CLI-018", f"there is no verb '{word}'; {hint}")
 
 
 _ALSO_CALLED = {

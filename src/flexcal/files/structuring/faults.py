@@ -11,10 +11,10 @@ from flexcal.files.structuring.wording import suggestion
 
 
 class Failure(NamedTuple):
-    """A value that does not fit: the keys that lead to it, and a code and sentence as of `FlexcalError`."""
+    """A value that does not fit: code and sentence as of `FlexcalError`, and the keys that lead to the value."""
 
-    keys: Keys
     code: str
+    keys: Keys
     sentence: str
 
 
@@ -64,7 +64,7 @@ def failures(problem: BaseException, keys: Keys) -> list[Failure | None]:
     if isinstance(problem, ForbiddenExtraKeysError):
         known = known_keys(problem.cl)
         return [
-            Failure((*keys, key), "E-YAML-001", _unknown_key(key, keys, known))
+            Failure("E-YAML-001", (*keys, key), _unknown_key(key, keys, known))
             for key in problem.extra_fields
         ]
     if isinstance(problem, BaseExceptionGroup):
@@ -83,18 +83,23 @@ def failures(problem: BaseException, keys: Keys) -> list[Failure | None]:
                     continue
                 faults.append(
                     Failure(
-                        keys, "E-YAML-002", f"the key '{name}'{_inside(keys)} is missing; add '{name}: …'."
+                        "E-YAML-002", keys, f"the key '{name}'{_inside(keys)} is missing; add '{name}: …'."
                     )
                 )
             else:
                 faults.extend(failures(inner, place))
         return faults
-    if isinstance(problem, (Fault, FlexcalError, ValueError, TypeError)):
-        subject = f"{dotted(keys)}: " if keys else ""
-        sentence = str(problem)
-        code = problem.code if isinstance(problem, (Fault, FlexcalError)) else "E-YAML-003"
-        return [Failure(keys, code, subject + sentence + ("" if sentence.endswith((".", "?")) else "."))]
+    if isinstance(problem, (Fault, FlexcalError)):
+        return [Failure(problem.code, keys, _placed(keys, problem))]
+    if isinstance(problem, (ValueError, TypeError)):
+        return [Failure("E-YAML-003", keys, _placed(keys, problem))]
     return [None]
+
+
+def _placed(keys: Keys, problem: Exception) -> str:
+    subject = f"{dotted(keys)}: " if keys else ""
+    sentence = str(problem)
+    return subject + sentence + ("" if sentence.endswith((".", "?")) else ".")
 
 
 def _key_of(problem: BaseExceptionGroup, name: str) -> str:
