@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 import signal
 import subprocess
 from collections.abc import Callable
+from contextlib import redirect_stdout
 from dataclasses import replace
 from fnmatch import fnmatch
 from pathlib import Path
@@ -60,6 +63,25 @@ def recorded(examples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         folder / "recorded",
     ]
     assert main([str(a) for a in arguments]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def responses(recorded: Path) -> Path:
+    """The responses identified from what was recorded."""
+    out = recorded.parent / "responses"
+    arguments = ["identify", "response", recorded / "robot.yaml", recorded / "recorded", "--out", out]
+    assert main([str(a) for a in arguments]) == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def stiff_robot(recorded: Path, responses: Path) -> Path:
+    """The robot's folder with the stiffnesses that these responses tell, which were asked for as JSON (`stiffness.json`)."""
+    folder = copied(recorded, recorded.parent / "stiff" / "tx90l")
+    arguments = ["identify", "stiffness", str(folder / "robot.yaml"), str(responses), "--json"]
+    with (folder / "stiffness.json").open("w", encoding="utf-8") as stream, redirect_stdout(stream):
+        assert main(arguments) == 0
     return folder
 
 
@@ -152,7 +174,9 @@ def test_responses(run, recorded: Path, tmp_path: Path) -> None:
     assert (tmp_path / "report.html").read_text("utf-8") == page
 
 
-def test_one_realisation_takes_the_local_polynomial_method(run, recorded: Path, tmp_path: Path) -> None:
+def test_one_realisation_takes_the_local_polynomial_method(
+    run, recorded: Path, responses: Path, tmp_path: Path
+) -> None:
     """Averages refuse it and say what does not; the response is that of three realisations, within its uncertainty."""
     folder = copied(recorded / "recorded", tmp_path / "recorded")
     plan = read_plan_of(folder / "plan.yaml", MultisinePlan)
@@ -162,9 +186,8 @@ def test_one_realisation_takes_the_local_polynomial_method(run, recorded: Path, 
     document = run(*arguments, "--method", "local-polynomial", "--json").document
     assert [entry["method"] for entry in document["responses"]] == ["local_polynomial"] * 2
     assert all(entry["relative_noise_std"] < entry["relative_std"] for entry in document["responses"])
-    run("identify", "response", recorded / "robot.yaml", recorded / "recorded", "--out", tmp_path / "all")
     one, all_of_them = (
-        FrequencyResponse.load(tmp_path / name / "response_pose_1.npz") for name in ("responses", "all")
+        FrequencyResponse.load(found / "response_pose_1.npz") for found in (tmp_path / "responses", responses)
     )
     axes = [0, 1, 2]
     apart = np.abs(one.response - all_of_them.response)[:, axes, axes]
@@ -181,16 +204,15 @@ def test_every_average_may_be_asked_for(run, recorded: Path, tmp_path: Path, met
     assert FrequencyResponse.load(tmp_path / "response_pose_1.npz").average == method.replace("-", "_")
 
 
-def test_stiffness(run, recorded: Path, tmp_path: Path) -> None:
+def test_stiffness(run, recorded: Path, responses: Path, stiff_robot: Path, tmp_path: Path) -> None:
     """Nine springs from two poses and few lines: the intervals of what is identifiable hold the truth, within reason."""
-    robot = copied(recorded, tmp_path / "tx90l") / "robot.yaml"
-    run("identify", "response", robot, recorded / "recorded", "--out", tmp_path / "responses")
-    page = run("identify", "stiffness", robot, tmp_path / "responses")
-    assert page.status == 0
-    assert "joint_3.bearing_y.stiffness" in page.out and "flexcal design poses" in page.out
+    robot = Path(shutil.copytree(stiff_robot, tmp_path / "tx90l")) / "robot.yaml"
+    document = json.loads((stiff_robot / "stiffness.json").read_text("utf-8"))
     estimates = robot.parent / "estimates.yaml"
     first = estimates.read_bytes()
-    document = run("identify", "stiffness", robot, tmp_path / "responses", "--json").document
+    page = run("identify", "stiffness", robot, responses)
+    assert page.status == 0
+    assert "joint_3.bearing_y.stiffness" in page.out and "flexcal design poses" in page.out
     assert estimates.read_bytes() == first
     assert document["fit"]["reference_motion_modelled"] and document["fit"]["missing_poses"] == []
     truth = read_truth(recorded / "recorded" / "truth.yaml")
@@ -206,12 +228,18 @@ def test_stiffness(run, recorded: Path, tmp_path: Path) -> None:
     )
 
 
-def test_ways_of_the_paper(run, recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ways_of_the_paper(
+    run,
+    recorded: Path,
+    responses: Path,
+    stiff_robot: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """The paper's weighting finds the same springs, to what two poses tell; a population may look for the start."""
     robot = recorded / "robot.yaml"
-    run("identify", "response", robot, recorded / "recorded", "--out", tmp_path / "responses")
-    stiffness = ("identify", "stiffness", robot, tmp_path / "responses", "--json", "--out")
-    usual = run(*stiffness, tmp_path / "usual").document["parameters"]
+    stiffness = ("identify", "stiffness", robot, responses, "--json", "--out")
+    usual = json.loads((stiff_robot / "stiffness.json").read_text("utf-8"))["parameters"]
     paper = run(*stiffness, tmp_path / "paper", "--weighting", "paper").document["parameters"]
     for name in ("joint_1.drive.stiffness", "joint_2.drive.stiffness", "joint_3.drive.stiffness"):
         assert paper[name]["estimate"] == pytest.approx(usual[name]["estimate"], rel=0.05), name
@@ -240,12 +268,13 @@ def test_ways_of_the_paper(run, recorded: Path, tmp_path: Path, monkeypatch: pyt
     assert inputs == {"robot.yaml", "tx90l.urdf", "plan.yaml", "response_pose_1.npz", "response_pose_2.npz"}
 
 
-def test_stiffness_leaves_out_what_calibration_made_of_it(run, recorded: Path, tmp_path: Path) -> None:
+def test_stiffness_leaves_out_what_calibration_made_of_it(
+    run, responses: Path, stiff_robot: Path, tmp_path: Path
+) -> None:
     """A calibration afterwards, which re-estimates stiffness, must not change what the same responses say of it."""
-    robot = copied(recorded, tmp_path / "tx90l") / "robot.yaml"
-    run("identify", "response", robot, recorded / "recorded", "--out", tmp_path / "responses")
-    stiffness = ("identify", "stiffness", robot, tmp_path / "responses", "--json")
-    first = run(*stiffness).document["parameters"]
+    robot = Path(shutil.copytree(stiff_robot, tmp_path / "tx90l")) / "robot.yaml"
+    stiffness = ("identify", "stiffness", robot, responses, "--json")
+    first = json.loads((stiff_robot / "stiffness.json").read_text("utf-8"))["parameters"]
     run("design", "poses", robot, "--count", 30, "--candidates", 300, "--out", tmp_path / "poses.yaml")
     measured = ("measure", tmp_path / "poses.yaml", "--robot", robot, "--cell", "virtual", "--seed", 4)
     run(*measured, "--out", tmp_path / "poses")
@@ -258,16 +287,8 @@ def test_stiffness_leaves_out_what_calibration_made_of_it(run, recorded: Path, t
     assert again["link_3.mass"]["estimate"] == pytest.approx(first["link_3.mass"]["estimate"], rel=2e-2)
 
 
-def test_stiffness_of_a_rigid_robot(run, recorded: Path, ur5_folder: Path, tmp_path: Path) -> None:
-    run(
-        "identify",
-        "response",
-        recorded / "robot.yaml",
-        recorded / "recorded",
-        "--out",
-        tmp_path / "responses",
-    )
-    arguments = ("identify", "stiffness", ur5_folder / "robot.yaml", tmp_path / "responses")
+def test_stiffness_of_a_rigid_robot(run, responses: Path, ur5_folder: Path) -> None:
+    arguments = ("identify", "stiffness", ur5_folder / "robot.yaml", responses)
     assert "no elastic joint" in refused(run, ur5_folder, *arguments)
 
 
@@ -403,9 +424,9 @@ def test_no_verb_reads_the_truth(run, recorded: Path, tmp_path: Path) -> None:
     assert estimates() == found
 
 
-def test_a_pose_without_response_is_named(run, recorded: Path, tmp_path: Path) -> None:
+def test_a_pose_without_response_is_named(run, recorded: Path, responses: Path, tmp_path: Path) -> None:
     robot = copied(recorded, tmp_path / "tx90l") / "robot.yaml"
-    run("identify", "response", robot, recorded / "recorded", "--out", tmp_path / "responses")
+    shutil.copytree(responses, tmp_path / "responses")
     (tmp_path / "responses" / "response_pose_1.npz").unlink()
     done = run("identify", "stiffness", robot, tmp_path / "responses")
     assert done.status == 0 and "poses of the plan without a response, not used in the fit: 1" in done.out

@@ -55,7 +55,8 @@ def test_nine_stiffnesses_and_the_delay(
 ) -> None:
     truth, plan, recordings = linear
     names = tx90l.joint_names[:3]
-    responses = list(frequency_responses(plan, late(recordings, samples), joint_names=names))
+    responses = frequency_responses(plan, late(recordings, samples), joint_names=names)
+    responses = [response.at_lines(slice(None, None, 4)) for response in responses]
     tight = replace(tx90l, config=replace(tx90l.config, geometry=GeometryConfig()))
     fit = fit_springs(
         tight, responses, inertias_known=True, tolerances=Tolerances.none(), rng=np.random.default_rng(0)

@@ -31,7 +31,7 @@ class ElasticArm:
         self.model.gravity = pin.Motion(robot.gravity, np.zeros(3))
         self.bodies: list[int] = []
         self.turns: list[np.ndarray] = []
-        velocity: dict[tuple[int, int], int] = {}
+        added: dict[tuple[int, int], int] = {}
         components = {e.index: e.components for e in robot.elastic}
         hung = robot.payload
         self._payload_joint = -1 if hung is None else hung.joint
@@ -49,14 +49,17 @@ class ElasticArm:
             for c in components.get(i, (2,)):
                 name = joint.name if c == 2 else f"{joint.name}.{SPRINGS[c]}"
                 body = self.model.addJoint(body, kinds[c], placement, name)
-                velocity[i, c] = self.model.joints[body].idx_v
+                added[i, c] = body
                 placement = pin.SE3.Identity()
             self.bodies.append(body)
             self.turns.append(frame)
             self.set_inertia(i, robot.inertias[i])
         self.data: Any = self.model.createData()
-        self.joint_velocity = np.array([velocity[i, 2] for i in range(robot.n)])
-        self.elastic = np.array([velocity[axis] for axis in elastic_axes(robot)], dtype=int)
+        axes = elastic_axes(robot)
+        self._springs, self._units = [added[axis] for axis in axes], [component for _, component in axes]
+        idx_v = list(self.model.idx_vs)
+        self.joint_velocity = np.array([idx_v[added[i, 2]] for i in range(robot.n)])
+        self.elastic = np.array([idx_v[spring] for spring in self._springs], dtype=int)
         self._block = np.ix_(self.elastic, self.elastic)
         self._upper = np.minimum(*self._block), np.maximum(*self._block)
 
@@ -114,15 +117,14 @@ class ElasticArm:
         pin.centerOfMass(self.model, self.data, configuration, True)
         d = len(self.elastic)
         axes, moments = np.empty((d, 3)), np.empty((d, 3))
-        ids = [self._joint_of(at) for at in self.elastic]
-        for k, joint in enumerate(ids):
+        for k, (joint, unit) in enumerate(zip(self._springs, self._units, strict=True)):
             placement = self.data.oMi[joint]
-            unit = {"Z": 2, "Y": 1, "X": 0}[self.model.joints[joint].shortname()[-1]]
             axes[k] = placement.rotation[:, unit]
             moments[k] = self.data.mass[joint] * (placement.rotation @ self.data.com[joint])
         twice = np.cross(axes[:, None], np.cross(axes, moments))
         chained = -np.einsum("kx,mlx->kml", np.cross(self.robot.gravity, axes), twice)
-        carries = np.array([[near in set(self.model.supports[far]) for far in ids] for near in ids])
+        supports = [set(self.model.supports[far]) for far in self._springs]
+        carries = np.array([[near in supporting for supporting in supports] for near in self._springs])
         chained *= carries[:, :, None] & carries[None]
         near, middle, far = np.sort(np.indices((d, d, d)), axis=0)
         return chained[near, middle, far]
@@ -138,20 +140,19 @@ class ElasticArm:
 
     def elastic_axes_at(self, joint: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Origins (d, 3) m and axes (d, 3) of the elastic coordinates after `place`, base frame, and which carry a joint's link (d,)."""
-        ids = [self._joint_of(at) for at in self.elastic]
-        placements = [self.data.oMi[i] for i in ids]
-        units = [{"Z": 2, "Y": 1, "X": 0}[self.model.joints[i].shortname()[-1]] for i in ids]
-        axes = np.array([p.rotation[:, unit] for p, unit in zip(placements, units, strict=True)])
+        placements = [self.data.oMi[i] for i in self._springs]
+        axes = np.array([p.rotation[:, unit] for p, unit in zip(placements, self._units, strict=True)])
         carrying = set(self.model.supports[self.bodies[joint]])
-        return np.array([p.translation for p in placements]), axes, np.array([i in carrying for i in ids])
+        return (
+            np.array([p.translation for p in placements]),
+            axes,
+            np.array([i in carrying for i in self._springs]),
+        )
 
     def nearer(self) -> np.ndarray:
         """Whether elastic coordinate k is nearer to the base than l, or the same, (d, d), for coordinates of one branch."""
-        ids = np.array([self._joint_of(at) for at in self.elastic])
+        ids = np.array(self._springs)
         return ids[:, None] <= ids[None, :]
-
-    def _joint_of(self, velocity: int) -> int:
-        return next(i for i in range(1, self.model.njoints) if self.model.joints[i].idx_v == velocity)
 
 
 def _pinocchio_inertia(body: Inertia) -> Any:
