@@ -76,7 +76,7 @@ class Judge:
             [(j.lower, j.upper, j.velocity, j.effort) for j in joints]
         ).T
         rotor, viscous, coulomb = np.nan_to_num(
-            [self.model.rotor_inertia, self.model.viscous, self.model.coulomb]
+            [self.model.drives.rotor_inertia, self.model.drives.viscous, self.model.drives.coulomb]
         )
         torque = torque_regressor(self.model, q, dq, ddq) @ inertial_parameters(self.model)
         torque += rotor * ddq + viscous * dq + coulomb * np.sign(dq)

@@ -71,7 +71,7 @@ def _poses(model: RobotModel, q: np.ndarray, position: np.ndarray, sigma: float)
         torque=None,
         payload=None,
         target=np.full(size, model.point().name),
-        station=np.full(size, model.stations[0]),
+        station=np.full(size, model.stations.names[0]),
         temperature=None,
         pose=np.arange(size),
     )

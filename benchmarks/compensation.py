@@ -65,7 +65,7 @@ def commanded(folder: Path, seed: int) -> dict[str, Any]:
     targets = ToolTargets(np.arange(TARGETS), np.full(TARGETS, nominal.point().name), drawn.q)
     found = compensate(model, nominal, targets)
     done = found.reached
-    place, turn = model.station[0, :3], vector_rotation(model.station[0, 3:])
+    place, turn = model.stations.pose[0, :3], vector_rotation(model.stations.pose[0, 3:])
     wanted = point_kinematics(nominal, drawn.q[done], jacobians=False).position @ turn.T + place
     commands = PosePlan(q=found.q[done], seed=seed)
     errors = cell.noise_free(commands) - wanted

@@ -50,7 +50,7 @@ def _simulated(robot: RobotModel, elastic: bool, rng: np.random.Generator) -> Po
     limits = np.array([(joint.lower, joint.upper) for joint in robot.joints])
     q = rng.uniform(limits[:, 0], limits[:, 1], (POSES, robot.n))
     sigma = np.full((POSES, 3), 3e-5)
-    names = np.full(POSES, robot.point().name), np.full(POSES, robot.stations[0])
+    names = np.full(POSES, robot.point().name), np.full(POSES, robot.stations.names[0])
     empty = PoseSet(q, np.zeros((POSES, 3)), sigma, None, None, *names, None, np.arange(POSES))
     points = predict(robot, empty, elastic=elastic).position + 3e-5 * rng.normal(size=(POSES, 3))
     return PoseSet(q, points, sigma, None, None, *names, None, np.arange(POSES))

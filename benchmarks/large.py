@@ -31,7 +31,7 @@ from flexcal.data.recordings import Recording, write_recording
 from flexcal.estimation import Estimate, Parameter, Parameters
 from flexcal.files.formats import write_estimates
 from flexcal.frequency.periodic import excitation_torque, reference_trajectory
-from flexcal.model.robot import RobotModel, carried_inertias
+from flexcal.model.robot import Links, RobotModel, carried_inertias
 from flexcal.model.statics import tool_at_rest
 from flexcal.model.torques import inertial_parameters, torque_regressor
 
@@ -286,7 +286,7 @@ def _motion(arm: RobotModel, number: np.ndarray, payload: float | None) -> pl.Da
     ddq = -np.sum(size * rate[:, None] ** 2 * np.sin(angle), axis=1)
     loaded = arm if payload is None else _holding(arm, payload)
     torque = torque_regressor(loaded, q, dq, ddq) @ inertial_parameters(loaded)
-    torque += arm.rotor_inertia * ddq + arm.viscous * dq + arm.coulomb * np.sign(dq)
+    torque += arm.drives.rotor_inertia * ddq + arm.drives.viscous * dq + arm.drives.coulomb * np.sign(dq)
     noise = np.random.default_rng(int(number[0])).normal(size=torque.shape)
     torque += 5e-3 * np.array([joint.effort for joint in arm.joints]) * noise
     columns = {"t": number / RATE_HZ} | {f"q{j + 1}": q[:, j] for j in range(arm.n)}
@@ -296,12 +296,7 @@ def _motion(arm: RobotModel, number: np.ndarray, payload: float | None) -> pl.Da
 
 def _holding(arm: RobotModel, payload: float) -> RobotModel:
     bodies = carried_inertias(arm, payload)
-    return replace(
-        arm,
-        mass=np.array([body.mass for body in bodies]),
-        com=np.array([body.com for body in bodies]),
-        inertia=np.array([body.inertia for body in bodies]),
-    )
+    return replace(arm, links=Links.of(bodies))
 
 
 def _flexcal(folder: Path, *arguments: str) -> None:

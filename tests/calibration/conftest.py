@@ -48,7 +48,7 @@ def empty_poses(model: RobotModel, q: np.ndarray, sigma: float) -> PoseSet:
         torque=None,
         payload=None,
         target=np.full(n, model.point().name),
-        station=np.full(n, model.stations[0]),
+        station=np.full(n, model.stations.names[0]),
         temperature=None,
         pose=np.arange(n),
     )

@@ -181,7 +181,7 @@ def test_any_orientation_of_the_tracker(simulate: Callable, tx90l: RobotModel) -
 
 
 def test_a_second_station_gets_its_own_frame(simulate: Callable, tx90l: RobotModel) -> None:
-    two = replace(tx90l, stations=("tracker", "window"), station=np.zeros((2, 6)))
+    two = replace(tx90l, stations=replace(tx90l.stations, names=("tracker", "window"), pose=np.zeros((2, 6))))
     simulated = simulate(8, 80)
     turn, shift = vector_rotation(np.array([0.1, 0.2, -2.0])), np.array([1.0, 2.0, 0.3])
     names, points = simulated.poses.station.copy(), simulated.poses.position.copy()

@@ -87,9 +87,9 @@ def test_a_parameter_without_effect_on_points_is_refused(simulate: Callable) -> 
 def with_slide(model: RobotModel, joint: int) -> RobotModel:
     """The robot with one joint sliding along its axis in place of turning about it, and no spring there."""
     joints = tuple(replace(j, kind="prismatic") if i == joint else j for i, j in enumerate(model.joints))
-    frames = {i: frame for i, frame in model.bearing_frames.items() if i != joint}
+    frames = {i: frame for i, frame in model.springs.bearing_frames.items() if i != joint}
     tree = kinematic_tree(joints, frames, model.config.bearings)
-    return replace(model, joints=joints, bearing_frames=frames, tree=tree)
+    return replace(model, springs=replace(model.springs, bearing_frames=frames), joints=joints, tree=tree)
 
 
 @pytest.mark.parametrize("joint", range(6))
@@ -109,9 +109,9 @@ def test_every_geometric_column_with_a_slide_anywhere(
 
 def held(model: RobotModel, mass: float) -> RobotModel:
     """The robot with another declared payload mass."""
-    assert model.nominal_payload is not None
-    other = replace(model.nominal_payload, mass=mass, mass_std=0.0)
-    return replace(model, nominal_payload=other, payload_mass=np.array([mass]))
+    assert model.payload is not None
+    other = replace(model.payload, mass=mass, nominal_mass=mass, mass_std=0.0)
+    return replace(model, payload=other)
 
 
 def test_the_payload_column_is_in_kilograms_whatever_is_declared(

@@ -111,7 +111,7 @@ def test_repeated_poses_count_once(ur5: RobotModel, anywhere: PoseSet) -> None:
 def test_a_robot_without_masses_says_why_compliance_is_not_considered(
     ur5: RobotModel, anywhere: PoseSet
 ) -> None:
-    light = replace(ur5, mass=np.zeros(ur5.n))
+    light = replace(ur5, links=replace(ur5.links, mass=np.zeros(ur5.n)))
     found = select_terms(light, seen(light, anywhere.subset(slice(0, 40)), np.random.default_rng(0)))
     reasons = {row.term: row.reason for row in found.considered}
     for term in ("gravity_compliance", "lateral_compliance", "backlash"):

@@ -311,7 +311,7 @@ def test_bodies_that_could_be_built(
     assert len(remarks) == 1 and "stay in estimates.yaml" in remarks[0]
     robot = RobotModel.from_yaml(tx40 / "robot.yaml")
     inertias = pin.buildModelFromUrdf(str(urdf)).inertias
-    assert [i.mass for i in list(inertias)[1:]] == pytest.approx(list(robot.mass), rel=1e-12)
+    assert [i.mass for i in list(inertias)[1:]] == pytest.approx(list(robot.links.mass), rel=1e-12)
 
 
 def test_a_robot_that_stands_still_is_refused(tx40: Path, capsys: pytest.CaptureFixture[str]) -> None:

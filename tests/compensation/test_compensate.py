@@ -45,7 +45,7 @@ def seen_in_base(model: RobotModel, q: np.ndarray, payload: np.ndarray | None) -
         temperature=None,
         pose=np.arange(n),
     )
-    place = model.station[0]
+    place = model.stations.pose[0]
     return (predict(model, poses).position - place[:3]) @ vector_rotation(place[3:])
 
 
@@ -99,7 +99,7 @@ def test_another_engine_puts_the_tool_there(
     done = found.reached & found.unambiguous
     plan = PosePlan(q=found.q[done])
     seen = VirtualCell(robot, CellConfig()).noise_free(plan)
-    place = robot.station[0]
+    place = robot.stations.pose[0]
     at = (seen - place[:3]) @ vector_rotation(place[3:])
     assert targets.q is not None
     assert np.abs(at - point_kinematics(tx90l, targets.q[done]).position).max() < MICROMETRE
@@ -180,8 +180,8 @@ def test_the_flank_turns_where_the_torque_does(tx90l: RobotModel, real: RobotMod
     assert commands.reached.all() and not commands.unambiguous.any()
     steps = np.diff(commands.q[:, 1] - near)
     turn = int(np.argmax(np.abs(steps)))
-    assert abs(steps[turn]) == pytest.approx(2 * real.backlash[1], rel=1e-2)
-    assert np.abs(np.delete(steps, turn)).max() < 1e-2 * real.backlash[1]
+    assert abs(steps[turn]) == pytest.approx(2 * real.drives.backlash[1], rel=1e-2)
+    assert np.abs(np.delete(steps, turn)).max() < 1e-2 * real.drives.backlash[1]
     pressed = np.where(np.arange(41) <= turn, *np.sign([load(crossing - 0.1), load(crossing + 0.1)]))
     flank = tool_at_rest(real, commands.q, None, targets.target).rest.flank.copy()
     flank[:, 1] = pressed
@@ -257,7 +257,7 @@ def test_poses_without_joint_positions_keep_the_configuration(
 def test_points_of_an_instrument(tx90l: RobotModel, real: RobotModel) -> None:
     """Points and orientations in the tracker's frame come to the same commands as in the base frame."""
     wanted = point_kinematics(tx90l, EASY)
-    place = real.station[0]
+    place = real.stations.pose[0]
     turn = vector_rotation(place[3:])
     seen = ToolTargets(
         pose=np.arange(1),

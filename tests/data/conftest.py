@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from flexcal.errors import InputError
 from flexcal.files.formats import read_yaml_file
-from flexcal.model.robot import SignalConfig
+from flexcal.model.robot import SignalConfig, Stations
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class RobotStandIn:
     points: dict[str, object]
     payload: object | None = "declared"
     reach: float = 1.2
-    stations: tuple[str, ...] = ("tracker",)
+    stations: Stations = field(default_factory=lambda: Stations(("tracker",), np.zeros((1, 6))))
     sensors: dict[str, object] = field(default_factory=dict)
 
     @property

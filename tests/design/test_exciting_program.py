@@ -124,7 +124,9 @@ def test_every_limit_holds_between_the_instants(tx90l: RobotModel) -> None:
     robot = pin.buildModelFromUrdf(str(model.urdf))
     data = robot.createData()
     torque = np.array([pin.rnea(robot, data, *state) for state in zip(q, dq, ddq, strict=True)])
-    torque += model.rotor_inertia * ddq + model.viscous * dq + model.coulomb * np.sign(dq)
+    torque += (
+        model.drives.rotor_inertia * ddq + model.drives.viscous * dq + model.drives.coulomb * np.sign(dq)
+    )
     for i, joint in enumerate(model.joints):
         assert joint.lower < q[:, i].min() and q[:, i].max() < joint.upper
         assert np.abs(dq[:, i]).max() < joint.velocity * 1.0005

@@ -79,7 +79,7 @@ def test_the_limit_of_a_gap_is_gravity_over_its_crest(tx90l, plan):
     system = linearise(tx90l, q)
     moved = closed_loop_motion(system, still.frequencies_hz, still.kp[:3], still.kd[:3])
     strain = (
-        tx90l.stiffness[:3, 2][:, None]
+        tx90l.springs.stiffness[:3, 2][:, None]
         * (drive_stretch(tx90l, system).T @ moved)
         @ multisine_spectra(still, 0)
     )

@@ -47,7 +47,7 @@ def test_derivatives_are_those_of_finite_differences(tx90l, plan, planned):
     """Of the transfer matrix with friction's viscous coefficients, along a spring, a mass, a delay and a geometric error."""
     q, frequencies = POSES[0], plan.frequencies_hz
     friction = FrictionDisturbance.of(tx90l, linearise(tx90l, q), plan)
-    viscous = tx90l.viscous[:3] + friction.viscous
+    viscous = tx90l.drives.viscous[:3] + friction.viscous
     rubbing = {f"joint_{k + 1}.viscous": v for k, v in enumerate(viscous)}
 
     def response(changes):
@@ -135,7 +135,7 @@ def test_friction_under_a_fast_reference_is_that_of_two_pulses(tx90l, plan):
     """For v much slower than the reference, Bussgang: the mean of the delta function 2 F δ(V) over a cycle, 2 F / (π V)."""
     found = FrictionDisturbance.of(tx90l, linearise(tx90l, POSES[0]), plan)
     speed = plan.reference_amplitude * 2 * np.pi * plan.reference_frequency_hz
-    np.testing.assert_allclose(found.viscous, 2 * tx90l.coulomb[:3] / (np.pi * speed), rtol=0.15)
+    np.testing.assert_allclose(found.viscous, 2 * tx90l.drives.coulomb[:3] / (np.pi * speed), rtol=0.15)
     still = FrictionDisturbance.of(
         tx90l.with_values({f"joint_{k}.coulomb": 0.0 for k in (1, 2, 3)}), linearise(tx90l, POSES[0]), plan
     )
@@ -207,7 +207,9 @@ def test_a_sensor_on_the_arm_counts(tx90l, plan):
     assert planned.std()[name] < 0.05
     found, names = planned.responses[0], planned.parameters.names
     assert found.response.shape[1:] == (4, 3)
-    rubbing = {f"joint_{k + 1}.viscous": v for k, v in enumerate(tx90l.viscous[:3] + found.friction.viscous)}
+    rubbing = {
+        f"joint_{k + 1}.viscous": v for k, v in enumerate(tx90l.drives.viscous[:3] + found.friction.viscous)
+    }
 
     def reading(xyz, direction):
         moved = replace(sensor, xyz=xyz, direction=direction)

@@ -27,7 +27,7 @@ def test_geometric_errors_count_as_in_point_kinematics(tx90l, rng):
     q = rng.uniform(-2, 2, (20, 6))
     rotation, origin = link_frames(model, q)
     point = model.point()
-    tip = point.translation + model.geometry[-1, 3:] + point.rotation @ point.xyz
+    tip = point.translation + model.geometry.errors[-1, 3:] + point.rotation @ point.xyz
     np.testing.assert_allclose(
         origin[:, -1] + rotation[:, -1] @ tip, point_kinematics(model, q).position, atol=1e-13
     )

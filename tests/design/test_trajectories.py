@@ -28,7 +28,9 @@ def test_limits_are_kept_and_nothing_touches(tx90l: RobotModel, plan: Trajectory
             assert joint.lower < q[:, i].min() and q[:, i].max() < joint.upper
             assert np.abs(dq[:, i]).max() < 0.82 * joint.velocity
         torque = torque_regressor(tx90l, q, dq, ddq) @ inertial_parameters(tx90l)
-        torque += tx90l.rotor_inertia * ddq + tx90l.viscous * dq + tx90l.coulomb * np.sign(dq)
+        torque += (
+            tx90l.drives.rotor_inertia * ddq + tx90l.drives.viscous * dq + tx90l.drives.coulomb * np.sign(dq)
+        )
         assert (np.abs(torque).max(axis=0) < 0.85 * np.array([j.effort for j in tx90l.joints])).all()
         assert not checker.collides(q[::5]).any()
 

@@ -30,7 +30,7 @@ def calm(motion: Motion) -> Motion:
 def test_the_yield_of_springs(tx90l: RobotModel, sines: Callable[[int, float], Motion]) -> None:
     """None where they are stiff; else what exact derivatives give along a periodic motion, away from the ends of the recording."""
     motion = calm(sines(1000, 100.0))
-    stiff = replace(tx90l, stiffness=1e7 * tx90l.stiffness)
+    stiff = replace(tx90l, springs=replace(tx90l.springs, stiffness=1e7 * tx90l.springs.stiffness))
     assert np.abs(FlexibilityCorrection.of(stiff, motion, ()).shift).max() < 1e-3
     states = motion.q, motion.dq, motion.ddq
     found = FlexibilityCorrection.of(tx90l, motion, ())
@@ -94,8 +94,8 @@ def test_the_yield_is_that_of_the_virtual_cell(tx90l: RobotModel, examples: Path
     (log,) = (tmp_path / "seen").glob("*.parquet")
     motion = Motion.of(read_recording(log, tx90l), CUTOFF_HZ, "held")
     rigid = torque_regressor(tx90l, motion.q, motion.dq, motion.ddq) @ loaded_parameters(tx90l)
-    friction = tx90l.viscous * motion.dq + tx90l.coulomb * np.tanh(motion.dq / 0.01)
-    seen = motion.torque - rigid - friction - tx90l.rotor_inertia * motion.ddq
+    friction = tx90l.drives.viscous * motion.dq + tx90l.drives.coulomb * np.tanh(motion.dq / 0.01)
+    seen = motion.torque - rigid - friction - tx90l.drives.rotor_inertia * motion.ddq
     rows = Decimation(640)
 
     def missed(model: RobotModel) -> np.ndarray:
@@ -106,7 +106,7 @@ def test_the_yield_is_that_of_the_virtual_cell(tx90l: RobotModel, examples: Path
     loose = tx90l.with_values(gaps)
     least, size = missed(loose), np.linalg.norm(rows.apply(seen.T), axis=1)[:3]
     assert np.all(least < np.array([0.005, 0.02, 0.03]) * size)
-    undamped = replace(loose, damping=0 * loose.damping)
+    undamped = replace(loose, springs=replace(loose.springs, damping=0 * loose.springs.damping))
     assert np.all(missed(tx90l)[1:] > 5 * least[1:]) and missed(undamped)[0] > 2 * least[0]
 
 

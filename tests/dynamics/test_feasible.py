@@ -218,7 +218,9 @@ def test_a_joint_that_never_moves(tx40: RobotModel, swing: Motion) -> None:
 
 
 def test_a_urdf_without_inertials_gets_bodies(tx40: RobotModel, swing: Motion) -> None:
-    bare = replace(tx40, mass=np.zeros(6), com=np.zeros((6, 3)), inertia=np.zeros((6, 3, 3)))
+    bare = replace(
+        tx40, links=replace(tx40.links, mass=np.zeros(6), com=np.zeros((6, 3)), inertia=np.zeros((6, 3, 3)))
+    )
     data, truth = simulated(tx40, swing)
     observation = Observation(bare, CLASSIC)
     data = replace(data, observation=observation, base=BaseParameters.of(observation))

@@ -78,15 +78,15 @@ def test_the_identified_robot_needs_the_measured_torques(
     links = (
         inertial_parameters(robot).reshape(6, 10)[:, [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]].ravel()
     )  # Iyy before Ixz
-    (inertia, viscous, coulomb), speed = robot.coupling[0], np.array([0.0, 0.0, 0.0, 0.0, 1.0, 1.0])
+    (inertia, viscous, coulomb), speed = robot.drives.coupling[0], np.array([0.0, 0.0, 0.0, 0.0, 1.0, 1.0])
     for k in (0, 500, 1500):
         q, dq, ddq = clean.q[k], clean.dq[k], clean.ddq[k]
         torque = (
             pin.computeJointTorqueRegressor(model, data, q, dq, ddq) @ links
-            + robot.rotor_inertia * ddq
-            + robot.viscous * dq
+            + robot.drives.rotor_inertia * ddq
+            + robot.drives.viscous * dq
         )
-        torque = torque + robot.coulomb * np.sign(dq) + robot.torque_offset
+        torque = torque + robot.drives.coulomb * np.sign(dq) + robot.drives.torque_offset
         torque += coulomb * np.sign(speed @ dq) * speed
         torque[4:] += inertia * ddq[[5, 4]] + viscous * dq[[5, 4]]
         np.testing.assert_allclose(torque, clean.torque[k], atol=1e-9 * np.abs(clean.torque).max())

@@ -40,7 +40,14 @@ def drawn(model: RobotModel, rng: np.random.Generator) -> RobotModel:
     values = draw_truth(model, CellConfig().spread, rng)
     values = {n: v for n, v in values.items() if not n.endswith((".backlash", ".damping"))}
     robot = model.with_values(values)
-    return replace(robot, viscous=model.viscous * rng.uniform(0.9, 1.1, model.n), coulomb=model.coulomb * 1.1)
+    return replace(
+        robot,
+        drives=replace(
+            robot.drives,
+            viscous=model.drives.viscous * rng.uniform(0.9, 1.1, model.n),
+            coulomb=model.drives.coulomb * 1.1,
+        ),
+    )
 
 
 STILL = repeat(np.zeros((1, 6)))
@@ -53,7 +60,9 @@ def synthetic(truth: RobotModel, plan: TrajectoryPlan, noises: Iterable[np.ndarr
     for number, noise in zip(range(len(plan)), noises, strict=False):
         q, dq, ddq = plan.motion(number, np.arange(size) / plan.rate_hz)
         torque = periodic_torque(truth, q, dq, ddq, 1 / plan.base_frequency_hz, 0.0)
-        torque += truth.rotor_inertia * ddq + truth.viscous * dq + truth.coulomb * np.sign(dq)
+        torque += (
+            truth.drives.rotor_inertia * ddq + truth.drives.viscous * dq + truth.drives.coulomb * np.sign(dq)
+        )
         yield Recording(
             time_step=1 / plan.rate_hz,
             q=np.tile(q, (plan.periods, 1)),
@@ -84,23 +93,27 @@ def test_without_noise_the_torques_of_the_robot_come_back(tx90l: RobotModel, sin
     """Single masses stay as uncertain as CAD; what turns the motors, on motions never recorded, does not."""
     rng = np.random.default_rng(5)
     truth = drawn(tx90l, rng)
-    truth = replace(truth, geometry=tx90l.geometry, stiffness=tx90l.stiffness)
+    truth = replace(
+        truth,
+        geometry=replace(truth.geometry, errors=tx90l.geometry.errors),
+        springs=replace(truth.springs, stiffness=tx90l.springs.stiffness),
+    )
     found = tx90l.with_estimate(identify_with_prior(tx90l, single, synthetic(truth, single, STILL)))
     q, dq, ddq = rng.uniform(-1, 1, (3, 50, 6)) * np.array([2.0, 2.0, 5.0])[:, None, None]
 
     def torque(robot: RobotModel) -> np.ndarray:
-        rows = torque_regressor(replace(robot, geometry=tx90l.geometry), q, dq, ddq) @ inertial_parameters(
-            robot
-        )
-        return rows + robot.rotor_inertia * ddq
+        rows = torque_regressor(
+            replace(robot, geometry=replace(robot.geometry, errors=tx90l.geometry.errors)), q, dq, ddq
+        ) @ inertial_parameters(robot)
+        return rows + robot.drives.rotor_inertia * ddq
 
     scale = np.linalg.norm(torque(truth), axis=0)
     before = np.linalg.norm(torque(tx90l) - torque(truth), axis=0) / scale
     after = np.linalg.norm(torque(found) - torque(truth), axis=0) / scale
     assert (before > 0.02).all()
     assert (after < 0.05 * before).all()
-    np.testing.assert_allclose(found.viscous, truth.viscous, rtol=1e-3)
-    np.testing.assert_allclose(found.coulomb, truth.coulomb, rtol=1e-3)
+    np.testing.assert_allclose(found.drives.viscous, truth.drives.viscous, rtol=1e-3)
+    np.testing.assert_allclose(found.drives.coulomb, truth.drives.coulomb, rtol=1e-3)
 
 
 def test_what_torques_miss(tx90l: RobotModel, single: TrajectoryPlan) -> None:
@@ -108,12 +121,12 @@ def test_what_torques_miss(tx90l: RobotModel, single: TrajectoryPlan) -> None:
     truth = drawn(tx90l, np.random.default_rng(8))
     recordings = list(synthetic(truth, single, STILL))
     assert trajectory_error(truth, single, recordings) < 1e-6
-    heavier = replace(truth, rotor_inertia=1.1 * truth.rotor_inertia)
+    heavier = replace(truth, drives=replace(truth.drives, rotor_inertia=1.1 * truth.drives.rotor_inertia))
     size = single.samples_per_period
     acceleration = single.motion(0, np.arange(size) / single.rate_hz)[2]
     spectrum = np.fft.rfft(recordings[0].torque[:size], axis=0)[:26] / size
     spectrum[1:] *= np.sqrt(2.0)
-    missed = np.linalg.norm(0.1 * truth.rotor_inertia * acceleration) / np.sqrt(size)
+    missed = np.linalg.norm(0.1 * truth.drives.rotor_inertia * acceleration) / np.sqrt(size)
     expected = missed / np.linalg.norm(spectrum)
     assert trajectory_error(heavier, single, recordings) == pytest.approx(expected, rel=1e-6)
 
@@ -122,7 +135,7 @@ def test_exact_links_leave_rotors_and_friction(tx90l: RobotModel, single: Trajec
     """A robot.yaml that lets no link be off has no unknown link."""
     exact = PriorConfig(mass=0.0, com=0.0, rotor_inertia=0.05)
     robot = replace(tx90l, config=replace(tx90l.config, prior=exact))
-    truth = replace(robot, rotor_inertia=1.04 * robot.rotor_inertia)
+    truth = replace(robot, drives=replace(robot.drives, rotor_inertia=1.04 * robot.drives.rotor_inertia))
     rng = np.random.default_rng(6)
     estimate = identify_with_prior(robot, single, synthetic(truth, single, coloured(single, rng)))
     assert not any(name.startswith("link") for name in estimate.parameters.names)
@@ -191,6 +204,6 @@ def test_what_does_not_fit_is_said(tx90l: RobotModel, plan: TrajectoryPlan) -> N
         identify_with_prior(tx90l, plan, [full, full])
     with pytest.raises(FlexcalError, match="torque of joint_1 is zero"):
         identify_with_prior(tx90l, plan, [replace(full, torque=0.0 * full.torque)])
-    lacking = replace(tx90l, rotor_inertia=np.full(6, np.nan))
+    lacking = replace(tx90l, drives=replace(tx90l.drives, rotor_inertia=np.full(6, np.nan)))
     with pytest.raises(FlexcalError, match="joint_1 no rotor inertia"):
         identify_with_prior(lacking, plan, [full])

@@ -67,9 +67,15 @@ def synthesise() -> Synthesis:
         s = 2j * np.pi * frequencies
         result = []
         for k, q in enumerate(poses):
-            moved = replace(truth, viscous=truth.viscous * np.append(VISCOUS, np.ones(3)) * (1 + 0.03 * k))
+            moved = replace(
+                truth,
+                drives=replace(
+                    truth.drives,
+                    viscous=truth.drives.viscous * np.append(VISCOUS, np.ones(3)) * (1 + 0.03 * k),
+                ),
+            )
             response = transfer_matrix(linearise(moved, q, payload), frequencies).response
-            response = response * np.exp(-s[:, None] * truth.delay[:3])[:, None, :]
+            response = response * np.exp(-s[:, None] * truth.drives.delay[:3])[:, None, :]
             one = noise**2 * response @ np.swapaxes(response, 1, 2).conj()
             covariance = np.zeros((len(s), 9, 9), dtype=complex)
             for c in range(3):

@@ -62,7 +62,7 @@ def test_compliance_of_a_gap(tx90l, poses, rng):
     motion, system = ReferenceMotion.of(plan), linearise(tx90l, q)
     size = multisine_torque(tx90l, system, plan.frequencies_hz, motion.excitation, motion.kp, motion.kd)
     torque = size[0] * rng.standard_normal(400_000)
-    stiffness, half_gap = tx90l.stiffness[0, 2], 5e-5
+    stiffness, half_gap = tx90l.springs.stiffness[0, 2], 5e-5
     twist = torque / stiffness + half_gap * np.sign(torque)
     compliance = (twist @ torque) / (torque @ torque)
     assert half_gap * added[0] > 0.2

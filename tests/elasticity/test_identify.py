@@ -137,7 +137,12 @@ def test_reference_motion_is_part_of_the_model(stiff, poses, synthesise, rng):
     motion = ReferenceMotion.of(plan)
     moving = []
     for k, response in enumerate(synthesise(stiff, poses["default"], noise=3e-3, rng=rng, step=8)):
-        robot = replace(stiff, viscous=stiff.viscous * np.append(VISCOUS, np.ones(3)) * (1 + 0.03 * k))
+        robot = replace(
+            stiff,
+            drives=replace(
+                stiff.drives, viscous=stiff.drives.viscous * np.append(VISCOUS, np.ones(3)) * (1 + 0.03 * k)
+            ),
+        )
         shift = reference_shift(robot, response.q_mean, None, response.frequencies_hz, motion)
         moving.append(replace(response, response=response.response + shift))
     name = "joint_2.bearing_y.damping"
@@ -225,7 +230,9 @@ def test_half_gap_is_found(tx90l, poses, synthesise, rng):
         torque="held", seed=0,
     )  # fmt: skip
     half_gap, responses = {1: 4e-5, 2: 6e-5}, []
-    dragging = replace(tx90l, viscous=tx90l.viscous * np.append(VISCOUS, np.ones(3)))
+    dragging = replace(
+        tx90l, drives=replace(tx90l.drives, viscous=tx90l.drives.viscous * np.append(VISCOUS, np.ones(3)))
+    )
     for q in poses["default"]:
         added = DriveTorque.of(dragging, q, None, plan).backlash_compliance()[0]
         soft = {

@@ -98,7 +98,7 @@ def test_nothing_is_left_out(tx90l: RobotModel) -> None:
         "std": pytest.approx(5e3),
     }
     assert second["springs"]["bearing_x"]["stiffness"] == {"value": 797.7e3, "unit": "N m/rad", "std": None}
-    assert second["drive"]["ratio"] == 45 and second["inertial"]["mass"]["value"] == tx90l.mass[1]
+    assert second["drive"]["ratio"] == 45 and second["inertial"]["mass"]["value"] == tx90l.links.mass[1]
     assert document["payload"]["mass"]["value"] == 6.0 and list(document["stations"]) == ["tracker"]
     assert set(document["parameters"]) == set(model.values)
     read = {name: entry["value"] for name, entry in document["parameters"].items()}

@@ -22,7 +22,7 @@ from flexcal.model.statics import gravity_moments
 def test_backlash_of_one_joint_is_its_lever_times_the_gap(tx90l: RobotModel) -> None:
     """Half the gap of the second joint, times the tool's distance from its axis."""
     gap = 1e-4
-    rigid = replace(tx90l, bearing_frames={})
+    rigid = tx90l.without_springs()
     model = rigid.with_values({"joint_2.backlash": gap})
     loss = measure_export_error(
         model, lambda q: point_kinematics(model, q, jacobians=False).position, AT_REST
@@ -56,7 +56,7 @@ def test_a_robot_without_points_names_what_is_lost_without_millimetres(
 
 def test_a_transmission_error_is_its_lever_times_the_wave(tx90l: RobotModel) -> None:
     wave = 1e-4
-    rigid = replace(tx90l, bearing_frames={})
+    rigid = tx90l.without_springs()
     model = rigid.with_values({"joint_3.transmission_2_sin": wave, "joint_1.length_x": 1e-3})
     loss = measure_export_error(
         model, lambda q: point_kinematics(model, q, jacobians=False).position, AT_REST
@@ -69,7 +69,7 @@ def test_a_transmission_error_is_its_lever_times_the_wave(tx90l: RobotModel) -> 
 
 
 def test_lateral_compliance_is_named_with_what_it_costs(tx90l: RobotModel) -> None:
-    rigid = replace(tx90l, bearing_frames={})
+    rigid = tx90l.without_springs()
     model = rigid.with_values({"joint_1.gravity_compliance_1": 1e-6, "joint_1.gravity_compliance_2": 1e-6})
     loss = measure_export_error(
         model, lambda q: point_kinematics(model, q, jacobians=False).position, AT_REST
@@ -84,7 +84,7 @@ def test_lateral_compliance_is_named_with_what_it_costs(tx90l: RobotModel) -> No
 @pytest.mark.parametrize("form", ["urdf", "mjcf", "sdf"])
 def test_the_file_is_what_is_measured(tx90l: RobotModel, form: str) -> None:
     """A millimetre that goes wrong in the text is found in the error."""
-    rigid = replace(tx90l, bearing_frames={})
+    rigid = tx90l.without_springs()
     render, read = {
         "urdf": (render_urdf, urdf_tool),
         "mjcf": (render_mjcf, mjcf_tool),

@@ -80,8 +80,8 @@ def test_springs_dampers_and_rotors_are_joints_of_one_tree(tx90l: RobotModel) ->
     np.testing.assert_allclose(np.sqrt(squares[:4]) / (2 * np.pi), expected, atol=0.06)
     whole = mjcf_spec(tx90l).compile()
     assert whole.nv == 15 and whole.ntendon == 0
-    assert whole.joint("joint_2").damping[0] == tx90l.viscous[1]
-    assert whole.dof_armature[whole.joint("joint_2").dofadr[0]] == tx90l.rotor_inertia[1]
+    assert whole.joint("joint_2").damping[0] == tx90l.drives.viscous[1]
+    assert whole.dof_armature[whole.joint("joint_2").dofadr[0]] == tx90l.drives.rotor_inertia[1]
 
 
 def test_the_payload_is_merged_into_its_link(tx90l: RobotModel) -> None:
@@ -103,7 +103,7 @@ def test_warnings_of_mujoco_leave_no_log_file(
     tx90l: RobotModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    weightless = replace(tx90l, rotor_inertia=np.zeros(tx90l.n))
+    weightless = replace(tx90l, drives=replace(tx90l.drives, rotor_inertia=np.zeros(tx90l.n)))
     with pytest.warns(UserWarning, match="Inertia matrix"):
         mjcf_spec(weightless).compile()
     assert list(tmp_path.iterdir()) == []

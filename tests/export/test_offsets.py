@@ -20,7 +20,7 @@ from flexcal.units import DEGREE
 @pytest.fixture(scope="module")
 def rigid(tx90l: RobotModel) -> RobotModel:
     """The TX90L without springs."""
-    return replace(tx90l, bearing_frames={})
+    return tx90l.without_springs()
 
 
 def test_offsets_alone_are_found(rigid: RobotModel) -> None:
@@ -52,7 +52,7 @@ def test_they_are_better_than_the_calibrated_offsets(tx90l: RobotModel, erroneou
         missed = wanted - point_kinematics(tx90l, q + offsets, jacobians=False).position
         return float(np.mean(np.sum(missed**2, axis=1)))
 
-    assert cost(best) < 0.98 * cost(model.geometry[:, 0])
+    assert cost(best) < 0.98 * cost(model.geometry.errors[:, 0])
     for step in 1e-4 * np.eye(6):
         assert cost(best) < min(cost(best + step), cost(best - step))
 
@@ -74,7 +74,7 @@ def test_base_and_tool_help(tx90l: RobotModel, erroneous) -> None:
 def test_motor_values_follow_the_ratio(tx90l: RobotModel, erroneous) -> None:
     text = render_offsets(erroneous(tx90l), tx90l, keep_frames=True).text
     rows = [line.split(",") for line in text.splitlines() if ",offset," in line]
-    for row, ratio in zip(rows, tx90l.ratio, strict=True):
+    for row, ratio in zip(rows, tx90l.drives.ratio, strict=True):
         value, degrees, motor = float(row[3]), float(row[5]), float(row[6])
         assert degrees == pytest.approx(value / DEGREE, abs=1e-6)
         assert motor == pytest.approx(ratio * value / DEGREE, abs=1e-5)

@@ -76,7 +76,7 @@ def test_sdf_stands_where_pinocchio_does(
     ours = np.array([read_sdf(text, "smr", dict(zip(model.joint_names, own, strict=True))) for own in q])
     np.testing.assert_allclose(ours, pinocchio_of(model)(q), atol=1e-12)
     masses = [float(e.text or "") for e in ET.fromstring(text).iter("mass")]
-    np.testing.assert_allclose(masses, model.mass)
+    np.testing.assert_allclose(masses, model.links.mass)
 
 
 def test_the_nominal_ur5_has_the_makers_numbers(ur5: RobotModel) -> None:

@@ -34,7 +34,12 @@ def test_the_energy_is_pinocchios(robot: RobotModel, rng: np.random.Generator) -
 
 def test_it_changes_by_the_power_of_the_torques(robot: RobotModel, rng: np.random.Generator) -> None:
     """Every column, by central differences along a motion, geometric errors included."""
-    bent = replace(robot, geometry=robot.geometry + 0.01 * rng.normal(size=robot.geometry.shape))
+    bent = replace(
+        robot,
+        geometry=replace(
+            robot.geometry, errors=robot.geometry.errors + 0.01 * rng.normal(size=robot.geometry.errors.shape)
+        ),
+    )
     q, dq, ddq = rng.normal(size=(3, 5, robot.n))
     h = 1e-5
     ahead = energy_regressor(bent, q + h * dq + h**2 / 2 * ddq, dq + h * ddq)

@@ -27,7 +27,7 @@ def test_springs_balance_gravity_in_pinocchio(tx90l: RobotModel) -> None:
             load = pin.computeGeneralizedGravity(arm.model, arm.data, arm.configuration(q, deflection))[
                 arm.elastic
             ]
-            springs = [tx90l.stiffness[a] * deflection[a] for a in elastic_axes(tx90l)]
+            springs = [tx90l.springs.stiffness[a] * deflection[a] for a in elastic_axes(tx90l)]
             np.testing.assert_allclose(load + springs, 0, atol=1e-9)
 
 
@@ -43,7 +43,7 @@ def test_one_newton_step_from_the_undeflected_pose_is_close(tx90l: RobotModel) -
     arm = ElasticArm(tx90l, 0.0)
     rest = static_equilibrium(tx90l, Q, 0.0)
     axes = elastic_axes(tx90l)
-    springs = np.diag([tx90l.stiffness[a] for a in axes])
+    springs = np.diag([tx90l.springs.stiffness[a] for a in axes])
     for q, deflection in zip(Q, rest.deflection, strict=True):
         straight = arm.configuration(q, np.zeros((6, 3)))
         load = pin.computeGeneralizedGravity(arm.model, arm.data, straight)[arm.elastic]
@@ -69,9 +69,9 @@ def test_regressor_is_the_derivative_by_inertia(tx90l: RobotModel, key: str) -> 
     rest = static_equilibrium(tx90l, Q, sensitivities=True)
     block = rest.regressor[:, :, 4 * 3 : 4 * 4]
     load = (
-        block @ np.concatenate([[1.0], tx90l.com[3]])
+        block @ np.concatenate([[1.0], tx90l.links.com[3]])
         if key == "mass"
-        else tx90l.mass[3] * block[:, :, 1 + "xyz".index(key[-1])]
+        else tx90l.links.mass[3] * block[:, :, 1 + "xyz".index(key[-1])]
     )
     expected = -np.einsum("sij,sj->si", rest.compliance, load)
     name, step = f"link_4.{key}", 1e-3
@@ -131,4 +131,4 @@ def test_payload_needs_a_declaration(tx90l: RobotModel) -> None:
     from dataclasses import replace
 
     with pytest.raises(FlexcalError, match="declares none"):
-        static_equilibrium(replace(tx90l, nominal_payload=None), Q, 3.0)
+        static_equilibrium(replace(tx90l, payload=None), Q, 3.0)

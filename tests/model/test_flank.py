@@ -61,7 +61,7 @@ def test_regressor_against_differences(
             gravity_torque(tx90l.with_values({name: tx90l.value(name) + sign * step}), q, payload)
             for sign in (1, -1)
         )
-        slope = regressor[:, :, k, 0] + regressor[:, :, k, 1:] @ tx90l.com[k]
+        slope = regressor[:, :, k, 0] + regressor[:, :, k, 1:] @ tx90l.links.com[k]
         np.testing.assert_allclose(slope, (high - low) / (2 * step), atol=1e-5)
 
 

@@ -37,8 +37,8 @@ def written_out(model: RobotModel, q: np.ndarray, deflection: np.ndarray) -> np.
     x, y, z = np.eye(3)
     total, length = np.eye(4), np.zeros(3)
     for i, joint in enumerate(model.joints):
-        offset, first, second = model.geometry[i, :3]
-        frame = model.bearing_frames.get(
+        offset, first, second = model.geometry.errors[i, :3]
+        frame = model.springs.bearing_frames.get(
             i, np.column_stack([joint.normals[0], np.cross(joint.axis, joint.normals[0]), joint.axis])
         )
         tilt_x, tilt_y, twist = deflection[i]
@@ -53,11 +53,15 @@ def written_out(model: RobotModel, q: np.ndarray, deflection: np.ndarray) -> np.
             @ matrix(joint.rotation, joint.translation + length)
             @ matrix(turn @ frame @ motion @ frame.T, np.zeros(3))
         )
-        length = model.geometry[i, 3:]
+        length = model.geometry.errors[i, 3:]
     point = model.point()
-    tool = axis_rotation(y, model.tool[2]) @ axis_rotation(x, model.tool[1]) @ axis_rotation(z, model.tool[0])
+    tool = (
+        axis_rotation(y, model.geometry.tool[2])
+        @ axis_rotation(x, model.geometry.tool[1])
+        @ axis_rotation(z, model.geometry.tool[0])
+    )
     total = total @ matrix(point.rotation @ tool, point.translation + length)
-    return (total @ np.append(point.xyz + model.tool[3:], 1.0))[:3]
+    return (total @ np.append(point.xyz + model.geometry.tool[3:], 1.0))[:3]
 
 
 def test_nominal_kinematics_agree_with_pinocchio(tx90l: RobotModel) -> None:

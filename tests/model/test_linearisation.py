@@ -80,7 +80,7 @@ def test_derivatives_by_the_springs_of_a_braked_wrist(tx90l: RobotModel) -> None
 
 def test_the_payloads_inertia_grows_with_its_mass(tx90l: RobotModel) -> None:
     """In the value and in the derivative alike, as that of a link does."""
-    q, held = np.array([0.3, 0.7, -0.4, 0.5, 0.6, 0.2]), tx90l.nominal_payload
+    q, held = np.array([0.3, 0.7, -0.4, 0.5, 0.6, 0.2]), tx90l.payload
     assert held is not None
     bulky = tx90l.with_values({"payload.Ixx": 0.3, "payload.Iyy": 0.2, "payload.Izz": 0.1})
     heavier = bulky.with_values({"payload.mass": 9.0}).payload

@@ -61,7 +61,11 @@ def _robot(folder: Path, gripper: tuple[str, str, str], locked: dict[str, float]
 def test_the_locked_gripper_is_the_fixed_one(tmp_path: Path) -> None:
     ours, other = _robot(tmp_path / "a", MOVING, LOCKED), _robot(tmp_path / "b", FIXED, {})
     assert ours.joint_names == other.joint_names == ("shoulder",)
-    for one, two in ((ours.mass, other.mass), (ours.com, other.com), (ours.inertia, other.inertia)):
+    for one, two in (
+        (ours.links.mass, other.links.mass),
+        (ours.links.com, other.links.com),
+        (ours.links.inertia, other.links.inertia),
+    ):
         np.testing.assert_allclose(one, two, rtol=0, atol=1e-14)
     np.testing.assert_allclose(ours.point().translation, other.point().translation, rtol=0, atol=1e-15)
     np.testing.assert_allclose(ours.point().rotation, other.point().rotation, rtol=0, atol=1e-15)
@@ -104,7 +108,11 @@ def test_an_exported_gripper_weighs_what_was_found(tmp_path: Path) -> None:
     write_urdf(found, tmp_path / "found.urdf")
     (tmp_path / "robot.yaml").write_text(f"robot: found.urdf\nlocked: {LOCKED}\n".replace("'", ""))
     again = RobotModel.from_yaml(tmp_path / "robot.yaml")
-    for one, two in ((found.mass, again.mass), (found.com, again.com), (found.inertia, again.inertia)):
+    for one, two in (
+        (found.links.mass, again.links.mass),
+        (found.links.com, again.links.com),
+        (found.links.inertia, again.links.inertia),
+    ):
         np.testing.assert_allclose(two, one, rtol=0, atol=1e-14)
 
 

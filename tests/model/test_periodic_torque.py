@@ -34,7 +34,7 @@ def tx90l(request: pytest.FixtureRequest, tx90l: RobotModel) -> RobotModel:
 
 def test_stiff_springs_make_the_rigid_robot(tx90l: RobotModel) -> None:
     states = swing(6, 40)
-    stiff = replace(tx90l, stiffness=1e6 * tx90l.stiffness)
+    stiff = replace(tx90l, springs=replace(tx90l.springs, stiffness=1e6 * tx90l.springs.stiffness))
     rigid = torque_regressor(tx90l, *states) @ inertial_parameters(tx90l)
     np.testing.assert_allclose(periodic_torque(stiff, *states, PERIOD, 0.0), rigid, atol=2e-4)
     soft = periodic_torque(tx90l, *states, PERIOD, 0.0)
@@ -53,14 +53,17 @@ def test_at_rest_it_holds_the_sagging_arm(tx90l: RobotModel, rng: np.random.Gene
 
 def test_a_heavy_arm_on_soft_springs_lags(tx90l: RobotModel) -> None:
     """One axis against its own equation of motion, I (q̈ + δ̈) = τ and δ = -τ/c: I q̈/(1 - (ω/ω₀)²) to first order in (ω/ω₀)²."""
-    stiffness = 1e6 * tx90l.stiffness
-    stiffness[0, 2] = tx90l.stiffness[0, 2]
+    stiffness = 1e6 * tx90l.springs.stiffness
+    stiffness[0, 2] = tx90l.springs.stiffness[0, 2]
     light = replace(
         tx90l,
-        mass=np.array([1e-9] * 5 + [5.0]),
-        com=np.zeros((6, 3)),
-        inertia=np.array([np.zeros((3, 3))] * 5 + [20.0 * np.eye(3)]),
-        stiffness=stiffness,
+        links=replace(
+            tx90l.links,
+            mass=np.array([1e-9] * 5 + [5.0]),
+            com=np.zeros((6, 3)),
+            inertia=np.array([np.zeros((3, 3))] * 5 + [20.0 * np.eye(3)]),
+        ),
+        springs=replace(tx90l.springs, stiffness=stiffness),
     )
     omega = 2 * np.pi / PERIOD
     time = np.arange(16) * PERIOD / 16
@@ -73,5 +76,5 @@ def test_a_heavy_arm_on_soft_springs_lags(tx90l: RobotModel) -> None:
     rigid = torque_regressor(light, q + bend, dq, ddq) @ inertial_parameters(light)
     inertia = float(rigid[4, 0] / ddq[4, 0])
     torque = periodic_torque(light, q + bend, dq, ddq, PERIOD, 0.0)
-    softened = (omega**2) * inertia / light.stiffness[0, 2]
+    softened = (omega**2) * inertia / light.springs.stiffness[0, 2]
     np.testing.assert_allclose(torque[:, 0], rigid[:, 0] * (1 + softened), rtol=1e-6, atol=1e-6)

@@ -14,8 +14,13 @@ from flexcal.model.robot import GEOMETRY, RobotModel
 def test_links_and_point_lie_where_the_kernels_put_them(tx90l: RobotModel, slides: tuple[int, ...]) -> None:
     rng = np.random.default_rng(7)
     joints = tuple(replace(j, kind="prismatic") if i in slides else j for i, j in enumerate(tx90l.joints))
-    frames = {i: frame for i, frame in tx90l.bearing_frames.items() if i not in slides}
-    model = replace(tx90l, joints=joints, bearing_frames=frames, tree=kinematic_tree(joints, frames))
+    frames = {i: frame for i, frame in tx90l.springs.bearing_frames.items() if i not in slides}
+    model = replace(
+        tx90l,
+        springs=replace(tx90l.springs, bearing_frames=frames),
+        joints=joints,
+        tree=kinematic_tree(joints, frames),
+    )
     names = [f"{owner}.{key}" for owner in (*model.joint_names, "tool") for key in GEOMETRY]
     model = model.with_values({name: 0.05 * rng.normal() for name in [*names, "point.smr.x"]})
     q = rng.uniform(-2, 2, (10, 6))

@@ -26,9 +26,14 @@ def robot(request: pytest.FixtureRequest) -> RobotModel:
 
 def bent(robot: RobotModel, rng: np.random.Generator) -> RobotModel:
     """With large geometric errors, and every joint about the axis of a bearing that leans."""
-    geometry = robot.geometry + 0.1 * rng.normal(size=robot.geometry.shape)
+    geometry = robot.geometry.errors + 0.1 * rng.normal(size=robot.geometry.errors.shape)
     frames = {i: pin.exp3(rng.normal(size=3)) for i in range(robot.n)}
-    return replace(robot, geometry=geometry, bearing_frames=frames, tree=kinematic_tree(robot.joints, frames))
+    return replace(
+        robot,
+        geometry=replace(robot.geometry, errors=geometry),
+        springs=replace(robot.springs, bearing_frames=frames),
+        tree=kinematic_tree(robot.joints, frames),
+    )
 
 
 def test_with_inertials_for_weights_it_is_pinocchios(robot: RobotModel, rng: np.random.Generator) -> None:

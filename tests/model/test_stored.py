@@ -133,7 +133,7 @@ def test_springs_do_not_stand_on_links_that_no_body_can_be(examples: Path, tmp_p
         InputError, match=r"estimates\.yaml: .* not physically consistent for link_3, .* --estimator sdp"
     ):
         RobotModel.from_yaml(robot)
-    rigid = replace(nominal, bearing_frames={})
+    rigid = nominal.without_springs()
     assert apply_estimates(rigid, path).value("link_3.Ixx") == pytest.approx(values["link_3.Ixx"])
 
 

@@ -90,7 +90,7 @@ def stage_one(model: RobotModel, truth: dict[str, float], rng: np.random.Generat
                 stds.append(std)
     for i, joint in enumerate(model.joints):
         name = f"{joint.link}.mass"
-        if i >= 1 and model.mass[i] > 0:
+        if i >= 1 and model.links.mass[i] > 0:
             items.append(
                 Parameter(
                     name, "kg", float(truth[name] * np.exp(0.02 * rng.normal())), prior_std=0.07, scale="log"
@@ -100,7 +100,7 @@ def stage_one(model: RobotModel, truth: dict[str, float], rng: np.random.Generat
     for i, joint in enumerate(model.joints):
         for key in "xyz":
             name = f"{joint.link}.com_{key}"
-            if i >= 1 and model.mass[i] > 0:
+            if i >= 1 and model.links.mass[i] > 0:
                 items.append(Parameter(name, "m", truth[name] + 0.002 * rng.normal(), prior_std=0.01))
                 stds.append(0.002)
     covariance = np.diag(np.square(stds))

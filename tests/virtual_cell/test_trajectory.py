@@ -54,7 +54,7 @@ def test_torques_are_those_of_the_elastic_robot(
     spectrum[12:] = 0
     omega = 2j * np.pi * 0.5 * np.arange(len(spectrum))[:, None]
     q, dq, ddq = (np.fft.irfft(spectrum * omega**order, n=len(q), axis=0) for order in range(3))
-    expected = periodic_torque(tx90l, q, dq, ddq, 2.0, payload) + tx90l.rotor_inertia * ddq
+    expected = periodic_torque(tx90l, q, dq, ddq, 2.0, payload) + tx90l.drives.rotor_inertia * ddq
     worst = np.abs(recording.torque[kept] - expected).max(axis=0)
     assert (worst < 0.01 * np.abs(expected).max(axis=0) + 0.05).all(), worst
 

@@ -69,7 +69,7 @@ def poses(rng: np.random.Generator, count: int = 20) -> PosePlan:
 
 def model_positions(truth: RobotModel, q: np.ndarray, payload: np.ndarray | None) -> np.ndarray:
     rest = static_equilibrium(truth, q, payload)
-    return truth.station[0, :3] + point_kinematics(truth, q, rest.deflection, jacobians=False).position
+    return truth.stations.pose[0, :3] + point_kinematics(truth, q, rest.deflection, jacobians=False).position
 
 
 def test_it_is_a_cell(tx90l: RobotModel) -> None:
@@ -107,7 +107,7 @@ def test_instruments_read_with_their_noise(truth: RobotModel, rng: np.random.Gen
     seen, true = cell.measure(plan), cell.noise_free(plan)
     assert np.abs(seen.q - plan.q).max() <= RESOLUTION / 2 * (1 + 1e-9)
     np.testing.assert_allclose(seen.q / RESOLUTION, np.rint(seen.q / RESOLUTION), atol=1e-6)
-    stand = truth.station[0, :3] + vector_rotation(truth.station[0, 3:]) @ [2.5, 0, 1]
+    stand = truth.stations.pose[0, :3] + vector_rotation(truth.stations.pose[0, 3:]) @ [2.5, 0, 1]
     measured = np.linalg.norm(seen.position - stand, axis=1)  # the tracker knows no other distance
     np.testing.assert_allclose(
         seen.sigma, np.repeat((15e-6 + 6e-6 * measured)[:, None], 3, axis=1), rtol=1e-12
@@ -115,7 +115,7 @@ def test_instruments_read_with_their_noise(truth: RobotModel, rng: np.random.Gen
     assert np.std((seen.position - true) / seen.sigma) == pytest.approx(1, abs=0.08)
     gravity = static_equilibrium(truth, plan.q, None).torque
     spread = (seen.torque - gravity).std(0)
-    np.testing.assert_allclose(spread, np.sqrt(truth.coulomb**2 / 3 + 1), rtol=0.1)
+    np.testing.assert_allclose(spread, np.sqrt(truth.drives.coulomb**2 / 3 + 1), rtol=0.1)
 
 
 def test_what_is_measured_depends_on_the_seed_alone(truth: RobotModel, rng: np.random.Generator) -> None:

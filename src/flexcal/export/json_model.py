@@ -33,7 +33,7 @@ def render_json(model: RobotModel, nominal: RobotModel) -> RenderedModel:
         "payload": _payload(model),
         "stations": {
             name: {"instrument_from_base": _placement(place[:3], vector_rotation(place[3:]))}
-            for name, place in zip(model.stations, model.station, strict=True)
+            for name, place in zip(model.stations.names, model.stations.pose, strict=True)
         },
         "parameters": {name: _quantity(model, name) for name in model.values},
     }
@@ -51,7 +51,7 @@ def _tool_map(text: str, nominal: RobotModel) -> ToolMap:
 def _joint(model: RobotModel, i: int, parent: str | None) -> dict[str, Any]:
     joint, inertia = model.joints[i], model.inertias[i]
     spring = next((e for e in model.elastic if e.index == i), None)
-    ratio = float(model.ratio[i])
+    ratio = float(model.drives.ratio[i])
     return {
         "name": joint.name,
         "link": joint.link,
@@ -69,7 +69,7 @@ def _joint(model: RobotModel, i: int, parent: str | None) -> dict[str, Any]:
         "transmission": [
             {"order": order}
             | {key: _quantity(model, f"{joint.name}.transmission_{order}_{key}") for key in ("sin", "cos")}
-            for order in model.harmonics
+            for order in model.drives.harmonics
         ],
         "springs": None
         if spring is None

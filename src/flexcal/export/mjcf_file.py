@@ -60,7 +60,7 @@ def render_mjcf(model: RobotModel) -> RenderedModel:
         remarks.append(
             f"The payload of {payload.mass:.3g} kg is part of the link {model.joints[payload.joint].link}."
         )
-    if model.coulomb[np.isfinite(model.coulomb)].any():
+    if model.drives.coulomb[np.isfinite(model.drives.coulomb)].any():
         remarks.append("Coulomb friction of the drives is MuJoCo's frictionloss, which holds an arm at rest.")
     springs = [
         f"{joint.name}.{SPRINGS[component]}" for joint in model.elastic for component in joint.components

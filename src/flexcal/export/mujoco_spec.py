@@ -96,9 +96,9 @@ def _add_motor(spec: mujoco.MjSpec, body: mujoco.MjsBody, model: RobotModel, i: 
     joint = model.joints[i]
     kind = mujoco.mjtJoint.mjJNT_SLIDE if joint.kind == "prismatic" else mujoco.mjtJoint.mjJNT_HINGE
     motor = body.add_joint(name=joint.name, type=kind, axis=joint.axis)
-    motor.armature = _known(model.rotor_inertia[i])
-    motor.damping = _linear(motor.damping, _known(model.viscous[i]))
-    motor.frictionloss = _known(model.coulomb[i])
+    motor.armature = _known(model.drives.rotor_inertia[i])
+    motor.damping = _linear(motor.damping, _known(model.drives.viscous[i]))
+    motor.frictionloss = _known(model.drives.coulomb[i])
     if np.isfinite([joint.lower, joint.upper]).all():
         motor.range = [joint.lower, joint.upper]
     drive = spec.add_actuator(name=joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT)

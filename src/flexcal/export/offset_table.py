@@ -81,7 +81,9 @@ def render_offsets(
             "unit": "m" if model.joints[i].kind == "prismatic" else "rad",
             "std": float(fit.std[i]) if fit.determined[i] and fit.std[i] > 0 else None,
             "determined": bool(fit.determined[i]),
-            "motor_offset": float(fit.offsets[i] * model.ratio[i]) if np.isfinite(model.ratio[i]) else None,
+            "motor_offset": float(fit.offsets[i] * model.drives.ratio[i])
+            if np.isfinite(model.drives.ratio[i])
+            else None,
         }
         for i in chain
     }
@@ -149,7 +151,7 @@ def _csv(model: RobotModel, fit: OffsetFit, chain: tuple[int, ...], *, keep_fram
         if joint.kind == "prismatic":
             writer.writerow([joint.name, "offset", "m", repr(value), std, "", "", told])
             continue
-        at_motor = value * model.ratio[i] / DEGREE
+        at_motor = value * model.drives.ratio[i] / DEGREE
         motor = f"{at_motor:.6f}" if np.isfinite(at_motor) else ""
         writer.writerow([joint.name, "offset", "rad", repr(value), std, f"{value / DEGREE:.6f}", motor, told])
     if not keep_frames:

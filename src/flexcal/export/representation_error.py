@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 
 import numpy as np
 
@@ -124,7 +123,7 @@ def measure_export_error(
     what the file's own freedom leaves of it; by default all of it.
     """
     present = [term for term in terms if _leave_out(model, term) is not model]
-    payload = float(model.payload_mass[0])
+    payload = model.payload_mass
     if not model.points:
         return ExportErrors(
             tuple(UnrepresentedTerm(term, None) for term in present), None, 0, "joint range", payload
@@ -169,27 +168,31 @@ def random_poses(model: RobotModel, point: str | None, rng: np.random.Generator)
 
 def _leave_out(model: RobotModel, term: str) -> RobotModel:
     """The robot without a term; the robot itself where it has none of it."""
+    geometry, springs, drives = model.geometry, model.springs, model.drives
     if term == GEOMETRY:
-        errors = model.geometry[:, 1:], model.tool, model.point_error
-        if not any(part.any() for part in errors):
+        if not any(part.any() for part in (geometry.errors[:, 1:], geometry.tool, geometry.point_error)):
             return model
-        offsets = model.geometry * (np.arange(6) == 0)
-        return replace(
-            model, geometry=offsets, tool=np.zeros(6), point_error=np.zeros_like(model.point_error)
+        geometry = replace(
+            geometry,
+            errors=geometry.errors * (np.arange(6) == 0),
+            tool=np.zeros(6),
+            point_error=np.zeros_like(geometry.point_error),
         )
-    if term == DEFLECTION and model.elastic:
-        return replace(model, bearing_frames=MappingProxyType({}))
-    if term == BACKLASH and model.backlash.any():
-        return replace(model, backlash=np.zeros_like(model.backlash))
-    if term == GRAVITY_COMPLIANCE and model.gravity_compliance.any():
-        return replace(model, gravity_compliance=np.zeros_like(model.gravity_compliance))
-    if term == LATERAL_COMPLIANCE and model.lateral_compliance.any():
-        return replace(model, lateral_compliance=np.zeros_like(model.lateral_compliance))
-    if term == HARDENING and model.hardening.any():
-        return replace(model, hardening=np.zeros_like(model.hardening))
-    if term == TRANSMISSION and model.transmission.any():
-        return replace(model, transmission=np.zeros_like(model.transmission))
-    return model
+    elif term == DEFLECTION and model.elastic:
+        return model.without_springs()
+    elif term == BACKLASH and drives.backlash.any():
+        drives = replace(drives, backlash=np.zeros_like(drives.backlash))
+    elif term == GRAVITY_COMPLIANCE and geometry.gravity_compliance.any():
+        geometry = replace(geometry, gravity_compliance=np.zeros_like(geometry.gravity_compliance))
+    elif term == LATERAL_COMPLIANCE and geometry.lateral_compliance.any():
+        geometry = replace(geometry, lateral_compliance=np.zeros_like(geometry.lateral_compliance))
+    elif term == HARDENING and springs.hardening.any():
+        springs = replace(springs, hardening=np.zeros_like(springs.hardening))
+    elif term == TRANSMISSION and drives.transmission.any():
+        drives = replace(drives, transmission=np.zeros_like(drives.transmission))
+    else:
+        return model
+    return replace(model, geometry=geometry, springs=springs, drives=drives)
 
 
 def _alone(error: PositionErrors | None) -> str:

@@ -116,7 +116,7 @@ def _add_joint(body: ET.Element, model: RobotModel, i: int, parent: str) -> None
     for key, value in _limits(joint).items():
         if np.isfinite(value):
             ET.SubElement(limit, key).text = repr(float(value))
-    known = {"damping": model.viscous[i], "friction": model.coulomb[i]}
+    known = {"damping": model.drives.viscous[i], "friction": model.drives.coulomb[i]}
     dynamics = ET.SubElement(axis, "dynamics")
     for key, value in known.items():
         ET.SubElement(dynamics, key).text = repr(float(value) if np.isfinite(value) else 0.0)

@@ -87,7 +87,7 @@ class VirtualCell:
     def _check_rotors(self, plan: MultisinePlan | TrajectoryPlan) -> None:
         moving = range(self.truth.n) if isinstance(plan, TrajectoryPlan) else plan.joints
         for spring in self.truth.elastic:
-            if spring.index in moving and not self.truth.rotor_inertia[spring.index] > 0:
+            if spring.index in moving and not self.truth.drives.rotor_inertia[spring.index] > 0:
                 raise FlexcalError(
                     "E-CELL-012",
                     f"{self.truth.path} gives {spring.name} no positive rotor inertia, and a motor before a drive spring cannot move "

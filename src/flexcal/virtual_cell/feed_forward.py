@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexcal.model.robot import RobotModel, carried_inertias
+from flexcal.model.robot import Links, RobotModel, carried_inertias
 from flexcal.model.torques import inertial_parameters, torque_regressor
 from flexcal.virtual_cell.config import CellConfig
 from flexcal.virtual_cell.plant import Plant, gravity_stiffness, linearise
@@ -42,13 +42,10 @@ def rigid_inverse_dynamics(
     `payload` in kg, None for the declared.
     """
     bodies = carried_inertias(model, payload)
-    loaded = replace(
-        model,
-        mass=np.array([body.mass for body in bodies]),
-        com=np.array([body.com for body in bodies]),
-        inertia=np.array([body.inertia for body in bodies]),
-    )
+    loaded = replace(model, links=Links.of(bodies))
     links = torque_regressor(loaded, q, dq, ddq) @ inertial_parameters(loaded)
-    rotor, viscous, coulomb = np.nan_to_num([model.rotor_inertia, model.viscous, model.coulomb])
+    rotor, viscous, coulomb = np.nan_to_num(
+        [model.drives.rotor_inertia, model.drives.viscous, model.drives.coulomb]
+    )
     scale, smoothing = config.friction.scale, config.friction.coulomb_velocity
     return links + rotor * ddq + scale * (viscous * dq + coulomb * np.tanh(dq / smoothing))

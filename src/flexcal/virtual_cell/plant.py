@@ -213,11 +213,11 @@ def _springs(model: RobotModel, config: CellConfig, names: tuple[str, ...]) -> n
             row = springs[names.index(f"{spring.name}.{('bearing_x', 'bearing_y', 'drive')[component]}")]
             row[:2] = spring.stiffness[component], spring.damping[component]
             if component == 2:
-                row[2] = model.backlash[spring.index]
+                row[2] = model.drives.backlash[spring.index]
                 row[3] = mismatch.cubic_stiffness / TWIST_OF_CUBIC**2
                 row[4] = mismatch.hysteresis * spring.stiffness[component]
     rigid = set(range(model.n)) - {e.index for e in model.elastic}
-    loose = [model.joint_names[i] for i in rigid if model.backlash[i] > 0]
+    loose = [model.joint_names[i] for i in rigid if model.drives.backlash[i] > 0]
     if loose:
         raise FlexcalError(
             "E-CELL-025",
@@ -229,7 +229,8 @@ def _springs(model: RobotModel, config: CellConfig, names: tuple[str, ...]) -> n
 def _frictions(model: RobotModel, config: CellConfig, joints: np.ndarray) -> np.ndarray:
     friction = config.friction
     viscous, coulomb = (
-        friction.scale * np.nan_to_num(values[joints]) for values in (model.viscous, model.coulomb)
+        friction.scale * np.nan_to_num(values[joints])
+        for values in (model.drives.viscous, model.drives.coulomb)
     )
     one = np.ones(len(joints))
     columns = (

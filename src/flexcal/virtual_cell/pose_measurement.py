@@ -51,7 +51,7 @@ def true_poses(
 
 def in_instrument(truth: RobotModel, point: np.ndarray) -> np.ndarray:
     """Points (N, 3) or (3,), m, from the robot's base frame into the first station's."""
-    station = truth.station[0]
+    station = truth.stations.pose[0]
     return station[:3] + point @ vector_rotation(station[3:]).T
 
 
@@ -62,7 +62,7 @@ def measured_poses(
     sensors, mismatch = config.sensors, config.mismatch
     true = true_poses(truth, config, plan, rng)
     size = len(true.q)
-    band = config.friction.scale * np.nan_to_num(truth.coulomb) * (1 + config.friction.stribeck)
+    band = config.friction.scale * np.nan_to_num(truth.drives.coulomb) * (1 + config.friction.stribeck)
     torque = read_torque(sensors, true.torque + band * rng.uniform(-1, 1, true.torque.shape), rng)
     point = true.point + mismatch.repeatability * rng.standard_normal(true.point.shape)
     temperature = None
@@ -70,7 +70,7 @@ def measured_poses(
         share, direction = np.linspace(0, 1, size), rng.standard_normal(3)
         temperature = mismatch.temperature_rise * share
         point = point + share[:, None] * mismatch.temperature_drift * direction / np.linalg.norm(direction)
-    station = truth.config.stations.get(truth.stations[0])
+    station = truth.config.stations.get(truth.stations.names[0])
     seen = in_instrument(truth, point)
     place = None if station is None else station.xyz
     stand = in_instrument(truth, np.zeros(3) if place is None else np.array(place))
@@ -85,7 +85,7 @@ def measured_poses(
         torque=torque,
         payload=true.payload,
         target=np.full(size, truth.point().name),
-        station=np.full(size, truth.stations[0]),
+        station=np.full(size, truth.stations.names[0]),
         temperature=temperature,
         pose=plan.numbers,
     )

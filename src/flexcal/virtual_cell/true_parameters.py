@@ -32,20 +32,23 @@ def draw_truth(model: RobotModel, spread: SpreadConfig, rng: np.random.Generator
 def _draws(model: RobotModel, spread: SpreadConfig, rng: np.random.Generator) -> Iterator[tuple[str, float]]:
     normal = rng.standard_normal
     for i, joint in enumerate(model.joints):
-        yield f"{joint.link}.mass", model.mass[i] * (1 + spread.mass * normal())
+        yield f"{joint.link}.mass", model.links.mass[i] * (1 + spread.mass * normal())
         for k, key in enumerate("xyz"):
-            yield f"{joint.link}.com_{key}", model.com[i, k] + spread.com * normal()
-        if np.isfinite(model.rotor_inertia[i]):
+            yield f"{joint.link}.com_{key}", model.links.com[i, k] + spread.com * normal()
+        if np.isfinite(model.drives.rotor_inertia[i]):
             yield (
                 f"{joint.name}.rotor_inertia",
-                model.rotor_inertia[i] * (1 + spread.rotor_inertia * normal()),
+                model.drives.rotor_inertia[i] * (1 + spread.rotor_inertia * normal()),
             )
-    for owner, values in (*zip(model.joint_names, model.geometry, strict=True), ("tool", model.tool)):
+    for owner, values in (
+        *zip(model.joint_names, model.geometry.errors, strict=True),
+        ("tool", model.geometry.tool),
+    ):
         for k, key in enumerate(GEOMETRY):
             scale = spread.length if key.startswith("length") else spread.angle
             yield f"{owner}.{key}", values[k] + scale * normal()
     for k, key in enumerate("xyz"):
-        yield f"station.{model.stations[0]}.{key}", model.station[0, k] + spread.length * normal()
+        yield f"station.{model.stations.names[0]}.{key}", model.stations.pose[0, k] + spread.length * normal()
     for i in model.backlash_joints:
         yield f"{model.joint_names[i]}.backlash", rng.uniform(*spread.backlash)
     for spring in model.elastic:

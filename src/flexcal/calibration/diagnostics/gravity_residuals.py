@@ -38,7 +38,9 @@ def gravity_loads(fit: Calibration, residuals: Mapping[str, np.ndarray]) -> Grav
     ]
     size = np.linalg.norm(motion, axis=1, keepdims=True)
     direction = np.divide(motion, size, out=np.zeros_like(motion), where=size > 1e-9)
-    turns = {name: vector_rotation(model.station[model.station_index(name)][3:]) for name in poses.stations}
+    turns = {
+        name: vector_rotation(model.stations.pose[model.station_index(name)][3:]) for name in poses.stations
+    }
     turn = np.array([turns[name] for name in poses.station])
     seen = np.matmul(turn, direction)
     masses = carried_mass(model, poses.payload, len(poses))

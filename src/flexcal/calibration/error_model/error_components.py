@@ -114,8 +114,8 @@ def known_scatter(model: RobotModel, *, stated: bool) -> ErrorComponents | None:
 
     A sigma that the calibration did not have is not added: the robot's part there holds the instrument's. None where nothing is known.
     """
-    instrument, share, robot, angular, _, pose, _ = model.scatter
-    if not model.scatter.any():
+    instrument, share, robot, angular, _, pose, _ = model.scatter.std
+    if not model.scatter.std.any():
         return ErrorComponents(share=1.0, robot=0.0) if stated else None
     if not stated:
         share = 1.0 if instrument > 0 else 0.0

@@ -70,4 +70,4 @@ def _names(model: RobotModel, poses: PoseSet) -> list[str]:
 
 def _carried(model: RobotModel, link: int) -> bool:
     """Whether a link hangs on a spring."""
-    return any(joint in model.bearing_frames for joint in model.path_to(link))
+    return any(joint in model.springs.bearing_frames for joint in model.path_to(link))

@@ -79,7 +79,7 @@ class PointFit:
         """
         if not are_different(poses.q, LEAST_POSES):
             terms = tuple(term for term in terms if term != TRANSMISSION)
-        bare = replace(model, station=np.zeros_like(model.station))
+        bare = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
         start = register(model, poses, predict(bare, poses, elastic=elastic).position)
         if "backlash" in terms:
             require_both_flanks(model, predict(start, poses, elastic=elastic).rest.flank)

@@ -46,7 +46,7 @@ def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotMod
     these in its posterior: what the measured points leave open. Both are the
     robot itself where nothing was calibrated.
     """
-    stations = [name for name in model.stations if f"station.{name}.x" in model.posterior.parameters]
+    stations = [name for name in model.stations.names if f"station.{name}.x" in model.posterior.parameters]
     if not stations or not targets:
         return model, model
     names = _names(model, targets, stations)
@@ -54,8 +54,11 @@ def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotMod
     poses = _random_poses(model, targets, stations)
     stiff = replace(
         model,
-        gravity_compliance=np.zeros_like(model.gravity_compliance),
-        lateral_compliance=np.zeros_like(model.lateral_compliance),
+        geometry=replace(
+            model.geometry,
+            gravity_compliance=np.zeros_like(model.geometry.gravity_compliance),
+            lateral_compliance=np.zeros_like(model.geometry.lateral_compliance),
+        ),
     )
     wanted = predict(stiff, poses, elastic=False).position
     scale = np.where(np.isfinite(std), std, 1.0)
@@ -102,9 +105,9 @@ def _names(model: RobotModel, targets: Sequence[str], stations: Sequence[str]) -
     names += [f"tool.{key}" for key in GEOMETRY]
     first = next(iter(model.points))
     names += [f"point.{t}.{axis}" for t in targets if t != first for axis in "xyz"]
-    for k, station in enumerate(model.stations):
+    for k, station in enumerate(model.stations.names):
         if station in stations:
-            turned = bool(model.station[k, 3:].any())
+            turned = bool(model.stations.pose[k, 3:].any())
             names += [f"station.{station}.{key}" for key in STATION[: 6 if turned else 3]]
     return names
 

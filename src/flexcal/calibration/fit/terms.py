@@ -78,7 +78,7 @@ def random_waves(model: RobotModel, poses: PoseSet, free: Parameters) -> dict[st
     every = {
         f"{model.joints[i].name}.{key}": 1.0 / order
         for i in joints
-        for order in model.harmonics
+        for order in model.drives.harmonics
         for key in _keys(f"transmission_{order}")
     }
     return {name: size for name, size in every.items() if name not in free}

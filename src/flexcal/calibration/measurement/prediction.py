@@ -95,8 +95,10 @@ class Prediction:
     def _twist(self, joint: int, key: str) -> np.ndarray:
         """How far a joint turns (N,) with its backlash, gravity compliance, hardening or one wave of its transmission error."""
         if key == "hardening":
-            hardening = self.model.hardening[joint]
-            twist = twist_from_torque(-self.rest.torque[:, joint], self.model.stiffness[joint, 2], hardening)
+            hardening = self.model.springs.hardening[joint]
+            twist = twist_from_torque(
+                -self.rest.torque[:, joint], self.model.springs.stiffness[joint, 2], hardening
+            )
             return twist_by_hardening(twist, hardening)
         if key == "backlash":
             return -self.rest.flank[:, joint]
@@ -132,7 +134,7 @@ class Prediction:
             load = np.zeros(self.rest.compliance.shape[:2])
             stretch = self.rest.deflection[:, axis[0], axis[1]]
             if axis[1] == 2:
-                stretch = -self.rest.torque[:, axis[0]] / self.model.stiffness[axis]
+                stretch = -self.rest.torque[:, axis[0]] / self.model.springs.stiffness[axis]
             load[:, [tuple(a) for a in self.rest.axes].index(axis)] = stretch
             return load
         if key == "mass" or key.startswith("com_"):
@@ -148,8 +150,8 @@ class Prediction:
             i = [joint.link for joint in self.model.joints].index(owner)
             block = self.rest.regressor[:, :, 4 * i : 4 * i + 4]
             if key == "mass":
-                return block[:, :, 0] + block[:, :, 1:] @ self.model.com[i]
-            return self.model.mass[i] * block[:, :, 1 + "xyz".index(key[-1])]
+                return block[:, :, 0] + block[:, :, 1:] @ self.model.links.com[i]
+            return self.model.links.mass[i] * block[:, :, 1 + "xyz".index(key[-1])]
         raise FlexcalError("E-CAL-013", f"the position of a point does not depend on '{name}'.")
 
 
@@ -182,7 +184,7 @@ def predict(
     )
     at, base = np.empty((len(poses), 3)), np.empty((len(poses), 3, 3))
     for name in poses.stations:
-        own, place = poses.station == name, model.station[model.station_index(name)]
+        own, place = poses.station == name, model.stations.pose[model.station_index(name)]
         at[own], base[own] = place[:3], vector_rotation(place[3:])
     position = np.matmul(base, tool.kinematics.position[:, :, None])[:, :, 0] + at
     return Prediction(model, poses, position, base, tool.rest, tool.kinematics)

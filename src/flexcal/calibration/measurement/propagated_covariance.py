@@ -65,10 +65,10 @@ class Propagation:
         model, axes = self.model, np.array(elastic_axes(self.model), dtype=int).reshape(-1, 2)
         loads, regressor, coupling = spring_loads(model, q, self.payload)
         at = point_kinematics(model, q, point=self.target)
-        stiffness = model.stiffness[axes[:, 0], axes[:, 1]]
+        stiffness = model.springs.stiffness[axes[:, 0], axes[:, 1]]
         by_load = at.motion_jacobian[:, :3][:, :, axes[:, 0], axes[:, 1]] / -stiffness
-        if model.hardening.any():
-            hardening = np.where(axes[:, 1] == 2, model.hardening[axes[:, 0]], 0.0)
+        if model.springs.hardening.any():
+            hardening = np.where(axes[:, 1] == 2, model.springs.hardening[axes[:, 0]], 0.0)
             by_load /= tangent_ratio(twist_from_torque(loads, stiffness, hardening), hardening)[:, None]
         by_geometry = at.geometry_jacobian[:, :3]
         by_geometry[:, :, : 6 * model.n] += np.matmul(by_load, coupling)
@@ -109,8 +109,10 @@ class Propagation:
             elif kind == "gravity_compliance":
                 columns[:, k] = -torque[:, joint]
             elif kind == "hardening":
-                hardening = self.model.hardening[joint]
-                twist = twist_from_torque(-torque[:, joint], self.model.stiffness[joint, 2], hardening)
+                hardening = self.model.springs.hardening[joint]
+                twist = twist_from_torque(
+                    -torque[:, joint], self.model.springs.stiffness[joint, 2], hardening
+                )
                 columns[:, k] = twist_by_hardening(twist, hardening)
             elif kind in LATERAL:
                 columns[:, k] = 0.0
@@ -148,7 +150,7 @@ class Propagation:
 
     def _by_station(self, position: np.ndarray) -> np.ndarray:
         """∂(point seen from the station, turned into the base frame)/∂(x, y, z, rx, ry, rz of the station), (N, 3, 6)."""
-        place = self.model.station[self.model.station_index(self.station)]
+        place = self.model.stations.pose[self.model.station_index(self.station)]
         turn = vector_rotation(place[3:])
         axes = turn.T @ left_jacobian(place[3:])
         result = np.empty((len(position), 3, 6))
@@ -172,7 +174,7 @@ def propagation(
             "E-CAL-014", f"no estimated parameter of {model.name} that moves a point; calibrate it first."
         )
     mass = float(carried_mass(model, None if payload is None else np.array([payload]), 1)[0])
-    place = model.stations[0] if station is None else station
+    place = model.stations.names[0] if station is None else station
     root = covariance_root(model, names)
     n, axes = model.n, elastic_axes(model)
     owners = [*model.joint_names, "tool"]
@@ -207,9 +209,9 @@ def propagation(
             rows[own : own + 4] += np.outer(moments, row)
         elif owner in links:
             i = links.index(owner)
-            moments = np.array([1.0, *model.com[i]]) if key == "mass" else np.zeros(4)
+            moments = np.array([1.0, *model.links.com[i]]) if key == "mass" else np.zeros(4)
             if key != "mass":
-                moments[1 + "xyz".index(key[-1])] = model.mass[i]
+                moments[1 + "xyz".index(key[-1])] = model.links.mass[i]
             rows[body + 4 * i : body + 4 * i + 4] += np.outer(moments, row)
     return Propagation(model, name, mass, place, tuple(twists), rows)
 

@@ -84,12 +84,12 @@ def candidates(model: RobotModel, poses: PoseSet) -> CandidateTerms:
         else:
             model = wider
             kinds.append("backlash")
-    kinds += [f"transmission_{order}" for order in model.harmonics]
+    kinds += [f"transmission_{order}" for order in model.drives.harmonics]
     return CandidateTerms(model, tuple(kinds), single, tuple(excluded))
 
 
 def _without_load(model: RobotModel) -> str:
-    if not model.mass.any() and not model.payload_mass.any():
+    if not model.links.mass.any() and not model.payload_mass:
         return f"{model.urdf.name} gives its links no mass, so gravity torques are not known; add <inertial> elements to consider it"
     if not np.any(model.gravity):
         return "robot.yaml says that there is no gravity"

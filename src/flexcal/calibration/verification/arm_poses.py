@@ -58,7 +58,7 @@ def joint_polylines(model: RobotModel, poses: PoseSet) -> np.ndarray:
 
     def place(index: int, rotation: np.ndarray, translation: np.ndarray, xyz: np.ndarray) -> np.ndarray:
         frame = np.ascontiguousarray(rotation), np.ascontiguousarray(translation)
-        geometry = np.ascontiguousarray(model.geometry)
+        geometry = np.ascontiguousarray(model.geometry.errors)
         return model.tree.point(index, frame[0], frame[1], xyz, geometry, np.zeros(6), q, still, False)[0]
 
     origins = [place(k, np.eye(3), np.zeros(3), np.zeros(3)) for k in model.path_to(target.joint)]

@@ -103,7 +103,9 @@ def _placed(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) -> RobotMo
     """The robot with what is refitted placed by all poses."""
     if "station" not in what:
         return _points_found(model, poses)
-    base = predict(replace(model, station=np.zeros_like(model.station)), poses)
+    base = predict(
+        replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose))), poses
+    )
     at, turned = base.position, base.kinematics.orientation
     placement = best_placement(poses, at, turned) if "point" in what else rigid_placement(poses, at)
     return model.with_values(placement.values(model))

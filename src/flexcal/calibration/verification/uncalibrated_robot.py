@@ -87,7 +87,7 @@ def uncalibrated_model(model: RobotModel, poses: PoseSet) -> UncalibratedRobot:
     """
     for station in poses.stations:
         model.station_index(station)
-    at_base = replace(model, station=np.zeros_like(model.station))
+    at_base = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
     declared = _declared(at_base, poses)
     if not can_register(poses):
         return UncalibratedRobot(declared, None, None)

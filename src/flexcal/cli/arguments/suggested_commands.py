@@ -39,7 +39,7 @@ def after_dynamics(robot: Path, model: RobotModel, loaded: str) -> str:
     springs = f"flexcal design frequency {robot} --out frequency.yaml"
     poses = f"flexcal design poses {robot} --count 40 --out poses.yaml"
     onward = springs if model.elastic else poses
-    if model.nominal_payload is None:
+    if model.payload is None:
         return onward
     return f"{loaded}; or, where the declared payload is weighed, {onward}"
 

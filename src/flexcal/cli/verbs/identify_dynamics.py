@@ -171,7 +171,7 @@ class IdentifyDynamics:
         if dynamics.bodiless:
             return f"{verb} --estimator sdp" + (f" --hold-out {self.hold_out}" if self.hold_out else "")
         urdf = f"flexcal export urdf {self.robot}{where} --out identified.urdf"
-        return urdf if model.nominal_payload is None else f"{payload}; or {urdf}"
+        return urdf if model.payload is None else f"{payload}; or {urdf}"
 
 
 def _share(text: str) -> float:

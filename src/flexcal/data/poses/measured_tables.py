@@ -192,4 +192,4 @@ def _check_measured(file: TableFile, model: RobotModel, place: str) -> None:
 
 
 def _first_station(model: RobotModel) -> str:
-    return next(iter(getattr(model, "stations", ())), "tracker")
+    return model.stations.names[0]

@@ -142,8 +142,8 @@ def _check_once(table: Table, pose: np.ndarray) -> None:
 
 def _check_stations(table: Table, model: RobotModel) -> None:
     for row, name in enumerate(table.columns["station"].tolist()):
-        if name not in model.stations:
-            known = ", ".join(model.stations)
+        if name not in model.stations.names:
+            known = ", ".join(model.stations.names)
             raise table.error(
                 "E-POSES-030", row, "station", f"there is no station '{name}' in robot.yaml; it has {known}."
             )

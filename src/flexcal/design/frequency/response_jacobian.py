@@ -173,7 +173,7 @@ def pose_response(
         )
     frequencies = plan.frequencies_hz
     rubbing = [f"{joint.name}.viscous" for joint in model.driven]
-    viscous = np.nan_to_num(model.viscous[list(plan.joints)]) + friction.viscous
+    viscous = np.nan_to_num(model.drives.viscous[list(plan.joints)]) + friction.viscous
     robot = model.with_values(dict(zip(rubbing, viscous, strict=True)))
     own = [name for name in parameters.names if _in_linearisation(name)]
     arm_sensors = tuple(model.sensors.values())

@@ -56,7 +56,7 @@ class FrictionDisturbance:
         F (sgn(V + v) - sgn(V - v)) / 2 = F sgn(v) where |v| > |V|, else 0.
         """
         axes = [joint.index for joint in robot.driven]
-        coulomb = np.nan_to_num(robot.coulomb[axes])
+        coulomb = np.nan_to_num(robot.drives.coulomb[axes])
         frequencies, lines = plan.frequencies_hz, np.asarray(plan.lines)
         samples = 1 << int(np.ceil(np.log2(_SAMPLES_PER_LINE * lines.max())))
         time = np.arange(samples) / (samples * plan.base_frequency_hz)

@@ -39,7 +39,7 @@ def geometry_jacobian(
     its gravity torque times its twist column. The arm is undeflected; the axes are the base's (the rank does not depend on the
     station's orientation). Raises `FlexcalError` for an unknown point or station.
     """
-    station = setup.station or model.stations[0]
+    station = setup.station or model.stations.names[0]
     motion = point_kinematics(model, q, point=setup.point)
     target = model.point(setup.point)
     names = [f"station.{station}.{axis}" for axis in "xyz"]

@@ -22,12 +22,12 @@ def station_position(model: RobotModel, station: str | None = None) -> np.ndarra
     Raises `FlexcalError` for an unknown name.
     """
     declared = model.config.stations
-    if station is not None and station not in model.stations:
+    if station is not None and station not in model.stations.names:
         raise FlexcalError(
             "E-DESIGN-040",
-            f"there is no station '{station}' in {model.path}; there are {', '.join(model.stations)}.",
+            f"there is no station '{station}' in {model.path}; there are {', '.join(model.stations.names)}.",
         )
-    entry = declared.get(model.stations[0] if station is None else station)
+    entry = declared.get(model.stations.names[0] if station is None else station)
     return None if entry is None or entry.xyz is None else np.array(entry.xyz)
 
 
@@ -48,7 +48,7 @@ def visible(checker: CollisionChecker, q: np.ndarray, setup: MeasuringSetup = ST
         axis = np.array(setup.acceptance.axis) / np.linalg.norm(setup.acceptance.axis)
         cosine = np.einsum("sij,j,si->s", target.orientation, axis, towards)
         seen = cosine >= np.cos(setup.acceptance.half_angle) * np.linalg.norm(towards, axis=1)
-    if model.config.stations[setup.station or model.stations[0]].line_of_sight:
+    if model.config.stations[setup.station or model.stations.names[0]].line_of_sight:
         left = np.flatnonzero(seen)
         seen[left] = ~line_of_sight_blocked(
             checker, q[left], origin, target.position[left], BEAM_RADIUS, TARGET_CLEARANCE

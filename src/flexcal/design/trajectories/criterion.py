@@ -159,11 +159,11 @@ def declared_unknowns(columns: BaseRegressor, free: tuple[str, ...] = ()) -> Unk
     names = uncertain_inertials(model, range(model.n))
     names += [
         f"{joint}.rotor_inertia"
-        for joint, value in zip(model.joint_names, model.rotor_inertia, strict=True)
+        for joint, value in zip(model.joint_names, model.drives.rotor_inertia, strict=True)
         if value > 0
     ]
     names += [f"{joint}.{key}" for key in DRIVE[1:] for joint in model.joint_names]
-    payload = model.nominal_payload
+    payload = model.payload
     if payload is not None and payload.mass_std > 0 and columns.payload is None:
         names.append("payload.mass")
     names += [name for name in free if name not in names]

@@ -115,7 +115,7 @@ class ExcitationProblem:
     @property
     def _drive_share(self) -> np.ndarray:
         """What Coulomb friction leaves of the motor torques (n,)."""
-        return self.limits.torque - np.nan_to_num(self.columns.model.coulomb)
+        return self.limits.torque - np.nan_to_num(self.columns.model.drives.coulomb)
 
     def uses(self, motion: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Share (4, N, n) of what is allowed that positions, velocities, accelerations and motor torques take, between -1 and 1."""

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from flexcal.estimation import Identifiability, analyse
-from flexcal.model.robot import RobotModel, carried_inertias
+from flexcal.model.robot import Links, RobotModel, carried_inertias
 from flexcal.model.torques import (
     inertial_names,
     inertial_parameters,
@@ -69,14 +69,10 @@ class BaseRegressor:
     def values(self) -> np.ndarray:
         """The model's values of all columns (p,), what it holds included and unknown friction zero."""
         bodies = carried_inertias(self.model, self.payload)
-        loaded = replace(
-            self.model,
-            mass=np.array([body.mass for body in bodies]),
-            com=np.array([body.com for body in bodies]),
-            inertia=np.array([body.inertia for body in bodies]),
-        )
-        drives = np.nan_to_num([getattr(self.model, key) for key in DRIVE])
-        return np.concatenate([inertial_parameters(loaded), drives.ravel()])
+        loaded = replace(self.model, links=Links.of(bodies))
+        own = self.model.drives
+        drives = np.concatenate([own.rotor_inertia, own.viscous, own.coulomb, own.torque_offset])
+        return np.concatenate([inertial_parameters(loaded), np.nan_to_num(drives)])
 
     @cached_property
     def base_values(self) -> np.ndarray:

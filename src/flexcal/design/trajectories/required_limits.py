@@ -22,7 +22,7 @@ def require_stated_limits(model: RobotModel) -> None:
                 f"{model.urdf}: {_listed(lacking)} {'have' if len(lacking) > 1 else 'has'} no limit of {key}, so no motion can be designed "
                 f"within it; write `{key}=` ({unit}) of the data sheet into <limit>.",
             )
-    if not model.mass.any():
+    if not model.links.mass.any():
         raise InputError(
             "E-DESIGN-052",
             f"{model.urdf}: no link has a mass, so motor torques along a motion are unknown; add <inertial> to the links, even with rough "
@@ -43,10 +43,15 @@ COULOMB, VISCOUS = 0.1, 0.2
 def with_assumed_friction(model: RobotModel) -> tuple[RobotModel, tuple[str, ...]]:
     """The model with these values where it has none, and the names of those joints."""
     effort, velocity = np.array([(joint.effort, joint.velocity) for joint in model.joints]).T
-    unknown = np.isnan(model.coulomb) | np.isnan(model.viscous)
+    unknown = np.isnan(model.drives.coulomb) | np.isnan(model.drives.viscous)
     filled = replace(
         model,
-        coulomb=np.where(np.isnan(model.coulomb), COULOMB * effort, model.coulomb),
-        viscous=np.where(np.isnan(model.viscous), VISCOUS * effort / velocity, model.viscous),
+        drives=replace(
+            model.drives,
+            coulomb=np.where(np.isnan(model.drives.coulomb), COULOMB * effort, model.drives.coulomb),
+            viscous=np.where(
+                np.isnan(model.drives.viscous), VISCOUS * effort / velocity, model.drives.viscous
+            ),
+        ),
     )
     return filled, tuple(name for name, none in zip(model.joint_names, unknown, strict=True) if none)

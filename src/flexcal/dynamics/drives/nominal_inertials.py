@@ -61,6 +61,8 @@ def _deviations(observation: Observation) -> np.ndarray:
     for number, joint in enumerate(model.joints):
         for axis, key in enumerate(("Ixx", "Iyy", "Izz")):
             column = np.zeros(len(names))
-            column[names.index(f"{joint.link}.{key}")] = model.prior.mass * model.inertia[number, axis, axis]
+            column[names.index(f"{joint.link}.{key}")] = (
+                model.prior.mass * model.links.inertia[number, axis, axis]
+            )
             columns.append(column)
     return np.array(columns).T

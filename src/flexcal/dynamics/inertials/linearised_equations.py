@@ -37,7 +37,9 @@ def unknowns(model: RobotModel) -> tuple[Parameters, tuple[str, ...]]:
     errors and what friction does at a reversal. Raises `FlexcalError` where a rotor inertia is missing.
     """
     lacking = [
-        name for name, value in zip(model.joint_names, model.rotor_inertia, strict=True) if not value > 0
+        name
+        for name, value in zip(model.joint_names, model.drives.rotor_inertia, strict=True)
+        if not value > 0
     ]
     if lacking:
         raise FlexcalError(
@@ -136,7 +138,7 @@ def drive_rows(model: RobotModel, motion: PeriodicMotion) -> Iterator[tuple[str,
 def _reversals(model: RobotModel, motion: PeriodicMotion) -> Iterator[tuple[str, int, np.ndarray]]:
     """The same of what friction does at a reversal."""
     dq = motion.states(motion.samples)[1]
-    rounded = np.nan_to_num(model.coulomb) * (np.tanh(dq / _REVERSAL_VELOCITY) - np.sign(dq))
+    rounded = np.nan_to_num(model.drives.coulomb) * (np.tanh(dq / _REVERSAL_VELOCITY) - np.sign(dq))
     for joint, name in enumerate(model.joint_names):
         yield _reversal(name), joint, motion.rows(rounded[:, joint])
 

@@ -35,7 +35,7 @@ class TiltedBearings:
             nominal = model.joints[joint]
             first = number == 0 or self.coordinates[number - 1][0] != joint
             offset, turn = joint_placement(model, joint) if first else (np.zeros(3), np.eye(3))
-            own = model.bearing_frames.get(joint)
+            own = model.springs.bearing_frames.get(joint)
             frame = bearing_frame(nominal) if own is None else own
             parents.append(number - 1 if not first else last[nominal.parent] if nominal.parent >= 0 else -1)
             slides.append(nominal.kind == "prismatic")
@@ -49,7 +49,7 @@ class TiltedBearings:
         self._geometry = np.zeros((len(self.coordinates), 6))
         for number, (joint, component) in enumerate(self.coordinates):
             if component == 2:
-                self._geometry[number, 0] = model.geometry[joint, 0]
+                self._geometry[number, 0] = model.geometry.errors[joint, 0]
 
     def __reduce__(self) -> tuple[type[TiltedBearings], tuple[RobotModel, tuple[int, ...]]]:
         """The kernels' view is built anew where it arrives: other processes can be handed arms."""

@@ -92,7 +92,10 @@ def identify_payload(equations: PayloadEquations) -> PayloadFit:
             "the payload's mass is not identifiable beside the robot's own inertia in this motion; move the joints that lift "
             "it, or give --free logs.",
         )
-    most, robot = 2 * float(solution.values[0]) - least, float(equations.data.observation.model.mass.sum())
+    most, robot = (
+        2 * float(solution.values[0]) - least,
+        float(equations.data.observation.model.links.mass.sum()),
+    )
     if most < -_UNSEEN * robot:
         raise FlexcalError(
             "E-DYN-021",

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from flexcal.dynamics.inverse_model import Memory, Observation
@@ -27,7 +25,7 @@ class RigidRobotSimulator:
 
         self.model, self.name = observation.model, name
         links = len(LINK_PARAMETERS) * self.model.n
-        rigid = replace(self.model, bearing_frames={})
+        rigid = self.model.without_springs()
         self._arm = ElasticArm(rigid, 0.0)
         for body, turn, own in zip(
             self._arm.bodies,
@@ -72,7 +70,7 @@ class RigidRobotSimulator:
         return links + self._drive(time, q, dq, before, self._memory) + self.rotors @ (ddq - before)
 
     def _at(self, q: np.ndarray) -> np.ndarray:
-        return q + self.model.geometry[:, 0]
+        return q + self.model.geometry.errors[:, 0]
 
     def _drive(
         self, time: float, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, memory: Memory

@@ -86,7 +86,7 @@ def with_fitting_bearings(
     better = comparison.preferred or model.bearings
     robot, fit = complete(*begun[better])
     ended = {better: (robot, fit)}
-    if robot.braked != model.braked:
+    if robot.springs.braked != model.springs.braked:
         worse: Bearings = "before" if better == "after" else "after"
         robot = robot.with_bearings(worse)
         try:

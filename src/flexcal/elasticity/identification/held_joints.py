@@ -37,7 +37,7 @@ class CompliantHeldJoints:
         rigid = [
             i
             for i, joint in enumerate(model.joints)
-            if i not in model.bearing_frames and joint.kind == "revolute"
+            if i not in model.springs.bearing_frames and joint.kind == "revolute"
         ]
         if not rigid:
             return cls({})

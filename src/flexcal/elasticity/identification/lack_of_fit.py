@@ -97,7 +97,7 @@ def implausible_springs(fit: ResponseFit) -> tuple[str, ...]:
 
 def _moved(robot: RobotModel, name: str, value: float) -> float:
     """Distance of the logarithm of a stiffness from robot.yaml's; 0 for one that robot.yaml does not declare."""
-    if robot.joint_index(name.split(".")[0]) in robot.braked:
+    if robot.joint_index(name.split(".")[0]) in robot.springs.braked:
         return 0.0
     return abs(float(np.log(value / robot.value(name))))
 

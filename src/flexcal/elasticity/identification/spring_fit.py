@@ -224,7 +224,9 @@ def _searched_fit(
     )
     first = first_fit(model, data, x)
     if find_misfit(first, data.responses) is not None:
-        rotors = {held_inertia_name(e.name): float(model.rotor_inertia[e.index]) for e in model.elastic}
+        rotors = {
+            held_inertia_name(e.name): float(model.drives.rotor_inertia[e.index]) for e in model.elastic
+        }
         moving = [(item.name, rotors.get(item.name, item.value)) for item in parameters.with_coordinates(x)]
         second = first_fit(model, data, parameters.coordinates(dict(moving)))
         first = min(first, second, key=lambda fit: fit.estimate.reduced_chi2)

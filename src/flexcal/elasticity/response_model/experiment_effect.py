@@ -46,8 +46,8 @@ def _effect(
     known, payload = pose.values(model.robot, natural)
     robot = model.robot.with_values(known)
     axes = [joint.index for joint in robot.driven]
-    excess = np.maximum(robot.viscous - np.nan_to_num(model.robot.viscous), 0.0)
-    strength = np.where(model.robot.coulomb > 0, excess, 0.0)[axes]
+    excess = np.maximum(robot.drives.viscous - np.nan_to_num(model.robot.drives.viscous), 0.0)
+    strength = np.where(model.robot.drives.coulomb > 0, excess, 0.0)[axes]
     sensors = pose.placed(natural)
     system = linearise(robot, pose.q, payload, sensors=sensors)
     pulses = FrictionPulses.of(system, pose.frequencies_hz, reference, strength)

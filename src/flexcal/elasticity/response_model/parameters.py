@@ -78,7 +78,7 @@ def stiffness_parameters(
             Parameter(
                 backlash_name(joint.name),
                 "rad",
-                float(model.backlash[joint.index]),
+                float(model.drives.backlash[joint.index]),
                 lower=0.0,
                 prior_std=HALF_GAP_STD,
             )
@@ -90,7 +90,7 @@ def stiffness_parameters(
             Parameter(
                 name := hardening_name(joint.name),
                 unit_of(name),
-                float(model.hardening[joint.index]),
+                float(model.springs.hardening[joint.index]),
                 lower=0.0,
                 prior_std=HARDENING_STD,
             )
@@ -104,8 +104,8 @@ def held_inertias(model: RobotModel) -> list[Parameter]:
     holds the motor in place of a brake. Joints whose rotor inertia is not declared have none."""
     items = []
     for joint in model.elastic:
-        rotor = float(model.rotor_inertia[joint.index])
-        if joint.index in model.braked and rotor > 0:
+        rotor = float(model.drives.rotor_inertia[joint.index])
+        if joint.index in model.springs.braked and rotor > 0:
             items.append(Parameter(held_inertia_name(joint.name), "kg m²", 0.0, lower=0.0, prior_std=rotor))
     return items
 

@@ -85,7 +85,7 @@ class PoseModel:
                 known[name] = known.get(name, robot.value(name)) * float(kept[axis])
         payload = self.payload
         if payload is not None and payload > 0 and "payload.mass" in known:
-            payload *= known["payload.mass"] / float(robot.payload_mass[0])
+            payload *= known["payload.mass"] / robot.payload_mass
             known["payload.mass"] = payload
         return known, payload
 
@@ -145,7 +145,7 @@ class ResponseModel:
         cls, robot: RobotModel, responses: Sequence[FrequencyResponse], parameters: Parameters
     ) -> ResponseModel:
         """For the poses and lines of measured responses; hardening is a parameter's or none."""
-        robot = replace(robot, hardening=np.zeros(robot.n))
+        robot = replace(robot, springs=replace(robot.springs, hardening=np.zeros(robot.n)))
         labels = pose_labels(responses)
         own = {
             viscous_name(joint.name, label): (f"{joint.name}.viscous", label)

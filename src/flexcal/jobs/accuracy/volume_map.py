@@ -168,7 +168,7 @@ def map_accuracy(
     require_distinct_files(verification)
     calibrated = calibrated_robot(robot, estimates, "map")
     model = calibrated.model
-    stations = [s for s in model.stations if is_station_identified(model, s)]
+    stations = [s for s in model.stations.names if is_station_identified(model, s)]
     reach = propagation(model, station=stations[0] if stations else None, payload=payload)
     scale, before, study, fitted, sample = _verified(calibrated, verification)
     rng = np.random.default_rng([seed, 7])

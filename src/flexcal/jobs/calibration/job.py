@@ -324,7 +324,7 @@ def _terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str, ...] | 
     asked = tuple(given) if given else ((declared,) if isinstance(declared, str) else declared)
     if asked == (AUTO,):
         return None
-    harmonics = tuple(f"transmission_{order}" for order in model.harmonics)
+    harmonics = tuple(f"transmission_{order}" for order in model.drives.harmonics)
     known = ("kinematic", "backlash", *PER_JOINT, TRANSMISSION, *harmonics)
     for term in asked:
         owner, _, kind = term.rpartition(".")

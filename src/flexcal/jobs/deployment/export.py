@@ -38,7 +38,7 @@ class Exportable:
         """Joints whose zeros the measured points do not tell; before an instrument with a frame of its own the base is anywhere."""
         if not self.measured:
             return ()
-        registered = bool(self.model.station[:, 3:].any())
+        registered = bool(self.model.stations.pose[:, 3:].any())
         return undetermined_offsets(self.nominal, self.measured, base=registered)
 
 

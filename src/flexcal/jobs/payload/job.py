@@ -97,7 +97,7 @@ class RobotPayload:
                 "per_joint": dict(zip(joints, 100 * fit.joint_errors, strict=True)),
             },
             "torque_units": torque_units(self.declared),
-            "robot_mass_kg": float(self.declared.mass.sum()),
+            "robot_mass_kg": float(self.declared.links.mass.sum()),
             "body_rise": fit.rise,
             "other_payloads": other_payloads(fit.estimate, self.blocks),
             "signals": dict(self.signals),
@@ -238,7 +238,7 @@ def identify_robot_payload(
 
 def _held(model: RobotModel, frame: str) -> tuple[RobotModel, str]:
     """The robot with a payload in its frame, and that frame."""
-    declared = model.nominal_payload
+    declared = model.payload
     if declared is None:
         place = frame or last_frame(model)
         return with_payload(model, place, 1.0, np.zeros(3), np.zeros((3, 3))), place

@@ -176,7 +176,9 @@ def _remarks(model: RobotModel) -> list[str]:
     from flexcal.design.scene import CollisionChecker
 
     remarks = []
-    massless = [joint.link for joint, mass in zip(model.joints, model.mass, strict=True) if not mass > 0]
+    massless = [
+        joint.link for joint, mass in zip(model.joints, model.links.mass, strict=True) if not mass > 0
+    ]
     if massless:
         remarks.append(
             f"the URDF gives no mass to what {', '.join(massless)} carries: deflection under its weight cannot be computed"

@@ -104,4 +104,4 @@ def _moves(estimate: Estimate, joint: str, model: RobotModel) -> bool:
         return False
     value, number = estimate.values[name], estimate.parameters.index(name)
     std = float(np.sqrt(estimate.covariance[number, number]))
-    return value > 0.5 * float(model.rotor_inertia[model.joint_index(joint)]) and value > 3 * std
+    return value > 0.5 * float(model.drives.rotor_inertia[model.joint_index(joint)]) and value > 3 * std

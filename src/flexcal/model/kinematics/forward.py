@@ -54,15 +54,15 @@ def point_kinematics(
     target = model.point(point)
     moved = np.zeros((*q.shape, 3)) if deflection is None else np.ascontiguousarray(deflection, dtype=float)
     first = target.name == next(iter(model.points))
-    error = model.tool[3:] if first else np.zeros(3)
-    own = model.point_error[list(model.points).index(target.name)]
-    tool = np.concatenate([model.tool[:3], error])
+    error = model.geometry.tool[3:] if first else np.zeros(3)
+    own = model.geometry.point_error[list(model.points).index(target.name)]
+    tool = np.concatenate([model.geometry.tool[:3], error])
     position, orientation, geometry, motion = model.tree.point(
         target.joint,
         np.ascontiguousarray(target.rotation),
         np.ascontiguousarray(target.translation),
         target.xyz + own,
-        np.ascontiguousarray(model.geometry),
+        np.ascontiguousarray(model.geometry.errors),
         tool,
         q,
         moved,

@@ -20,7 +20,7 @@ def link_frames(model: RobotModel, q: np.ndarray) -> tuple[np.ndarray, np.ndarra
     origin = np.empty((len(q), model.n, 3))
     for i, joint in enumerate(model.joints):
         shift, turn = joint_placement(model, i)
-        moved = q[:, i] + model.geometry[i, 0]
+        moved = q[:, i] + model.geometry.errors[i, 0]
         if joint.parent < 0:
             turned, origin[:, i] = np.broadcast_to(turn, (len(q), 3, 3)), shift
         else:

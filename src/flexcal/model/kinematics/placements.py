@@ -15,8 +15,8 @@ from flexcal.model.robot import RobotModel
 
 def joint_placement(model: RobotModel, joint: int) -> tuple[np.ndarray, np.ndarray]:
     """Position (3,) m and rotation (3, 3) of a joint in its parent link, before its motion and offset."""
-    nominal, (_, first, second) = model.joints[joint], model.geometry[joint, :3]
-    length = np.zeros(3) if nominal.parent < 0 else model.geometry[nominal.parent, 3:]
+    nominal, (_, first, second) = model.joints[joint], model.geometry.errors[joint, :3]
+    length = np.zeros(3) if nominal.parent < 0 else model.geometry.errors[nominal.parent, 3:]
     turn = axis_rotation(nominal.normals[1], second) @ axis_rotation(nominal.normals[0], first)
     return nominal.translation + length, nominal.rotation @ turn
 
@@ -24,7 +24,7 @@ def joint_placement(model: RobotModel, joint: int) -> tuple[np.ndarray, np.ndarr
 def link_placement(model: RobotModel, joint: int, q: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Position (3,) m and rotation (3, 3) of a joint's link in the parent link with the motor at `q` (rad or m), undeflected."""
     position, rotation = joint_placement(model, joint)
-    axis, motion = model.joints[joint].axis, q + model.geometry[joint, 0]
+    axis, motion = model.joints[joint].axis, q + model.geometry.errors[joint, 0]
     if model.joints[joint].kind == "prismatic":
         return position + rotation @ axis * motion, rotation
     return position, rotation @ axis_rotation(axis, motion)
@@ -34,19 +34,21 @@ def bearing_placement(model: RobotModel, spring: ElasticJoint, q: float = 0.0) -
     """Axes (3, 3) about which the bearing tilts, and the joint's, in the axes of its link at `link_placement`."""
     if not spring.tilts_first:
         return spring.frame
-    motion = q + model.geometry[spring.index, 0]
+    motion = q + model.geometry.errors[spring.index, 0]
     return axis_rotation(model.joints[spring.index].axis, -motion) @ spring.frame
 
 
 def point_placement(model: RobotModel, name: str) -> tuple[int, np.ndarray, np.ndarray]:
     """Joint whose link carries a target, its position (3,) m and frame (3, 3) in that link, with the errors of link and tool."""
     point = model.point(name)
-    tool, own = model.tool, model.point_error[list(model.points).index(name)]
+    tool, own = model.geometry.tool, model.geometry.point_error[list(model.points).index(name)]
     x, y, z = np.eye(3)
     turn = axis_rotation(y, tool[2]) @ axis_rotation(x, tool[1]) @ axis_rotation(z, tool[0])
     rotation = point.rotation @ turn
     length = tool[3:] if name == next(iter(model.points)) else np.zeros(3)
-    position = point.translation + model.geometry[point.joint, 3:] + rotation @ (point.xyz + own + length)
+    position = (
+        point.translation + model.geometry.errors[point.joint, 3:] + rotation @ (point.xyz + own + length)
+    )
     return point.joint, position, rotation
 
 

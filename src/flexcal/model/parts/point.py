@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from flexcal.model.parts.inertia import Inertia
+
+_PARAMETERS = ("mass", "com_x", "com_y", "com_z", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +28,8 @@ class Point:
 class Payload:
     """A body held in a frame that sits at `rotation`, `translation` in the link of joint `joint`.
 
-    `mass` kg with standard deviation `mass_std`, `com` (3,) in the frame, `inertia` (3, 3) about the centre of mass in frame axes.
+    `mass` kg, `com` (3,) in the frame, `inertia` (3, 3) about the centre of mass in frame axes; `nominal_mass` kg is the declared one, with
+    standard deviation `mass_std`.
     """
 
     frame: str
@@ -33,6 +37,7 @@ class Payload:
     rotation: np.ndarray
     translation: np.ndarray
     mass: float
+    nominal_mass: float
     mass_std: float
     com: np.ndarray
     inertia: np.ndarray
@@ -46,6 +51,21 @@ class Payload:
     def moments(self) -> np.ndarray:
         """Ixx, Ixy, Ixz, Iyy, Iyz, Izz (6,) of `inertia`."""
         return self.inertia[np.triu_indices(3)]
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Its ten parameters by name: mass, com_x … com_z, and Ixx … Izz about the centre of mass."""
+        return dict(zip(_PARAMETERS, map(float, [self.mass, *self.com, *self.moments]), strict=True))
+
+    def with_values(self, values: Mapping[str, float]) -> Payload:
+        """The payload with some of `values` changed; where the mass is, the inertia that is not named scales with it."""
+        mass = values.get("mass", self.mass)
+        moments = self.moments * (mass / self.mass) if self.mass > 0 else self.moments
+        unnamed = dict(zip(_PARAMETERS, [mass, *self.com, *moments], strict=True))
+        changed = np.array([values.get(key, value) for key, value in unnamed.items()])
+        inertia = np.empty((3, 3))
+        inertia[np.triu_indices(3)] = inertia.T[np.triu_indices(3)] = changed[4:]
+        return replace(self, mass=float(mass), com=changed[1:4], inertia=inertia)
 
     @property
     def com_in_link(self) -> np.ndarray:

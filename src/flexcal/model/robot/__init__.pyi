@@ -1,6 +1,7 @@
 from .arm_sensor import ArmSensor, mounting_names, sensitivity_name, sensor_column, sensor_delay_name
 from .attached_payload import carried_inertias, last_frame, with_payload, with_point_at_frame
 from .config import AcceptanceConfig, DynamicsConfig, RobotConfig, SignalConfig
+from .parameter_groups import Links, Stations
 from .parameter_names import (
     FRICTION_PARAMETERS,
     GEOMETRY,
@@ -55,10 +56,12 @@ __all__ = [
     "AcceptanceConfig",
     "ArmSensor",
     "DynamicsConfig",
+    "Links",
     "Posterior",
     "RobotConfig",
     "RobotModel",
     "SignalConfig",
+    "Stations",
     "carried_inertias",
     "declared_parameter",
     "elastic_inertials",

@@ -30,14 +30,8 @@ def with_payload(
     joint moves.
     """
     place = _moving_frame(model, frame)
-    payload = Payload(frame, place.joint, place.rotation, place.translation, mass, 0.0, com, inertia)
-    return replace(
-        model,
-        nominal_payload=payload,
-        payload_mass=np.array([mass]),
-        payload_com=np.array(com),
-        payload_inertia=payload.moments,
-    )
+    payload = Payload(frame, place.joint, place.rotation, place.translation, mass, mass, 0.0, com, inertia)
+    return replace(model, payload=payload)
 
 
 def carried_inertias(model: RobotModel, payload: float | None = None) -> tuple[Inertia, ...]:
@@ -78,10 +72,11 @@ def with_point_at_frame(model: RobotModel, frame: str) -> RobotModel:
         )
     place = _moving_frame(model, frame)
     point = Point(frame, frame, place.joint, place.rotation, place.translation, np.zeros(3))
+    errors = np.vstack([model.geometry.point_error, np.zeros(3)])
     return replace(
         model,
         points=MappingProxyType({**model.points, frame: point}),
-        point_error=np.vstack([model.point_error, np.zeros(3)]),
+        geometry=replace(model.geometry, point_error=errors),
     )
 
 

@@ -1,11 +1,11 @@
-"""Reading of robot.yaml and URDF into the parts of a robot model."""
+"""Reading of robot.yaml and URDF into a robot model."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,21 +23,22 @@ from flexcal.model.parts import (
 )
 from flexcal.model.robot.arm_sensor import ArmSensor
 from flexcal.model.robot.config import ElasticConfig, RobotConfig
+from flexcal.model.robot.parameter_groups import Drives, Geometry, Links, Scatter, Springs, Stations
 from flexcal.model.robot.parameter_names import COUPLED, FRICTION_PARAMETERS, PARALLEL, SCATTER
 from flexcal.model.urdf import Description, Frame, read_urdf
+
+if TYPE_CHECKING:
+    from flexcal.model.robot.robot_model import RobotModel
 
 HARMONICS = (1, 2, 3)
 
 
-def robot_parts(path: Path) -> dict[str, Any]:
-    """Arguments of `RobotModel` for a robot.yaml and its URDF; raises `InputError` with file and line where they do not fit."""
+def read_robot(robot_type: type[RobotModel], path: Path) -> RobotModel:
+    """A robot of a robot.yaml and its URDF; raises `InputError` with file and line where they do not fit."""
     file = read_yaml_file(path)
     config = file.structure(RobotConfig)
     urdf = path.parent / config.robot
-    return _parts(file, config, urdf, read_urdf(urdf, config.locked))
-
-
-def _parts(file: YamlFile, config: RobotConfig, urdf: Path, description: Description) -> dict[str, Any]:
+    description = read_urdf(urdf, config.locked)
     joints = description.joints
     n = len(joints)
     names = [joint.name for joint in joints]
@@ -62,6 +63,38 @@ def _parts(file: YamlFile, config: RobotConfig, urdf: Path, description: Descrip
         _check_count(file, ("limits", "acceleration"), config.limits.acceleration, n)
     points = {name: _point(file, description, name, config) for name in config.points}
     payload = _payload(file, description, config)
+    springs = _springs(file, config, joints, points)
+    stations = tuple(config.stations) or ("tracker",)
+    return robot_type(
+        config=config,
+        path=file.path,
+        urdf=urdf,
+        name=description.name,
+        joints=joints,
+        points=points,
+        tree=kinematic_tree(joints, springs.bearing_frames, config.bearings),
+        geometry=Geometry(
+            errors=np.zeros((n, 6)),
+            tool=np.zeros(6),
+            point_error=np.zeros((len(points), 3)),
+            gravity_compliance=np.zeros(n),
+            lateral_compliance=np.zeros((n, 2)),
+        ),
+        springs=springs,
+        drives=_drives(file, config, n),
+        links=Links.of(description.inertias),
+        stations=Stations(stations, np.zeros((len(stations), 6))),
+        scatter=Scatter(np.zeros(len(SCATTER))),
+        payload=payload,
+        force_sensor=_force_sensor(file, description, config),
+        sensors={name: _sensor(file, description, name, config) for name in config.sensors},
+    )
+
+
+def _springs(
+    file: YamlFile, config: RobotConfig, joints: Sequence[Joint], points: Mapping[str, Point]
+) -> Springs:
+    n, names = len(joints), [joint.name for joint in joints]
     stiffness, damping = np.full((n, 3), np.nan), np.full((n, 3), np.nan)
     bearing_frames: dict[int, np.ndarray] = {}
     carrying = {i for p in points.values() for i in path_to(joints, p.joint)}
@@ -86,49 +119,24 @@ def _parts(file: YamlFile, config: RobotConfig, urdf: Path, description: Descrip
         for c, spring in enumerate((entry.bearing_x, entry.bearing_y)):
             if spring is not None:
                 stiffness[i, c], damping[i, c] = spring.stiffness, spring.damping
-    stations = tuple(config.stations) or ("tracker",)
-    return dict(
-        config=config,
-        path=file.path,
-        urdf=urdf,
-        name=description.name,
-        joints=joints,
-        points=points,
-        nominal_payload=payload,
-        force_sensor=_force_sensor(file, description, config),
-        bearing_frames=bearing_frames,
-        tree=kinematic_tree(joints, bearing_frames, config.bearings),
-        stations=stations,
-        harmonics=HARMONICS,
-        geometry=np.zeros((n, 6)),
-        tool=np.zeros(6),
-        point_error=np.zeros((len(points), 3)),
-        station=np.zeros((len(stations), 6)),
-        scatter=np.zeros(len(SCATTER)),
-        backlash=np.zeros(n),
-        gravity_compliance=np.zeros(n),
-        lateral_compliance=np.zeros((n, 2)),
-        transmission=np.zeros((n, len(HARMONICS), 2)),
-        stiffness=stiffness,
-        damping=damping,
-        hardening=np.zeros(n),
-        held_inertia=np.zeros(n),
+    return Springs(bearing_frames, stiffness, damping, hardening=np.zeros(n))
+
+
+def _drives(file: YamlFile, config: RobotConfig, n: int) -> Drives:
+    return Drives(
         rotor_inertia=_per_joint(file, config, "rotor_inertia", n),
+        held_inertia=np.zeros(n),
         viscous=_per_joint(file, config, "viscous", n),
         coulomb=_per_joint(file, config, "coulomb", n),
         torque_offset=np.zeros(n),
-        parallel=np.zeros((n, len(PARALLEL))),
         friction=np.zeros((n, len(FRICTION_PARAMETERS))),
+        parallel=np.zeros((n, len(PARALLEL))),
         coupling=np.zeros((len(config.drives.coupling), len(COUPLED))),
         delay=np.zeros(n),
         ratio=_per_joint(file, config, "ratio", n),
-        mass=np.array([y.mass for y in description.inertias]),
-        com=np.array([y.com for y in description.inertias]),
-        inertia=np.array([y.inertia for y in description.inertias]),
-        payload_mass=np.array([payload.mass if payload else 0.0]),
-        payload_com=np.array(payload.com if payload else np.zeros(3)),
-        payload_inertia=payload.moments if payload else np.zeros(6),
-        sensors={name: _sensor(file, description, name, config) for name in config.sensors},
+        backlash=np.zeros(n),
+        transmission=np.zeros((n, len(HARMONICS), 2)),
+        harmonics=HARMONICS,
     )
 
 
@@ -199,7 +207,15 @@ def _payload(file: YamlFile, description: Description, config: RobotConfig) -> P
             "E-ROBOT-031", ("payload", "inertia"), "the payload's inertia must be symmetric and positive."
         )
     return Payload(
-        entry.frame, frame.joint, frame.rotation, frame.translation, entry.mass, entry.mass_std, com, inertia
+        entry.frame,
+        frame.joint,
+        frame.rotation,
+        frame.translation,
+        entry.mass,
+        entry.mass,
+        entry.mass_std,
+        com,
+        inertia,
     )
 
 

@@ -1,8 +1,10 @@
-"""Table of parameter names (docs/file-formats.md): attribute of `RobotModel` and unit of each."""
+"""Table of parameter names (docs/file-formats.md): place in `RobotModel` and unit of each."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
+
+from flexcal.model.robot.parameter_groups import Location
 
 if TYPE_CHECKING:
     from flexcal.model.robot.robot_model import RobotModel
@@ -99,58 +101,54 @@ def unknown_parallel(model: RobotModel, joint: str) -> tuple[str, ...]:
     return tuple(unknown)
 
 
-def parameter_locations(model: RobotModel) -> dict[str, tuple[str, tuple[int, ...]]]:
-    """Every parameter name of a robot → (array attribute of `RobotModel`, index into it).
+def parameter_locations(model: RobotModel) -> dict[str, Location]:
+    """Every parameter name of a robot → its place in the groups of arrays.
 
-    Inertia entries of links (`<link>.Ixx`…, at the joint frame) and first moments (`<link>.mc_x`…) are not here: they depend on mass and
-    centre of mass too.
+    The payload's are not here, for it keeps its own (`Payload.values`), nor are inertia entries of links (`<link>.Ixx`…, at the joint
+    frame) and first moments (`<link>.mc_x`…), which depend on mass and centre of mass too.
     """
-    table: dict[str, tuple[str, tuple[int, ...]]] = {}
-    for s, name in enumerate(model.stations):
+    table: dict[str, Location] = {}
+    for s, name in enumerate(model.stations.names):
         for k, key in enumerate(STATION):
-            table[f"station.{name}.{key}"] = ("station", (s, k))
+            table[f"station.{name}.{key}"] = Location("stations", "pose", (s, k))
     elastic = {e.index: e for e in model.elastic}
     for i, joint in enumerate(model.joints):
         for k, key in enumerate(GEOMETRY):
-            table[f"{joint.name}.{key}"] = ("geometry", (i, k))
-        table[f"{joint.name}.backlash"] = ("backlash", (i,))
-        table[f"{joint.name}.gravity_compliance"] = ("gravity_compliance", (i,))
+            table[f"{joint.name}.{key}"] = Location("geometry", "errors", (i, k))
+        table[f"{joint.name}.backlash"] = Location("drives", "backlash", (i,))
+        table[f"{joint.name}.gravity_compliance"] = Location("geometry", "gravity_compliance", (i,))
         for k, key in enumerate(LATERAL):
-            table[f"{joint.name}.{key}"] = ("lateral_compliance", (i, k))
-        for h, order in enumerate(model.harmonics):
+            table[f"{joint.name}.{key}"] = Location("geometry", "lateral_compliance", (i, k))
+        for h, order in enumerate(model.drives.harmonics):
             for k, key in enumerate(("sin", "cos")):
-                table[f"{joint.name}.transmission_{order}_{key}"] = ("transmission", (i, h, k))
+                table[f"{joint.name}.transmission_{order}_{key}"] = Location(
+                    "drives", "transmission", (i, h, k)
+                )
         for key in ("rotor_inertia", "viscous", "coulomb", "torque_offset", "delay"):
-            table[f"{joint.name}.{key}"] = (key, (i,))
+            table[f"{joint.name}.{key}"] = Location("drives", key, (i,))
         for key in unknown_parallel(model, joint.name):
-            table[f"{joint.name}.{key}"] = ("parallel", (i, PARALLEL.index(key)))
+            table[f"{joint.name}.{key}"] = Location("drives", "parallel", (i, PARALLEL.index(key)))
         for k, key in enumerate(FRICTION_PARAMETERS):
-            table[f"{joint.name}.{key}"] = ("friction", (i, k))
+            table[f"{joint.name}.{key}"] = Location("drives", "friction", (i, k))
         if i in elastic:
             for k, key in enumerate(SPRINGS):
                 if key == "drive" or elastic[i].bearings:
-                    table[f"{joint.name}.{key}.stiffness"] = ("stiffness", (i, k))
-                    table[f"{joint.name}.{key}.damping"] = ("damping", (i, k))
-            table[f"{joint.name}.drive.hardening"] = ("hardening", (i,))
-        if i in model.braked:
-            table[f"{joint.name}.held_inertia"] = ("held_inertia", (i,))
-        table[f"{joint.link}.mass"] = ("mass", (i,))
+                    table[f"{joint.name}.{key}.stiffness"] = Location("springs", "stiffness", (i, k))
+                    table[f"{joint.name}.{key}.damping"] = Location("springs", "damping", (i, k))
+            table[f"{joint.name}.drive.hardening"] = Location("springs", "hardening", (i,))
+        if i in model.springs.braked:
+            table[f"{joint.name}.held_inertia"] = Location("drives", "held_inertia", (i,))
+        table[f"{joint.link}.mass"] = Location("links", "mass", (i,))
         for k, key in enumerate("xyz"):
-            table[f"{joint.link}.com_{key}"] = ("com", (i, k))
+            table[f"{joint.link}.com_{key}"] = Location("links", "com", (i, k))
     for c, entry in enumerate(model.config.drives.coupling):
         for k, key in enumerate(COUPLED):
-            table[f"{entry.motor}.{key}_at_{entry.joint}"] = ("coupling", (c, k))
+            table[f"{entry.motor}.{key}_at_{entry.joint}"] = Location("drives", "coupling", (c, k))
     for k, key in enumerate(GEOMETRY):
-        table[f"tool.{key}"] = ("tool", (k,))
+        table[f"tool.{key}"] = Location("geometry", "tool", (k,))
     for p, name in enumerate(model.points):
         for k, key in enumerate("xyz"):
-            table[f"point.{name}.{key}"] = ("point_error", (p, k))
+            table[f"point.{name}.{key}"] = Location("geometry", "point_error", (p, k))
     for k, key in enumerate(SCATTER):
-        table[f"scatter.{key}"] = ("scatter", (k,))
-    if model.payload is not None:
-        table["payload.mass"] = ("payload_mass", (0,))
-        for k, key in enumerate("xyz"):
-            table[f"payload.com_{key}"] = ("payload_com", (k,))
-        for k, key in enumerate(MOMENTS):
-            table[f"payload.{key}"] = ("payload_inertia", (k,))
+        table[f"scatter.{key}"] = Location("scatter", "std", (k,))
     return table

@@ -42,12 +42,12 @@ def uncertain_inertials(model: RobotModel, links: Collection[int]) -> list[str]:
     """Names of mass and centre of mass of those of the `links` that have a mass, as far as robot.yaml's `prior:` lets them be off."""
     keys = ["mass"] if model.prior.mass > 0 else []
     keys += ["com_x", "com_y", "com_z"] if model.prior.com > 0 else []
-    return [f"{model.joints[i].link}.{key}" for i in sorted(links) if model.mass[i] > 0 for key in keys]
+    return [f"{model.joints[i].link}.{key}" for i in sorted(links) if model.links.mass[i] > 0 for key in keys]
 
 
 def uncertain_payload(model: RobotModel) -> tuple[str, ...]:
     """What is uncertain of the payload: its mass as robot.yaml's `mass_std` says, or what was identified of mass and centre of mass."""
-    payload = model.nominal_payload
+    payload = model.payload
     if payload is None:
         return ()
     names = ("payload.mass", "payload.com_x", "payload.com_y", "payload.com_z")
@@ -117,9 +117,9 @@ def declared_parameter(model: RobotModel, name: str) -> Parameter:
 
 def _std(model: RobotModel, name: str, key: str) -> float:
     if name == "payload.mass":
-        payload = model.nominal_payload
+        payload = model.payload
         assert payload is not None
-        return payload.mass_std / payload.mass if payload.mass_std > 0 else float("inf")
+        return payload.mass_std / payload.nominal_mass if payload.mass_std > 0 else float("inf")
     if key in GEOMETRY:
         return LENGTH_TOLERANCE if key.startswith("length") else ANGLE_TOLERANCE
     return {

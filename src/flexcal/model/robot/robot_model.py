@@ -31,6 +31,16 @@ from flexcal.model.parts import (
 )
 from flexcal.model.robot.arm_sensor import ArmSensor
 from flexcal.model.robot.config import ControllerConfig, PriorConfig, RobotConfig
+from flexcal.model.robot.parameter_groups import (
+    Drives,
+    Geometry,
+    Group,
+    Links,
+    Location,
+    Scatter,
+    Springs,
+    Stations,
+)
 from flexcal.model.robot.parameter_names import parameter_locations
 from flexcal.model.robot.posterior import NOTHING_ESTIMATED, Posterior
 
@@ -40,11 +50,14 @@ _FIRST_MOMENTS = {"mc_x": 0, "mc_y": 1, "mc_z": 2}
 
 @dataclass(frozen=True, eq=False)
 class RobotModel:
-    """An immutable robot: structure from the URDF, and one array a kind of parameter (n joints, SI units).
+    """An immutable robot: structure from the URDF, settings of robot.yaml, and parameters in groups of arrays (n joints, SI units).
 
     Every number that can be identified has a name (docs/file-formats.md): `values` reads them all, `with_values` makes a changed robot.
     Setting a link's or the payload's mass scales its inertia about the centre of mass with it; setting a link's `com_x`… or first moment
     `mc_x`… (mass times centre of mass, after the mass) moves that inertia rigidly.
+
+    `geometry` holds deviations from the URDF and compliances, `springs` those of the elastic joints, `drives` motors, transmissions and
+    friction, `links` masses and inertia, `stations` the instrument's places; `tree` is the kernels' view of joints and bearing frames.
     """
 
     config: RobotConfig
@@ -53,51 +66,25 @@ class RobotModel:
     name: str
     joints: tuple[Joint, ...]
     points: Mapping[str, Point]
-    nominal_payload: Payload | None
-    force_sensor: ForceSensor | None
-    bearing_frames: Mapping[int, np.ndarray]
     tree: Tree
-    stations: tuple[str, ...]
-    harmonics: tuple[int, ...]
-    geometry: np.ndarray
-    tool: np.ndarray
-    point_error: np.ndarray
-    station: np.ndarray
-    scatter: np.ndarray
-    backlash: np.ndarray
-    gravity_compliance: np.ndarray
-    lateral_compliance: np.ndarray
-    transmission: np.ndarray
-    stiffness: np.ndarray
-    damping: np.ndarray
-    hardening: np.ndarray
-    held_inertia: np.ndarray
-    rotor_inertia: np.ndarray
-    viscous: np.ndarray
-    coulomb: np.ndarray
-    torque_offset: np.ndarray
-    parallel: np.ndarray
-    friction: np.ndarray
-    coupling: np.ndarray
-    delay: np.ndarray
-    ratio: np.ndarray
-    mass: np.ndarray
-    com: np.ndarray
-    inertia: np.ndarray
-    payload_mass: np.ndarray
-    payload_com: np.ndarray
-    payload_inertia: np.ndarray
+    geometry: Geometry
+    springs: Springs
+    drives: Drives
+    links: Links
+    stations: Stations
+    scatter: Scatter
+    payload: Payload | None
+    force_sensor: ForceSensor | None
     posterior: Posterior = NOTHING_ESTIMATED
-    braked: frozenset[int] = frozenset()
     sensors: Mapping[str, ArmSensor] = field(default_factory=dict)
 
     @classmethod
     def from_yaml(cls, path: str | Path, *, estimates: bool = True) -> RobotModel:
         """Read robot.yaml, its URDF and, where present, the estimates beside it; raises `InputError` with file and line."""
-        from flexcal.model.robot.loading import robot_parts
+        from flexcal.model.robot.loading import read_robot
         from flexcal.model.robot.stored_estimates import apply_estimates
 
-        model = cls(**robot_parts(Path(path)))
+        model = read_robot(cls, Path(path))
         stored = model.path.parent / model.config.estimates
         return apply_estimates(model, stored) if estimates and current_path(stored).exists() else model
 
@@ -107,13 +94,14 @@ class RobotModel:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(
-            state, tree=kinematic_tree(state["joints"], state["bearing_frames"], state["config"].bearings)
+            state,
+            tree=kinematic_tree(state["joints"], state["springs"].bearing_frames, state["config"].bearings),
         )
 
     def with_bearings(self, bearings: Bearings) -> RobotModel:
         """The robot whose bearings are known to tilt before or after the joint's rotation, its parameters and posterior as they are."""
         config = replace(self.config, bearings=bearings)
-        tree = kinematic_tree(self.joints, self.bearing_frames, bearings)
+        tree = kinematic_tree(self.joints, self.springs.bearing_frames, bearings)
         return replace(self, config=config, tree=tree)
 
     def with_drive_springs(self, springs: Mapping[int, tuple[float, float]]) -> RobotModel:
@@ -121,7 +109,8 @@ class RobotModel:
 
         In a frequency experiment the motors of these joints are braked. Raises `FlexcalError` for a prismatic joint.
         """
-        frames, stiffness, damping = dict(self.bearing_frames), self.stiffness.copy(), self.damping.copy()
+        frames = dict(self.springs.bearing_frames)
+        stiffness, damping = self.springs.stiffness.copy(), self.springs.damping.copy()
         for i, (constant, loss) in springs.items():
             joint = self.joints[i]
             if joint.kind != "revolute":
@@ -131,27 +120,32 @@ class RobotModel:
                 )
             frames[i] = bearing_frame(joint)
             stiffness[i, 2], damping[i, 2] = constant, loss
-        return replace(
-            self,
+        widened = replace(
+            self.springs,
             bearing_frames=frames,
-            tree=kinematic_tree(self.joints, frames, self.config.bearings),
             stiffness=stiffness,
             damping=damping,
-            braked=self.braked | set(springs),
+            braked=self.springs.braked | set(springs),
         )
+        return replace(self, springs=widened, tree=kinematic_tree(self.joints, frames, self.config.bearings))
+
+    def without_springs(self) -> RobotModel:
+        """The robot with no elastic joint."""
+        return replace(self, springs=replace(self.springs, bearing_frames={}))
 
     def with_estimated_springs(self, values: Mapping[str, float]) -> RobotModel:
         """The robot with a drive spring at every rigid joint whose `<joint>.drive.stiffness` is among `values`."""
         springs = {}
         for i, name in enumerate(self.joint_names):
             stiffness = values.get(f"{name}.drive.stiffness")
-            if stiffness is not None and i not in self.bearing_frames:
+            if stiffness is not None and i not in self.springs.bearing_frames:
                 springs[i] = (stiffness, values.get(f"{name}.drive.damping", 0.0))
         return self.with_drive_springs(springs) if springs else self
 
     def with_brakes(self, excited: tuple[str, ...]) -> RobotModel:
         """The robot in a frequency experiment that excites the named joints: the motors of all other elastic joints are braked."""
-        return replace(self, braked=frozenset(e.index for e in self.elastic if e.name not in excited))
+        braked = frozenset(e.index for e in self.elastic if e.name not in excited)
+        return replace(self, springs=replace(self.springs, braked=braked))
 
     @property
     def n(self) -> int:
@@ -201,36 +195,31 @@ class RobotModel:
                 i,
                 self.joints[i].name,
                 frame,
-                self.stiffness[i],
-                self.damping[i],
-                bool(np.isfinite(self.stiffness[i, 0])),
+                self.springs.stiffness[i],
+                self.springs.damping[i],
+                bool(np.isfinite(self.springs.stiffness[i, 0])),
                 self.bearings == "before",
             )
-            for i, frame in sorted(self.bearing_frames.items())
+            for i, frame in sorted(self.springs.bearing_frames.items())
         )
 
     @cached_property
     def driven(self) -> tuple[ElasticJoint, ...]:
-        """The elastic joints whose motors are excited in a frequency experiment: those that are not `braked`."""
-        return tuple(joint for joint in self.elastic if joint.index not in self.braked)
+        """The elastic joints whose motors are excited in a frequency experiment: those that are not braked."""
+        return tuple(joint for joint in self.elastic if joint.index not in self.springs.braked)
 
     @cached_property
     def inertias(self) -> tuple[Inertia, ...]:
         """Inertia of the link of every joint."""
         return tuple(
-            Inertia(float(m), c, y) for m, c, y in zip(self.mass, self.com, self.inertia, strict=True)
+            Inertia(float(m), c, y)
+            for m, c, y in zip(self.links.mass, self.links.com, self.links.inertia, strict=True)
         )
 
     @property
-    def payload(self) -> Payload | None:
-        """The declared payload with its current mass, centre of mass and inertia."""
-        nominal = self.nominal_payload
-        if nominal is None:
-            return None
-        inertia = np.empty((3, 3))
-        for value, (row, column) in zip(self.payload_inertia, _MOMENTS.values(), strict=True):
-            inertia[row, column] = inertia[column, row] = value
-        return replace(nominal, mass=float(self.payload_mass[0]), com=self.payload_com, inertia=inertia)
+    def payload_mass(self) -> float:
+        """Mass of the declared payload, kg; zero without one."""
+        return 0.0 if self.payload is None else self.payload.mass
 
     @cached_property
     def reach(self) -> float:
@@ -269,71 +258,94 @@ class RobotModel:
 
     def station_index(self, name: str) -> int:
         """Index of one of the instrument's places; raises `FlexcalError` that lists the names."""
-        if name not in self.stations:
+        if name not in self.stations.names:
             raise FlexcalError(
                 "E-ROBOT-042",
-                f"there is no station '{name}' in {self.path}, which has {', '.join(self.stations)}; declare it under `stations:`, "
+                f"there is no station '{name}' in {self.path}, which has {', '.join(self.stations.names)}; declare it under `stations:`, "
                 "and the others there too.",
             )
-        return self.stations.index(name)
+        return self.stations.names.index(name)
 
     @cached_property
-    def _locations(self) -> dict[str, tuple[str, tuple[int, ...]]]:
+    def _locations(self) -> dict[str, Location]:
         return parameter_locations(self)
+
+    @cached_property
+    def _payload_keys(self) -> dict[str, str]:
+        return {} if self.payload is None else {f"payload.{key}": key for key in self.payload.values}
+
+    @cached_property
+    def _link_moments(self) -> dict[str, tuple[int, str]]:
+        """Name → (link, key) of the inertia about the joint frame and of the first moments."""
+        keys = (*_MOMENTS, *_FIRST_MOMENTS)
+        return {f"{joint.link}.{key}": (i, key) for i, joint in enumerate(self.joints) for key in keys}
 
     @cached_property
     def values(self) -> Mapping[str, float]:
         """Every named value, SI."""
-        table = {name: float(getattr(self, field)[index]) for name, (field, index) in self._locations.items()}
-        for i, joint in enumerate(self.joints):
-            at_joint = self.inertia[i] + parallel_axis(self.mass[i], self.com[i])
-            table.update({f"{joint.link}.{key}": float(at_joint[index]) for key, index in _MOMENTS.items()})
-            table.update(
-                {
-                    f"{joint.link}.{key}": float(self.mass[i] * self.com[i, k])
-                    for key, k in _FIRST_MOMENTS.items()
-                }
-            )
+        table = {
+            name: float(getattr(getattr(self, group), array)[index])
+            for name, (group, array, index) in self._locations.items()
+        }
+        payload = {} if self.payload is None else self.payload.values
+        table.update({name: payload[key] for name, key in self._payload_keys.items()})
+        links = [_moments_at_joint(inertia) for inertia in self.inertias]
+        table.update({name: links[i][key] for name, (i, key) in self._link_moments.items()})
         return MappingProxyType(table)
 
     def value(self, name: str) -> float:
         """One named value, SI; raises `FlexcalError` that suggests close names."""
         if name not in self.values:
-            raise FlexcalError(
-                "E-ROBOT-043", f"unknown parameter '{name}'{suggestion(name, list(self.values), 3) or '.'}"
-            )
+            raise self._unknown(name)
         return self.values[name]
 
     def with_values(self, values: Mapping[str, float]) -> RobotModel:
         """A robot with some named values changed; raises `FlexcalError` for an unknown name."""
-        arrays: dict[str, np.ndarray] = {}
+        changes: dict[Group, dict[str, np.ndarray]] = {}
 
-        def own(field: str) -> np.ndarray:
-            return arrays.setdefault(field, getattr(self, field).copy())
+        def own(group: Group, array: str) -> np.ndarray:
+            arrays = changes.setdefault(group, {})
+            if array not in arrays:
+                arrays[array] = getattr(getattr(self, group), array).copy()
+            return arrays[array]
 
         moments: dict[int, dict[str, float]] = {}
+        payload_values: dict[str, float] = {}
         for name, value in values.items():
             if name in self._locations:
-                field, index = self._locations[name]
-                own(field)[index] = value
-                if field == "mass" and self.mass[index] > 0:
-                    own("inertia")[index] = self.inertia[index] * (value / self.mass[index])
-                elif field == "payload_mass" and self.payload_mass[0] > 0:
-                    own("payload_inertia")[:] = self.payload_inertia * (value / self.payload_mass[0])
+                group, array, index = self._locations[name]
+                own(group, array)[index] = value
+                if group == "links" and array == "mass" and self.links.mass[index] > 0:
+                    own("links", "inertia")[index] = self.links.inertia[index] * (
+                        value / self.links.mass[index]
+                    )
+            elif name in self._payload_keys:
+                payload_values[self._payload_keys[name]] = value
+            elif name in self._link_moments:
+                i, key = self._link_moments[name]
+                moments.setdefault(i, {})[key] = value
             else:
-                self.value(name)
-                link, _, key = name.rpartition(".")
-                moments.setdefault([j.link for j in self.joints].index(link), {})[key] = value
+                raise self._unknown(name)
         for i, entries in moments.items():
+            mass, com, inertia = (own("links", array) for array in ("mass", "com", "inertia"))
             for key in _FIRST_MOMENTS.keys() & entries.keys():
-                own("com")[i, _FIRST_MOMENTS[key]] = self._com_of(i, entries.pop(key), own("mass")[i])
-            moved = parallel_axis(own("mass")[i], own("com")[i])
-            at_joint = own("inertia")[i] + moved
+                com[i, _FIRST_MOMENTS[key]] = self._com_of(i, entries.pop(key), mass[i])
+            moved = parallel_axis(mass[i], com[i])
+            at_joint = inertia[i] + moved
             for key, value in entries.items():
                 row, column = _MOMENTS[key]
                 at_joint[row, column] = at_joint[column, row] = value
-            own("inertia")[i] = at_joint - moved
-        return replace(self, **arrays)
+            inertia[i] = at_joint - moved
+        payload = self.payload
+        if payload is not None and payload_values:
+            payload = payload.with_values(payload_values)
+        groups = {group: replace(getattr(self, group), **arrays) for group, arrays in changes.items()}
+        return replace(self, payload=payload, **groups)
+
+    def _unknown(self, name: str) -> FlexcalError:
+        return FlexcalError(
+            "E-ROBOT-043", f"unknown parameter '{name}'{suggestion(name, list(self.values), 3) or '.'}"
+        )
 
     def _com_of(self, link: int, first_moment: float, mass: float) -> float:
         if mass == 0 and first_moment != 0:
@@ -353,3 +365,10 @@ class RobotModel:
         own = tuple(name for name in estimate.parameters.names if name in widened.values)
         changed = widened.with_values({name: estimate.values[name] for name in own})
         return replace(changed, posterior=self.posterior.updated(estimate, own))
+
+
+def _moments_at_joint(link: Inertia) -> dict[str, float]:
+    """Inertia about the origin of the joint frame and first moments of a link."""
+    at_joint = link.inertia + parallel_axis(link.mass, link.com)
+    inertias = {key: float(at_joint[index]) for key, index in _MOMENTS.items()}
+    return inertias | {key: float(link.mass * link.com[k]) for key, k in _FIRST_MOMENTS.items()}

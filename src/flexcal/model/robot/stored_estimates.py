@@ -98,7 +98,7 @@ def _with_bearings(model: RobotModel, blocks: Mapping[Block, Estimate], path: Pa
 
 def _with_payload(model: RobotModel, estimate: Estimate, path: Path) -> RobotModel:
     """With the identified payload's frame, whose values come with its block."""
-    frame, declared = estimate.provenance.get(PAYLOAD_FRAME, ""), model.nominal_payload
+    frame, declared = estimate.provenance.get(PAYLOAD_FRAME, ""), model.payload
     if declared is None:
         values = estimate.values
         com = np.array([values[f"payload.com_{key}"] for key in "xyz"])

@@ -32,10 +32,10 @@ class ToolAtRest:
         if len(axes):
             by_load = np.matmul(by_motion[:, :, axes[:, 0], axes[:, 1]], self.rest.compliance)
             by_command -= np.matmul(by_load, self.rest.coupling[:, :, ::6])
-        if self.model.transmission.any():
-            orders = np.array(self.model.harmonics)
+        if self.model.drives.transmission.any():
+            orders = np.array(self.model.drives.harmonics)
             phase = self.q[:, :, None] * orders
-            sine, cosine = np.moveaxis(orders[:, None] * self.model.transmission, 2, 0)
+            sine, cosine = np.moveaxis(orders[:, None] * self.model.drives.transmission, 2, 0)
             by_command *= 1 + (sine * np.cos(phase) - cosine * np.sin(phase)).sum(axis=2)[:, None, :]
         return by_command
 
@@ -46,15 +46,17 @@ def carried_mass(model: RobotModel, payload: np.ndarray | None, samples: int) ->
     Where the payload was found to weigh more or less than declared, the values of the file are as much off. Raises `FlexcalError` for a
     payload without a declaration.
     """
-    nominal, identified = model.nominal_payload, float(model.payload_mass[0])
+    declared = model.payload
     if payload is None:
-        return np.full(samples, identified)
-    if payload.any() and nominal is None:
+        return np.full(samples, model.payload_mass)
+    if payload.any() and declared is None:
         raise FlexcalError(
             "E-MODEL-004",
             f"the poses name a payload but {model.path} declares none; add `payload:` with its centre of mass.",
         )
-    return payload * (identified / nominal.mass if nominal is not None and nominal.mass > 0 else 1.0)
+    if declared is None or declared.nominal_mass == 0:
+        return payload * 1.0
+    return payload * (declared.mass / declared.nominal_mass)
 
 
 def tool_at_rest(

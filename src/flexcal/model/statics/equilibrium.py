@@ -20,12 +20,12 @@ def lateral_axes(model: RobotModel, q: np.ndarray) -> np.ndarray:
     from flexcal.model.parts import bearing_frame
 
     result = np.zeros((*q.shape, 2, 2))
-    motion = q + model.geometry[:, 0] if model.bearings == "after" else np.zeros(q.shape)
+    motion = q + model.geometry.errors[:, 0] if model.bearings == "after" else np.zeros(q.shape)
     cosine, sine = np.cos(motion), np.sin(motion)
     for i, joint in enumerate(model.joints):
         if joint.kind != "revolute":
             continue
-        frame = model.bearing_frames.get(i)
+        frame = model.springs.bearing_frames.get(i)
         x, y = (joint.normals @ (bearing_frame(joint) if frame is None else frame))[:, :2].T
         result[:, i, :, 0] = np.outer(cosine[:, i], x) + np.outer(sine[:, i], y)
         result[:, i, :, 1] = np.outer(cosine[:, i], y) - np.outer(sine[:, i], x)
@@ -65,9 +65,9 @@ def elastic_axes(model: RobotModel) -> list[tuple[int, int]]:
 def payload_batch(model: RobotModel, payload: np.ndarray | float | None, samples: int) -> np.ndarray:
     """Payload mass per pose (samples,), kg: the declared one where None; raises `FlexcalError` without a declared payload."""
     if payload is None:
-        return np.full(samples, model.payload_mass[0])
+        return np.full(samples, model.payload_mass)
     masses = np.ascontiguousarray(np.broadcast_to(np.asarray(payload, dtype=float), (samples,)))
-    if model.nominal_payload is None and masses.any():
+    if model.payload is None and masses.any():
         raise FlexcalError(
             "E-MODEL-005",
             f"a payload is given but {model.path} declares none; add `payload:` with its frame and centre of mass.",
@@ -90,9 +90,9 @@ def _solve(
         deflection, compliance, regressor, coupling, step = model.tree.equilibrium(
             axes,
             np.ascontiguousarray(stiffness, dtype=float),
-            np.ascontiguousarray(model.geometry),
-            np.ascontiguousarray(model.mass),
-            np.ascontiguousarray(model.mass[:, None] * model.com),
+            np.ascontiguousarray(model.geometry.errors),
+            np.ascontiguousarray(model.links.mass),
+            np.ascontiguousarray(model.links.mass[:, None] * model.links.com),
             payload,
             declared.joint if declared else -1,
             np.ascontiguousarray(declared.com_in_link if declared else np.zeros(3)),
@@ -207,38 +207,38 @@ def static_equilibrium(
     q = joint_batch(model, q)
     masses = payload_batch(model, payload, len(q))
     axes = elastic_axes(model) if elastic else []
-    stiffness = np.array([model.stiffness[a] for a in axes])
+    stiffness = np.array([model.springs.stiffness[a] for a in axes])
     if not (np.isfinite(stiffness) & (stiffness > 0)).all():
         raise FlexcalError(
             "E-MODEL-008",
             f"{model.name}: every stiffness must be positive and finite, not {stiffness.min():g} N m/rad.",
         )
     load = gravity_torque(model, q, masses)
-    free = transmission_error(model, q) - load * model.gravity_compliance
-    loose = model.backlash > 0
+    free = transmission_error(model, q) - load * model.geometry.gravity_compliance
+    loose = model.drives.backlash > 0
     drives = [k for k, (_, component) in enumerate(axes) if component == 2]
     sprung = [axes[k][0] for k in drives]
-    hardening = model.hardening[sprung]
+    hardening = model.springs.hardening[sprung]
     twist = twist_from_torque(load[:, sprung], stiffness[drives], hardening)
     free[:, sprung] += load[:, sprung] / stiffness[drives] - twist
     rest = np.sign(load) if flank is None else flank
     passes = 0
     while True:
         passes += 1
-        slack = free - rest * model.backlash
+        slack = free - rest * model.drives.backlash
         deflection, *derivatives = _solve(
             model, axes, stiffness, q + slack, masses, sensitivities=sensitivities
         )
         torque = load.copy()
-        torque[:, sprung] = -model.stiffness[sprung, 2] * deflection[:, sprung, 2]
+        torque[:, sprung] = -model.springs.stiffness[sprung, 2] * deflection[:, sprung, 2]
         if flank is not None or passes == _FLANK_PASSES or (np.sign(torque) == rest)[:, loose].all():
             break
         rest = np.sign(torque)
     sign = np.where(loose, rest, np.sign(torque)) if flank is None else flank
     deflection[:, :, 2] += slack
-    if model.lateral_compliance.any():
+    if model.geometry.lateral_compliance.any():
         slopes = lateral_slopes(model, q, masses)
-        deflection[:, :, :2] += np.matmul(model.lateral_compliance[:, None, :], slopes)[:, :, 0]
+        deflection[:, :, :2] += np.matmul(model.geometry.lateral_compliance[:, None, :], slopes)[:, :, 0]
     if sensitivities and hardening.any():
         derivatives[0][:, drives] /= tangent_ratio(twist, hardening)[:, :, None]
     has_backlash = np.zeros(model.n)
@@ -250,9 +250,10 @@ def static_equilibrium(
 
 def transmission_error(model: RobotModel, q: np.ndarray) -> np.ndarray:
     """Harmonic transmission error (samples, n), rad: Σ a_k sin(k q) + b_k cos(k q)."""
-    if not model.transmission.any():
+    if not model.drives.transmission.any():
         return np.zeros(q.shape)
-    phase = q[:, :, None] * np.array(model.harmonics)
-    return (model.transmission[:, :, 0] * np.sin(phase) + model.transmission[:, :, 1] * np.cos(phase)).sum(
-        axis=2
-    )
+    phase = q[:, :, None] * np.array(model.drives.harmonics)
+    return (
+        model.drives.transmission[:, :, 0] * np.sin(phase)
+        + model.drives.transmission[:, :, 1] * np.cos(phase)
+    ).sum(axis=2)

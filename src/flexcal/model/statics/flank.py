@@ -34,9 +34,9 @@ def gravity_torque_std(
     declared: list[float] = []
     for k, joint in enumerate(model.joints):
         names += [f"{joint.link}.{key}" for key in MASS_AND_COM]
-        rows.append(regressor[:, :, k, 0] + regressor[:, :, k, 1:] @ model.com[k])
-        rows += [model.mass[k] * regressor[:, :, k, c] for c in (1, 2, 3)]
-        declared += [model.prior.mass * model.mass[k], *[model.prior.com] * 3]
+        rows.append(regressor[:, :, k, 0] + regressor[:, :, k, 1:] @ model.links.com[k])
+        rows += [model.links.mass[k] * regressor[:, :, k, c] for c in (1, 2, 3)]
+        declared += [model.prior.mass * model.links.mass[k], *[model.prior.com] * 3]
     declared_payload = model.payload
     if declared_payload is not None and declared_payload.mass > 0:
         own = regressor[:, :, declared_payload.joint]

@@ -22,7 +22,7 @@ def energy_regressor(model: RobotModel, q: np.ndarray, dq: np.ndarray) -> np.nda
         raise FlexcalError(
             "E-MODEL-009", f"q and dq have shapes {q.shape} and {dq.shape}; give as many samples of each."
         )
-    geometry, still = np.ascontiguousarray(model.geometry), np.zeros((*q.shape, 3))
+    geometry, still = np.ascontiguousarray(model.geometry.errors), np.zeros((*q.shape, 3))
     rest = np.zeros_like(q)
     momentum = torque_regressor(model, q, rest, dq) - torque_regressor(model, q, rest, rest)  # M q̇
     energy = 0.5 * np.einsum("sj,sjk->sk", dq, momentum)

@@ -30,7 +30,7 @@ def sensor_jacobian(model: RobotModel, q: np.ndarray) -> np.ndarray:
     for i in carrying:
         offset, turn = joint_placement(model, i)
         position, rotation = position + rotation @ offset, rotation @ turn
-        axis, moved = model.joints[i].axis, q[:, i] + model.geometry[i, 0]
+        axis, moved = model.joints[i].axis, q[:, i] + model.geometry.errors[i, 0]
         axes[i], origins[i] = rotation @ axis, position
         if model.joints[i].kind == "prismatic":
             position = position + moved[:, None] * axes[i]

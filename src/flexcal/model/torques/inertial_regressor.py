@@ -39,7 +39,7 @@ def write_torque_regressor(
     are not written. Raises `FlexcalError` as that does.
     """
     q, dq, ddq = motion_batch(model, q, dq, ddq)
-    geometry = np.ascontiguousarray(model.geometry)
+    geometry = np.ascontiguousarray(model.geometry.errors)
     model.tree.torque_regressor(geometry, model.gravity, q, dq, ddq, places, out)
 
 

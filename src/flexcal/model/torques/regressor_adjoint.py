@@ -43,5 +43,5 @@ def placed_regressor_adjoint(
         raise FlexcalError(
             "E-MODEL-012", f"weights have shape {weights.shape}; give rows of {len(q)} numbers, one a sample."
         )
-    geometry, rows = np.ascontiguousarray(model.geometry), np.ascontiguousarray(weights, dtype=float)
+    geometry, rows = np.ascontiguousarray(model.geometry.errors), np.ascontiguousarray(weights, dtype=float)
     return model.tree.torque_regressor_adjoint(geometry, model.gravity, q, dq, ddq, places, rows)

@@ -26,7 +26,7 @@ class ElasticArm:
         import pinocchio as pin
 
         self.robot = robot
-        self.payload = float(robot.payload_mass[0] if payload is None else payload)
+        self.payload = robot.payload_mass if payload is None else float(payload)
         self.model: Any = pin.Model()
         self.model.gravity = pin.Motion(robot.gravity, np.zeros(3))
         self.bodies: list[int] = []
@@ -37,7 +37,7 @@ class ElasticArm:
         self._payload_joint = -1 if hung is None else hung.joint
         self._carried = None if hung is None or self.payload <= 0 else hung.carried(self.payload)
         for i, joint in enumerate(robot.joints):
-            frame = robot.bearing_frames.get(i)
+            frame = robot.springs.bearing_frames.get(i)
             frame = bearing_frame(joint) if frame is None else frame
             position, aligned = joint_placement(robot, i)
             placement = pin.SE3(aligned @ frame, position)
@@ -76,7 +76,7 @@ class ElasticArm:
     def configuration(self, q: np.ndarray, deflection: np.ndarray) -> np.ndarray:
         """Pinocchio's configuration (nq,) of motors at `q` (n,) and the arm deflected by `deflection` (n, 3)."""
         result = np.zeros(self.model.nq)
-        result[self.joint_velocity] = q + self.robot.geometry[:, 0] + deflection[:, 2]
+        result[self.joint_velocity] = q + self.robot.geometry.errors[:, 0] + deflection[:, 2]
         for at, (joint, component) in zip(self.elastic, elastic_axes(self.robot), strict=True):
             if component != 2:
                 result[at] = deflection[joint, component]

@@ -83,11 +83,14 @@ def _loads(
 
     axes, count = elastic_axes(model), len(motion[0])
     stiffness, damping = (
-        np.array([values[axis] for axis in axes]) for values in (model.stiffness, model.damping)
+        np.array([values[axis] for axis in axes])
+        for values in (model.springs.stiffness, model.springs.damping)
     )
-    half_backlash = np.array([model.backlash[joint] if component == 2 else 0.0 for joint, component in axes])
+    half_backlash = np.array(
+        [model.drives.backlash[joint] if component == 2 else 0.0 for joint, component in axes]
+    )
     rigid = np.zeros((3, count, arm.model.nv))
-    rigid[:, :, arm.joint_velocity] = motion[0] + model.geometry[:, 0], motion[1], motion[2]
+    rigid[:, :, arm.joint_velocity] = motion[0] + model.geometry.errors[:, 0], motion[1], motion[2]
     state, torque, bent = rigid, np.empty(rigid.shape[1:]), np.zeros((3, count, len(axes)))
     for last in (*(False,) * (passes - 1), True):
         for k, (position, velocity, acceleration) in enumerate(state.transpose(1, 0, 2)):

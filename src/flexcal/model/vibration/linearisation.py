@@ -71,16 +71,16 @@ def linearise(
     mass[count:, count:] = arm.mass_matrix(at)
     stiffness[count:, count:] = arm.gravity_stiffness(at)
     for r, joint in enumerate(robot.driven):
-        if not robot.rotor_inertia[joint.index] > 0:
+        if not robot.drives.rotor_inertia[joint.index] > 0:
             raise FlexcalError(
                 "E-MODEL-014",
                 f"{robot.path} gives no rotor inertia for the elastic joint {joint.name}; add `drives: rotor_inertia:`.",
             )
-        mass[r, r] = robot.rotor_inertia[joint.index]
-        damping[r, r] = np.nan_to_num(robot.viscous[joint.index])
+        mass[r, r] = robot.drives.rotor_inertia[joint.index]
+        damping[r, r] = np.nan_to_num(robot.drives.viscous[joint.index])
     for k, (joint, component) in enumerate(axes):
-        if component == 2 and joint in robot.braked:
-            mass[count + k, count + k] += robot.held_inertia[joint]
+        if component == 2 and joint in robot.springs.braked:
+            mass[count + k, count + k] += robot.drives.held_inertia[joint]
     springs = _springs(robot, axes, rest)
     for pattern, k, c in springs.values():
         stiffness += k * pattern
@@ -102,7 +102,7 @@ def _springs(
     A braked rotor does not move, so its spring holds the twist against the ground. The pattern of a drive that hardens is larger by its
     tangent stiffness at rest.
     """
-    steeper = tangent_ratio(_twists(robot, rest), robot.hardening)
+    steeper = tangent_ratio(_twists(robot, rest), robot.springs.hardening)
     count = len(robot.driven)
     rotor = {e.index: r for r, e in enumerate(robot.driven)}
     result = {}
@@ -114,8 +114,8 @@ def _springs(
         pattern = np.outer(stretch, stretch) * (steeper[joint] if component == 2 else 1.0)
         result[joint, component] = (
             pattern,
-            robot.stiffness[joint, component],
-            robot.damping[joint, component],
+            robot.springs.stiffness[joint, component],
+            robot.springs.damping[joint, component],
         )
     return result
 
@@ -193,7 +193,7 @@ def _twists(robot: RobotModel, rest: Equilibrium) -> np.ndarray:
     """Twist (n,) of the drive springs at rest, rad; 0 for rigid joints."""
     twist, sprung = np.zeros(robot.n), [e.index for e in robot.elastic]
     twist[sprung] = -twist_from_torque(
-        rest.torque[0, sprung], robot.stiffness[sprung, 2], robot.hardening[sprung]
+        rest.torque[0, sprung], robot.springs.stiffness[sprung, 2], robot.springs.hardening[sprung]
     )
     return twist
 
@@ -202,7 +202,7 @@ def _stretch(robot: RobotModel, rest: Equilibrium, axis: tuple[int, int]) -> flo
     joint, component = axis
     if component != 2:
         return float(rest.deflection[0, joint, component])
-    return float(-rest.torque[0, joint] / robot.stiffness[joint, 2])
+    return float(-rest.torque[0, joint] / robot.springs.stiffness[joint, 2])
 
 
 def _by_inertia(
@@ -244,5 +244,5 @@ def _load_by_inertia(
     i = [joint.link for joint in robot.joints].index(owner)
     block = rest.regressor[0][:, 4 * i : 4 * i + 4]
     if key == "mass":
-        return block[:, 0] + block[:, 1:] @ robot.com[i]
-    return robot.mass[i] * block[:, 1 + "xyz".index(key[-1])]
+        return block[:, 0] + block[:, 1:] @ robot.links.com[i]
+    return robot.links.mass[i] * block[:, 1 + "xyz".index(key[-1])]

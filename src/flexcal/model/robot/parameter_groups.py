@@ -1,0 +1,116 @@
+"""Groups of a robot's parameters: geometry, springs, drives, links, stations and scatter; n joints, SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from flexcal.model.parts import Inertia
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """Deviations of the geometry from the URDF, and compliances at rigid joints.
+
+    `errors` (n, 6) of every joint and `tool` (6,) in the order of `GEOMETRY`, rad and m; `point_error` (points, 3), m, in the order of
+    the robot's points; `gravity_compliance` (n,) about the joints' axes and `lateral_compliance` (n, 2) across them, rad/(N m).
+    """
+
+    errors: np.ndarray
+    tool: np.ndarray
+    point_error: np.ndarray
+    gravity_compliance: np.ndarray
+    lateral_compliance: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Springs:
+    """Springs of the elastic joints.
+
+    `bearing_frames`: joint index → axes (3, 3) of its bearing in the link frame; its keys are the elastic joints. `stiffness` (n, 3),
+    N m/rad, and `damping` (n, 3), N m s/rad, in the order of `SPRINGS`, NaN where there is no spring; `hardening` (n,) of the drive
+    springs, 1; `braked`: indices of the elastic joints whose motors are braked.
+    """
+
+    bearing_frames: Mapping[int, np.ndarray]
+    stiffness: np.ndarray
+    damping: np.ndarray
+    hardening: np.ndarray
+    braked: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True, eq=False)
+class Drives:
+    """Motors, transmissions and friction; in N, m, kg for a prismatic joint.
+
+    (n,) each: `rotor_inertia`, kg m², of the motors at the joint; `held_inertia`, kg m², that moves with the arm of a braked joint beyond
+    its links'; `viscous`, N m s/rad, and `coulomb`, N m, friction; `torque_offset`, N m; `delay` of the torque signal, s; `ratio`, motor
+    turns per joint turn; `backlash`, half the gap, rad. `friction` (n, terms) in the order of `FRICTION_PARAMETERS`; `parallel` (n, 3),
+    springs and cables beside the motor, in that of `PARALLEL`; `coupling` (declared couplings, 3) in that of `COUPLED`. `transmission`
+    (n, harmonics, 2), rad: sine and cosine of the transmission errors of the orders `harmonics`. NaN where robot.yaml gives no value.
+    """
+
+    rotor_inertia: np.ndarray
+    held_inertia: np.ndarray
+    viscous: np.ndarray
+    coulomb: np.ndarray
+    torque_offset: np.ndarray
+    friction: np.ndarray
+    parallel: np.ndarray
+    coupling: np.ndarray
+    delay: np.ndarray
+    ratio: np.ndarray
+    backlash: np.ndarray
+    transmission: np.ndarray
+    harmonics: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Links:
+    """Inertial parameters of the joints' links.
+
+    `mass` (n,), kg; `com` (n, 3), centre of mass in the link frame, m; `inertia` (n, 3, 3) about it in link axes, kg m².
+    """
+
+    mass: np.ndarray
+    com: np.ndarray
+    inertia: np.ndarray
+
+    @classmethod
+    def of(cls, inertias: Sequence[Inertia]) -> Links:
+        """The links with these inertias."""
+        return cls(
+            np.array([link.mass for link in inertias]),
+            np.array([link.com for link in inertias]),
+            np.array([link.inertia for link in inertias]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Stations:
+    """Places of the measuring instrument: `names`, and `pose` (stations, 6) as x, y, z, m, and the rotation vector rx, ry, rz, rad."""
+
+    names: tuple[str, ...]
+    pose: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """Scatter of measured points: `std` (7,) of its causes in the order of `SCATTER`, m and rad; `instrument_share` is a ratio."""
+
+    std: np.ndarray
+
+
+Group = Literal["geometry", "springs", "drives", "links", "stations", "scatter"]
+"""Groups of arrays of a robot model."""
+
+
+class Location(NamedTuple):
+    """Place of a named parameter in a robot model: group, array of that group, indices into the array."""
+
+    group: Group
+    array: str
+    indices: tuple[int, ...]
