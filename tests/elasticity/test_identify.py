@@ -67,7 +67,7 @@ def test_paper_plan_leaves_the_forearm_torsion_unidentified(tx90l, poses, synthe
     assert quantity["identifiable"] is False
     assert quantity["std"] is None
     assert paper.quantity("joint_1.drive.stiffness")["identifiable"]
-    default = fit_springs(tx90l, synthesise(truth, poses["default"], noise=0.05, rng=rng), rng=rng)
+    default = fit_springs(tx90l, synthesise(truth, poses["default"], noise=0.05, rng=rng, step=8), rng=rng)
     assert all(default.quantity(n)["identifiable"] for n in spring_names(tx90l) if n.endswith(".stiffness"))
 
 
@@ -176,7 +176,7 @@ def squared_errors(model, poses, synthesise, drawn, seeds, *, inertias):
     for seed in seeds:
         rng = np.random.default_rng(seed)
         truth = drawn(model, rng, inertias=inertias)
-        responses = synthesise(truth, poses, noise=0.03, rng=rng, step=6)
+        responses = synthesise(truth, poses, noise=0.03, rng=rng, step=12)
         estimate = fit_springs(
             model, responses, rng=rng, inertias_known=not inertias, tolerances=Tolerances.none(),
             search=MultiStart(agreement=1),
@@ -257,7 +257,7 @@ def test_half_gap_is_found(tx90l, poses, synthesise, rng):
 
 def test_masses_that_take_up_a_misfit_have_no_intervals(stiff, synthesise, shaken, poses, rng):
     """A resonance that the model lacks moves masses by more than is known of them; without it none moves so far."""
-    clean = synthesise(stiff, poses["default"][:3], noise=0.003, rng=rng)
+    clean = synthesise(stiff, poses["default"][:3], noise=0.003, rng=rng, step=12)
     calm = fit_springs(stiff, clean, rng=rng).estimate
     moved = fit_springs(stiff, [shaken(r, 0.3) for r in clean], rng=rng).estimate
     assert calm.misfit is None and calm.std("link_3.mass") is not None
@@ -269,7 +269,7 @@ def test_torque_constants_are_in_the_intervals(stiff, synthesise, poses, rng):
     """Believed torques of all motors 2 % too small: the springs of a robot whose inertias follow are as wrong, and say so."""
     responses = [
         replace(r, response=r.response * 1.02)
-        for r in synthesise(stiff, poses["default"][:3], noise=0.003, rng=rng)
+        for r in synthesise(stiff, poses["default"][:3], noise=0.003, rng=rng, step=8)
     ]
     names = [f"joint_{j}.drive.stiffness" for j in (1, 2, 3)]
     squares = []

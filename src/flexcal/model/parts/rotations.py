@@ -32,6 +32,8 @@ def rotation_rpy(rotation: np.ndarray) -> np.ndarray:
 
 def axis_rotation(axis: np.ndarray, angle: float) -> np.ndarray:
     """Rotation (3, 3) by `angle` (rad) about the unit vector `axis` (3,)."""
+    if angle == 0:
+        return np.eye(3)
     skew = skew_matrix(axis)
     return np.eye(3) + np.sin(angle) * skew + (1 - np.cos(angle)) * skew @ skew
 

@@ -25,8 +25,8 @@ def path_to(joints: Sequence[Joint], joint: int) -> tuple[int, ...]:
 
 def bearing_frame(joint: Joint) -> np.ndarray:
     """The default bearing frame (3, 3) of a joint: z its axis, x the first axis normal to it."""
-    x = joint.normals[0]
-    return np.column_stack([x, np.cross(joint.axis, x), joint.axis])
+    (x, y, z), (a, b, c) = joint.normals[0].tolist(), joint.axis.tolist()
+    return np.array([[x, b * z - c * y, a], [y, c * x - a * z, b], [z, a * y - b * x, c]])
 
 
 def kinematic_tree(
