@@ -86,9 +86,9 @@ def one_seed(seed: int, plans: Path, substeps: int = 1) -> dict[str, Any]:
                 truth=folder / "truth.yaml",
             )
         loaded = [folder / "loaded"]
-        free = identify_robot_payload(robot, loaded, free=[folder / "free"], out=folder / "out").fit.estimate
+        free = identify_robot_payload(robot, loaded, free=[folder / "free"], out=folder / "out").estimate
         identify_robot_inertials(robot, folder / "free")
-        block = identify_robot_payload(robot, loaded).fit.estimate
+        block = identify_robot_payload(robot, loaded).estimate
     tool = {}
     true = nominal.with_values(truth)
     for name, values in (("declared", {}), ("block", block.values), ("free", free.values)):

@@ -30,7 +30,6 @@ from .dynamics.estimators import (
 from .dynamics.friction import select_friction
 from .dynamics.inertials import identify_with_prior, trajectory_error
 from .dynamics.inverse_model import CLASSIC, BaseParameters, Observation
-from .dynamics.payload import identify_payload
 from .dynamics.regression import assemble_regression, experiment_system
 from .dynamics.residual import read_learned_residual
 from .dynamics.signals import JointLog, Window
@@ -46,6 +45,7 @@ from .frequency.periodic import (
 )
 from .jobs.dynamics import DynamicsIdentification, identify_dynamics
 from .jobs.experiments import exciting_plan, frequency_plan
+from .jobs.payload import PayloadIdentification, identify_payload
 from .jobs.stiffness import StiffnessIdentification, identify_stiffness
 from .model.kinematics import point_kinematics
 from .model.parts import is_physically_consistent
@@ -84,6 +84,7 @@ __all__ = [
     "MeasuringSetup",
     "MultisinePlan",
     "Observation",
+    "PayloadIdentification",
     "PosePlan",
     "PoseSet",
     "PowerModel",

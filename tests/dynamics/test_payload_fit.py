@@ -14,7 +14,7 @@ from two_links import swings as swing_of
 from flexcal.data.recordings import Decimation
 from flexcal.dynamics.estimators import weighted_least_squares
 from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
-from flexcal.dynamics.payload import PayloadEquations, PayloadFit, RobotPrior, identify_payload
+from flexcal.dynamics.payload import PayloadEquations, PayloadFit, RobotPrior, fit_payload
 from flexcal.dynamics.payload.equations import payload_to_link_frame
 from flexcal.dynamics.payload.rigid_body import (
     identified_moments,
@@ -60,7 +60,7 @@ def found(
     base, held = BaseParameters.of(arm), arm.model.payload
     data = assemble_regression(arm, base, motions, Decimation(1))
     assert held is not None
-    return identify_payload(PayloadEquations(data, carries, held, RobotPrior.of(arm, base, dynamics)))
+    return fit_payload(PayloadEquations(data, carries, held, RobotPrior.of(arm, base, dynamics)))
 
 
 def values(fit: PayloadFit) -> np.ndarray:
@@ -92,7 +92,7 @@ def test_what_is_predicted_is_what_was_measured(
         data = assemble_regression(arm, base, noisy, Decimation(1), mask_standstill=False)
         assert held is not None
         equations = PayloadEquations(data, [True, False], held, RobotPrior.of(arm, base, None))
-        fit = identify_payload(equations)
+        fit = fit_payload(equations)
         left = []
         for each, carries in zip(noisy, (True, False), strict=True):
             found = equations.coefficients(fit.unknowns, carries)

@@ -24,7 +24,7 @@ from flexcal.cli.arguments.suggested_commands import estimates_option, stored_li
 from flexcal.cli.terminal.console import Console
 
 if TYPE_CHECKING:
-    from flexcal.jobs.payload import RobotPayload
+    from flexcal.jobs.payload import PayloadIdentification
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class IdentifyPayload:
                 progress=progress,
             )
         document = payload.document()
-        units = {item.name: item.unit for item in payload.fit.estimate.parameters}
+        units = {item.name: item.unit for item in payload.estimate.parameters}
         title = f"payload in the frame {payload.frame}, inertia about its centre of mass"
         console.show(quantity_table(title, document["parameters"], units))
         console.say(f"relative torque error: {document['error_percent']['train']:.2f} %")
@@ -99,7 +99,7 @@ class IdentifyPayload:
             console.say(line)
         console.finish(document, self._next(payload))
 
-    def _next(self, payload: RobotPayload) -> str:
+    def _next(self, payload: PayloadIdentification) -> str:
         where = estimates_option(self.out or self.estimates)
         if "calibration" in payload.blocks:
             return f"flexcal compensate {self.robot} targets.csv{where} --out commands.csv"

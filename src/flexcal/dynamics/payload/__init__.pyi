@@ -1,6 +1,6 @@
 from .equations import PayloadEquations
 from .flexibility_correction import FlexibilityCorrection, uncertain_parameters
-from .identification import BODY, PayloadFit, identify_payload
+from .identification import BODY, PayloadFit, fit_payload
 from .robot_prior import RobotPrior
 
 __all__ = [
@@ -9,6 +9,6 @@ __all__ = [
     "PayloadEquations",
     "PayloadFit",
     "RobotPrior",
-    "identify_payload",
+    "fit_payload",
     "uncertain_parameters",
 ]

@@ -68,7 +68,7 @@ class _Solution:
     freedom_left: int
 
 
-def identify_payload(equations: PayloadEquations) -> PayloadFit:
+def fit_payload(equations: PayloadEquations) -> PayloadFit:
     """Bayesian weighted least squares, without prior of the payload; then the nearest consistent payload (Wensing et al. 2018).
 
     The intervals include the uncertainty of the robot, and errors correlated in time and between joints (`score_covariance`).

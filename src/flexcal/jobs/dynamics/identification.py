@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
-from flexcal.data.recordings import Recording, write_recording
 from flexcal.dynamics.diagnostics import ExternalExcess, essential_parameters, external_share, weight_shares
 from flexcal.dynamics.drives import with_backlash, with_nominal_uncertainty
 from flexcal.dynamics.estimators import WLS, Estimator
@@ -15,14 +12,17 @@ from flexcal.dynamics.friction import select_friction
 from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation, SensorOffset
 from flexcal.dynamics.regression import RegressionData
 from flexcal.dynamics.residual import require_scikit_learn
-from flexcal.errors import FlexcalError, InputError
+from flexcal.errors import InputError
 from flexcal.jobs.dynamics.flexible_model import require_flexible_bearings, require_flexible_drives
 from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
 from flexcal.jobs.dynamics.result import DynamicsIdentification
 from flexcal.jobs.inputs import require_distinct_files
 from flexcal.jobs.logs import (
     HoldOutLogs,
+    JointLogs,
     choose_preprocessing,
+    log_files,
+    model_for_logs,
     preprocessing_document,
     scratch_folder,
     weight_faults,
@@ -30,7 +30,6 @@ from flexcal.jobs.logs import (
 from flexcal.model.robot import DynamicsConfig, RobotModel
 from flexcal.progress import Progress, silent
 
-JointLogs = Sequence[str | Path | Recording]
 _DEFAULT = WLS()
 
 
@@ -94,9 +93,9 @@ def identify_dynamics(
     if learn_residual:
         _require_rigid_and_learnable(flexible)
     begun = time.perf_counter()
-    model = _without_columns(model, [*logs, *validate])
+    model = model_for_logs(model, [*logs, *validate])
     with scratch_folder() as folder:
-        files, others = _files(logs, folder, "log"), _files(validate, folder, "validation")
+        files, others = log_files(logs, folder, "log"), log_files(validate, folder, "validation")
         require_distinct_files(files, others)
         springs = require_flexible_drives(model, [*files, *others], estimator.name) if flexible else ()
         bearings = require_flexible_bearings(model, [*files, *others]) if flexible else ()
@@ -159,32 +158,6 @@ def identify_dynamics(
             predictions=tuple(divided.predictions(observation, estimate)),
             seconds=time.perf_counter() - begun,
         )
-
-
-def _without_columns(model: RobotModel, logs: JointLogs) -> RobotModel:
-    """The robot for logs in memory, which are in SI units of the joints already; raises `FlexcalError` where they stand beside files."""
-    in_memory = sum(isinstance(log, Recording) for log in logs)
-    if not in_memory or not model.config.signals:
-        return model
-    if in_memory < len(logs):
-        raise FlexcalError(
-            "E-RUN-033",
-            f"{model.path} says how the columns of files are converted (`signals:`), so logs in memory cannot stand beside files; "
-            "give one kind.",
-        )
-    return replace(model, config=replace(model.config, signals={}))
-
-
-def _files(logs: JointLogs, folder: Path, name: str) -> list[Path]:
-    """The logs as files; those in memory are written to `folder`."""
-    files = []
-    for number, log in enumerate(logs, start=1):
-        if isinstance(log, Recording):
-            files.append(folder / f"{name}_{number}.parquet")
-            write_recording(files[-1], log)
-        else:
-            files.append(Path(log))
-    return files
 
 
 def _require_rigid_and_learnable(flexible: bool) -> None:

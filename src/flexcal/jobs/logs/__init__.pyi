@@ -1,4 +1,5 @@
 from .checks import payload_masses, require_joint_torques, require_no_wrenches, weight_faults
+from .given_logs import JointLogs, log_files, model_for_logs
 from .hold_out import HoldOutLogs
 from .preprocessing import Preprocessing, choose_preprocessing, preprocessing_document, preprocessing_remarks
 from .regression_systems import LogSegment, assemble_log_systems, read_logs
@@ -7,10 +8,13 @@ from .torque_predictions import predict_log_torques
 
 __all__ = [
     "HoldOutLogs",
+    "JointLogs",
     "LogSegment",
     "Preprocessing",
     "assemble_log_systems",
     "choose_preprocessing",
+    "log_files",
+    "model_for_logs",
     "payload_masses",
     "predict_log_torques",
     "preprocessing_document",

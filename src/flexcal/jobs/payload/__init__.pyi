@@ -1,6 +1,9 @@
-from .job import RobotPayload, identify_robot_payload
+from .identification import identify_payload
+from .job import identify_robot_payload
+from .result import PayloadIdentification
 
 __all__ = [
-    "RobotPayload",
+    "PayloadIdentification",
+    "identify_payload",
     "identify_robot_payload",
 ]
