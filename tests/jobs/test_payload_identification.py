@@ -117,7 +117,7 @@ def test_what_cannot_be_told_apart_is_refused(arm: Path, own: DynamicsIdentifica
     nominal = RobotModel.from_yaml(arm / "robot.yaml", estimates=False)
     with pytest.raises(FlexcalError) as refused:
         identify_payload(nominal, [arm / "loaded.csv"])
-    assert refused.value.code == "E-RUN-100"
+    assert refused.value.code == "E-RUN-094"
     with pytest.raises(FlexcalError) as refused:
         identify_payload(nominal, [arm / "free.csv"], dynamics=own.estimate, free=[arm / "free.csv"])
     assert "is given twice" in str(refused.value)

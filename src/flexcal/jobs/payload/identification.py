@@ -91,7 +91,7 @@ def identify_payload(
     """
     if dynamics is None and not free:
         raise FlexcalError(
-            "E-RUN-100",
+            "E-RUN-094",
             "payload and robot inertia are not identifiable separately; give the estimate of the robot's own dynamics (`dynamics`) or "
             "logs without payload (`free`).",
         )
