@@ -5,8 +5,8 @@ from pathlib import Path
 from threading import Thread
 
 import pytest
+from refusals import refused
 
-from flexcal.errors import InputError
 from flexcal.files.transaction import atomic_path, atomic_paths, write_text
 
 
@@ -44,7 +44,7 @@ def test_files_that_belong_together_appear_together(tmp_path: Path) -> None:
     assert a.read_text() == b.read_text() == "new" and sorted(os.listdir(tmp_path)) == ["a.npz", "b.yaml"]
     (tmp_path / "c.yaml").mkdir()
     with (
-        pytest.raises(InputError, match="is a folder"),
+        refused("E-FILE-013", "a folder"),
         atomic_paths(tmp_path / "c.npz", tmp_path / "c.yaml"),
     ):
         pass
@@ -71,7 +71,7 @@ def test_permissions_are_those_of_a_plain_file(tmp_path: Path) -> None:
 
 def test_places_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="cannot be written"):
+    with refused("E-FILE-012"):
         write_text(tmp_path / "file" / "a.txt", "")
-    with pytest.raises(InputError, match="is a folder"):
+    with refused("E-FILE-013", "a folder"):
         write_text(tmp_path, "")

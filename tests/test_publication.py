@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from refusals import refused
 
 from flexcal.errors import InputError
 from flexcal.files.transaction import FileTransaction, Stage, atomic_path, current_path, recover, write_text
@@ -162,7 +163,7 @@ def test_a_file_may_be_written_bit_by_bit(tmp_path: Path) -> None:
 def test_a_file_of_ours_that_somebody_changed_meanwhile_stays(tmp_path: Path) -> None:
     path = tmp_path / "estimates.yaml"
     write_text(path, "old")
-    with pytest.raises(InputError, match="changed by another program"), FileTransaction():
+    with refused("E-FILE-018"), FileTransaction():
         write_text(path, "new")
         path.write_text("theirs, and longer")
     assert path.read_text() == "theirs, and longer" and os.listdir(tmp_path) == ["estimates.yaml"]
@@ -176,7 +177,7 @@ def test_what_somebody_wrote_after_the_kill_is_not_replaced(tmp_path: Path) -> N
             break
         recover(tmp_path)
     (tmp_path / "b").write_text("written by hand")
-    with pytest.raises(InputError, match="b was changed after a run"):
+    with refused("E-FILE-015", "b"):
         recover(tmp_path)
     assert (tmp_path / "b").read_text() == "written by hand"
 
@@ -222,7 +223,7 @@ def test_renaming_that_fails_is_finished_later(tmp_path: Path, monkeypatch: pyte
 
     with monkeypatch.context() as patch:
         patch.setattr(Path, "replace", fails)
-        with pytest.raises(InputError, match="the next flexcal that opens the folder does it"):
+        with refused("E-FILE-016"):
             write_run(tmp_path, "new")
     recover(tmp_path)
     assert whole(tmp_path) == "new"
@@ -243,7 +244,7 @@ def test_no_file_of_flexcals_own(tmp_path: Path) -> None:
     }.items():
         with pytest.raises(InputError, match=f"{name} is {kind}"):
             write_text(tmp_path / name, "new")
-    with pytest.raises(InputError, match="/dev/null is a device"):
+    with refused("E-FILE-013", "/dev/null", "a device"):
         write_text("/dev/null", "new")
     assert (tmp_path / "target").read_text() == "mine"
     assert sorted(os.listdir(tmp_path)) == ["dangling", "folder", "link", "pipe", "target"]

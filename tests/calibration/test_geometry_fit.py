@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from flexcal.calibration.diagnostics import implausible_shifts
 from flexcal.calibration.error_model import ErrorStatistics
@@ -13,7 +14,6 @@ from flexcal.calibration.fit import Calibration, ElasticPrior, calibrate
 from flexcal.calibration.measurement import predict
 from flexcal.calibration.verification import verify
 from flexcal.data.poses import read_poses
-from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate, Parameter, Parameters
 from flexcal.model.parts import vector_rotation
 from flexcal.model.robot import RobotModel
@@ -73,7 +73,7 @@ def test_reestimated_and_marginalised_elasticity_agree(simulate: Callable, tx90l
 def test_a_robust_loss_cannot_weigh_poses_tied_by_marginalised_springs(
     simulate: Callable, tx90l: RobotModel
 ) -> None:
-    with pytest.raises(FlexcalError, match="use re-estimated elasticity instead"):
+    with refused("E-CAL-005"):
         calibrate(tx90l, simulate(1).poses, elasticity="marginalised", loss="cauchy")
 
 
@@ -236,20 +236,17 @@ def test_a_stiffer_secant_is_found(simulate: Callable, tx90l: RobotModel) -> Non
 
 def test_poses_that_cannot_work_are_refused(simulate: Callable, tx90l: RobotModel) -> None:
     poses = simulate(1).poses
-    with pytest.raises(FlexcalError, match="too few for 29 identifiable parameters"):
+    with refused("E-CAL-009", "29"):
         calibrate(tx90l, poses.subset(slice(0, 9)))
     same = replace(poses, q=np.repeat(poses.q[:1], len(poses), axis=0))
-    with pytest.raises(FlexcalError, match="all 60 poses are the same"):
+    with refused("E-CAL-007", "60"):
         calibrate(tx90l, same)
     still = poses.q.copy()
     still[:, 3] = 0.3
-    with pytest.raises(FlexcalError, match="joint_4 never moves"):
+    with refused("E-CAL-008", "joint_4"):
         calibrate(tx90l, replace(poses, q=still))
     flank = predict(tx90l, poses).rest.flank
-    with pytest.raises(
-        FlexcalError,
-        match=r"joint_2 rests on one flank.*backlash and joint offset are not identifiable separately",
-    ):
+    with refused("E-CAL-010", "joint_2"):
         calibrate(tx90l, poses.subset(flank[:, 1] > 0))
 
 
@@ -283,11 +280,11 @@ def test_stations_and_measurements_that_are_not_known_are_named(
     poses = simulate(1).poses
     elsewhere = replace(poses, station=np.full(len(poses), "window"))
     for call in (calibrate, verify):
-        with pytest.raises(FlexcalError, match=r"no station 'window'.*which has tracker"):
+        with refused("E-ROBOT-042", "window", "tracker"):
             call(tx90l, elsewhere)
-        with pytest.raises(FlexcalError, match="orientations cannot be used"):
+        with refused("E-CAL-012"):
             call(tx90l, replace(poses, quaternion_wxyz=np.tile([1.0, 0, 0, 0], (len(poses), 1))))
-        with pytest.raises(FlexcalError, match="lengths of a wire"):
+        with refused("E-CAL-011"):
             call(tx90l, replace(poses, length=np.ones(len(poses))))
 
 

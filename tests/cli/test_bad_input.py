@@ -17,7 +17,7 @@ from flexcal.model.statics import gravity_torque
 Table = tuple[list[str], np.ndarray]
 
 
-def refused(run, folder: Path, *arguments: str | Path) -> str:
+def refused_run(run, folder: Path, *arguments: str | Path) -> str:
     """The one sentence with which a command line is refused; checks that nothing else happened."""
     before = snapshot(folder)
     outcome = run(*arguments)
@@ -55,7 +55,7 @@ def test_robot_yaml(run, tx90l_folder: Path, right: str, wrong: str, words: list
     text = robot.read_text()
     assert right in text
     robot.write_text(text.replace(right, wrong, 1))
-    sentence = refused(run, tx90l_folder, "design", "poses", robot, "--out", tx90l_folder / "plan.yaml")
+    sentence = refused_run(run, tx90l_folder, "design", "poses", robot, "--out", tx90l_folder / "plan.yaml")
     line = text[: text.index(right)].count("\n") + 1
     for word in words:
         assert word.replace("LINE", str(line)) in sentence
@@ -72,7 +72,7 @@ def test_a_number_in_scientific_notation_is_a_number(tx90l_folder: Path) -> None
 )
 def test_urdf_that_does_not_parse(run, ur5_folder: Path, content: str) -> None:
     (ur5_folder / "ur5.urdf").write_text(content)
-    sentence = refused(run, ur5_folder, "calibrate", ur5_folder / "robot.yaml", ur5_folder / "grid.csv")
+    sentence = refused_run(run, ur5_folder, "calibrate", ur5_folder / "robot.yaml", ur5_folder / "grid.csv")
     assert "ur5.urdf" in sentence
 
 
@@ -80,8 +80,8 @@ def test_measurements_that_count_twice(run, ur5_folder: Path) -> None:
     robot, poses = ur5_folder / "robot.yaml", ur5_folder / "random.csv"
     (ur5_folder / "copy.csv").write_bytes(poses.read_bytes())
     for verb in ("calibrate", "verify"):
-        assert f"{poses} is given twice" in refused(run, ur5_folder, verb, robot, poses, poses)
-        assert "copy.csv holds the same as" in refused(
+        assert f"{poses} is given twice" in refused_run(run, ur5_folder, verb, robot, poses, poses)
+        assert "copy.csv holds the same as" in refused_run(
             run, ur5_folder, verb, robot, poses, ur5_folder / "copy.csv"
         )
 
@@ -89,12 +89,12 @@ def test_measurements_that_count_twice(run, ur5_folder: Path) -> None:
 def test_files_of_another_kind(run, tx90l_folder: Path) -> None:
     """Settings in the place of a plan, a file in that of a folder, a robot in that of responses."""
     robot, out = tx90l_folder / "robot.yaml", tx90l_folder / "out"
-    sentence = refused(
+    sentence = refused_run(
         run, tx90l_folder, "measure", tx90l_folder / "cell.yaml", "--cell", "virtual", "--out", out
     )
     assert "this is no plan" in sentence and "flexcal design" in sentence
-    assert "tx90l.urdf is no folder" in refused(run, tx90l_folder, "report", tx90l_folder / "tx90l.urdf")
-    sentence = refused(run, tx90l_folder, "identify", "stiffness", robot, tx90l_folder / "tx90l.urdf")
+    assert "tx90l.urdf is no folder" in refused_run(run, tx90l_folder, "report", tx90l_folder / "tx90l.urdf")
+    sentence = refused_run(run, tx90l_folder, "identify", "stiffness", robot, tx90l_folder / "tx90l.urdf")
     assert "identify response" in sentence and "pickle" not in sentence
 
 
@@ -165,7 +165,7 @@ POSES = {
 def test_pose_file(run, ur5_folder: Path, alter: Callable[[Table], Table], words: list[str]) -> None:
     header, rows = read_csv(ur5_folder / "grid.csv")
     file = write_csv(ur5_folder / "bad.csv", *alter((header, rows[:60])))
-    sentence = refused(run, ur5_folder, "calibrate", ur5_folder / "robot.yaml", file, "--json")
+    sentence = refused_run(run, ur5_folder, "calibrate", ur5_folder / "robot.yaml", file, "--json")
     for word in ["bad.csv", *words] if "parameters" not in " ".join(words) else words:
         assert word in sentence
 
@@ -175,21 +175,21 @@ def test_poses_with_a_payload_that_robot_yaml_does_not_declare(run, ur5_folder: 
     file = write_csv(
         ur5_folder / "held.csv", [*header, "payload"], np.hstack([rows, np.ones((len(rows), 1))])
     )
-    assert "payload" in refused(run, ur5_folder, "calibrate", ur5_folder / "robot.yaml", file)
+    assert "payload" in refused_run(run, ur5_folder, "calibrate", ur5_folder / "robot.yaml", file)
 
 
 def test_draw_wire_lengths_are_refused_by_name(run, ur5_folder: Path) -> None:
     header, rows = read_csv(ur5_folder / "random.csv")
     file = write_csv(ur5_folder / "wire.csv", [*header[:7], "length"], rows[:, :8] ** 2 + 0.1)
     rows[:, 7] = 1.0
-    assert "wire" in refused(run, ur5_folder, "calibrate", ur5_folder / "robot.yaml", file)
+    assert "wire" in refused_run(run, ur5_folder, "calibrate", ur5_folder / "robot.yaml", file)
 
 
 def test_orientations_are_refused_by_name(run, ur5_folder: Path) -> None:
     header, rows = read_csv(ur5_folder / "random.csv")
     turned = np.hstack([rows, np.tile([1.0, 0.0, 0.0, 0.0], (len(rows), 1))])
     file = write_csv(ur5_folder / "turned.csv", [*header, "qw", "qx", "qy", "qz"], turned)
-    sentence = refused(run, ur5_folder, "calibrate", ur5_folder / "robot.yaml", file)
+    sentence = refused_run(run, ur5_folder, "calibrate", ur5_folder / "robot.yaml", file)
     assert "turned.csv" in sentence and "take out the columns qw" in sentence
 
 
@@ -198,7 +198,7 @@ def test_calibrate_from_a_station_that_robot_yaml_does_not_have(run, ur5_folder:
     moved = [f"{lines[0]},station", *(f"{line},elsewhere" for line in lines[1:])]
     (ur5_folder / "moved.csv").write_text("\n".join(moved) + "\n")
     arguments = (ur5_folder / "robot.yaml", ur5_folder / "moved.csv")
-    assert "no station 'elsewhere'" in refused(run, ur5_folder, "calibrate", *arguments)
+    assert "no station 'elsewhere'" in refused_run(run, ur5_folder, "calibrate", *arguments)
 
 
 def test_sigma_in_some_files_only(run, ur5_folder: Path) -> None:
@@ -206,7 +206,7 @@ def test_sigma_in_some_files_only(run, ur5_folder: Path) -> None:
     stated = np.hstack([rows, np.full((len(rows), 1), 5e-5)])
     file = write_csv(ur5_folder / "stated.csv", [*header, "sigma"], stated)
     arguments = (ur5_folder / "robot.yaml", ur5_folder / "random.csv", file)
-    assert "only 1 of 2 pose sets have sigma" in refused(run, ur5_folder, "calibrate", *arguments)
+    assert "only 1 of 2 pose sets have sigma" in refused_run(run, ur5_folder, "calibrate", *arguments)
 
 
 def test_one_flank_of_a_backlash_only(run, tx90l_folder: Path, rng: np.random.Generator) -> None:
@@ -220,7 +220,7 @@ def test_one_flank_of_a_backlash_only(run, tx90l_folder: Path, rng: np.random.Ge
         target=np.full(len(q), "smr"), station=np.full(len(q), "tracker"), pose=np.arange(len(q)),
     )  # fmt: skip
     write_poses(tx90l_folder / "flank.csv", poses)
-    sentence = refused(
+    sentence = refused_run(
         run, tx90l_folder, "calibrate", tx90l_folder / "robot.yaml", tx90l_folder / "flank.csv"
     )
     assert "joint_2" in sentence and "one flank" in sentence
@@ -228,7 +228,7 @@ def test_one_flank_of_a_backlash_only(run, tx90l_folder: Path, rng: np.random.Ge
 
 def test_unknown_term(run, ur5_folder: Path) -> None:
     arguments = (ur5_folder / "robot.yaml", ur5_folder / "random.csv", "--terms", "kinematics")
-    assert "'kinematics'" in refused(run, ur5_folder, "calibrate", *arguments)
+    assert "'kinematics'" in refused_run(run, ur5_folder, "calibrate", *arguments)
 
 
 @pytest.mark.parametrize(
@@ -245,13 +245,13 @@ def test_numbers_out_of_range(
     run, tx90l_folder: Path, verb: tuple[str, ...], option: str, value: str
 ) -> None:
     robot, out = tx90l_folder / "robot.yaml", tx90l_folder / "out.yaml"
-    sentence = refused(run, tx90l_folder, *verb, robot, "--out", out, option, value)
+    sentence = refused_run(run, tx90l_folder, *verb, robot, "--out", out, option, value)
     assert option in sentence and "at least" in sentence
 
 
 def test_negative_secant_scale(run, ur5_folder: Path) -> None:
     arguments = (ur5_folder / "robot.yaml", ur5_folder / "random.csv", "--secant-scale", "-0.1")
-    assert "--secant-scale" in refused(run, ur5_folder, "calibrate", *arguments)
+    assert "--secant-scale" in refused_run(run, ur5_folder, "calibrate", *arguments)
 
 
 # ---- arguments in each other's place ------------------------------------------------------------------------------------------------
@@ -259,14 +259,14 @@ def test_negative_secant_scale(run, ur5_folder: Path) -> None:
 
 @pytest.mark.parametrize("verb", ["calibrate", "verify", "identify stiffness"])
 def test_swapped_arguments(run, ur5_folder: Path, verb: str) -> None:
-    sentence = refused(run, ur5_folder, *verb.split(), ur5_folder / "grid.csv", ur5_folder / "robot.yaml")
+    sentence = refused_run(run, ur5_folder, *verb.split(), ur5_folder / "grid.csv", ur5_folder / "robot.yaml")
     assert "did you mean" in sentence and "robot.yaml first" in sentence and len(sentence) < 400
 
 
 def test_folder_in_the_place_of_the_robot(run, ur5_folder: Path) -> None:
-    sentence = refused(run, ur5_folder, "identify", "response", ur5_folder, ur5_folder / "robot.yaml")
+    sentence = refused_run(run, ur5_folder, "identify", "response", ur5_folder, ur5_folder / "robot.yaml")
     assert "did you mean" in sentence
-    assert "no robot.yaml" in refused(
+    assert "no robot.yaml" in refused_run(
         run, ur5_folder, "calibrate", ur5_folder / "ur5.urdf", ur5_folder / "grid.csv"
     )
 
@@ -274,7 +274,7 @@ def test_folder_in_the_place_of_the_robot(run, ur5_folder: Path) -> None:
 def test_a_whole_file_is_not_quoted(run, ur5_folder: Path) -> None:
     robot = ur5_folder / "robot.yaml"
     robot.write_bytes((ur5_folder / "grid.csv").read_bytes())
-    sentence = refused(run, ur5_folder, "calibrate", robot, ur5_folder / "grid.csv")
+    sentence = refused_run(run, ur5_folder, "calibrate", robot, ur5_folder / "grid.csv")
     assert "robot.yaml line 1" in sentence and len(sentence) < 400
 
 
@@ -282,7 +282,7 @@ def test_a_whole_file_is_not_quoted(run, ur5_folder: Path) -> None:
 
 
 def test_verify_before_calibrate(run, ur5_folder: Path) -> None:
-    sentence = refused(run, ur5_folder, "verify", ur5_folder / "robot.yaml", ur5_folder / "random.csv")
+    sentence = refused_run(run, ur5_folder, "verify", ur5_folder / "robot.yaml", ur5_folder / "random.csv")
     assert "estimates.yaml" in sentence and "flexcal calibrate" in sentence
 
 
@@ -310,7 +310,7 @@ def test_estimates_that_are_another_file(
         lines = Path("random.csv").read_text().splitlines()
         Path("random.csv").write_text("\n".join([*lines, lines[1]]) + "\n")
     at = 2 if verb[0] == "export" else 1
-    sentence = refused(run, ur5_folder, *verb[:at], "robot.yaml", *verb[at:], "--estimates", named)
+    sentence = refused_run(run, ur5_folder, *verb[:at], "robot.yaml", *verb[at:], "--estimates", named)
     assert what in sentence
     assert (
         "takes the estimates.yaml that 'flexcal calibrate' or another identification wrote, or the folder with it"
@@ -326,7 +326,7 @@ def test_verify_from_a_station_that_was_not_calibrated(run, ur5_folder: Path) ->
     (ur5_folder / "moved.csv").write_text(
         "\n".join(f"{a},{b}" for a, b in zip(lines, moved, strict=True)) + "\n"
     )
-    assert "'elsewhere'" in refused(run, ur5_folder, "verify", robot, ur5_folder / "moved.csv")
+    assert "'elsewhere'" in refused_run(run, ur5_folder, "verify", robot, ur5_folder / "moved.csv")
 
 
 def test_estimates_of_another_robot(run, ur5_folder: Path, tx90l_folder: Path) -> None:
@@ -337,7 +337,7 @@ def test_estimates_of_another_robot(run, ur5_folder: Path, tx90l_folder: Path) -
     for name in ("estimates.yaml", "estimates.npz"):
         (tx90l_folder / name).write_bytes((ur5_folder / name).read_bytes())
     arguments = ("export", "urdf", tx90l_folder / "robot.yaml", "--out", tx90l_folder / "new.urdf")
-    sentence = refused(run, tx90l_folder, *arguments)
+    sentence = refused_run(run, tx90l_folder, *arguments)
     assert "estimates.yaml" in sentence and "shoulder_pan_joint" in sentence
 
 
@@ -351,9 +351,9 @@ def test_folder_that_cannot_be_written(run, ur5_folder: Path) -> None:
         "--out",
         ur5_folder / "file",
     )
-    assert "cannot be written" in refused(run, ur5_folder, "calibrate", *arguments)
+    assert "cannot be written" in refused_run(run, ur5_folder, "calibrate", *arguments)
 
 
 def test_nominal_urdf_is_never_overwritten(run, ur5_folder: Path) -> None:
     arguments = (ur5_folder / "robot.yaml", "--out", ur5_folder / "ur5.urdf")
-    assert "never changed" in refused(run, ur5_folder, "export", "urdf", *arguments)
+    assert "never changed" in refused_run(run, ur5_folder, "export", "urdf", *arguments)

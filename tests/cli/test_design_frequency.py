@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_bad_input import refused
+from test_bad_input import refused_run
 
 from flexcal.data.plans import MultisinePlan, read_plan_of
 
@@ -71,4 +71,4 @@ def test_options_that_cannot_be_met(run, tx90l_folder, options, sentence):
     given = [tx90l_folder / o if o.endswith(".csv") else o for o in options]
     out = tx90l_folder / "plan.yaml"
     arguments = ("design", "frequency", tx90l_folder / "robot.yaml", "--out", out, *given)
-    assert sentence in refused(run, tx90l_folder, *arguments)
+    assert sentence in refused_run(run, tx90l_folder, *arguments)

@@ -6,7 +6,7 @@ import csv
 from pathlib import Path
 
 import pytest
-from test_bad_input import refused
+from test_bad_input import refused_run
 
 from flexcal.model.robot import RobotModel
 
@@ -80,7 +80,7 @@ def test_tables_are_tables(run, tx90l_folder: Path) -> None:
 @pytest.mark.parametrize("own", ["robot.yaml", "tx90l.urdf", "frequency_poses.csv"])
 def test_a_robots_own_file_is_no_place_for_an_export(run, tx90l_folder: Path, name: str, own: str) -> None:
     arguments = ("export", name, tx90l_folder / "robot.yaml", "--out", tx90l_folder / own)
-    assert "never changed" in refused(run, tx90l_folder, *arguments)
+    assert "never changed" in refused_run(run, tx90l_folder, *arguments)
 
 
 def test_what_flexcal_wrote_is_protected_while_it_is_the_robot(run, tx90l_folder: Path) -> None:
@@ -89,7 +89,7 @@ def test_what_flexcal_wrote_is_protected_while_it_is_the_robot(run, tx90l_folder
     robot.write_text(
         (tx90l_folder / "robot.yaml").read_text().replace("tx90l.urdf", "new.urdf").replace("smr:", "seen:")
     )
-    sentence = refused(run, tx90l_folder, "export", "urdf", robot, "--out", tx90l_folder / "new.urdf")
+    sentence = refused_run(run, tx90l_folder, "export", "urdf", robot, "--out", tx90l_folder / "new.urdf")
     assert "is the nominal URDF" in sentence
 
 
@@ -98,17 +98,19 @@ def test_a_chain_needs_a_point(run, tx90l_folder: Path, name: str) -> None:
     robot = tx90l_folder / "robot.yaml"
     lines = robot.read_text().splitlines(keepends=True)
     robot.write_text("".join(line for line in lines if not line.startswith(("points:", "  smr:"))))
-    sentence = refused(run, tx90l_folder, "export", name, robot, "--out", tx90l_folder / "new")
+    sentence = refused_run(run, tx90l_folder, "export", name, robot, "--out", tx90l_folder / "new")
     assert "declares none; add one under `points:`" in sentence
 
 
 def test_other_input_that_cannot_be_used(run, tx90l_folder: Path, examples: Path) -> None:
     robot, out = tx90l_folder / "robot.yaml", tx90l_folder / "new"
-    sentence = refused(run, tx90l_folder, "export", "dh", robot, "--point", "tool", "--out", out)
+    sentence = refused_run(run, tx90l_folder, "export", "dh", robot, "--point", "tool", "--out", out)
     assert "no point 'tool'" in sentence and "smr" in sentence
-    missing = refused(run, tx90l_folder, "export", "mjcf", robot, "--estimates", "nowhere", "--out", out)
+    missing = refused_run(run, tx90l_folder, "export", "mjcf", robot, "--estimates", "nowhere", "--out", out)
     assert "nowhere does not exist" in missing
-    massless = refused(run, tx90l_folder, "export", "mjcf", examples / "tx40" / "robot.yaml", "--out", out)
+    massless = refused_run(
+        run, tx90l_folder, "export", "mjcf", examples / "tx40" / "robot.yaml", "--out", out
+    )
     assert "MuJoCo cannot build" in massless and "tx40.urdf" in massless
-    assert "is a folder" in refused(run, tx90l_folder, "export", "sdf", robot, "--out", tx90l_folder)
-    assert "no 'export step'" in refused(run, tx90l_folder, "export", "step", robot, "--out", out)
+    assert "is a folder" in refused_run(run, tx90l_folder, "export", "sdf", robot, "--out", tx90l_folder)
+    assert "no 'export step'" in refused_run(run, tx90l_folder, "export", "step", robot, "--out", out)

@@ -17,7 +17,7 @@ import numpy as np
 import polars as pl
 import pytest
 from cli_files import FLEXCAL, copied
-from test_bad_input import refused
+from test_bad_input import refused_run
 
 from flexcal.cli.arguments.verb_table import find_verb
 from flexcal.cli.main import main
@@ -182,7 +182,7 @@ def test_one_realisation_takes_the_local_polynomial_method(
     plan = read_plan_of(folder / "plan.yaml", MultisinePlan)
     write_plan(folder / "plan.yaml", replace(plan, realisations=1, settle_periods=0))
     arguments = ("identify", "response", recorded / "robot.yaml", folder, "--out", tmp_path / "responses")
-    assert "--method local-polynomial" in refused(run, tmp_path, *arguments)
+    assert "--method local-polynomial" in refused_run(run, tmp_path, *arguments)
     document = run(*arguments, "--method", "local-polynomial", "--json").document
     assert [entry["method"] for entry in document["responses"]] == ["local_polynomial"] * 2
     assert all(entry["relative_noise_std"] < entry["relative_std"] for entry in document["responses"])
@@ -289,12 +289,12 @@ def test_stiffness_leaves_out_what_calibration_made_of_it(
 
 def test_stiffness_of_a_rigid_robot(run, responses: Path, ur5_folder: Path) -> None:
     arguments = ("identify", "stiffness", ur5_folder / "robot.yaml", responses)
-    assert "no elastic joint" in refused(run, ur5_folder, *arguments)
+    assert "no elastic joint" in refused_run(run, ur5_folder, *arguments)
 
 
 def test_folder_without_responses(run, recorded: Path, tmp_path: Path) -> None:
     arguments = ("identify", "stiffness", recorded / "robot.yaml", tmp_path)
-    assert "flexcal identify response" in refused(run, tmp_path, *arguments)
+    assert "flexcal identify response" in refused_run(run, tmp_path, *arguments)
 
 
 def alter_log(folder: Path, change: Callable[[pl.DataFrame], pl.DataFrame]) -> None:
@@ -321,7 +321,7 @@ def test_bad_log(
     folder = copied(recorded / "recorded", tmp_path / "recorded")
     alter_log(folder, change)
     arguments = ("identify", "response", recorded / "robot.yaml", folder, "--out", tmp_path / "responses")
-    sentence = refused(run, tmp_path, *arguments)
+    sentence = refused_run(run, tmp_path, *arguments)
     for word in words:
         assert word in sentence
     assert LOG in sentence
@@ -331,7 +331,7 @@ def test_missing_log(run, recorded: Path, tmp_path: Path) -> None:
     folder = copied(recorded / "recorded", tmp_path / "recorded")
     (folder / LOG).unlink()
     arguments = ("identify", "response", recorded / "robot.yaml", folder, "--out", tmp_path / "responses")
-    assert Path(LOG).stem in refused(run, tmp_path, *arguments)
+    assert Path(LOG).stem in refused_run(run, tmp_path, *arguments)
 
 
 def test_poses_are_no_frequency_experiment(run, recorded: Path, tmp_path: Path) -> None:
@@ -348,7 +348,7 @@ def test_poses_are_no_frequency_experiment(run, recorded: Path, tmp_path: Path) 
         tmp_path / "measured",
     )
     arguments = ("identify", "response", robot, tmp_path / "measured", "--out", tmp_path / "responses")
-    assert "flexcal calibrate" in refused(run, tmp_path, *arguments)
+    assert "flexcal calibrate" in refused_run(run, tmp_path, *arguments)
 
 
 def test_plan_of_another_robot(run, recorded: Path, ur5_folder: Path, tmp_path: Path) -> None:
@@ -356,13 +356,13 @@ def test_plan_of_another_robot(run, recorded: Path, ur5_folder: Path, tmp_path: 
     shorter = replace(plan, poses=plan.poses[:, :5], kp=plan.kp[:5], kd=plan.kd[:5])
     write_plan(ur5_folder / "five.yaml", shorter)
     arguments = ("measure", ur5_folder / "five.yaml", "--cell", "virtual", "--out", tmp_path / "x")
-    assert "5 joints" in refused(run, tmp_path, *arguments)
+    assert "5 joints" in refused_run(run, tmp_path, *arguments)
 
 
 def test_truth_of_another_robot(run, recorded: Path, tmp_path: Path) -> None:
     (tmp_path / "truth.yaml").write_text("joint_9.offset: 0.001\n")
     arguments = ("measure", recorded / "small.yaml", "--cell", "virtual", "--truth", tmp_path / "truth.yaml")
-    sentence = refused(run, tmp_path, *arguments, "--out", tmp_path / "out")
+    sentence = refused_run(run, tmp_path, *arguments, "--out", tmp_path / "out")
     assert "truth.yaml" in sentence and "joint_9.offset" in sentence
 
 
@@ -377,7 +377,7 @@ def test_motor_without_rotor_inertia(
     robot.write_text("\n".join(lines) + "\n")
     monkeypatch.chdir(tx90l_folder)
     measure = ("measure", recorded / "small.yaml", "--robot", "robot.yaml", "--cell", "virtual", "--out", "m")
-    sentence = refused(run, tx90l_folder, *measure)
+    sentence = refused_run(run, tx90l_folder, *measure)
     assert "rotor_inertia" in sentence and ("joint_2" in sentence) == ("6.4" in wrong)
 
 

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import polars as pl
 import pytest
+from refusals import refused
 from two_links import GAINS, HELD, swings, two_links
 
 from flexcal.dynamics.inverse_model import CLASSIC, Observation
-from flexcal.errors import InputError
 from flexcal.files.formats import read_estimates
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import gravity_torque
@@ -121,7 +121,7 @@ def test_a_frame_that_changed_is_seen(arm: Path, run: Run) -> None:
     robot = arm / "robot.yaml"
     assert run("identify", "payload", robot, arm / "loaded.csv", "--free", arm / "free.csv").status == 0
     declare(arm, DECLARED.replace("lower", "upper"))
-    with pytest.raises(InputError, match=r"identified in the frame 'lower', but .* declares it in 'upper'"):
+    with refused("E-ROBOT-048", "lower", "upper"):
         RobotModel.from_yaml(robot)
 
 

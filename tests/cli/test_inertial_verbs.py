@@ -13,7 +13,7 @@ import numpy as np
 import polars as pl
 import pytest
 from cli_files import copied
-from test_bad_input import refused
+from test_bad_input import refused_run
 
 from flexcal.cli.main import main
 from flexcal.data.plans import FourierPaths, TrajectoryPlan, read_plan_of, write_plan
@@ -175,7 +175,7 @@ def test_bad_logs(
     folder = copied(recorded / "exciting", tmp_path / "exciting")
     change(pl.read_parquet(folder / LOG)).write_parquet(folder / LOG)
     out = ("--out", tmp_path / "out")
-    sentence = refused(run, tmp_path, "identify", "inertials", recorded / "robot.yaml", folder, *out)
+    sentence = refused_run(run, tmp_path, "identify", "inertials", recorded / "robot.yaml", folder, *out)
     for word in words:
         assert word in sentence
 
@@ -183,16 +183,16 @@ def test_bad_logs(
 def test_folders_of_other_plans(run, recorded: Path, tmp_path: Path) -> None:
     robot, folder = recorded / "robot.yaml", copied(recorded / "exciting", tmp_path / "exciting")
     inertials = ("identify", "inertials", robot, folder)
-    sentence = refused(run, tmp_path, "identify", "response", robot, folder, "--out", tmp_path / "out")
+    sentence = refused_run(run, tmp_path, "identify", "response", robot, folder, "--out", tmp_path / "out")
     assert "trajectories" in sentence and "flexcal identify inertials" in sentence
     (folder / LOG).unlink()
-    assert LOG.removesuffix(".parquet") in refused(run, tmp_path, *inertials)
+    assert LOG.removesuffix(".parquet") in refused_run(run, tmp_path, *inertials)
     for verb, following in (("poses", "calibrate"), ("frequency", "identify response")):
         plan = tmp_path / f"{verb}.yaml"
         options = ("--random", "--count", 3) if verb == "poses" else ()
         assert run("design", verb, robot, *options, "--out", plan).status == 0
         shutil.copy(plan, folder / "plan.yaml")
-        assert f"'flexcal {following}'" in refused(run, tmp_path, *inertials)
+        assert f"'flexcal {following}'" in refused_run(run, tmp_path, *inertials)
 
 
 REFUSED = {
@@ -217,9 +217,9 @@ REFUSED = {
 def test_what_cannot_be_designed(run, recorded: Path, tmp_path: Path) -> None:
     robot = copied(recorded, tmp_path / "tx90l") / "robot.yaml"
     arguments = ("design", "trajectory", robot, "--out", tmp_path / "plan.yaml")
-    assert "--count is 0" in refused(run, tmp_path, *arguments, "--count", 0)
+    assert "--count is 0" in refused_run(run, tmp_path, *arguments, "--count", 0)
     for words, sentence in REFUSED.items():
-        assert sentence in refused(run, tmp_path, *arguments, *words)
+        assert sentence in refused_run(run, tmp_path, *arguments, *words)
 
 
 def test_a_robot_without_controller_gets_a_plan_that_the_virtual_cell_refuses(
@@ -232,7 +232,7 @@ def test_a_robot_without_controller_gets_a_plan_that_the_virtual_cell_refuses(
     assert run("design", "trajectory", robot, "--count", 1, "--out", plan).status == 0
     assert read_plan_of(plan, TrajectoryPlan).rate_hz == 1000.0
     measure = ("measure", plan, "--cell", "virtual", "--out", tmp_path / "measured")
-    assert "no gains" in refused(run, tmp_path, *measure)
+    assert "no gains" in refused_run(run, tmp_path, *measure)
 
 
 def test_a_plan_of_more_trajectories_needs_all_logs(run, recorded: Path, tmp_path: Path) -> None:
@@ -241,7 +241,7 @@ def test_a_plan_of_more_trajectories_needs_all_logs(run, recorded: Path, tmp_pat
     twice = FourierPaths.of_coefficients(np.repeat(plan.paths.coefficients, 2, axis=0))
     write_plan(folder / "plan.yaml", replace(plan, paths=twice))
     arguments = ("identify", "inertials", recorded / "robot.yaml", folder)
-    assert "realisation_2_experiment_1_plus" in refused(run, tmp_path, *arguments)
+    assert "realisation_2_experiment_1_plus" in refused_run(run, tmp_path, *arguments)
 
 
 def test_measurements_of_another_plan_are_kept(run, recorded: Path, tmp_path: Path) -> None:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 from cli_files import snapshot
-from test_bad_input import refused
+from refusals import refused
+from test_bad_input import refused_run
 
 from flexcal.cli.folders.ledger import LEDGER
 from flexcal.cli.folders.overwrite_protection import outputs
@@ -23,7 +24,7 @@ def sha256(path: Path) -> str:
 def test_a_users_file_is_no_place_for_a_plan(run, tx90l_folder: Path, name: str) -> None:
     (tx90l_folder / "notes.txt").write_text("mine")
     arguments = ("design", "frequency", tx90l_folder / "robot.yaml", "--out", tx90l_folder / name)
-    assert "never changed" in refused(run, tx90l_folder, *arguments)
+    assert "never changed" in refused_run(run, tx90l_folder, *arguments)
 
 
 def test_a_users_measurements_are_not_replaced(run, tx90l_folder: Path, tmp_path: Path) -> None:
@@ -33,25 +34,25 @@ def test_a_users_measurements_are_not_replaced(run, tx90l_folder: Path, tmp_path
     out.mkdir()
     (out / "poses.csv").write_text("pose,q1\n1,0\n")
     measure = ("measure", plan, "--robot", robot, "--cell", "virtual", "--out")
-    assert "mine/poses.csv" in refused(run, tmp_path, *measure, out)
+    assert "mine/poses.csv" in refused_run(run, tmp_path, *measure, out)
     assert run(*measure, tmp_path / "new").status == 0
     first = snapshot(tmp_path / "new")
     assert run(*measure, tmp_path / "new").status == 0
     assert snapshot(tmp_path / "new") == first
     with (tmp_path / "new" / "poses.csv").open("a") as stream:
         stream.write("\n")
-    assert "has been changed" in refused(run, tmp_path, *measure, tmp_path / "new")
+    assert "has been changed" in refused_run(run, tmp_path, *measure, tmp_path / "new")
 
 
 def test_demo_does_not_touch_a_robots_estimates(run, tx90l_folder: Path) -> None:
     (tx90l_folder / "estimates.yaml").write_text("calibration: {values: {}}\n")
-    assert "estimates.yaml" in refused(run, tx90l_folder, "demo", "--out", tx90l_folder)
+    assert "estimates.yaml" in refused_run(run, tx90l_folder, "demo", "--out", tx90l_folder)
 
 
 @pytest.mark.parametrize("place", ["file", "file/below", "/proc/none/such"])
 def test_a_place_that_is_no_folder(run, tmp_path: Path, place: str) -> None:
     (tmp_path / "file").write_text("mine")
-    sentence = refused(run, tmp_path, "demo", "--out", tmp_path / place)
+    sentence = refused_run(run, tmp_path, "demo", "--out", tmp_path / place)
     assert place in sentence and "cannot be written to" in sentence
 
 
@@ -99,12 +100,14 @@ def test_a_verb_that_fails_changes_nothing(tmp_path: Path) -> None:
 def test_results_of_two_verbs_do_not_share_a_folder(run, ur5_folder: Path) -> None:
     robot, out, poses = ur5_folder / "robot.yaml", ur5_folder / "out", ur5_folder / "random.csv"
     assert run("calibrate", robot, poses, "--terms", "kinematic", "--out", out).status == 0
-    sentence = refused(run, ur5_folder, "verify", robot, poses, "--estimates", out, "--out", out)
+    sentence = refused_run(run, ur5_folder, "verify", robot, poses, "--estimates", out, "--out", out)
     assert "written by 'flexcal calibrate'" in sentence and "a folder of its own with --out" in sentence
     # the page alone may be made anew from the numbers, and the same verb may be run again
     assert run("report", out).status == 0
     assert run("calibrate", robot, poses, "--terms", "kinematic", "--out", out).status == 0
-    assert "calibrate" in refused(run, ur5_folder, "verify", robot, poses, "--estimates", out, "--out", out)
+    assert "calibrate" in refused_run(
+        run, ur5_folder, "verify", robot, poses, "--estimates", out, "--out", out
+    )
     digests = {}
     for line in (out / LEDGER).read_text().splitlines():
         if not line.startswith("#"):
@@ -117,7 +120,7 @@ def test_measurements_do_not_replace_the_plan_of_the_same_name(tmp_path: Path) -
     plan = tmp_path / "poses.csv"
     with outputs("design poses", plan, page=True):
         write_text(plan, "plan")
-    with pytest.raises(InputError, match="design poses") as caught, outputs("import", plan):
+    with refused("E-CLI-014", "design poses") as caught, outputs("import", plan):
         write_text(plan, "measured")
     assert "give 'flexcal import' a file of its own" in str(caught.value)
     assert plan.read_text() == "plan"
@@ -129,7 +132,7 @@ def test_a_ledger_without_verbs_hinders_none(tmp_path: Path) -> None:
     (tmp_path / LEDGER).write_text(f"{sha256(tmp_path / 'x')}  x\n")
     with outputs("demo", tmp_path, ("x",)):
         write_text(tmp_path / "x", "2")
-    with pytest.raises(InputError, match="'flexcal demo'"), outputs("verify", tmp_path, ("x",)):
+    with refused("E-CLI-014", "demo"), outputs("verify", tmp_path, ("x",)):
         pass
 
 
@@ -146,7 +149,7 @@ def test_another_programs_covariances_are_seen_before_the_work(run, tx90l_folder
     arguments = [
         tx90l_folder / word if word.startswith(("robot", "none")) else word for word in words.split()
     ]
-    assert "out/estimates.npz was not written by flexcal" in refused(
+    assert "out/estimates.npz was not written by flexcal" in refused_run(
         run, tx90l_folder, *arguments, "--out", out
     )
 
@@ -155,5 +158,5 @@ def test_another_programs_file_is_no_learned_residual(run, tx90l_folder: Path) -
     pytest.importorskip("sklearn", reason="scikit-learn (the extra 'learn') is not installed")
     (tx90l_folder / "learned_residual.npz").write_bytes(b"mine")
     robot, log = tx90l_folder / "robot.yaml", tx90l_folder / "none.csv"
-    sentence = refused(run, tx90l_folder, "identify", "dynamics", robot, log, "--learn-residual")
+    sentence = refused_run(run, tx90l_folder, "identify", "dynamics", robot, log, "--learn-residual")
     assert "learned_residual.npz was not written by flexcal" in sentence

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cli_files import write_csv
-from test_bad_input import refused
+from test_bad_input import refused_run
 
 from flexcal.data.plans import PosePlan, read_plan_of
 from flexcal.model.kinematics import point_kinematics
@@ -46,7 +46,9 @@ def test_as_few_poses_as_the_wanted_error_needs(run, tx90l_folder: Path) -> None
     document = run(*arguments, "--wanted", 0.06).document
     assert 10 <= document["poses"] < 40 and document["tool_error_mm"] <= 0.06
     (tx90l_folder / "plan.yaml").unlink(), (tx90l_folder / "plan.html").unlink()
-    assert "40 poses predict a tool error of 0.0" in refused(run, tx90l_folder, *arguments, "--wanted", 0.001)
+    assert "40 poses predict a tool error of 0.0" in refused_run(
+        run, tx90l_folder, *arguments, "--wanted", 0.001
+    )
 
 
 def test_the_next_poses_until_enough(run, tx90l_folder: Path) -> None:
@@ -97,7 +99,7 @@ def test_the_reflector_is_turned_towards_the_instrument(run, tx90l_folder: Path)
 )
 def test_bad_options(run, tx90l_folder: Path, options: list[str], sentence: str) -> None:
     arguments = ("design", "poses", tx90l_folder / "robot.yaml", "--candidates", 100, *options)
-    assert sentence in refused(run, tx90l_folder, *arguments, "--out", tx90l_folder / "plan.yaml")
+    assert sentence in refused_run(run, tx90l_folder, *arguments, "--out", tx90l_folder / "plan.yaml")
 
 
 def test_a_pool_in_which_no_pose_is_seen(run, tx90l_folder: Path) -> None:
@@ -107,9 +109,9 @@ def test_a_pool_in_which_no_pose_is_seen(run, tx90l_folder: Path) -> None:
     rows = np.column_stack([np.arange(50), np.random.default_rng(1).uniform(-1, 1, (50, 6))])
     file = write_csv(tx90l_folder / "taught.csv", ["pose", *(f"q{i}" for i in range(1, 7))], rows)
     arguments = ("design", "poses", robot, "--from", file, "--out", tx90l_folder / "plan.yaml")
-    assert "the instrument can measure none of the 50 poses" in refused(run, tx90l_folder, *arguments)
+    assert "the instrument can measure none of the 50 poses" in refused_run(run, tx90l_folder, *arguments)
     drawn = ("design", "poses", robot, "--candidates", 20, "--out", tx90l_folder / "plan.yaml")
-    assert "visibility threw out" in refused(run, tx90l_folder, *drawn)
+    assert "visibility threw out" in refused_run(run, tx90l_folder, *drawn)
 
 
 def test_limits_that_cross_and_an_obstacle_around_the_base(run, tx90l_folder: Path) -> None:
@@ -118,12 +120,12 @@ def test_limits_that_cross_and_an_obstacle_around_the_base(run, tx90l_folder: Pa
     text = urdf.read_text()
     limit = re.search(r'<limit[^>]*lower="([^"]*)"[^>]*>', text)
     urdf.write_text(text.replace(limit[0], limit[0].replace(f'lower="{limit[1]}"', 'lower="9"'), 1))
-    assert "joint_1" in refused(run, tx90l_folder, *arguments)
+    assert "joint_1" in refused_run(run, tx90l_folder, *arguments)
     urdf.write_text(text)
     box = '<robot name="box"><link name="box"><collision><geometry><box size="1 1 1"/></geometry></collision></link></robot>'
     (tx90l_folder / "box.urdf").write_text(box)
     robot.write_text(robot.read_text() + "obstacles: [box.urdf]\n")
-    sentence = refused(run, tx90l_folder, *arguments)
+    sentence = refused_run(run, tx90l_folder, *arguments)
     assert "the obstacle box" in sentence and "in every configuration" in sentence
 
 
@@ -133,9 +135,9 @@ def test_a_working_volume_and_an_acceptance_that_are_none(run, tx90l_folder: Pat
     arguments = ("design", "poses", robot, *SMALL, "--out", tx90l_folder / "plan.yaml")
     robot.write_text(text + "working_volume: {lower: [1, 0, 0], upper: [0, 1, 1]}\n")
     assert (
-        "robot.yaml line" in (sentence := refused(run, tx90l_folder, *arguments))
+        "robot.yaml line" in (sentence := refused_run(run, tx90l_folder, *arguments))
         and "cross along x" in sentence
     )
     declared = "xyz: [0.10, 0.00, 0.15], acceptance: {axis: [0, 0, 0]}}"
     robot.write_text(text.replace("xyz: [0.10, 0.00, 0.15]}", declared))
-    assert "not all zero" in refused(run, tx90l_folder, *arguments)
+    assert "not all zero" in refused_run(run, tx90l_folder, *arguments)

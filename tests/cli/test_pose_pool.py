@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cli_files import read_csv, write_csv
-from test_bad_input import refused
+from test_bad_input import refused_run
 
 from flexcal.data.plans import PosePlan, read_plan_of
 
@@ -114,13 +114,13 @@ def test_a_pose_outside_the_limits_is_refused(run, tx90l_folder: Path) -> None:
         "--out",
         tx90l_folder / "plan.yaml",
     )
-    sentence = refused(run, tx90l_folder, *arguments)
+    sentence = refused_run(run, tx90l_folder, *arguments)
     assert "taught.csv line 5, column q2: pose 3" in sentence and "limits of joint_2" in sentence
 
 
 def test_random_and_given_poses_exclude_each_other(run, ur5_folder: Path) -> None:
     arguments = ("design", "poses", ur5_folder / "robot.yaml", "--random", "--from", ur5_folder / "grid.csv")
-    assert "--from" in refused(run, ur5_folder, *arguments, "--out", ur5_folder / "plan.yaml")
+    assert "--from" in refused_run(run, ur5_folder, *arguments, "--out", ur5_folder / "plan.yaml")
 
 
 FREQUENCY = [
@@ -144,7 +144,7 @@ def test_frequency_poses_that_do_not_fit(
     assert right in text
     file.write_text(text.replace(right, wrong))
     arguments = ("design", "frequency", tx90l_folder / "robot.yaml", "--out", tx90l_folder / "plan.yaml")
-    sentence = refused(run, tx90l_folder, *arguments)
+    sentence = refused_run(run, tx90l_folder, *arguments)
     for word in ("frequency_poses.csv", *words):
         assert word in sentence
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from test_bad_input import refused
+from test_bad_input import refused_run
 
 
 @pytest.fixture
@@ -55,15 +55,15 @@ def test_verification_leaves_its_report(run, calibrated: Path) -> None:
 
 
 def test_folders_without_anything_to_report(run, ur5_folder: Path, tmp_path: Path) -> None:
-    assert "no results.json" in refused(run, tmp_path, "report", ur5_folder)
-    assert "no results.json" in refused(run, tmp_path, "report", tmp_path / "none")
+    assert "no results.json" in refused_run(run, tmp_path, "report", ur5_folder)
+    assert "no results.json" in refused_run(run, tmp_path, "report", tmp_path / "none")
     (tmp_path / "measured").mkdir()
     (tmp_path / "measured" / "results.json").write_text('{"kind": "poses", "poses": 3}\n')
-    assert "not of this version" in refused(run, tmp_path, "report", tmp_path / "measured")
+    assert "not of this version" in refused_run(run, tmp_path, "report", tmp_path / "measured")
     (tmp_path / "measured" / "results.json").write_text('{"kind": "measurement", "schema": 1, "poses": 3}\n')
-    assert "no calibration" in refused(run, tmp_path, "report", tmp_path / "measured")
+    assert "no calibration" in refused_run(run, tmp_path, "report", tmp_path / "measured")
     (tmp_path / "measured" / "results.json").write_text("{")
-    assert "cannot be read" in refused(run, tmp_path, "report", tmp_path / "measured")
+    assert "cannot be read" in refused_run(run, tmp_path, "report", tmp_path / "measured")
 
 
 def test_two_calibrations_are_compared(run, calibrated: Path, tmp_path: Path) -> None:
@@ -76,16 +76,16 @@ def test_two_calibrations_are_compared(run, calibrated: Path, tmp_path: Path) ->
     document = run("report", calibrated, "--compare", folder / "again", "--json").document
     assert document["runs"] == ["out", "again"] and document["difference_mm"]["mean"] == 0
     assert document["parameters"]["calibration"]["changed"] == [] and document["shared"] == ["random.csv"]
-    assert "same folder" in refused(run, tmp_path, "report", calibrated, "--compare", calibrated)
-    assert "no results.json" in refused(run, tmp_path, "report", calibrated, "--compare", folder / "none")
+    assert "same folder" in refused_run(run, tmp_path, "report", calibrated, "--compare", calibrated)
+    assert "no results.json" in refused_run(run, tmp_path, "report", calibrated, "--compare", folder / "none")
     old = folder / "old"
     old.mkdir()
     (old / "results.json").write_text('{"kind": "verification", "schema": 1, "rms_mm": {}, "provenance": {}}')
     header, *_ = rows = (calibrated / "points.csv").read_text("utf-8").splitlines()
     (old / "points.csv").write_text("\n".join(rows) + "\n", "utf-8")
-    assert "lacks 'robot'" in refused(run, tmp_path, "report", calibrated, "--compare", old)
+    assert "lacks 'robot'" in refused_run(run, tmp_path, "report", calibrated, "--compare", old)
     (old / "points.csv").write_text(f"{header}\n", "utf-8")
-    assert "lacks columns or rows" in refused(run, tmp_path, "report", old)
+    assert "lacks columns or rows" in refused_run(run, tmp_path, "report", old)
     check = (
         "verify",
         folder / "robot.yaml",
@@ -96,7 +96,7 @@ def test_two_calibrations_are_compared(run, calibrated: Path, tmp_path: Path) ->
         folder / "check",
     )
     assert run(*check).status == 0
-    assert "two of the same kind" in refused(
+    assert "two of the same kind" in refused_run(
         run, tmp_path, "report", calibrated, "--compare", folder / "check"
     )
 

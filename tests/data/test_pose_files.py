@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import refused
 
 from flexcal.data.poses import PoseSet, concatenate, read_pose_pool, read_poses, write_poses
-from flexcal.errors import FlexcalError
 from flexcal.model.robot import RobotModel
 from flexcal.units import DEGREE, MILLIMETRE
 
@@ -257,15 +257,15 @@ def test_subset_and_concatenate() -> None:
     assert turned.pose.tolist() == [4, 1]
     assert np.array_equal(turned.q, poses.q[[4, 1]])
     assert concatenate([poses, poses]).pose.tolist() == list(range(12))
-    with pytest.raises(FlexcalError, match="only 1 of 2 pose sets have torque"):
+    with refused("E-POSES-026", "1", "2", "torque"):
         concatenate([poses, make_poses(6, torque=None)])
-    with pytest.raises(FlexcalError, match="different numbers of joints"):
+    with refused("E-POSES-024"):
         concatenate([poses, make_poses(6, q=np.zeros((6, 3)), torque=None)])
-    with pytest.raises(FlexcalError, match="at least one"):
+    with refused("E-POSES-023"):
         concatenate([])
-    with pytest.raises(FlexcalError, match="payload of a pose set"):
+    with refused("E-POSES-022", "payload"):
         make_poses(6, payload=np.zeros(3))
-    with pytest.raises(FlexcalError, match="q of a pose set"):
+    with refused("E-POSES-021"):
         make_poses(6, q=np.zeros(3))
 
 

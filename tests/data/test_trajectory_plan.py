@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from flexcal.data.experiments import labels
 from flexcal.data.plans import (
@@ -18,7 +19,7 @@ from flexcal.data.plans import (
     read_plan_of,
     write_plan,
 )
-from flexcal.errors import FlexcalError, InputError
+from flexcal.errors import FlexcalError
 from flexcal.files.formats import to_plain
 
 
@@ -47,7 +48,7 @@ def test_round_trip(tmp_path: Path) -> None:
     again = read_plan_of(tmp_path / "plan.yaml", TrajectoryPlan)
     assert to_plain(again) == to_plain(plan)
     np.testing.assert_array_equal(again.paths.coefficients, plan.paths.coefficients)
-    with pytest.raises(InputError, match="kind 'trajectory', but one of kind 'multisine'"):
+    with refused("E-PLAN-022", "trajectory", "multisine"):
         read_plan_of(tmp_path / "plan.yaml", MultisinePlan)
 
 
@@ -140,5 +141,5 @@ def test_of_a_misspelt_path_the_nearer_kind_is_named(tmp_path: Path) -> None:
     write_plan(tmp_path / "plan.yaml", make_trajectory())
     text = (tmp_path / "plan.yaml").read_text().replace("cosine:", "cosines:")
     (tmp_path / "plan.yaml").write_text(text)
-    with pytest.raises(InputError, match="did you mean 'cosine'"):
+    with refused("E-YAML-001", "cosine"):
         read_plan_of(tmp_path / "plan.yaml", TrajectoryPlan)

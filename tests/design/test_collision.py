@@ -1,8 +1,7 @@
 import numpy as np
-import pytest
+from refusals import refused
 
 from flexcal.design.scene import CollisionChecker
-from flexcal.errors import InputError
 from flexcal.model.robot import RobotModel
 from flexcal.units import DEGREE
 
@@ -91,7 +90,7 @@ def test_obstacles_of_robot_yaml(tmp_path):
         checker.collides(np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]])), [True, False]
     )
     (tmp_path / "wall.urdf").unlink()
-    with pytest.raises(InputError, match="there is no such obstacle"):
+    with refused("E-DESIGN-037"):
         CollisionChecker(model)
 
 
@@ -106,7 +105,7 @@ def test_meshes_count_as_their_hull_and_missing_ones_are_an_error(tmp_path):
     )
     mesh = '<collision><geometry><mesh filename="part.stl"/></geometry></collision>'
     model = _planar(tmp_path, last=mesh)
-    with pytest.raises(InputError, match="collision shapes cannot be read"):
+    with refused("E-DESIGN-036"):
         CollisionChecker(model)
     (tmp_path / "part.stl").write_text(f"solid part\n{facets}endsolid part\n")
     checker = CollisionChecker(model, floor=None)

@@ -2,10 +2,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from flexcal.data.poses import PoseSet
 from flexcal.design.poses import next_poses, pose_candidates, pose_sensitivity, random_poses
-from flexcal.errors import FlexcalError
 
 
 def _measured(q, sigma=2e-5, **other):
@@ -88,13 +88,13 @@ def test_payloads_and_unknown_noise(tx90l, found, measured, rng):
 
 
 def test_bad_input(found, measured, rng):
-    with pytest.raises(FlexcalError, match="must be c, A or D, not O3"):
+    with refused("E-DESIGN-029", "O3"):
         next_poses(found, measured, 2, rng=rng, criterion="O3")
-    with pytest.raises(FlexcalError, match="hold the target ball, but the next ones are chosen for smr"):
+    with refused("E-DESIGN-031", "target", "ball", "smr"):
         next_poses(found, replace(measured, target=np.full(14, "ball")), 2, rng=rng)
-    with pytest.raises(FlexcalError, match="hold the station door, but"):
+    with refused("E-DESIGN-031", "station", "door"):
         next_poses(found, replace(measured, station=np.full(14, "door")), 2, rng=rng)
-    with pytest.raises(FlexcalError, match="lengths of a wire"):
+    with refused("E-DESIGN-030"):
         next_poses(found, replace(measured, length=np.ones(14)), 2, rng=rng)
-    with pytest.raises(FlexcalError, match="cannot choose 121 of 120"):
+    with refused("E-DESIGN-017", "121", "120"):
         next_poses(found, measured, 121, rng=rng)

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from refusals import refused
 
 from flexcal.design.optimality import (
     DOptimal,
@@ -10,7 +11,6 @@ from flexcal.design.optimality import (
     shortlist,
 )
 from flexcal.design.optimality.shortlist import predicted_gains
-from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters, Sensitivity
 
 WEIGHT = np.diag([1.0, 5.0, 0.2, 2.0, 1.0, 3.0]) + 0.1
@@ -82,5 +82,5 @@ def test_few_candidates_are_exchanged_all_at_once(many):
 
 def test_bad_input(many, monkeypatch):
     monkeypatch.setattr(shortlist, "MANY", 500)
-    with pytest.raises(FlexcalError, match="cannot choose 1501 of 1500"):
+    with refused("E-DESIGN-017", "1501", "1500"):
         exchange_on_shortlist(many, 1501, DOptimal())

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from refusals import refused
 
 from flexcal.design.poses import (
     base_sensitivity,
@@ -13,7 +14,6 @@ from flexcal.design.poses import (
 from flexcal.design.poses.feasibility import tool_error_weight
 from flexcal.design.poses.selection import tool_error
 from flexcal.design.scene import CollisionChecker
-from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import joint_ranges, point_kinematics
 
 LOWER, UPPER = np.array([0.5, -0.2, 0.3]), np.array([0.9, 0.2, 0.7])
@@ -68,12 +68,10 @@ def test_poses_chosen_for_the_volume_are_better_there(tx90l, box):
 
 def test_bad_input(tx90l, rng):
     checker = CollisionChecker(tx90l)
-    with pytest.raises(FlexcalError, match="is no box; give every smallest"):
+    with refused("E-DESIGN-032"):
         working_box(checker, UPPER, LOWER, rng)
-    with pytest.raises(FlexcalError, match="reaches no point of the working volume from 5, 5, 0"):
+    with refused("E-DESIGN-033", "5, 5, 0"):
         working_box(checker, np.array([5.0, 5, 0]), np.array([6.0, 6, 1]), rng)
     points = np.array([[0.6, 0.0, 0.5], [4.0, 0.0, 0.5]])
-    with pytest.raises(
-        FlexcalError, match=r"does not reach working point 2 at 4, 0, 0.5 m .* \(1 of 2 points"
-    ):
+    with refused("E-DESIGN-034", "2", "4, 0, 0.5", "1", "2"):
         working_points(checker, points, rng)

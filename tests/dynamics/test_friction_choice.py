@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from flexcal.data.recordings import Decimation
 from flexcal.dynamics.estimators import weighted_least_squares
@@ -28,7 +29,6 @@ from flexcal.dynamics.regression import (
 )
 from flexcal.dynamics.regression import blocks as rows
 from flexcal.dynamics.signals import Motion, Window
-from flexcal.errors import FlexcalError
 from flexcal.jobs.dynamics.remarks import dynamics_remarks
 from flexcal.model.robot import RobotModel
 from flexcal.model.torques import inertial_parameters
@@ -80,7 +80,7 @@ def test_a_listed_term_stays_and_gets_its_best_shape(tx40: RobotModel, swing: Mo
     for candidate in found.chosen:
         tried = [t for t in found.trials if t.terms[-1].startswith(candidate.name)]
         assert min(tried, key=lambda t: t.error).terms[-1] == candidate.label
-    with pytest.raises(FlexcalError, match="no friction term 'sticky'; there are viscous, coulomb"):
+    with refused("E-DYN-013", "sticky", "viscous, coulomb"):
         select_friction(tx40, ("sticky",), equations_of(motion, Decimation(4)), Decimation(4))
 
 
@@ -145,7 +145,7 @@ def test_one_block_teaches_nothing_about_itself(tx40: RobotModel, swing: Motion)
     observation = Observation(tx40, CLASSIC)
     motion = with_torques(tx40, (), swing, 0.0, 6)
     system = experiment_system(observation, motion, Decimation(4), Window(), mask_standstill=True, batches=1)
-    with pytest.raises(FlexcalError, match="too short to choose friction by cross-validation"):
+    with refused("E-DYN-026"):
         folds([system], observation.column_indices, len(observation.names), [0], 10)
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import joblib
 import numpy as np
 import pytest
+from refusals import refused
 
 from flexcal.data.recordings import Decimation, Recording, read_recording, write_recording
 from flexcal.dynamics.estimators import weighted_least_squares
@@ -12,7 +13,6 @@ from flexcal.dynamics.estimators.column_noise import PerturbedLog
 from flexcal.dynamics.inverse_model import BaseParameters, Observation
 from flexcal.dynamics.regression import ExperimentSystem, assemble_regression, regression_blocks
 from flexcal.dynamics.signals import JointLog, Motion, Window, joint_log
-from flexcal.errors import FlexcalError
 from flexcal.jobs.dynamics.remarks import dynamics_remarks
 from flexcal.jobs.logs import LogSegment, Preprocessing, assemble_log_systems, read_logs
 from flexcal.jobs.logs.regression_systems import split_hold_out
@@ -148,7 +148,7 @@ def test_nothing_reaches_across_a_gap(
 
 
 def test_no_room_for_the_filtered_log(logs: list[Path], observation: Observation, tmp_path: Path) -> None:
-    with pytest.raises(FlexcalError, match=r"cannot take the filtered log \(No such file.*set TMPDIR"):
+    with refused("E-DYN-033", "No such file"):
         JointLog.read(logs[0], observation.model, 10.0, tmp_path / "nowhere")
 
 

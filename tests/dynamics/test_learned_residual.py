@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from recovery import driven, recorded
+from refusals import refused
 from scipy.signal import lfilter
 from two_links import true_values, two_links
 
@@ -20,7 +21,6 @@ from flexcal.dynamics.residual import (
     residual_errors,
 )
 from flexcal.dynamics.signals import Motion, Window
-from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 
 pytest.importorskip("sklearn", reason="scikit-learn (the extra 'learn') is not installed")
@@ -206,9 +206,7 @@ def test_an_exact_model_leaves_nothing_to_learn(arm: Observation) -> None:
 
 
 def test_too_few_rows_are_refused(arm: Observation) -> None:
-    with pytest.raises(
-        FlexcalError, match="90 rows are too few to learn a residual torque; the minimum is 100"
-    ):
+    with refused("E-DYN-029", "90", "100"):
         learned(arm, noisy(swings(arm, 0, 90), np.random.default_rng(0)))
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from recovery import driven
+from refusals import refused
 from two_links import true_values, two_links
 
 from flexcal.data.recordings import Decimation
@@ -23,7 +24,6 @@ from flexcal.dynamics.residual import (
     write_learned_residual,
 )
 from flexcal.dynamics.signals import Motion
-from flexcal.errors import FlexcalError, InputError
 from flexcal.estimation import Estimate
 from flexcal.files.formats import write_estimates
 
@@ -62,7 +62,7 @@ def test_joints_feel_what_was_learned_of_the_motors(
     np.testing.assert_allclose(std[:, 0], np.sqrt((1.5 * spread) ** 2 + (0.5 * 0.3) ** 2))
     np.testing.assert_allclose(std[:, 1], 0.3)
     for wrong in ((q[:, :1], dq, predicted), (q, dq[:4], predicted), (q[0], dq[0], predicted[0])):
-        with pytest.raises(FlexcalError, match=r"give \(samples, 2\) of each"):
+        with refused("E-DYN-028", "2"):
             learned.torque(*wrong)
 
 
@@ -92,18 +92,15 @@ def test_it_belongs_to_one_estimate(learned: LearnedResidual, estimate: Estimate
     write_learned_residual(file, learned, estimates)
     moved = estimate.parameters.with_coordinates(1.01 * estimate.parameters.coordinates())
     write_estimates(estimates, "dynamics", replace(estimate, parameters=moved))
-    with pytest.raises(
-        InputError,
-        match=r"was learned with other dynamics than those of .*estimates\.yaml; run 'flexcal identify",
-    ):
+    with refused("E-DYN-030", "estimates.yaml", "flexcal identify"):
         read_learned_residual(file, estimates)
     for content in (b"", b"nonsense", b"PK\x03\x04"):
         file.write_bytes(content)
-        with pytest.raises(InputError, match=r"learned_residual\.npz cannot be read"):
+        with refused("E-FILE-003", "learned_residual.npz"):
             read_learned_residual(file, estimates)
     np.savez(file, allow_pickle=False, names=np.array(["shoulder"]))
-    with pytest.raises(InputError, match=r"lacks the array"):
+    with refused("E-FILE-004"):
         read_learned_residual(file, estimates)
     file.unlink()
-    with pytest.raises(InputError, match=r"cannot be read \(No such file"):
+    with refused("E-FILE-003", "No such file"):
         read_learned_residual(file, estimates)

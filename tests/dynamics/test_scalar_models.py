@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from recovery import NOISE, covered, driven, errors, recorded
+from refusals import refused
 
 from flexcal.dynamics.estimators import RecordedRows, energy_least_squares, power_least_squares
 from flexcal.dynamics.estimators.energy_model import EnergyModel
@@ -13,7 +14,6 @@ from flexcal.dynamics.estimators.power_model import PowerModel
 from flexcal.dynamics.inverse_model import BaseParameters, Observation
 from flexcal.dynamics.regression import RegressionData
 from flexcal.dynamics.signals import Motion
-from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 
 
@@ -77,7 +77,7 @@ def test_a_row_of_energy_is_the_work_of_its_window(
 def test_motion_that_is_too_short_is_refused(
     observation: Observation, base: BaseParameters, clean: Callable[[int, float], Motion]
 ) -> None:
-    with pytest.raises(FlexcalError, match="equations of the power of all joints"):
+    with refused("E-DYN-012", "the power of all joints"):
         power_least_squares(recorded(observation, base, clean(40, 5.0)))
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from recovery import NOISE, covered, driven, errors, recorded
+from refusals import refused
 
 from flexcal.data.recordings import Decimation, Recording, write_recording
 from flexcal.dynamics.estimators import (
@@ -21,7 +22,6 @@ from flexcal.dynamics.estimators.column_noise import position_noise
 from flexcal.dynamics.inverse_model import BaseParameters, Observation
 from flexcal.dynamics.regression import RegressionData, assemble_regression
 from flexcal.dynamics.signals import JointLog, Motion
-from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 
 SPEED, ACCELERATION = 0.05, 1.5
@@ -137,5 +137,5 @@ def test_the_noise_of_a_log_is_read_from_it(
     np.testing.assert_array_equal(added, again)
     passed = np.std(added, axis=0) / std  # a low-pass at 10 of 100 Hz leaves about a tenth of the power
     assert np.all((passed > 0.2) & (passed < 0.4))
-    with pytest.raises(FlexcalError, match="positions as they were logged"):
+    with refused("E-DYN-004"):
         perturbed_logs(recorded(observation, base, swing))

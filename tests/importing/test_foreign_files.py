@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from flexcal.errors import InputError
 from flexcal.importing.readers import read_foreign
@@ -95,9 +96,9 @@ def test_excel(tmp_path: Path) -> None:
     np.testing.assert_array_equal(columns(foreign), VALUES)
     assert foreign.units == {"a": "deg", "b": "mm"} and tuple(foreign.texts) == ("when",)
     assert any("'points'" in note and "--sheet" in note for note in foreign.notes)
-    with pytest.raises(InputError, match="no sheet 'third'; there are points, other"):
+    with refused("E-IMPORT-026", "third", "points, other"):
         read(tmp_path / "a.xlsx", sheet="third")
-    with pytest.raises(InputError, match="no row of numbers"):
+    with refused("E-IMPORT-053"):
         read(tmp_path / "a.xlsx", sheet="other")
 
 
@@ -173,12 +174,10 @@ def test_mat_of_version_7_3_that_cannot_be_read(tmp_path: Path, monkeypatch: pyt
         b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM" + bytes(400)
     )
     pytest.importorskip("h5py")
-    with pytest.raises(InputError, match=r"not a readable MAT-file .* '-v7'"):
+    with refused("E-IMPORT-030"):
         read(tmp_path / "new.mat")
     monkeypatch.setitem(sys.modules, "h5py", None)
-    with pytest.raises(
-        InputError, match=r"need h5py: pip install h5py; or save it again with save\(…, '-v7'\)"
-    ):
+    with refused("E-IMPORT-029"):
         read(tmp_path / "new.mat")
 
 
@@ -214,5 +213,5 @@ def test_bad_files_are_refused(tmp_path: Path, name: str, content: str, words: s
     (tmp_path / name).write_text(content)
     with pytest.raises(InputError, match=words):
         read(tmp_path / name)
-    with pytest.raises(InputError, match="no such file"):
+    with refused("E-IMPORT-022"):
         read(tmp_path / f"other_{name}")

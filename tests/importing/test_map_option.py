@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from flexcal.errors import InputError
 from flexcal.importing.columns import apply_map, guess_columns
@@ -68,7 +69,7 @@ def test_the_signals_block_says_the_same(ur5, foreign, tmp_path) -> None:
             signals[name].values(foreign.table), placed[name].values(foreign.table), rtol=1e-12
         )
     add_signals(robot, {"q": placed["q"].config()})
-    with pytest.raises(InputError, match="has `signals:` already"):
+    with refused("E-RUN-092"):
         add_signals(robot, {"q": {"columns": [f"A{i}" for i in range(6)]}})
 
 

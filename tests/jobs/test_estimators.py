@@ -4,11 +4,10 @@ import shutil
 from pathlib import Path
 from typing import get_args, get_type_hints
 
-import pytest
+from refusals import refused
 
 from flexcal.cli.verbs.identify_dynamics import IdentifyDynamics
 from flexcal.dynamics.estimators import ESTIMATORS, EstimatorName
-from flexcal.errors import FlexcalError
 from flexcal.jobs.dynamics import identify_robot_dynamics
 
 
@@ -21,6 +20,6 @@ def test_a_motion_that_does_not_repeat_is_refused_and_nothing_written(examples: 
     robot = Path(shutil.copytree(examples / "tx40", tmp_path / "tx40")) / "robot.yaml"
     robot.write_text(robot.read_text().replace("decimation: 100", "decimation: 100, friction: classic"))
     before = sorted(tmp_path.rglob("*"))
-    with pytest.raises(FlexcalError, match="no periodic motion; maximum likelihood estimates the noise"):
+    with refused("E-DYN-041", "no periodic motion"):
         identify_robot_dynamics(robot, [robot.parent / "exciting.parquet"], estimator="ml")
     assert sorted(tmp_path.rglob("*")) == before

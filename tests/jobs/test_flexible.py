@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from refusals import refused
 
 from flexcal.cli.main import main
 from flexcal.errors import InputError
@@ -112,7 +113,7 @@ def test_what_the_flexible_model_needs(recorded, tmp_path: Path) -> None:
         with pytest.raises(InputError, match=sentence) as refusal:
             identify_robot_dynamics(file, [measured], flexible=True, out=tmp_path / "out")
         assert "\n" not in str(refusal.value)
-    with pytest.raises(InputError, match="--estimator energy is for rigid robots; take one of wls"):
+    with refused("E-RUN-023", "energy", "wls"):
         identify_robot_dynamics(robot, logs, flexible=True, estimator="energy", out=tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

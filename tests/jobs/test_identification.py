@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from planar_arm import Log
+from refusals import refused
 
-from flexcal import IRLS, SDP, FlexcalError, RobotModel, identify_dynamics, read_recording
+from flexcal import IRLS, SDP, RobotModel, identify_dynamics, read_recording
 from flexcal.jobs.dynamics import DynamicsIdentification, identify_robot_dynamics
 
 
@@ -68,5 +69,5 @@ def test_estimators_are_objects(estimator: SDP | IRLS, files: tuple[Path, Path])
 
 
 def test_an_unknown_friction_is_refused(files: tuple[Path, Path]) -> None:
-    with pytest.raises(FlexcalError, match="friction must be 'auto', 'classic' or a list of terms"):
+    with refused("E-ROBOT-017"):
         identify_dynamics(RobotModel.from_yaml(files[0]), [files[1]], friction="stiction")

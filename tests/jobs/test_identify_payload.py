@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import refused
 
-from flexcal.errors import InputError
 from flexcal.jobs.experiments import measure
 from flexcal.jobs.experiments.measurement import VIRTUAL
 from flexcal.jobs.payload import identify_robot_payload
@@ -40,9 +40,9 @@ def test_folders_are_taken_as_they_were_planned(examples: Path, tmp_path: Path) 
             + ("" if payload == "null" else f"payload: {payload}\n")
         )
         measure(robot, tmp_path / f"{name}.yaml", VIRTUAL, tmp_path / name)
-    with pytest.raises(InputError, match="was planned without the payload; give it with --free"):
+    with refused("E-RUN-068"):
         identify_robot_payload(robot, [tmp_path / "free"], free=[tmp_path / "loaded"])
-    with pytest.raises(InputError, match="--free was planned with the payload"):
+    with refused("E-RUN-069"):
         identify_robot_payload(robot, [tmp_path / "loaded"], free=[tmp_path / "loaded"])
-    with pytest.raises(InputError, match="has no block 'dynamics'"):
+    with refused("E-RUN-064"):
         identify_robot_payload(robot, [tmp_path / "loaded"])

@@ -3,8 +3,8 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+from refusals import refused
 
-from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import elastic_axes, gravity_torque, static_equilibrium
@@ -123,12 +123,12 @@ def test_the_flank_is_the_sign_of_the_torque_at_rest(
 
 def test_springs_too_weak_for_gravity_are_refused(tx90l: RobotModel) -> None:
     weak = tx90l.with_values({"joint_2.drive.stiffness": 1.0})
-    with pytest.raises(FlexcalError, match="springs cannot carry the arm"):
+    with refused("E-MODEL-006", "springs cannot carry the arm"):
         static_equilibrium(weak, np.zeros((1, 6)))
 
 
 def test_payload_needs_a_declaration(tx90l: RobotModel) -> None:
     from dataclasses import replace
 
-    with pytest.raises(FlexcalError, match="declares none"):
+    with refused("E-MODEL-005"):
         static_equilibrium(replace(tx90l, payload=None), Q, 3.0)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from refusals import refused
 
-from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import point_kinematics, reach_points
 from flexcal.model.robot import RobotModel
 
@@ -42,5 +42,5 @@ def test_a_point_out_of_reach_is_said_and_a_start_that_stands_there_stays(
 
 
 def test_wrong_number_of_joints(tx90l: RobotModel) -> None:
-    with pytest.raises(FlexcalError, match="5 columns"):
+    with refused("E-MODEL-001", "5"):
         reach_points(tx90l, np.zeros((1, 3)), np.zeros((1, 5)), *_limits(tx90l))

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from flexcal.errors import InputError
 from flexcal.model.urdf import read_urdf
@@ -101,14 +102,14 @@ def test_the_sound_file(tmp_path: Path) -> None:
 
 def test_what_only_the_parser_sees_is_said_in_its_words(tmp_path: Path) -> None:
     (tmp_path / "arm.urdf").write_text(ARM.replace('<robot name="arm">', "<robot>"))
-    with pytest.raises(InputError, match=r"not a valid URDF \(No name given for the robot") as caught:
+    with refused("E-URDF-022", "No name given for the robot") as caught:
         read_urdf(tmp_path / "arm.urdf", {})
     assert "\n" not in str(caught.value)
 
 
 def test_a_joint_and_a_link_of_one_name(tmp_path: Path) -> None:
     (tmp_path / "arm.urdf").write_text(ARM.replace('name="shoulder"', 'name="base"'))
-    with pytest.raises(InputError, match=r"arm\.urdf: a joint and a link have one name .*base.* rename one"):
+    with refused("E-URDF-023", "arm.urdf", "base"):
         read_urdf(tmp_path / "arm.urdf", {})
 
 

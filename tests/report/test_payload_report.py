@@ -12,8 +12,8 @@ import numpy as np
 import polars as pl
 import pytest
 from outline import Outline
+from refusals import refused
 
-from flexcal.errors import InputError
 from flexcal.files.formats import read_estimates
 from flexcal.jobs.pages import report_folder
 from flexcal.jobs.result_files import read_predictions
@@ -84,9 +84,7 @@ def test_the_folder_gives_the_same_page_again(payload_folder: Path) -> None:
 def test_a_folder_without_its_torques_is_refused(payload_folder: Path, tmp_path: Path) -> None:
     for name in ("results.json", "estimates.yaml", "estimates.npz"):
         (tmp_path / name).write_bytes((payload_folder / name).read_bytes())
-    with pytest.raises(
-        InputError, match=r"predictions.npz cannot be read .* run the verb that writes it again"
-    ):
+    with refused("E-FILE-003", "predictions.npz", "the verb that writes it again"):
         report_folder(tmp_path)
 
 

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from outline import Outline
+from refusals import refused
 
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.verification import CALIBRATED, Verification
-from flexcal.errors import InputError
 from flexcal.estimation import Parameter, Parameters
 from flexcal.jobs.pages import report_folder
 from flexcal.jobs.result_files import quantities
@@ -186,7 +186,7 @@ def test_a_folder_of_an_older_version_keeps_its_page(report: Path, tmp_path: Pat
     shutil.copytree(report.parent, old)
     (old / "fitted_responses.npz").unlink()
     before = (old / "report.html").read_bytes()
-    with pytest.raises(InputError, match=r"fitted_responses\.npz cannot be read \(No such file"):
+    with refused("E-FILE-003", "fitted_responses.npz", "No such file"):
         report_folder(old)
     assert (old / "report.html").read_bytes() == before
 
@@ -216,7 +216,7 @@ def test_names_from_files_cannot_break_the_page(study: TwoStageStudy, tmp_path: 
 
 def test_a_place_that_cannot_be_written_leaves_nothing(study: TwoStageStudy, tmp_path: Path) -> None:
     (tmp_path / "report.html").mkdir()
-    with pytest.raises(InputError):
+    with refused("E-FILE-013"):
         write_page(tmp_path / "report.html", two_stage_page(study))
     assert list(tmp_path.iterdir()) == [tmp_path / "report.html"]
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from refusals import refused
 from scipy.linalg import eigh
 
-from flexcal.errors import FlexcalError
 from flexcal.model.robot import RobotModel
 from flexcal.model.vibration import linearise as model_linearise
 from flexcal.model.vibration import transfer_matrix
@@ -204,11 +204,11 @@ def test_free_oscillations_keep_their_energy_and_frequency(tx90l: RobotModel, mo
 def test_a_diverging_loop_is_reported(tx90l: RobotModel) -> None:
     plant = build_plant(tx90l, LINEAR, q=POSE, free=(0, 1, 2), payload=6.0, time_step=0.25e-3)
     wrong = LoopGains(np.full(3, -1e5), np.zeros(3), rate_hz=4000.0)
-    with pytest.raises(FlexcalError, match="diverged after"):
+    with refused("E-CELL-015"):
         run(plant, wrong, np.full((8000, 3), 1.0))
 
 
 def test_the_step_of_the_plant_must_be_the_controllers(tx90l: RobotModel) -> None:
     plant = build_plant(tx90l, LINEAR, q=POSE, free=(0, 1, 2), payload=6.0, time_step=0.25e-3)
-    with pytest.raises(FlexcalError, match="rebuild the plant"):
+    with refused("E-CELL-014"):
         run(plant, replace(PD, rate_hz=1000.0), np.zeros((10, 3)))

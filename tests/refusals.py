@@ -1,0 +1,30 @@
+"""Errors that tests expect: by their codes, whatever words the sentence has."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+
+from flexcal.errors import FlexcalError
+
+
+@contextmanager
+def refused(code: str, *names: str) -> Iterator[pytest.ExceptionInfo[FlexcalError]]:
+    """A block that raises the error of this code, whose sentence has these names and numbers, in this order."""
+    with pytest.raises(FlexcalError) as caught:
+        yield caught
+    assert caught.value.code == code, f"{caught.value.code}: {caught.value}"
+    assert_named(str(caught.value), *names)
+
+
+def assert_named(sentence: str, *names: str) -> None:
+    """Names (files, joints, numbers) stand in a sentence in this order, each by itself and not inside a longer word or number."""
+    start = 0
+    for name in names:
+        found = re.compile(rf"(?<![\w.-]){re.escape(name)}(?!\w|[.-]\w)").search(sentence, start)
+        before = " after the names before it" if start else ""
+        assert found is not None, f"'{name}' does not stand{before} in: {sentence}"
+        start = found.end()
