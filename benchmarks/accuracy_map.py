@@ -8,9 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from flexcal.calibration.accuracy import accuracy_map, random_poses_in
-from flexcal.calibration.fit import calibrate
-from flexcal.calibration.measurement import covariance_root, moving_parameters, predict, propagation
+from flexcal.calibration.accuracy import predicted_accuracy, random_poses_in
+from flexcal.calibration.fit import fit_geometry
+from flexcal.calibration.measurement import (
+    covariance_root,
+    moving_parameters,
+    predict_measurements,
+    propagation,
+)
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import distance_quantile, principal_variances
 from flexcal.model.kinematics import joint_ranges
@@ -29,19 +34,19 @@ def run() -> list[tuple[str, float, str]]:
     rng = np.random.default_rng(0)
     nominal = RobotModel.from_yaml(ROBOT, estimates=False)
     lower, upper = joint_ranges(nominal)
-    model = calibrate(nominal, _measured(nominal, rng.uniform(lower, upper, (60, nominal.n)), rng)).model
+    model = fit_geometry(nominal, _measured(nominal, rng.uniform(lower, upper, (60, nominal.n)), rng)).model
     reach = propagation(model)
     q = random_poses_in(reach, POINTS, rng)
     wall, processor = time.perf_counter(), time.process_time()
-    accuracy_map(reach, q)
+    predicted_accuracy(reach, q)
     wall, processor = time.perf_counter() - wall, time.process_time() - processor
     few = q[:COMPARED]
     names = [n for n in moving_parameters(model) if model.posterior.determines(n)]
-    at = predict(model, _poses(model, few, np.zeros((COMPARED, 3)), 1e-5), jacobians=True)
+    at = predict_measurements(model, _poses(model, few, np.zeros((COMPARED, 3)), 1e-5), jacobians=True)
     roots = at.jacobian(names) @ covariance_root(model, names)
     exact = distance_quantile(principal_variances(roots @ np.swapaxes(roots, 1, 2)))
     sure = certain_flank(model, few, at.rest.torque)[:, list(model.backlash_joints)].all(axis=1)
-    away = float(np.abs(accuracy_map(reach, few).p95 / exact - 1)[sure].max())
+    away = float(np.abs(predicted_accuracy(reach, few).p95 / exact - 1)[sure].max())
     return [
         (
             f"accuracy map of {POINTS:.0e} poses, {os.cpu_count()} cores, ≤ {WANTED:g} s",
@@ -58,7 +63,7 @@ def run() -> list[tuple[str, float, str]]:
 
 def _measured(model: RobotModel, q: np.ndarray, rng: np.random.Generator) -> PoseSet:
     sigma = 3e-5
-    points = predict(model, _poses(model, q, np.zeros((len(q), 3)), sigma)).position
+    points = predict_measurements(model, _poses(model, q, np.zeros((len(q), 3)), sigma)).position
     return _poses(model, q, points + sigma * rng.standard_normal(points.shape), sigma)
 
 

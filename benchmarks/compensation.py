@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from flexcal.calibration.error_model import ErrorStatistics
-from flexcal.compensation import compensate
+from flexcal.compensation import motor_commands
 from flexcal.data.plans import PosePlan
 from flexcal.data.poses import ToolTargets
 from flexcal.design.poses import random_poses
@@ -63,7 +63,7 @@ def commanded(folder: Path, seed: int) -> dict[str, Any]:
     cell = VirtualCell(truth, config, seed, controller_model=nominal)
     drawn = random_poses(nominal, TARGETS, np.random.default_rng([seed, 6]), MeasuringSetup())
     targets = ToolTargets(np.arange(TARGETS), np.full(TARGETS, nominal.point().name), drawn.q)
-    found = compensate(model, nominal, targets)
+    found = motor_commands(model, nominal, targets)
     done = found.reached
     place, turn = model.stations.pose[0, :3], vector_rotation(model.stations.pose[0, 3:])
     wanted = point_kinematics(nominal, drawn.q[done], jacobians=False).position @ turn.T + place
@@ -127,7 +127,7 @@ def run() -> list[tuple[str, float, str]]:
     q = rng.uniform(*joint_ranges(nominal), (count, nominal.n))
     targets = ToolTargets(np.arange(count), np.full(count, "smr"), q, payload=rng.uniform(0, 6, count))
     started = time.process_time()
-    found = compensate(model, nominal, targets)
+    found = motor_commands(model, nominal, targets)
     ours = time.process_time() - started
     sure = np.flatnonzero(found.unambiguous)[:few]
     started = time.process_time()

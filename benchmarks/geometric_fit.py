@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.peers import run_peer
-from flexcal.calibration.fit import calibrate
-from flexcal.calibration.measurement import predict
+from flexcal.calibration.fit import fit_geometry
+from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.model.robot import GEOMETRY, RobotModel
 
@@ -34,7 +34,7 @@ def run() -> list[tuple[str, float, str]]:
     for label, elastic in (("rigid", False), ("elastic", True)):
         poses = _simulated(model.with_values(truth), elastic, rng)
         seconds = min(_seconds(model, poses, elastic) for _ in range(5))
-        fit = calibrate(model, poses, elastic=elastic)
+        fit = fit_geometry(model, poses, elastic=elastic)
         kept = fit.identifiability.diagonal[: fit.identifiability.rank]
         note = (
             f"{peer['seconds']:.2f} s (condition {peer['condition']:.1e}, left {peer['mean_mm']:.3f} mm) against {seconds * 1e3:.1f} ms "
@@ -52,11 +52,11 @@ def _simulated(robot: RobotModel, elastic: bool, rng: np.random.Generator) -> Po
     sigma = np.full((POSES, 3), 3e-5)
     names = np.full(POSES, robot.point().name), np.full(POSES, robot.stations.names[0])
     empty = PoseSet(q, np.zeros((POSES, 3)), sigma, None, None, *names, None, np.arange(POSES))
-    points = predict(robot, empty, elastic=elastic).position + 3e-5 * rng.normal(size=(POSES, 3))
+    points = predict_measurements(robot, empty, elastic=elastic).position + 3e-5 * rng.normal(size=(POSES, 3))
     return PoseSet(q, points, sigma, None, None, *names, None, np.arange(POSES))
 
 
 def _seconds(model: RobotModel, poses: PoseSet, elastic: bool) -> float:
     started = time.perf_counter()
-    calibrate(model, poses, elastic=elastic)
+    fit_geometry(model, poses, elastic=elastic)
     return time.perf_counter() - started

@@ -20,8 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration.fit import calibrate
-from flexcal.calibration.verification import verify
+from flexcal.calibration.fit import fit_geometry
+from flexcal.calibration.verification import prediction_errors
 from flexcal.data.plans import PosePlan
 from flexcal.files.formats import read_yaml
 from flexcal.hard_cell import HardCell
@@ -150,7 +150,7 @@ def like_for_like(seed: int) -> dict[str, dict[str, float]]:
             cell.measure(PosePlan(poses.q, poses.payload, seed=number))
             for number, poses in enumerate((run.calibration.poses, run.verification_poses))
         )
-        found[meaning] = verify(calibrate(elastic, fitted).model, fresh).all.in_millimetres()
+        found[meaning] = prediction_errors(fit_geometry(elastic, fitted).model, fresh).all.in_millimetres()
     return found
 
 

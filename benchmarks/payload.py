@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.compensation import compensate
+from flexcal.compensation import motor_commands
 from flexcal.data.plans import write_plan
 from flexcal.data.poses import ToolTargets
 from flexcal.design.poses import random_poses
@@ -111,7 +111,7 @@ def _tool_error(nominal: RobotModel, model: RobotModel, true: RobotModel, seed: 
     """How far (mm, mean) the true tool is from where commands of a calibrated robot with this payload want it."""
     drawn = random_poses(nominal, TARGETS, np.random.default_rng([seed, 6]), MeasuringSetup())
     names = np.full(TARGETS, nominal.point().name)
-    found = compensate(model, nominal, ToolTargets(np.arange(TARGETS), names, drawn.q))
+    found = motor_commands(model, nominal, ToolTargets(np.arange(TARGETS), names, drawn.q))
     done = found.reached
     at = tool_at_rest(true, found.q[done], None, names[done]).kinematics.position
     wanted = point_kinematics(nominal, drawn.q[done], jacobians=False).position

@@ -1,13 +1,13 @@
-from .calibration.accuracy import AccuracyMap, accuracy_map, repeatability
-from .calibration.fit import Calibration, calibrate
-from .calibration.measurement import predict, register, rigid_motion
+from .calibration.accuracy import PredictedAccuracy, predicted_accuracy, repeatability
+from .calibration.fit import GeometricFit, fit_geometry
+from .calibration.measurement import predict_measurements, register, rigid_motion
 from .calibration.term_selection import select_terms
-from .calibration.verification import Verification, verify
-from .compensation import Compensation, compensate
+from .calibration.verification import PredictionErrors, prediction_errors
+from .compensation import MotorCommands, motor_commands
 from .data.plans import MultisinePlan, PosePlan, TrajectoryPlan, read_plan
 from .data.poses import PoseSet, ToolTargets, read_poses, read_targets
 from .data.recordings import Decimation, Recording, read_recording
-from .design.poses import design_poses, next_poses, random_poses
+from .design.poses import random_poses, select_next_poses, select_poses
 from .design.scene import MeasuringSetup
 from .design.trajectories import design_trajectories
 from .dynamics.diagnostics import predict_torques
@@ -67,11 +67,8 @@ __all__ = [
     "SDP",
     "TLS",
     "WLS",
-    "AccuracyMap",
     "BaseParameters",
-    "Calibration",
     "CellConfig",
-    "Compensation",
     "Decimation",
     "DynamicsIdentification",
     "EnergyModel",
@@ -79,33 +76,33 @@ __all__ = [
     "Estimator",
     "FlexcalError",
     "FrequencyResponse",
+    "GeometricFit",
     "InputError",
     "JointLog",
     "MeasuringSetup",
+    "MotorCommands",
     "MultisinePlan",
     "Observation",
     "PayloadIdentification",
     "PosePlan",
     "PoseSet",
     "PowerModel",
+    "PredictedAccuracy",
+    "PredictionErrors",
     "Recording",
     "RobotModel",
     "StiffnessIdentification",
     "ToolTargets",
     "TrajectoryPlan",
-    "Verification",
     "VirtualCell",
     "Window",
-    "accuracy_map",
     "assemble_regression",
-    "calibrate",
-    "compensate",
-    "design_poses",
     "design_trajectories",
     "draw_truth",
     "exciting_plan",
     "experiment_system",
     "feasible_least_squares",
+    "fit_geometry",
     "frequency_plan",
     "frequency_response",
     "frequency_responses",
@@ -116,10 +113,12 @@ __all__ = [
     "identify_with_prior",
     "is_physically_consistent",
     "local_polynomial_responses",
-    "next_poses",
+    "motor_commands",
     "point_kinematics",
-    "predict",
+    "predict_measurements",
     "predict_torques",
+    "predicted_accuracy",
+    "prediction_errors",
     "random_poses",
     "read_learned_residual",
     "read_plan",
@@ -131,12 +130,13 @@ __all__ = [
     "repeatability",
     "rigid_motion",
     "select_friction",
+    "select_next_poses",
+    "select_poses",
     "select_terms",
     "static_equilibrium",
     "tool_at_rest",
     "torque_regressor",
     "trajectory_error",
-    "verify",
     "weighted_least_squares",
     "write_mjcf",
     "write_urdf",

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from flexcal.calibration.measurement import predict
+from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.model.robot import GEOMETRY, RobotModel
 
@@ -73,7 +73,7 @@ def simulate(tx90l: RobotModel) -> Callable[..., Simulated]:
         robot = tx90l.with_values(chosen)
         limits = np.array([(joint.lower, joint.upper) for joint in tx90l.joints])
         empty = empty_poses(tx90l, rng.uniform(limits[:, 0], limits[:, 1], (poses, tx90l.n)), sigma)
-        points = predict(robot, empty).position
+        points = predict_measurements(robot, empty).position
         if noise:
             points = points + sigma * rng.normal(size=points.shape)
         return Simulated(chosen, robot, replace(empty, position=points))

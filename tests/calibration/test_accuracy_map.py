@@ -8,10 +8,15 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from flexcal.calibration.accuracy import accuracy_map, error_sources, random_poses_in
+from flexcal.calibration.accuracy import error_sources, predicted_accuracy, random_poses_in
 from flexcal.calibration.accuracy.source_contributions import source_of
-from flexcal.calibration.measurement import covariance_root, moving_parameters, predict, propagation
-from flexcal.calibration.verification import ErrorCovariance, ErrorScale, Verification, error_scale
+from flexcal.calibration.measurement import (
+    covariance_root,
+    moving_parameters,
+    predict_measurements,
+    propagation,
+)
+from flexcal.calibration.verification import ErrorCovariance, ErrorScale, PredictionErrors, error_scale
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameter, Parameters
 from flexcal.model.kinematics import joint_ranges, point_kinematics
@@ -86,7 +91,7 @@ def test_covariance_is_that_of_all_derivatives(
         "payload",
         "instrument's place",
     }
-    at = predict(model, seen(model, q), jacobians=True)
+    at = predict_measurements(model, seen(model, q), jacobians=True)
     roots = at.jacobian(names) @ covariance_root(model, names)
     position, fast = propagation(model).roots(q)
     exact, approximate = (np.linalg.eigvalsh(r @ np.swapaxes(r, 1, 2)) for r in (roots, fast))
@@ -102,15 +107,15 @@ def test_mean_and_quantile_are_those_of_drawn_robots(tx90l: RobotModel, rng: np.
     """Robots drawn from the posterior, each predicted in full: springs, flanks and all."""
     model = uncertain(placed(tx90l), rng)
     poses = seen(model, poses_of(model, 8, rng))
-    found = accuracy_map(propagation(model), poses.q, threads=1)
+    found = predicted_accuracy(propagation(model), poses.q, threads=1)
     parameters = model.posterior.parameters
     root = np.linalg.cholesky(model.posterior.covariance)
-    centre, here = parameters.coordinates(), predict(model, poses)
+    centre, here = parameters.coordinates(), predict_measurements(model, poses)
     drawn = np.empty((1500, 8))
     for distances in drawn:
         moved = centre + root @ rng.standard_normal(len(centre))
         values = {p.name: p.natural(x) for p, x in zip(parameters, moved, strict=True)}
-        there = predict(model.with_values(values), poses, flank=here.rest.flank)
+        there = predict_measurements(model.with_values(values), poses, flank=here.rest.flank)
         distances[:] = np.linalg.norm(there.position - here.position, axis=1)
     np.testing.assert_allclose(found.mean, drawn.mean(axis=0), rtol=0.05)
     np.testing.assert_allclose(found.p95, np.quantile(drawn, 0.95, axis=0), rtol=0.09)
@@ -121,7 +126,7 @@ def test_sources_are_what_conditioning_takes_away(tx90l: RobotModel, rng: np.ran
     q = poses_of(model, 6, rng)
     shares = error_sources(propagation(model), q)
     names = moving_parameters(model)
-    slopes = predict(model, seen(model, q), jacobians=True).jacobian(names)
+    slopes = predict_measurements(model, seen(model, q), jacobians=True).jacobian(names)
     root = covariance_root(model, names)
     covariance = root @ root.T
     scale = np.sqrt(np.diag(covariance))
@@ -160,7 +165,7 @@ def scale(
     rms = np.sqrt((roots**2).sum(axis=(1, 2)))
     none = np.zeros(len(errors))
     independent = None if noise is None else noise[:, :, None] ** 2 * np.eye(3)
-    verification = Verification(np.zeros_like(errors), errors, rms, none, ambiguous)
+    verification = PredictionErrors(np.zeros_like(errors), errors, rms, none, ambiguous)
     return error_scale(verification, ErrorCovariance(roots, 0, independent))
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from flexcal.calibration.diagnostics import Drift
-from flexcal.calibration.fit import calibrate
+from flexcal.calibration.fit import fit_geometry
 
 TRAVEL = np.array([6e-5, -6e-5, 5e-5])
 
@@ -19,7 +19,7 @@ def _drifted(poses, travel):
 
 def test_a_drift_is_found(simulate, tx90l):
     measured = simulate(3, 60, sigma=3e-5)
-    drift = Drift.of(calibrate(tx90l, _drifted(measured.poses, TRAVEL)))
+    drift = Drift.of(fit_geometry(tx90l, _drifted(measured.poses, TRAVEL)))
     z = np.linalg.solve(np.linalg.cholesky(drift.covariance), drift.travel - TRAVEL)
     assert np.linalg.norm(z) < 4
     assert drift.certain
@@ -29,8 +29,8 @@ def test_a_drift_is_found(simulate, tx90l):
 def test_taking_the_drift_out_leaves_none(simulate, tx90l):
     """The estimate is one step of Gauss-Newton: points less the drift that was found have none, the parameters fitted anew."""
     poses = _drifted(simulate(4, 60, sigma=3e-5).poses, TRAVEL)
-    first = Drift.of(calibrate(tx90l, poses))
-    again = Drift.of(calibrate(tx90l, _drifted(poses, -first.travel)))
+    first = Drift.of(fit_geometry(tx90l, poses))
+    again = Drift.of(fit_geometry(tx90l, _drifted(poses, -first.travel)))
     assert again.distance < 0.02 * first.distance
     assert not again.certain
 
@@ -39,7 +39,7 @@ def test_no_drift_is_invented(simulate, tx90l):
     """For an arm that stays, travel over its standard deviation is three standard normal numbers."""
     statistics, flagged = [], 0
     for seed in range(24):
-        drift = Drift.of(calibrate(tx90l, simulate(seed, 40, sigma=3e-5).poses))
+        drift = Drift.of(fit_geometry(tx90l, simulate(seed, 40, sigma=3e-5).poses))
         statistics.append(drift.travel @ np.linalg.solve(drift.covariance, drift.travel))
         flagged += drift.certain
     assert 1.5 < np.mean(statistics) < 4.5
@@ -50,5 +50,5 @@ def test_outliers_do_not_count(simulate, tx90l):
     poses = simulate(5, 80, sigma=3e-5).poses
     position = poses.position.copy()
     position[-6:] += 5e-3
-    drift = Drift.of(calibrate(tx90l, replace(poses, position=position), loss="cauchy"))
+    drift = Drift.of(fit_geometry(tx90l, replace(poses, position=position), loss="cauchy"))
     assert not drift.certain

@@ -10,9 +10,9 @@ from refusals import refused
 
 from flexcal.calibration.diagnostics import implausible_shifts
 from flexcal.calibration.error_model import ErrorStatistics
-from flexcal.calibration.fit import Calibration, ElasticPrior, calibrate
-from flexcal.calibration.measurement import predict
-from flexcal.calibration.verification import verify
+from flexcal.calibration.fit import ElasticPrior, GeometricFit, fit_geometry
+from flexcal.calibration.measurement import predict_measurements
+from flexcal.calibration.verification import prediction_errors
 from flexcal.data.poses import read_poses
 from flexcal.estimation import Estimate, Parameter, Parameters
 from flexcal.model.parts import vector_rotation
@@ -21,7 +21,7 @@ from flexcal.model.robot import RobotModel
 
 def test_rank_is_29_of_47_with_a_gap_of_many_decades(simulate: Callable) -> None:
     """27 geometric directions of a position-only 6R arm (six axis lines and a point) and two backlashes; the paper keeps 30."""
-    found = calibrate(simulate(1).robot, simulate(1).poses).identifiability
+    found = fit_geometry(simulate(1).robot, simulate(1).poses).identifiability
     assert (found.rank, len(found.names)) == (29, 47)
     assert found.gap > 9
     assert {"joint_2.backlash", "joint_3.backlash"} <= set(found.kept_names)
@@ -32,15 +32,15 @@ def test_a_target_on_the_last_axis_loses_two_more(tx90l: RobotModel, simulate: C
     point = replace(tx90l.point(), xyz=np.array([0.15, 0.0, 0.0]))
     on_axis = replace(tx90l, points={"smr": point})
     simulated = simulate(1)
-    poses = replace(simulated.poses, position=predict(on_axis, simulated.poses).position)
-    assert calibrate(on_axis, poses).identifiability.rank == 27
+    poses = replace(simulated.poses, position=predict_measurements(on_axis, simulated.poses).position)
+    assert fit_geometry(on_axis, poses).identifiability.rank == 27
 
 
 def test_noiseless_recovery(simulate: Callable, tx90l: RobotModel) -> None:
     """With the true elasticity, exact points are met to 1 µm, a thirtieth of σ, and the kept parameters are the regrouped truth."""
     simulated = simulate(2, 80, noise=False)
     elastic = {n: v for n, v in simulated.truth.items() if n.startswith("link_") or n.endswith(".stiffness")}
-    fit = calibrate(tx90l.with_values(elastic), simulated.poses)
+    fit = fit_geometry(tx90l.with_values(elastic), simulated.poses)
     assert fit.errors.max < 1e-6
     assert str(fit.errors) in repr(fit) and "joint_2.offset" in fit.summary()
     expected = fit.estimate.regrouped(simulated.truth)
@@ -51,8 +51,8 @@ def test_noiseless_recovery(simulate: Callable, tx90l: RobotModel) -> None:
 def test_reestimated_and_marginalised_elasticity_agree(simulate: Callable, tx90l: RobotModel) -> None:
     """R + J Σ Jᵀ in the residual covariance, or the same parameters re-estimated with Σ as prior: one estimate of all of them."""
     simulated, fresh = simulate(4, 50), simulate(41, 100, truth=simulate(4, 50).truth, noise=False)
-    joint = calibrate(tx90l, simulated.poses)
-    marginal = calibrate(tx90l, simulated.poses, elasticity="marginalised")
+    joint = fit_geometry(tx90l, simulated.poses)
+    marginal = fit_geometry(tx90l, simulated.poses, elasticity="marginalised")
     one, other = joint.estimate, marginal.estimate
     assert one.parameters.names == other.parameters.names and one.identifiable == other.identifiable
     assert (one.rank, one.degrees_of_freedom) == (other.rank, other.degrees_of_freedom)
@@ -64,7 +64,7 @@ def test_reestimated_and_marginalised_elasticity_agree(simulate: Callable, tx90l
     assert other.chi2 == pytest.approx(one.chi2, rel=1e-5) and other.cost == pytest.approx(one.cost, rel=1e-5)
     moved = one.parameters["joint_2.drive.stiffness"].value / tx90l.value("joint_2.drive.stiffness")
     assert abs(moved - 1) > 0.05  # the springs have left their prior, or the agreement says nothing
-    seen, again = verify(joint.model, fresh.poses), verify(marginal.model, fresh.poses)
+    seen, again = prediction_errors(joint.model, fresh.poses), prediction_errors(marginal.model, fresh.poses)
     np.testing.assert_allclose(seen.position, again.position, atol=1e-7)
     np.testing.assert_allclose(seen.parameter_rms, again.parameter_rms, rtol=1e-3)
     np.testing.assert_allclose(marginal.residuals, joint.residuals, atol=1e-7)
@@ -74,7 +74,7 @@ def test_a_robust_loss_cannot_weigh_poses_tied_by_marginalised_springs(
     simulate: Callable, tx90l: RobotModel
 ) -> None:
     with refused("E-CAL-005"):
-        calibrate(tx90l, simulate(1).poses, elasticity="marginalised", loss="cauchy")
+        fit_geometry(tx90l, simulate(1).poses, elasticity="marginalised", loss="cauchy")
 
 
 def stage_one(model: RobotModel, std: float, correlation: float = 0.0) -> Estimate:
@@ -99,7 +99,10 @@ def test_the_posterior_of_the_model_is_the_prior_of_the_springs(
     np.testing.assert_allclose(block, 0.01**2 * (0.5 * np.eye(9) + 0.5))
     others = np.setdiff1d(np.arange(len(bare.parameters)), springs)
     np.testing.assert_allclose(known.covariance[others, others], bare.covariance[others, others])
-    loose, tight = calibrate(tx90l, poses), calibrate(tx90l.with_estimate(stage_one(tx90l, 1e-4)), poses)
+    loose, tight = (
+        fit_geometry(tx90l, poses),
+        fit_geometry(tx90l.with_estimate(stage_one(tx90l, 1e-4)), poses),
+    )
     name = "joint_2.drive.stiffness"
     assert tight.estimate.values[name] == pytest.approx(tx90l.value(name), rel=1e-3)
     assert abs(loose.estimate.values[name] / tx90l.value(name) - 1) > 0.05
@@ -109,7 +112,7 @@ def test_without_sigma_the_scatter_stands_for_it(simulate: Callable, tx90l: Robo
     """The same points with and without a stated sigma: the same intervals, for the noise can be seen."""
     simulated = simulate(13, 80)
     silent = replace(simulated.poses, sigma=np.full_like(simulated.poses.sigma, 1e-4), sigma_given=False)
-    stated, found = calibrate(tx90l, simulated.poses), calibrate(tx90l, silent)
+    stated, found = fit_geometry(tx90l, simulated.poses), fit_geometry(tx90l, silent)
     assert found.poses.sigma[0, 0] == pytest.approx(3e-5, rel=0.15)
     assert found.estimate.reduced_chi2 == pytest.approx(1, abs=0.1)
     for name in stated.identifiability.kept_names:
@@ -120,7 +123,7 @@ def coverage(simulate: Callable, tx90l: RobotModel, seeds: range) -> tuple[float
     inside, squares, chi2 = [], [], []
     for seed in seeds:
         simulated = simulate(seed, 50)
-        fit = calibrate(tx90l, simulated.poses)
+        fit = fit_geometry(tx90l, simulated.poses)
         expected = fit.estimate.regrouped(simulated.truth)
         # against the true sigma: the estimated scatter, which is never negative, takes up a part of it by chance
         squares_of_noise = float(np.sum((fit.residuals / simulated.poses.sigma) ** 2))
@@ -150,14 +153,17 @@ def test_intervals_cover_over_many_seeds(simulate: Callable, tx90l: RobotModel) 
 
 def test_verification_beats_the_rigid_fit(simulate: Callable, tx90l: RobotModel) -> None:
     simulated, fresh = simulate(5, 60), simulate(6, 150, truth=simulate(5, 60).truth, noise=False)
-    elastic, rigid = calibrate(tx90l, simulated.poses), calibrate(tx90l, simulated.poses, elastic=False)
-    seen, bare = verify(elastic.model, fresh.poses), verify(rigid.model, fresh.poses, elastic=False)
+    elastic, rigid = fit_geometry(tx90l, simulated.poses), fit_geometry(tx90l, simulated.poses, elastic=False)
+    seen, bare = (
+        prediction_errors(elastic.model, fresh.poses),
+        prediction_errors(rigid.model, fresh.poses, elastic=False),
+    )
     assert seen.all.p90 < 0.07e-3 < 0.5e-3 < bare.all.p90
     standard = np.linalg.norm(seen.errors, axis=1) / seen.parameter_rms
     assert 0.5 < np.sqrt(np.mean(standard[~seen.ambiguous] ** 2)) < 1.5
     noise = np.full_like(fresh.poses.position, 2e-4)
     rng = np.random.default_rng(0)
-    noisy = verify(
+    noisy = prediction_errors(
         elastic.model,
         replace(
             fresh.poses, sigma=noise, position=fresh.poses.position + noise * rng.normal(size=noise.shape)
@@ -174,10 +180,10 @@ def test_any_orientation_of_the_tracker(simulate: Callable, tx90l: RobotModel) -
     simulated = simulate(7, 60)
     turn, shift = vector_rotation(np.array([0.4, -1.0, 2.0])), np.array([3.0, -2.0, 0.5])
     turned = replace(simulated.poses, position=simulated.poses.position @ turn.T + shift)
-    straight, moved = calibrate(tx90l, simulated.poses), calibrate(tx90l, turned)
+    straight, moved = fit_geometry(tx90l, simulated.poses), fit_geometry(tx90l, turned)
     np.testing.assert_allclose(moved.errors.mean, straight.errors.mean, rtol=5e-3)
-    again = predict(tx90l.with_estimate(moved.estimate), turned).position
-    np.testing.assert_allclose(again, predict(moved.model, turned).position, atol=1e-9)
+    again = predict_measurements(tx90l.with_estimate(moved.estimate), turned).position
+    np.testing.assert_allclose(again, predict_measurements(moved.model, turned).position, atol=1e-9)
 
 
 def test_a_second_station_gets_its_own_frame(simulate: Callable, tx90l: RobotModel) -> None:
@@ -188,7 +194,7 @@ def test_a_second_station_gets_its_own_frame(simulate: Callable, tx90l: RobotMod
     names[40:] = "window"
     names = np.array(["tracker"] * 40 + ["window"] * 40)
     points[40:] = points[40:] @ turn.T + shift
-    fit = calibrate(two, replace(simulated.poses, station=names, position=points))
+    fit = fit_geometry(two, replace(simulated.poses, station=names, position=points))
     assert (fit.identifiability.rank, len(fit.identifiability.names)) == (35, 53)
     assert fit.errors.max < 0.15e-3
 
@@ -201,7 +207,7 @@ def test_outliers_are_found_and_listed(simulate: Callable, tx90l: RobotModel) ->
     points = simulated.poses.position.copy()
     directions = rng.normal(size=(8, 3))
     points[wrong] += 5e-3 * directions / np.linalg.norm(directions, axis=1)[:, None]
-    fit = calibrate(tx90l, replace(simulated.poses, position=points), loss="cauchy")
+    fit = fit_geometry(tx90l, replace(simulated.poses, position=points), loss="cauchy")
     assert set(fit.estimate.outliers) == set(wrong.tolist())
     fine = np.delete(np.arange(80), wrong)
     assert ErrorStatistics.of(fit.residuals[fine]).max < 0.15e-3
@@ -226,8 +232,8 @@ def test_a_stiffer_secant_is_found(simulate: Callable, tx90l: RobotModel) -> Non
     precise = replace(start.config, prior=replace(start.config.prior, mass=1e-3, com=1e-4))
     known = replace(start, config=precise)
     stiff = known.with_estimate(stage_one(known, 0.01))
-    scaled = calibrate(stiff, simulated.poses, secant_scale=0.1)
-    plain = calibrate(stiff, simulated.poses)
+    scaled = fit_geometry(stiff, simulated.poses, secant_scale=0.1)
+    plain = fit_geometry(stiff, simulated.poses)
     assert plain.estimate.cost > scaled.estimate.cost + 15
     assert 0.8 < scaled.estimate.reduced_chi2 < 1.2
     for name in drives[1:]:
@@ -237,20 +243,20 @@ def test_a_stiffer_secant_is_found(simulate: Callable, tx90l: RobotModel) -> Non
 def test_poses_that_cannot_work_are_refused(simulate: Callable, tx90l: RobotModel) -> None:
     poses = simulate(1).poses
     with refused("E-CAL-009", "29"):
-        calibrate(tx90l, poses.subset(slice(0, 9)))
+        fit_geometry(tx90l, poses.subset(slice(0, 9)))
     same = replace(poses, q=np.repeat(poses.q[:1], len(poses), axis=0))
     with refused("E-CAL-007", "60"):
-        calibrate(tx90l, same)
+        fit_geometry(tx90l, same)
     still = poses.q.copy()
     still[:, 3] = 0.3
     with refused("E-CAL-008", "joint_4"):
-        calibrate(tx90l, replace(poses, q=still))
-    flank = predict(tx90l, poses).rest.flank
+        fit_geometry(tx90l, replace(poses, q=still))
+    flank = predict_measurements(tx90l, poses).rest.flank
     with refused("E-CAL-010", "joint_2"):
-        calibrate(tx90l, poses.subset(flank[:, 1] > 0))
+        fit_geometry(tx90l, poses.subset(flank[:, 1] > 0))
 
 
-def unexplained(fit: Calibration) -> float:
+def unexplained(fit: GeometricFit) -> float:
     """What a fit ascribes to robot and model beside the instrument, m."""
     return float(np.hypot(fit.scatter.robot, fit.scatter.model))
 
@@ -259,8 +265,8 @@ def test_the_fit_without_backlash_is_worse(simulate: Callable, tx90l: RobotModel
     truth = simulate(12, 80).truth | {"joint_2.backlash": 3e-4, "joint_3.backlash": 3e-4}
     simulated = simulate(12, 80, truth=truth)
     with_, without = (
-        calibrate(tx90l, simulated.poses),
-        calibrate(tx90l, simulated.poses, terms=("kinematic",)),
+        fit_geometry(tx90l, simulated.poses),
+        fit_geometry(tx90l, simulated.poses, terms=("kinematic",)),
     )
     assert unexplained(with_) < 8e-6 and unexplained(without) > 2 * unexplained(with_)
     assert abs(with_.estimate.values["joint_2.backlash"] - 3e-4) < 4 * with_.estimate.std("joint_2.backlash")  # type: ignore[operator]
@@ -269,7 +275,7 @@ def test_the_fit_without_backlash_is_worse(simulate: Callable, tx90l: RobotModel
 def test_a_nominal_robot_can_be_verified(simulate: Callable, tx90l: RobotModel) -> None:
     """Before any estimate there is no covariance: the flank is judged by the size of the torque alone."""
     simulated = simulate(1)
-    seen = verify(tx90l, simulated.poses)
+    seen = prediction_errors(tx90l, simulated.poses)
     assert seen.all.mean > 0.2e-3
     assert not seen.parameter_rms.any()
 
@@ -291,9 +297,9 @@ def test_stations_and_measurements_that_are_not_known_are_named(
 def test_a_fit_that_turned_an_axis_round_is_remarked(ur5: RobotModel, examples: Path) -> None:
     """A column with the wrong sign can be fitted perfectly, by an axis that points the other way."""
     poses = read_poses(examples / "ur5_tracker" / "grid.csv", ur5).subset(slice(0, None, 8))
-    assert not implausible_shifts(calibrate(ur5, poses, terms=("kinematic",)))
+    assert not implausible_shifts(fit_geometry(ur5, poses, terms=("kinematic",)))
     wrong = poses.q * np.array([1, 1, 1, -1, 1, 1])
-    found = calibrate(ur5, replace(poses, q=wrong), terms=("kinematic",))
+    found = fit_geometry(ur5, replace(poses, q=wrong), terms=("kinematic",))
     assert found.errors.max < 0.3e-3
     assert implausible_shifts(found)[0].name.startswith("wrist_1_joint.misalignment")
     assert abs(abs(implausible_shifts(found)[0].value) - np.pi) < 0.02
@@ -305,6 +311,6 @@ def test_a_spring_far_from_what_stage_one_said_is_remarked(simulate: Callable, t
     sure = replace(tx90l.config, prior=replace(tx90l.config.prior, mass=1e-3, com=1e-4))
     known = replace(tx90l, config=sure).with_values(elastic)
     stiffer = known.with_values({name: 1.5 * known.value(name)})
-    assert not implausible_shifts(calibrate(known.with_estimate(stage_one(known, 0.02)), simulated.poses))
-    far = implausible_shifts(calibrate(stiffer.with_estimate(stage_one(stiffer, 0.02)), simulated.poses))
+    assert not implausible_shifts(fit_geometry(known.with_estimate(stage_one(known, 0.02)), simulated.poses))
+    far = implausible_shifts(fit_geometry(stiffer.with_estimate(stage_one(stiffer, 0.02)), simulated.poses))
     assert far[0].name == name and far[0].start > 1.2 * far[0].value

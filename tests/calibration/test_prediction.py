@@ -20,7 +20,9 @@ def tx90l(request: pytest.FixtureRequest, tx90l: RobotModel) -> RobotModel:
 
 def slope(model: RobotModel, poses, name: str, step: float, flank: np.ndarray) -> np.ndarray:
     ends = [
-        predict(model.with_values({name: model.value(name) + s * step}), poses, flank=flank).position
+        predict_measurements(
+            model.with_values({name: model.value(name) + s * step}), poses, flank=flank
+        ).position
         for s in (1, -1)
     ]
     return (ends[0] - ends[1]) / (2 * step)
@@ -47,7 +49,7 @@ def test_every_column(simulate: Callable, suffixes: tuple, step: float, relative
     robot = simulated.robot.with_values(
         {"station.tracker.rx": 0.3, "station.tracker.rz": -1.2, "station.tracker.x": 0.8}
     )
-    at = predict(robot, simulated.poses, jacobians=True)
+    at = predict_measurements(robot, simulated.poses, jacobians=True)
     elastic = ("joint_1", "joint_2", "joint_3")
     names = [
         n for n in robot.values if n.endswith(suffixes) and not n.startswith("point.") and "torque" not in n
@@ -67,7 +69,7 @@ def test_columns_of_drives_that_harden(simulate: Callable) -> None:
     simulated = simulate(3, 25)
     drives = [f"joint_{k}.drive" for k in (2, 3)]
     robot = simulated.robot.with_values({f"{drive}.hardening": 0.3 for drive in drives})
-    at = predict(robot, simulated.poses, jacobians=True)
+    at = predict_measurements(robot, simulated.poses, jacobians=True)
     steps = {f"{drive}.hardening": 3e-3 for drive in drives} | {
         f"{drive}.stiffness": 10.0 for drive in drives
     }
@@ -81,7 +83,7 @@ def test_columns_of_drives_that_harden(simulate: Callable) -> None:
 def test_a_parameter_without_effect_on_points_is_refused(simulate: Callable) -> None:
     simulated = simulate(1, 5)
     with refused("E-CAL-013", "joint_1.delay"):
-        predict(simulated.robot, simulated.poses, jacobians=True).jacobian(["joint_1.delay"])
+        predict_measurements(simulated.robot, simulated.poses, jacobians=True).jacobian(["joint_1.delay"])
 
 
 def with_slide(model: RobotModel, joint: int) -> RobotModel:
@@ -99,7 +101,7 @@ def test_every_geometric_column_with_a_slide_anywhere(
     """A slide before, among or beyond the springs carries the masses beyond it to where their load is another."""
     simulated = simulate(3, 15)
     robot = with_slide(simulated.robot, joint)
-    at = predict(robot, simulated.poses, jacobians=True)
+    at = predict_measurements(robot, simulated.poses, jacobians=True)
     names = [f"{owner}.{key}" for owner in (*robot.joint_names, "tool") for key in GEOMETRY]
     jacobian = at.jacobian(names)
     for k, name in enumerate(names):
@@ -119,9 +121,12 @@ def test_the_payload_column_is_in_kilograms_whatever_is_declared(
 ) -> None:
     """Also where robot.yaml declares the place of a payload and no mass: the column is not a share of it."""
     poses = replace(simulate(1, 8).poses, payload=np.array([0.0, 3.0] * 4))
-    light, heavy = predict(held(tx90l, 0.0), poses, jacobians=True), predict(held(tx90l, 6.0), poses)
+    light, heavy = (
+        predict_measurements(held(tx90l, 0.0), poses, jacobians=True),
+        predict_measurements(held(tx90l, 6.0), poses),
+    )
     np.testing.assert_allclose(light.position, heavy.position, atol=1e-14)
-    empty = predict(held(tx90l, 0.0), replace(poses, payload=None))
+    empty = predict_measurements(held(tx90l, 0.0), replace(poses, payload=None))
     apart = np.linalg.norm(light.position - empty.position, axis=1)
     assert apart[::2].max() < 1e-14 < 1e-5 < apart[1::2].min()
     expected = slope(light.model, poses, "payload.com_x", 1e-4, light.rest.flank)
@@ -134,7 +139,7 @@ def test_a_payload_found_heavier_makes_all_of_the_column_heavier(
     simulate: Callable, tx90l: RobotModel
 ) -> None:
     poses = replace(simulate(1, 8).poses, payload=np.full(8, 3.0))
-    found = predict(tx90l.with_values({"payload.mass": 6.6}), poses).position
+    found = predict_measurements(tx90l.with_values({"payload.mass": 6.6}), poses).position
     np.testing.assert_allclose(
-        found, predict(tx90l, replace(poses, payload=np.full(8, 3.3))).position, atol=1e-14
+        found, predict_measurements(tx90l, replace(poses, payload=np.full(8, 3.3))).position, atol=1e-14
     )

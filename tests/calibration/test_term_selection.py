@@ -11,7 +11,7 @@ import pytest
 
 from flexcal.calibration.error_model import order_folds, workspace_folds
 from flexcal.calibration.fit import geometric_parameters
-from flexcal.calibration.measurement import predict
+from flexcal.calibration.measurement import predict_measurements
 from flexcal.calibration.term_selection import select_terms
 from flexcal.data.poses import PoseSet, read_poses
 from flexcal.model.robot import RobotModel
@@ -52,7 +52,7 @@ TERMS = {
 
 def seen(robot: RobotModel, poses: PoseSet, rng: np.random.Generator) -> PoseSet:
     """What a tracker with a scatter of 0.05 mm sees of `robot`."""
-    exact = predict(robot, poses).position
+    exact = predict_measurements(robot, poses).position
     return replace(poses, position=exact + 5e-5 * rng.normal(size=exact.shape))
 
 

@@ -12,7 +12,7 @@ import polars as pl
 import pytest
 from cli_files import copied, read_csv, snapshot, write_csv
 
-from flexcal.calibration.measurement import predict
+from flexcal.calibration.measurement import predict_measurements
 from flexcal.cli.main import main
 from flexcal.data.poses import read_poses, write_poses
 from flexcal.files.formats import sha256_of
@@ -44,7 +44,7 @@ def calibrated(examples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
     again = nominal.subset(parameter_rows)
     q = commands.select(Q).to_numpy()[parameter_rows]
     after = replace(again, q=q, sigma=np.full((60, 3), SIGMA), sigma_given=True)
-    seen = predict(model, after).position + SIGMA * rng.standard_normal((60, 3))
+    seen = predict_measurements(model, after).position + SIGMA * rng.standard_normal((60, 3))
     write_poses(folder / "after.csv", replace(after, position=seen))
     return folder
 

@@ -12,8 +12,8 @@ from scipy.optimize import least_squares
 from stranger_arm import PANDA, SIX, StrangerArm
 
 from flexcal.calibration.diagnostics import is_implausible
-from flexcal.calibration.fit import Calibration, calibrate
-from flexcal.calibration.verification import error_scale, verify, verify_jointly
+from flexcal.calibration.fit import GeometricFit, fit_geometry
+from flexcal.calibration.verification import error_scale, prediction_errors, prediction_errors_with_covariance
 from flexcal.data.poses import PoseSet, read_poses
 from flexcal.jobs.calibration.remarks import calibration_remarks
 from flexcal.model.robot import RobotModel
@@ -43,8 +43,8 @@ class Measured:
         file = self.arm.write_poses(self.folder / "poses.csv", q, xyz, sigma)
         return read_poses(file, self.model, require_motion=False)
 
-    def calibrated(self, q: np.ndarray, xyz: np.ndarray, sigma: float | None) -> Calibration:
-        return calibrate(self.model, self.poses(q, xyz, sigma), terms=("kinematic",))
+    def calibrated(self, q: np.ndarray, xyz: np.ndarray, sigma: float | None) -> GeometricFit:
+        return fit_geometry(self.model, self.poses(q, xyz, sigma), terms=("kinematic",))
 
     def fresh(self, count: int = 100) -> PoseSet:
         q = self.arm.postures(count, self.rng)
@@ -57,11 +57,11 @@ def wrong_sigmas(folder: Path, seed: int) -> tuple[list[float], float, int]:
     q = case.arm.postures(40, case.rng)
     xyz = case.arm.measured(q, case.rng, np.hypot(case.rng.uniform(3e-5, 1e-4), TRACKER))
     fresh, without = case.fresh(), case.calibrated(q, xyz, None)
-    plain = verify(without.model, fresh, noise_free=True).all.mean
+    plain = prediction_errors(without.model, fresh, noise_free=True).all.mean
     ratios, squares, outliers = [], [], 0
     for factor in (0.01, 0.1, 1.0, 10.0, 100.0, 1000.0):
         found = case.calibrated(q, xyz, TRACKER * factor)
-        seen = verify(found.model, fresh, noise_free=True)
+        seen = prediction_errors(found.model, fresh, noise_free=True)
         ratios.append(seen.all.mean / plain)
         squares.append(float(np.mean((seen.errors**2).sum(axis=1) / seen.parameter_rms**2)))
         outliers += len(found.estimate.outliers)
@@ -154,11 +154,11 @@ def test_a_tool_that_never_turns_does_not_tell_its_offset(tmp_path: Path, run: C
         quantity = found.estimate.quantity(f"tool.length_{key}")
         assert quantity["estimate"] == 0 and quantity["std"] is None and not quantity["identifiable"]
     elsewhere = case.fresh(60)
-    seen, covariance = verify_jointly(found.model, elsewhere)
+    seen, covariance = prediction_errors_with_covariance(found.model, elsewhere)
     assert seen.all.mean > 3e-3 and error_scale(seen, covariance).inside > 0.9
     q = constant_orientation(case, 30)
     there = case.poses(q, case.arm.measured(q, case.rng), 2e-5)
-    seen, covariance = verify_jointly(found.model, there)
+    seen, covariance = prediction_errors_with_covariance(found.model, there)
     assert seen.all.mean < 1e-4 and error_scale(seen, covariance).ratio < 1.35
     file = case.arm.write_poses(tmp_path / "p.csv", q, case.arm.measured(q, case.rng), 2e-5)
     assert "not determined by these poses" in run("calibrate", tmp_path / "robot.yaml", file).out
@@ -170,7 +170,7 @@ def test_a_joint_that_hardly_moves_is_named(tmp_path: Path) -> None:
     q[:, 1] = q[0, 1] + 4e-3 * case.rng.uniform(-1, 1, 60)
     found = case.calibrated(q, case.arm.measured(q, case.rng), 2e-5)
     assert found.undetermined and any("a2 moved 0.5° only" in item.cause for item in found.undetermined)
-    seen, covariance = verify_jointly(found.model, case.fresh(60))
+    seen, covariance = prediction_errors_with_covariance(found.model, case.fresh(60))
     assert error_scale(seen, covariance).ratio_low < 1.35
 
 
@@ -182,9 +182,9 @@ def test_terms_that_poses_do_not_tell_stay_plausible(tmp_path: Path, terms: tupl
     case = Measured.drawn(tmp_path, 72)
     q = case.arm.postures(40, case.rng, spread=0.02)
     measured = case.poses(q, case.arm.measured(q, case.rng), 2e-5)
-    found = calibrate(case.model, measured, terms=("kinematic", *terms))
+    found = fit_geometry(case.model, measured, terms=("kinematic", *terms))
     assert {u.name.rpartition(".")[2].rpartition("_")[0] for u in found.undetermined} >= {"transmission_1"}
-    seen, covariance = verify_jointly(found.model, case.fresh(60))
+    seen, covariance = prediction_errors_with_covariance(found.model, case.fresh(60))
     assert seen.all.max < 0.01 and seen.parameter_rms.max() < 0.015
     assert error_scale(seen, covariance).inside > 0.9
 
@@ -197,7 +197,7 @@ def test_the_rotation_of_a_station_is_the_first_joints(tmp_path: Path) -> None:
         q = case.arm.postures(1, case.rng) + 2e-3 * case.rng.uniform(-1, 1, (40, 6))
         q[:, 3] += case.rng.uniform(-0.8, 0.8, 40)
         found = case.calibrated(q, case.arm.measured(q, case.rng), 2e-5)
-        seen, covariance = verify_jointly(found.model, case.fresh(60))
+        seen, covariance = prediction_errors_with_covariance(found.model, case.fresh(60))
         ratios.append(error_scale(seen, covariance).ratio)
         errors.append(seen.all.mean)
     assert np.sqrt(np.mean(np.square(ratios))) < 2 and max(errors) < 0.02
@@ -218,7 +218,7 @@ def test_points_of_a_plane_predict_the_space(tmp_path: Path) -> None:
             found.append(np.r_[solved.x, start[3:]])
     q = np.array(found)
     fit = case.calibrated(q, case.arm.measured(q, case.rng), 2e-5)
-    seen, covariance = verify_jointly(fit.model, case.fresh(60))
+    seen, covariance = prediction_errors_with_covariance(fit.model, case.fresh(60))
     assert error_scale(seen, covariance).ratio < 1.6 and seen.all.p90 < 2e-4
 
 
@@ -305,4 +305,4 @@ def test_a_declared_prior_holds_what_points_do_not_tell(tmp_path: Path) -> None:
     assert abs(found.estimate.values["a2.length_x"]) < 5e-6
     known = dict(zip(names, found.estimate.identifiable, strict=True))
     assert not known["a2.length_x"] and sum(known[name] for name in names if name.startswith("a")) > 2
-    assert verify(found.model, case.fresh(), noise_free=True).all.p90 < 1e-4
+    assert prediction_errors(found.model, case.fresh(), noise_free=True).all.p90 < 1e-4

@@ -15,7 +15,7 @@ from cli_files import read_csv, write_csv
 from newcomer_robot import urdf_text
 from two_links import HELD, PAYLOAD, swings, two_links
 
-from flexcal.calibration.measurement import predict
+from flexcal.calibration.measurement import predict_measurements
 from flexcal.cli.arguments.verb_table import VERBS
 from flexcal.cli.main import main
 from flexcal.data.poses import read_poses, write_poses
@@ -79,7 +79,7 @@ def calibrated_arm(folder: Path, examples: Path) -> list[str]:
     for name, q in (("nominal", measured.q), ("compensated", commands)):
         visited = replace(measured, q=q, sigma=np.full((len(q), 3), 2e-5), sigma_given=True)
         visits = visited.subset(np.tile(np.arange(len(q)), 3))
-        seen = predict(model, visits).position + 2e-5 * rng.standard_normal((3 * len(q), 3))
+        seen = predict_measurements(model, visits).position + 2e-5 * rng.standard_normal((3 * len(q), 3))
         write_poses(folder / f"{name}.csv", replace(visits, position=seen))
     shutil.copy("compensated.csv", "visits.csv")
     run("flexcal verify robot.yaml others.csv --out checked")

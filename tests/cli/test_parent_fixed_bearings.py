@@ -10,7 +10,7 @@ import pytest
 from heavy_robot import REPEATABILITY, TRACKER, HeavyRobot, poses, write_poses, write_robot
 
 from flexcal.calibration.diagnostics import BearingAxes, compare_bearings
-from flexcal.calibration.fit import calibrate
+from flexcal.calibration.fit import fit_geometry
 from flexcal.data.poses import read_poses
 from flexcal.model.robot import RobotModel
 
@@ -95,7 +95,7 @@ def compared(
     for sigma in sigmas:
         write_poses(folder / "poses.csv", q, xyz, sigma)
         measured = read_poses([folder / "poses.csv"], model)
-        found = compare_bearings(model, lambda robot: calibrate(robot, measured, terms=terms))  # noqa: B023
+        found = compare_bearings(model, lambda robot: fit_geometry(robot, measured, terms=terms))  # noqa: B023
         assert found is not None
         yield found
 

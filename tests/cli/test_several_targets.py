@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from stranger_arm import SIX, StrangerArm
 
-from flexcal.calibration.fit import Calibration, calibrate
-from flexcal.calibration.verification import error_scale, verify, verify_jointly
+from flexcal.calibration.fit import GeometricFit, fit_geometry
+from flexcal.calibration.verification import error_scale, prediction_errors, prediction_errors_with_covariance
 from flexcal.data.poses import read_poses
 from flexcal.model.robot import RobotModel
 
@@ -44,18 +44,18 @@ def write_reflectors(
     return path
 
 
-def calibrated(folder: Path, seed: int, kind: str) -> tuple[Calibration, float]:
+def calibrated(folder: Path, seed: int, kind: str) -> tuple[GeometricFit, float]:
     """A calibration, and the mean square of its standardised errors at fresh poses without noise."""
     arm = robot_with_reflectors(folder, seed)
     rng = np.random.default_rng([seed, 2])
     model = RobotModel.from_yaml(folder / "robot.yaml")
     file = write_reflectors(folder / "poses.csv", arm, arm.postures(POSES, rng), rng, kind)
-    found = calibrate(model, read_poses(file, model), terms=("kinematic",))
+    found = fit_geometry(model, read_poses(file, model), terms=("kinematic",))
     q = arm.postures(60, rng)
     fresh = read_poses(
         arm.write_poses(folder / "fresh.csv", q, arm.measured(q, rng, 0.0, xyz=TRUE["smr"])), model
     )
-    seen = verify(found.model, fresh, noise_free=True)
+    seen = prediction_errors(found.model, fresh, noise_free=True)
     return found, float(np.mean((seen.errors**2).sum(axis=1) / seen.parameter_rms**2))
 
 
@@ -75,7 +75,7 @@ def test_verification_counts_poses_rather_than_points(tmp_path: Path, kind: str)
         rng = np.random.default_rng([seed, 9])
         arm = robot_with_reflectors(tmp_path, seed)
         file = write_reflectors(tmp_path / "fresh.csv", arm, arm.postures(15, rng), rng, kind)
-        scale = error_scale(*verify_jointly(found.model, read_poses(file, found.model)))
+        scale = error_scale(*prediction_errors_with_covariance(found.model, read_poses(file, found.model)))
         covered.append(scale.ratio_low < 1 < scale.ratio_high)
         freedom.append(scale.freedom)
     assert sum(covered) >= 17

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from stranger_arm import SIX, StrangerArm
 
-from flexcal.calibration.fit import Calibration, calibrate
-from flexcal.calibration.verification import error_scale, verify_jointly
+from flexcal.calibration.fit import GeometricFit, fit_geometry
+from flexcal.calibration.verification import error_scale, prediction_errors_with_covariance
 from flexcal.data.poses import PoseSet, read_poses
 from flexcal.model.robot import RobotModel
 
@@ -40,9 +40,9 @@ class WavyArm:
         xyz = self.arm.measured(turned, self.rng, SCATTER)
         return read_poses(self.arm.write_poses(self.folder / "poses.csv", q, xyz, None), self.model)
 
-    def with_and_without(self, count: int) -> tuple[Calibration, Calibration]:
+    def with_and_without(self, count: int) -> tuple[GeometricFit, GeometricFit]:
         poses = self.points(count)
-        return calibrate(self.model, poses), calibrate(self.model, poses, terms=("kinematic",))
+        return fit_geometry(self.model, poses), fit_geometry(self.model, poses, terms=("kinematic",))
 
     def true(self, name: str) -> float:
         joint, kind = name.split(".")
@@ -51,11 +51,11 @@ class WavyArm:
         return float(self.amplitude[at] * (np.cos if wave == "sin" else np.sin)(self.phase[at]))
 
 
-def at_fresh_poses(arm: WavyArm, fits: tuple[Calibration, ...]) -> np.ndarray:
+def at_fresh_poses(arm: WavyArm, fits: tuple[GeometricFit, ...]) -> np.ndarray:
     """Mean error (mm), share inside the 95 % bound, and observed over predicted errors of every fit, (fits, 3)."""
     fresh, rows = arm.points(150), []
     for fit in fits:
-        found, covariance = verify_jointly(fit.model, fresh)
+        found, covariance = prediction_errors_with_covariance(fit.model, fresh)
         scale = error_scale(found, covariance)
         rows.append((1e3 * found.all.mean, scale.inside, scale.ratio))
     return np.array(rows)

@@ -11,8 +11,8 @@ import pytest
 from refusals import refused
 from scipy.optimize import brentq, root
 
-from flexcal.calibration.measurement import predict
-from flexcal.compensation import best_posture, compensate
+from flexcal.calibration.measurement import predict_measurements
+from flexcal.compensation import best_posture, motor_commands
 from flexcal.data.plans import PosePlan
 from flexcal.data.poses import PoseSet, ToolTargets
 from flexcal.model.kinematics import point_kinematics
@@ -46,7 +46,7 @@ def seen_in_base(model: RobotModel, q: np.ndarray, payload: np.ndarray | None) -
         pose=np.arange(n),
     )
     place = model.stations.pose[0]
-    return (predict(model, poses).position - place[:3]) @ vector_rotation(place[3:])
+    return (predict_measurements(model, poses).position - place[:3]) @ vector_rotation(place[3:])
 
 
 @pytest.mark.parametrize("bearings", ["after", "before"])
@@ -54,7 +54,7 @@ def test_round_trip_is_within_a_micrometre(
     tx90l: RobotModel, real: RobotModel, random_targets: Callable[[int], ToolTargets], bearings: Bearings
 ) -> None:
     targets, real = random_targets(1000), real.with_bearings(bearings)
-    found = compensate(real, tx90l, targets)
+    found = motor_commands(real, tx90l, targets)
     done = found.reached & found.unambiguous
     assert done.mean() > 0.8 and found.reached.mean() > 0.96
     assert targets.q is not None and targets.payload is not None
@@ -76,7 +76,7 @@ def test_axes_that_tilt_under_gravity_are_compensated(
     """With payloads of 0 to 6 kg, whose moments tilt the wrist's axes."""
     tilts = {f"joint_{k}.gravity_compliance_{axis}": 1e-5 for k in (4, 5) for axis in (1, 2)}
     targets, tilting = random_targets(100), real.with_bearings(bearings).with_values(tilts)
-    found = compensate(tilting, tx90l, targets)
+    found = motor_commands(tilting, tx90l, targets)
     done = found.reached & found.unambiguous
     assert done.mean() > 0.8 and targets.q is not None and targets.payload is not None
     wanted = point_kinematics(tx90l, targets.q).position[done]
@@ -95,7 +95,7 @@ def test_another_engine_puts_the_tool_there(
         {"joint_4.transmission_2_sin": 0.0, "joint_5.gravity_compliance": 0.0, "payload.mass": 6.0}
     )
     targets = replace(random_targets(60), payload=None)
-    found = compensate(robot, tx90l, targets)
+    found = motor_commands(robot, tx90l, targets)
     done = found.reached & found.unambiguous
     plan = PosePlan(q=found.q[done])
     seen = VirtualCell(robot, CellConfig()).noise_free(plan)
@@ -110,7 +110,7 @@ def test_commands_are_those_of_a_solver_by_differences(
 ) -> None:
     """MINPACK's hybrid method, target by target, with its own difference quotients."""
     targets = random_targets(12)
-    found = compensate(real, tx90l, targets)
+    found = motor_commands(real, tx90l, targets)
     assert targets.q is not None and targets.payload is not None
     wanted = point_kinematics(tx90l, targets.q)
     for k in np.flatnonzero(found.reached & found.unambiguous):
@@ -154,9 +154,9 @@ def test_one_by_one_is_all_at_once(
     tx90l: RobotModel, real: RobotModel, random_targets: Callable[[int], ToolTargets]
 ) -> None:
     targets = random_targets(40)
-    together = compensate(real, tx90l, targets)
+    together = motor_commands(real, tx90l, targets)
     for k in range(40):
-        alone = compensate(real, tx90l, targets.subset(slice(k, k + 1)))
+        alone = motor_commands(real, tx90l, targets.subset(slice(k, k + 1)))
         np.testing.assert_allclose(alone.q[0], together.q[k], atol=1e-12)
         assert alone.reason[0] == together.reason[k] and alone.unambiguous[0] == together.unambiguous[k]
 
@@ -170,13 +170,13 @@ def test_the_flank_turns_where_the_torque_does(tx90l: RobotModel, real: RobotMod
         return targets_at(q)
 
     def load(angle: float) -> float:
-        command = compensate(real, tx90l, at(np.array([angle]))).q
+        command = motor_commands(real, tx90l, at(np.array([angle]))).q
         return float(tool_at_rest(real, command, None, np.array(["smr"])).rest.torque[0, 1])
 
     crossing = brentq(load, -1.0, 0.5, xtol=1e-10)
     near = crossing + np.linspace(-2e-4, 2e-4, 41)
     targets = at(near)
-    commands = compensate(real, tx90l, targets)
+    commands = motor_commands(real, tx90l, targets)
     assert commands.reached.all() and not commands.unambiguous.any()
     steps = np.diff(commands.q[:, 1] - near)
     turn = int(np.argmax(np.abs(steps)))
@@ -190,7 +190,7 @@ def test_the_flank_turns_where_the_torque_does(tx90l: RobotModel, real: RobotMod
     wanted = point_kinematics(tx90l, targets.q).position
     assert np.abs(there.kinematics.position - wanted).max() < MICROMETRE
     np.testing.assert_array_equal(np.sign(there.rest.torque[:, 1]), pressed)
-    assert compensate(real, tx90l, at(crossing + np.array([-0.2, 0.2]))).unambiguous.all()
+    assert motor_commands(real, tx90l, at(crossing + np.array([-0.2, 0.2]))).unambiguous.all()
 
 
 def test_a_joint_past_its_limit_is_named(tx90l: RobotModel, real: RobotModel) -> None:
@@ -198,7 +198,7 @@ def test_a_joint_past_its_limit_is_named(tx90l: RobotModel, real: RobotModel) ->
     shifted = real.with_values({"joint_5.offset": -5e-3})
     q = np.tile(EASY, (2, 1))
     q[1, 4] = upper
-    found = compensate(shifted, tx90l, targets_at(q))
+    found = motor_commands(shifted, tx90l, targets_at(q))
     assert found.reached.tolist() == [True, False]
     assert np.isnan(found.q[1]).all()
     assert found.reason[1].startswith("joint limit: joint_5 would be 0.00")
@@ -208,7 +208,7 @@ def test_a_joint_past_its_limit_is_named(tx90l: RobotModel, real: RobotModel) ->
 def test_a_singular_wrist_is_named(tx90l: RobotModel, real: RobotModel) -> None:
     q = EASY.copy()
     q[4] = 1e-4
-    found = compensate(real, tx90l, targets_at(q))
+    found = motor_commands(real, tx90l, targets_at(q))
     assert not found.reached[0]
     assert found.reason[0].startswith("singular: joint_4 and joint_6 can move together")
 
@@ -216,7 +216,7 @@ def test_a_singular_wrist_is_named(tx90l: RobotModel, real: RobotModel) -> None:
 def test_a_stretched_arm_that_is_too_short_is_named(tx90l: RobotModel, real: RobotModel) -> None:
     short = real.with_values({"joint_2.length_z": -2e-3, "joint_3.length_z": -2e-3})
     q = np.array([0.3, 0.5, 0.0, 0.4, 0.9, -0.5])
-    found = compensate(short, tx90l, targets_at(q))
+    found = motor_commands(short, tx90l, targets_at(q))
     assert found.reason[0].startswith("singular: joint_2, joint_3")
     assert "the smallest distance of the tool to the target is " in found.reason[0]
 
@@ -226,7 +226,7 @@ def test_points_alone(tx90l: RobotModel, real: RobotModel, rng: np.random.Genera
     near = EASY + 0.2 * rng.normal(size=(30, 6))
     position = np.vstack([point_kinematics(tx90l, near).position, [[5.0, 0.0, 1.0]]])
     targets = ToolTargets(pose=np.arange(31), target=np.full(31, "smr"), position=position)
-    found = compensate(real, tx90l, targets, start=EASY)
+    found = motor_commands(real, tx90l, targets, start=EASY)
     assert found.reached.tolist() == [True] * 30 + [False] and not found.elsewhere[:30].any()
     assert re.fullmatch(
         r"out of reach: the smallest distance of the tool to the target is 3\d{3} mm", found.reason[30]
@@ -249,9 +249,9 @@ def test_poses_without_joint_positions_keep_the_configuration(
         position=wanted.position,
         rotation=wanted.orientation,
     )
-    found = compensate(real, tx90l, bare, start=EASY)
+    found = motor_commands(real, tx90l, bare, start=EASY)
     np.testing.assert_allclose(found.nominal, near, atol=1e-7)
-    np.testing.assert_allclose(found.q, compensate(real, tx90l, targets_at(near)).q, atol=1e-7)
+    np.testing.assert_allclose(found.q, motor_commands(real, tx90l, targets_at(near)).q, atol=1e-7)
 
 
 def test_points_of_an_instrument(tx90l: RobotModel, real: RobotModel) -> None:
@@ -268,14 +268,14 @@ def test_points_of_an_instrument(tx90l: RobotModel, real: RobotModel) -> None:
         station=np.array(["tracker"]),
     )
     np.testing.assert_allclose(
-        compensate(real, tx90l, seen).q, compensate(real, tx90l, targets_at(EASY)).q, atol=1e-9
+        motor_commands(real, tx90l, seen).q, motor_commands(real, tx90l, targets_at(EASY)).q, atol=1e-9
     )
 
 
 def test_a_position_given_with_joints_keeps_their_orientation(tx90l: RobotModel, real: RobotModel) -> None:
     at = point_kinematics(tx90l, EASY)
     moved = targets_at(EASY, position=at.position + np.array([0.01, -0.02, 0.03]))
-    found = compensate(real, tx90l, moved)
+    found = motor_commands(real, tx90l, moved)
     tool = tool_at_rest(real, found.q, None, np.array(["smr"])).kinematics
     np.testing.assert_allclose(tool.position, moved.position, atol=MICROMETRE)
     np.testing.assert_allclose(tool.orientation, at.orientation, atol=1e-6)

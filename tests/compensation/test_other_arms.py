@@ -10,7 +10,7 @@ import pytest
 from refusals import refused
 from scipy.optimize import minimize
 
-from flexcal.compensation import compensate
+from flexcal.compensation import motor_commands
 from flexcal.data.poses import ToolTargets
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.parts import rotation_vector
@@ -57,7 +57,7 @@ def test_seven_joints_change_least(tmp_path: Path, rng: np.random.Generator) -> 
     nominal = arm(tmp_path, 7)
     robot = real(nominal)
     q = rng.uniform(-1.2, 1.2, (4, 7))
-    found = compensate(robot, nominal, targets_at(q))
+    found = motor_commands(robot, nominal, targets_at(q))
     assert found.reached.all()
     wanted = point_kinematics(nominal, q)
     for k in range(4):
@@ -85,13 +85,13 @@ def test_a_spare_joint_makes_up_for_one_at_its_limit(tmp_path: Path) -> None:
     nominal = arm(tmp_path, 7)
     robot = real(nominal)
     q = np.array([[0.3, 0.6, -0.4, 1.1, 0.5, 0.8, 0.2]])
-    free = compensate(robot, nominal, targets_at(q)).q
+    free = motor_commands(robot, nominal, targets_at(q)).q
     joint = int(np.argmax(free - q))
     limit = float(q[0, joint] + 0.3 * (free - q)[0, joint])
     joints = list(robot.joints)
     joints[joint] = replace(joints[joint], upper=limit)
     held = replace(robot, joints=tuple(joints))
-    found = compensate(held, nominal, targets_at(q))
+    found = motor_commands(held, nominal, targets_at(q))
     assert found.reached.all() and found.q[0, joint] == pytest.approx(limit, abs=1e-12)
     at = tool_at_rest(held, found.q, None, np.array(["tip"])).kinematics
     wanted = point_kinematics(nominal, q)
@@ -103,13 +103,13 @@ def test_four_joints_bring_the_point_there_and_take_no_orientation(tmp_path: Pat
     nominal = arm(tmp_path, 4)
     robot = real(nominal)
     q = np.array([[0.3, 1.0, 1.9, 1.3], [0.1, -0.5, 0.7, 1.4]])
-    found = compensate(robot, nominal, targets_at(q))
+    found = motor_commands(robot, nominal, targets_at(q))
     wanted = point_kinematics(nominal, q)
     at = tool_at_rest(robot, found.q, None, np.full(2, "tip")).kinematics
     np.testing.assert_allclose(at.position, wanted.position, atol=1e-6)
     posed = replace(targets_at(q), position=wanted.position, rotation=wanted.orientation)
     with refused("E-COMP-001", "4", "tip"):
-        compensate(robot, nominal, posed)
+        motor_commands(robot, nominal, posed)
 
 
 def test_two_hands(tree: RobotModel, tmp_path: Path) -> None:
@@ -123,7 +123,7 @@ def test_two_hands(tree: RobotModel, tmp_path: Path) -> None:
     )
     q = np.random.default_rng(5).uniform(-0.5, 0.5, (6, nominal.n))
     target = np.array(["hand", "finger"] * 3)
-    found = compensate(robot, nominal, ToolTargets(np.arange(6), target, q))
+    found = motor_commands(robot, nominal, ToolTargets(np.arange(6), target, q))
     assert found.reached.all()
     for name, still in (("hand", ("to_right", "to_finger")), ("finger", ("to_left", "to_slider", "to_hand"))):
         rows = target == name

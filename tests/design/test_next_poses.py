@@ -47,7 +47,7 @@ def _places(model, q):
 
 
 def test_each_pose_is_the_best_of_all_after_those_before(tx90l, found, measured, rng):
-    after = next_poses(found, measured, 3, rng=rng)
+    after = select_next_poses(found, measured, 3, rng=rng)
     chosen = after.design.selection.chosen.tolist()
     for number in range(3):
         before = chosen[:number]
@@ -60,7 +60,7 @@ def test_each_pose_is_the_best_of_all_after_those_before(tx90l, found, measured,
 
 def test_when_to_stop(tx90l, measured, rng):
     many = pose_candidates(tx90l, rng=rng, candidates=1500)
-    after = next_poses(many, measured, 60, rng=rng)
+    after = select_next_poses(many, measured, 60, rng=rng)
     assert np.all(np.diff(after.tool_error) < 0) and np.all(after.possible <= after.tool_error)
     wanted = float(after.tool_error[7])
     assert after.enough(wanted) == 7 and after.enough(2 * after.tool_error[0]) == 0
@@ -74,12 +74,12 @@ def test_when_to_stop(tx90l, measured, rng):
 
 def test_payloads_and_unknown_noise(tx90l, found, measured, rng):
     held = np.where(np.arange(14) < 7, 0.0, 6.0)
-    two = next_poses(found, replace(measured, payload=held), 2, rng=rng)
-    declared = next_poses(found, replace(measured, payload=np.full(14, 6.0)), 2, rng=rng)
-    plain = next_poses(found, measured, 2, rng=rng)
+    two = select_next_poses(found, replace(measured, payload=held), 2, rng=rng)
+    declared = select_next_poses(found, replace(measured, payload=np.full(14, 6.0)), 2, rng=rng)
+    plain = select_next_poses(found, measured, 2, rng=rng)
     np.testing.assert_allclose(declared.tool_error, plain.tool_error, rtol=1e-12)
     assert two.tool_error[0] != pytest.approx(plain.tool_error[0], rel=1e-9)
-    vague = next_poses(found, replace(measured, sigma_given=False), 2, rng=rng)
+    vague = select_next_poses(found, replace(measured, sigma_given=False), 2, rng=rng)
     rows = found.base.columns(pose_sensitivity(tx90l, measured.q, found.setup).jacobian).reshape(-1, 29)
     covariance = np.linalg.inv(rows.T @ rows + found.base.sensitivity.prior_information)
     assert vague.tool_error[0] == pytest.approx(
@@ -89,12 +89,12 @@ def test_payloads_and_unknown_noise(tx90l, found, measured, rng):
 
 def test_bad_input(found, measured, rng):
     with refused("E-DESIGN-029", "O3"):
-        next_poses(found, measured, 2, rng=rng, criterion="O3")
+        select_next_poses(found, measured, 2, rng=rng, criterion="O3")
     with refused("E-DESIGN-031", "target", "ball", "smr"):
-        next_poses(found, replace(measured, target=np.full(14, "ball")), 2, rng=rng)
+        select_next_poses(found, replace(measured, target=np.full(14, "ball")), 2, rng=rng)
     with refused("E-DESIGN-031", "station", "door"):
-        next_poses(found, replace(measured, station=np.full(14, "door")), 2, rng=rng)
+        select_next_poses(found, replace(measured, station=np.full(14, "door")), 2, rng=rng)
     with refused("E-DESIGN-030"):
-        next_poses(found, replace(measured, length=np.ones(14)), 2, rng=rng)
+        select_next_poses(found, replace(measured, length=np.ones(14)), 2, rng=rng)
     with refused("E-DESIGN-017", "121", "120"):
-        next_poses(found, measured, 121, rng=rng)
+        select_next_poses(found, measured, 121, rng=rng)

@@ -9,11 +9,11 @@ from flexcal.data.poses import PosePool
 from flexcal.design.optimality import DOptimal, SpectralCriterion, exchange, observability
 from flexcal.design.poses import (
     base_sensitivity,
-    design_poses,
     pose_curve,
     pose_sensitivity,
     preloaded,
     random_poses,
+    select_poses,
 )
 from flexcal.design.poses.selection import tool_error
 from flexcal.design.scene import CollisionChecker, MeasuringSetup, visible
@@ -26,7 +26,7 @@ POOL = Path(__file__).parent / "pose_pool.csv"
 
 @pytest.fixture(scope="module")
 def design(tx90l):
-    return design_poses(tx90l, 40, rng=np.random.default_rng(3), candidates=800)
+    return select_poses(tx90l, 40, rng=np.random.default_rng(3), candidates=800)
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +98,7 @@ def test_d_and_sigma_min_within_two_percent_of_fifty_restarts(pool, rng):
 @pytest.mark.parametrize("name", ["A", "D", "E", "O1", "O2", "O3", "O4", "O5"])
 def test_every_criterion_is_best_at_what_it_is_for(tx90l, design, name):
     rng = np.random.default_rng(3)
-    other = design_poses(tx90l, 40, rng=rng, candidates=800, criterion=name)
+    other = select_poses(tx90l, 40, rng=rng, candidates=800, criterion=name)
     np.testing.assert_array_equal(other.candidates.q, design.candidates.q)
     rows = design.base.sensitivity.jacobian[design.selection.chosen].reshape(-1, 29)
     prior = design.base.sensitivity.prior_information if other.criterion.uses_prior else 0.0
@@ -108,7 +108,7 @@ def test_every_criterion_is_best_at_what_it_is_for(tx90l, design, name):
 
 def test_the_seed_decides_and_payload_is_kept(tx90l):
     one, two = (
-        design_poses(
+        select_poses(
             tx90l, 12, rng=np.random.default_rng(1), candidates=150, setup=MeasuringSetup(payload=3.0)
         ).plan
         for _ in range(2)
@@ -116,14 +116,14 @@ def test_the_seed_decides_and_payload_is_kept(tx90l):
     np.testing.assert_array_equal(one.q, two.q)
     assert one.seed == two.seed
     np.testing.assert_array_equal(one.payload, np.full(12, 3.0))
-    assert design_poses(tx90l, 12, rng=np.random.default_rng(1), candidates=150).plan.payload is None
+    assert select_poses(tx90l, 12, rng=np.random.default_rng(1), candidates=150).plan.payload is None
 
 
 def test_measure_where_you_will_work(tx90l, rng):
     corner = random_poses(tx90l, 3000, rng).q
     corner = corner[(np.abs(corner[:, 0]) < 0.3) & (np.abs(corner[:, 1] - 0.8) < 0.4)]
-    there = design_poses(tx90l, 15, rng=np.random.default_rng(2), candidates=600, working=corner)
-    everywhere = design_poses(tx90l, 15, rng=np.random.default_rng(2), candidates=600)
+    there = select_poses(tx90l, 15, rng=np.random.default_rng(2), candidates=600, working=corner)
+    everywhere = select_poses(tx90l, 15, rng=np.random.default_rng(2), candidates=600)
     assert there.tool_error < 0.97 * tool_error(
         everywhere.base, there.tool_error_weight, everywhere.selection.chosen
     )
@@ -137,7 +137,7 @@ def test_random_poses_ask_nothing_of_the_flank(tx90l):
 
 
 def test_a_rigid_robot_without_shapes_or_station(ur5):
-    found = design_poses(ur5, 20, rng=np.random.default_rng(0), candidates=300)
+    found = select_poses(ur5, 20, rng=np.random.default_rng(0), candidates=300)
     assert found.identifiability.rank == 25  # the target lies on the last axis
     assert found.flank.shape == (20, 0)
 
@@ -175,7 +175,7 @@ def test_criteria_against_their_definitions(design):
 def test_chosen_from_a_pool_of_given_poses(tx90l):
     q = np.loadtxt(POOL, delimiter=",", max_rows=500)
     given = PosePool(q, np.arange(100, 100 + len(q)))
-    found = design_poses(tx90l, 40, rng=np.random.default_rng(0), criterion="E", candidates=given)
+    found = select_poses(tx90l, 40, rng=np.random.default_rng(0), criterion="E", candidates=given)
     np.testing.assert_array_equal(found.plan.q, q[found.numbers - 100])
     sure = preloaded(tx90l, q)
     np.testing.assert_array_equal(found.candidates.pose, given.pose[sure])
@@ -190,7 +190,7 @@ def test_the_payload_of_a_pool_counts_unless_another_is_given(tx90l):
     q = np.loadtxt(POOL, delimiter=",", max_rows=500)[:300]
     given = PosePool(q, np.arange(300), payload=0.0)
     for setup, mass in ((MeasuringSetup(), 0.0), (MeasuringSetup(payload=6.0), 6.0)):
-        found = design_poses(tx90l, 12, rng=np.random.default_rng(0), candidates=given, setup=setup)
+        found = select_poses(tx90l, 12, rng=np.random.default_rng(0), candidates=given, setup=setup)
         np.testing.assert_array_equal(found.plan.payload, np.full(12, mass))
         assert len(found.candidates) == preloaded(tx90l, q, mass).sum()
 
@@ -200,16 +200,16 @@ def test_a_pool_in_which_few_flanks_are_sure(tx90l, rng):
     sure = preloaded(tx90l, q)
     q = np.concatenate([q[sure][:11], q[~sure]])
     with pytest.raises(FlexcalError, match=rf"holds {len(q)} poses, .* in 11 of them; 12 cannot"):
-        design_poses(tx90l, 12, rng=rng, candidates=PosePool(q, np.arange(len(q))))
+        select_poses(tx90l, 12, rng=rng, candidates=PosePool(q, np.arange(len(q))))
 
 
 def test_bad_input(tx90l, rng):
     with refused("E-DESIGN-026", "9", "29", "10"):
-        design_poses(tx90l, 9, rng=rng, candidates=100)
+        select_poses(tx90l, 9, rng=rng, candidates=100)
     with refused("E-DESIGN-028", "F"):
-        design_poses(tx90l, 30, rng=rng, criterion="F", candidates=100)  # type: ignore[arg-type]
+        select_poses(tx90l, 30, rng=rng, criterion="F", candidates=100)  # type: ignore[arg-type]
     with refused("E-DESIGN-017", "200", "100"):
-        design_poses(tx90l, 200, rng=rng, candidates=100)
+        select_poses(tx90l, 200, rng=rng, candidates=100)
 
 
 def test_one_flank_only_is_said_by_name(tx90l, rng):
@@ -218,4 +218,4 @@ def test_one_flank_only_is_said_by_name(tx90l, rng):
     forward = tuple(replace(j, lower=0.4, upper=1.2) if j.name == "joint_2" else j for j in tx90l.joints)
     forward = tuple(replace(j, lower=0.0, upper=0.3) if j.name == "joint_3" else j for j in forward)
     with refused("E-DESIGN-024", "joint_2", "200"):
-        design_poses(replace(tx90l, joints=forward), 30, rng=rng, candidates=200)
+        select_poses(replace(tx90l, joints=forward), 30, rng=rng, candidates=200)

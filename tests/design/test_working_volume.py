@@ -4,10 +4,10 @@ from refusals import refused
 
 from flexcal.design.poses import (
     base_sensitivity,
-    design_poses,
     geometry_jacobian,
     pose_sensitivity,
     random_poses,
+    select_poses,
     working_box,
     working_points,
 )
@@ -59,7 +59,7 @@ def test_the_criterion_is_the_directly_predicted_error_in_the_volume(tx90l, box,
 
 def test_poses_chosen_for_the_volume_are_better_there(tx90l, box):
     there, anywhere = (
-        design_poses(tx90l, 15, rng=np.random.default_rng(2), candidates=600, working=working)
+        select_poses(tx90l, 15, rng=np.random.default_rng(2), candidates=600, working=working)
         for working in (box.q, None)
     )
     elsewhere = tool_error(anywhere.base, there.tool_error_weight, anywhere.selection.chosen)

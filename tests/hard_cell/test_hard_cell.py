@@ -11,7 +11,7 @@ import pytest
 from refusals import refused
 
 import flexcal.hard_cell
-from flexcal.calibration.measurement import predict
+from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.experiments import Cell
 from flexcal.data.plans import MultisinePlan, PosePlan
 from flexcal.hard_cell import HardCell, counterparts, draw_robot, read_description
@@ -75,7 +75,7 @@ def test_without_errors_its_points_are_those_of_the_model(
     described = read_description(robot)
     cell = HardCell(ideal_robot(described, bearings_before=before), described)
     poses = anywhere(20)
-    predicted = predict(
+    predicted = predict_measurements(
         tx90l.with_bearings("before" if before else "after"), replace(cell.measure(poses), q=poses.q)
     ).position
     np.testing.assert_allclose(cell.noise_free(poses), predicted, atol=2e-6)

@@ -10,7 +10,7 @@ from yielding_robot import PANDA_LIKE, REFLECTOR, TWO_ARMS, Body, YieldingRobot,
 
 from flexcal.calibration.fit import probable_robot
 from flexcal.jobs.accuracy import verify_robot
-from flexcal.jobs.calibration import RobotCalibration, calibrate_robot
+from flexcal.jobs.calibration import Calibration, calibrate_robot
 from flexcal.model.kinematics import found_xyz
 
 KINDS = ("gravity_compliance", "lateral_compliance")
@@ -32,7 +32,7 @@ def drawn(
 
 def calibrated(
     folder: Path, robot: YieldingRobot, poses: int, fresh: int = 60, *, masses: bool = True
-) -> tuple[RobotCalibration, float]:
+) -> tuple[Calibration, float]:
     """Calibration on some poses with defaults, and its mean error (m) at fresh ones, free of noise."""
     yaml = write_robot(folder, robot.bodies, masses=masses)
     found = calibrate_robot(yaml, [robot.write(folder / "poses.csv", poses)])
@@ -45,7 +45,7 @@ def panda(seed: int, kinds: tuple[str, ...]) -> YieldingRobot:
     return YieldingRobot(PANDA_LIKE, drawn(PANDA_LIKE, kinds, 3e-5, rng), rng)
 
 
-def considered(found: RobotCalibration) -> dict[str | None, str]:
+def considered(found: Calibration) -> dict[str | None, str]:
     assert found.selection is not None
     return {row.term: row.reason for row in found.selection.considered}
 

@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from flexcal.calibration.fit import calibrate
-from flexcal.calibration.measurement import predict
+from flexcal.calibration.fit import fit_geometry
+from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.design.scene import CollisionChecker
 from flexcal.export import write_urdf
@@ -121,11 +121,11 @@ def test_points_on_both_arms_calibrate_the_tree(
         q=q, position=np.zeros((80, 3)), sigma=np.full((80, 3), 1e-5), torque=None, payload=None,
         target=names, station=np.full(80, "tracker"), temperature=None, pose=np.arange(80),
     )  # fmt: skip
-    seen = replace(poses, position=predict(robot, poses).position)
-    fit = calibrate(torso, seen.subset(slice(0, 60)), terms=("kinematic",))
+    seen = replace(poses, position=predict_measurements(robot, poses).position)
+    fit = fit_geometry(torso, seen.subset(slice(0, 60)), terms=("kinematic",))
     fresh = seen.subset(slice(60, 80))
-    np.testing.assert_allclose(predict(fit.model, fresh).position, fresh.position, atol=1e-6)
-    before = predict(torso, fresh).position
+    np.testing.assert_allclose(predict_measurements(fit.model, fresh).position, fresh.position, atol=1e-6)
+    before = predict_measurements(torso, fresh).position
     assert np.linalg.norm(before - fresh.position, axis=1).mean() > 3e-4
     other = pin.buildModelFromUrdf(str(write_urdf(fit.model, tmp_path / "calibrated.urdf").path))
     _, theirs = in_pinocchio(torso, q)

@@ -17,7 +17,7 @@ from flexcal.calibration.term_selection import TermComparison, considered_docume
 from flexcal.calibration.verification import CALIBRATED
 from flexcal.errors import InputError
 from flexcal.jobs.accuracy import verify_robot
-from flexcal.jobs.calibration import RobotCalibration, calibrate_robot
+from flexcal.jobs.calibration import Calibration, calibrate_robot
 from flexcal.jobs.pages import report_folder
 from flexcal.jobs.pages.report import calibration_study
 from flexcal.jobs.result_files import read_arm, read_points
@@ -39,14 +39,14 @@ def folder(examples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def fit(folder: Path) -> RobotCalibration:
+def fit(folder: Path) -> Calibration:
     terms = ("kinematic", "gravity_compliance")
     files = folder / "robot.yaml", [folder / "some.csv"]
     return calibrate_robot(*files, terms=terms, out=folder / "fit", command=COMMAND)
 
 
 @pytest.fixture
-def study(fit: RobotCalibration, folder: Path) -> CalibrationStudy:
+def study(fit: Calibration, folder: Path) -> CalibrationStudy:
     final, nan = fit.selected.terms, float("nan")
     rows = [
         TermComparison(None, ("kinematic",), 1.1e-4, 1.2e-4, 1e-4, 3e-4, 0.0, True, ""),
@@ -61,9 +61,7 @@ def study(fit: RobotCalibration, folder: Path) -> CalibrationStudy:
     return replace(stored, results={**stored.results, **chosen, "cross_validation": validated})
 
 
-def test_calibration_report_is_complete(
-    study: CalibrationStudy, fit: RobotCalibration, tmp_path: Path
-) -> None:
+def test_calibration_report_is_complete(study: CalibrationStudy, fit: Calibration, tmp_path: Path) -> None:
     write_page(tmp_path / "report.html", calibration_page(study))
     outline = Outline((tmp_path / "report.html").read_text("utf-8"))
     assert outline.unbalanced == []
@@ -99,13 +97,13 @@ def test_calibration_report_is_complete(
     assert all(name in outline.words for name in fit.selected.identifiability.kept_names)
 
 
-def test_the_page_of_the_folder_is_that_of_the_verb(fit: RobotCalibration, folder: Path) -> None:
+def test_the_page_of_the_folder_is_that_of_the_verb(fit: Calibration, folder: Path) -> None:
     page = (folder / "fit" / "report.html").read_bytes()
     report_folder(folder / "fit")
     assert (folder / "fit" / "report.html").read_bytes() == page
 
 
-def test_stored_points_are_those_of_the_fit(fit: RobotCalibration, folder: Path) -> None:
+def test_stored_points_are_those_of_the_fit(fit: Calibration, folder: Path) -> None:
     points = read_points(folder / "fit", sigma=1e-4)
     np.testing.assert_array_equal(points.calibrated, fit.selected.residuals)
     np.testing.assert_array_equal(points.poses.q, fit.selected.poses.q)
@@ -114,7 +112,7 @@ def test_stored_points_are_those_of_the_fit(fit: RobotCalibration, folder: Path)
     assert not points.poses.sigma_given and points.poses.target.tolist() == fit.selected.poses.target.tolist()
 
 
-def test_arrows_are_turned_into_the_frame_of_the_arm(fit: RobotCalibration, folder: Path) -> None:
+def test_arrows_are_turned_into_the_frame_of_the_arm(fit: Calibration, folder: Path) -> None:
     """By the rotation that lays the measured points over the arm's tips."""
     arms, measured = read_arm(folder / "fit"), fit.selected.poses.position
     turn, _ = Rotation.align_vectors(arms.tip - arms.tip.mean(axis=0), measured - measured.mean(axis=0))
@@ -154,7 +152,7 @@ def test_nothing_to_see_is_not_blamed_on_a_kept_parameter(study: CalibrationStud
     )
 
 
-def test_verification_report_is_complete(fit: RobotCalibration, folder: Path) -> None:
+def test_verification_report_is_complete(fit: Calibration, folder: Path) -> None:
     files = folder / "robot.yaml", [folder / "random.csv"]
     found = verify_robot(*files, estimates=folder / "fit", out=folder / "check")
     page = (folder / "check" / "report.html").read_text("utf-8")
@@ -167,9 +165,7 @@ def test_verification_report_is_complete(fit: RobotCalibration, folder: Path) ->
     assert (folder / "check" / "report.html").read_text("utf-8") == page
 
 
-def test_three_points_with_sigma_are_predicted_but_not_registered(
-    fit: RobotCalibration, folder: Path
-) -> None:
+def test_three_points_with_sigma_are_predicted_but_not_registered(fit: Calibration, folder: Path) -> None:
     header, *rows = (folder / "random.csv").read_text("utf-8").splitlines()
     few = [f"{header},sigma", *(f"{row},5e-5" for row in rows[:3])]
     (folder / "few.csv").write_text("\n".join(few) + "\n", "utf-8")
@@ -179,7 +175,7 @@ def test_three_points_with_sigma_are_predicted_but_not_registered(
     assert "Too few poses to tell" in outline.words
 
 
-def test_poses_of_the_fit_are_not_called_fresh(fit: RobotCalibration, folder: Path) -> None:
+def test_poses_of_the_fit_are_not_called_fresh(fit: Calibration, folder: Path) -> None:
     verify_robot(folder / "robot.yaml", [folder / "some.csv"], estimates=folder / "fit", out=folder / "same")
     words = Outline((folder / "same" / "report.html").read_text("utf-8")).words
     assert (
@@ -191,7 +187,7 @@ def test_poses_of_the_fit_are_not_called_fresh(fit: RobotCalibration, folder: Pa
 
 @pytest.mark.parametrize("name", ["points.csv", "arm.npz", "estimates.yaml", "results.json"])
 def test_a_spoilt_folder_is_refused_in_one_sentence(
-    fit: RobotCalibration, folder: Path, tmp_path: Path, name: str
+    fit: Calibration, folder: Path, tmp_path: Path, name: str
 ) -> None:
     shutil.copytree(folder / "fit", tmp_path / "fit")
     (tmp_path / "fit" / name).write_text("pose\n1\n", "utf-8")
@@ -202,7 +198,7 @@ def test_a_spoilt_folder_is_refused_in_one_sentence(
         report_folder(tmp_path / "fit")
 
 
-def test_results_without_a_number_are_refused(fit: RobotCalibration, folder: Path, tmp_path: Path) -> None:
+def test_results_without_a_number_are_refused(fit: Calibration, folder: Path, tmp_path: Path) -> None:
     shutil.copytree(folder / "fit", tmp_path / "fit")
     results = json.loads((tmp_path / "fit" / "results.json").read_text("utf-8"))
     del results["drift"]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from flexcal.calibration.diagnostics import Drift
-from flexcal.calibration.fit import Calibration
-from flexcal.calibration.measurement import moving_parameters, predict
+from flexcal.calibration.fit import GeometricFit
+from flexcal.calibration.measurement import moving_parameters, predict_measurements
 from flexcal.calibration.verification import CALIBRATED, prediction_document
 from flexcal.jobs.two_stage import TwoStageRun
 from flexcal.report.checks import (
@@ -108,7 +108,7 @@ def test_chi2_is_judged(study: TwoStageStudy) -> None:
 def test_a_drift_is_flagged(simulated: TwoStageRun) -> None:
     fit = simulated.calibration
 
-    def judged(calibration: Calibration) -> str:
+    def judged(calibration: GeometricFit) -> str:
         return check_drift(Drift.of(calibration).document()).status
 
     assert judged(fit) == "good"
@@ -151,7 +151,9 @@ def test_chance_is_one_in_a_hundred(simulated: TwoStageRun, rng: np.random.Gener
     numbers = [posterior.parameters.index(n) for n in names]
     parameters = posterior.parameters.subset(names)
     slopes = parameters.natural_slope(parameters.coordinates())
-    jacobian = predict(model, simulated.verification_poses, jacobians=True).jacobian(names) * slopes
+    jacobian = (
+        predict_measurements(model, simulated.verification_poses, jacobians=True).jacobian(names) * slopes
+    )
     draws = rng.multivariate_normal(
         np.zeros(len(names)), posterior.covariance[np.ix_(numbers, numbers)], 3000
     )

@@ -15,7 +15,7 @@ from outline import Outline
 from refusals import refused
 
 from flexcal.calibration.error_model import ErrorStatistics
-from flexcal.calibration.verification import CALIBRATED, Verification
+from flexcal.calibration.verification import CALIBRATED, PredictionErrors
 from flexcal.estimation import Parameter, Parameters
 from flexcal.jobs.pages import report_folder
 from flexcal.jobs.result_files import quantities
@@ -95,7 +95,7 @@ def test_arrays_are_float32_in_base64(outline: Outline, simulated: TwoStageRun) 
     np.testing.assert_allclose(drawn, 1e3 * np.linalg.norm(simulated.before.own, axis=1), rtol=1e-6)
 
 
-def as_measured(run: TwoStageRun, model: Verification) -> ErrorStatistics:
+def as_measured(run: TwoStageRun, model: PredictionErrors) -> ErrorStatistics:
     """What the tracker reads of a model's errors at the fresh poses."""
     seen = run.measured_verification.position + run.measured_verification.errors
     return ErrorStatistics.of(seen - model.position)

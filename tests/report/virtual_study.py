@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from flexcal.calibration.error_model import ErrorStatistics
-from flexcal.calibration.fit import calibrate
-from flexcal.calibration.measurement import predict
+from flexcal.calibration.fit import fit_geometry
+from flexcal.calibration.measurement import predict_measurements
 from flexcal.calibration.verification import (
     CALIBRATED,
     MeasuredPoints,
     arms_at,
     errors_before,
+    prediction_errors,
+    prediction_errors_with_covariance,
     uncalibrated_model,
-    verify,
-    verify_jointly,
 )
 from flexcal.data.plans import MultisinePlan, write_plan
 from flexcal.data.poses import PoseSet
@@ -139,7 +139,7 @@ def random_poses(model: RobotModel, count: int, rng: np.random.Generator) -> np.
     lower = np.array([joint.lower for joint in model.joints])
     upper = np.array([joint.upper for joint in model.joints])
     q = 0.5 * (lower + upper) + 0.4 * (upper - lower) * rng.uniform(-1, 1, (6 * count, model.n))
-    height = predict(model, pose_set(q, np.zeros((len(q), 3)))).position[:, 2]
+    height = predict_measurements(model, pose_set(q, np.zeros((len(q), 3)))).position[:, 2]
     return q[height > -0.2][:count]
 
 
@@ -154,7 +154,7 @@ def pose_set(q: np.ndarray, position: np.ndarray, sigma: float = 2.2e-5) -> Pose
 def measured(model: RobotModel, q: np.ndarray, rng: np.random.Generator | None) -> PoseSet:
     """What the instrument reads at `q`, without noise where there is no `rng`."""
     exact = pose_set(q, np.zeros((len(q), 3)))
-    position = predict(model, exact).position
+    position = predict_measurements(model, exact).position
     return pose_set(q, position if rng is None else position + exact.sigma * rng.normal(size=position.shape))
 
 
@@ -183,13 +183,13 @@ def simulate_run(nominal: RobotModel, seed: int = 1) -> TwoStageRun:
     )  # fmt: skip
     started = time.perf_counter()
     q = random_poses(nominal, 100, rng)
-    calibrated = calibrate(softer, measured(robot, q[:40], rng))
-    rigid = tuple(calibrate(nominal, measured(robot, q[:size], rng), elastic=False) for size in (40, 100))
+    calibrated = fit_geometry(softer, measured(robot, q[:40], rng))
+    rigid = tuple(fit_geometry(nominal, measured(robot, q[:size], rng), elastic=False) for size in (40, 100))
     q_verify = random_poses(nominal, 150, rng)
     exact = measured(robot, q_verify, None)
     noisy = measured(robot, q_verify, rng)
     took = time.perf_counter() - started
-    seen, covariance = verify_jointly(calibrated.model, noisy)
+    seen, covariance = prediction_errors_with_covariance(calibrated.model, noisy)
     floor = 2.0e-5 * rng.normal(size=exact.position.shape)
     placed = uncalibrated_model(nominal, calibrated.poses)
     assert placed.registered is not None and placed.own is not None
@@ -203,10 +203,12 @@ def simulate_run(nominal: RobotModel, seed: int = 1) -> TwoStageRun:
         rigid=rigid,
         before=placed.errors(calibrated.poses),
         verification_poses=exact,
-        nominal_verification=verify(placed.registered, exact, elastic=False, noise_free=True),
-        own_verification=verify(placed.own, exact, elastic=False, noise_free=True),
-        elastic_verification=verify(calibrated.model, exact, noise_free=True),
-        rigid_verification=tuple(verify(fit.model, exact, elastic=False, noise_free=True) for fit in rigid),
+        nominal_verification=prediction_errors(placed.registered, exact, elastic=False, noise_free=True),
+        own_verification=prediction_errors(placed.own, exact, elastic=False, noise_free=True),
+        elastic_verification=prediction_errors(calibrated.model, exact, noise_free=True),
+        rigid_verification=tuple(
+            prediction_errors(fit.model, exact, elastic=False, noise_free=True) for fit in rigid
+        ),
         measured_verification=seen,
         measured_covariance=covariance,
         floor=ErrorStatistics.of(floor),

@@ -1,10 +1,10 @@
 from .desired_poses import desired_pose
 from .start_postures import best_posture
-from .target_commands import Compensation, compensate
+from .target_commands import MotorCommands, motor_commands
 
 __all__ = [
-    "Compensation",
+    "MotorCommands",
     "best_posture",
-    "compensate",
     "desired_pose",
+    "motor_commands",
 ]

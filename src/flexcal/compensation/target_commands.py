@@ -21,7 +21,7 @@ _BLOCK = 8192
 
 
 @dataclass(frozen=True, eq=False)
-class Compensation:
+class MotorCommands:
     """Motor commands for N targets of an n-joint robot.
 
     `q` (N, n) rad or m, NaN where there is none; `nominal` (N, n): what the nominal robot would be commanded; `before` (N,) m: how far the
@@ -43,14 +43,14 @@ class Compensation:
         return self.reason == ""
 
 
-def compensate(
+def motor_commands(
     model: RobotModel,
     nominal: RobotModel,
     targets: ToolTargets,
     *,
     start: np.ndarray | None = None,
     progress: Progress = silent,
-) -> Compensation:
+) -> MotorCommands:
     """Commands with which the calibrated `model` puts its tool where `targets` say; `nominal` is the robot before calibration.
 
     The nominal inverse kinematics starts from the targets' own joint positions, else from `start` (n,), and Newton's method on `model` from
@@ -64,14 +64,16 @@ def compensate(
         progress("compensating", first / len(targets))
         parts.append(_solve(model, nominal, targets.subset(slice(first, first + _BLOCK)), start))
     progress("compensating", 1.0)
-    joined = {f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Compensation)}
-    return Compensation(**joined)
+    joined = {
+        f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(MotorCommands)
+    }
+    return MotorCommands(**joined)
 
 
 def _solve(
     model: RobotModel, nominal: RobotModel, targets: ToolTargets, start: np.ndarray | None
-) -> Compensation:
-    """`compensate` for a block of rows."""
+) -> MotorCommands:
+    """`motor_commands` for a block of rows."""
     size = len(targets)
     aim = desired_pose(model, nominal, targets)
     elsewhere = np.zeros(size, dtype=bool)
@@ -104,4 +106,4 @@ def _solve(
         model, q[done], commands.torque[commands.reached], carried_mass(model, targets.payload, size)[done]
     )
     unambiguous[done] = certain[:, list(model.backlash_joints)].all(axis=1)
-    return Compensation(q, known, before, unambiguous, elsewhere, reason)
+    return MotorCommands(q, known, before, unambiguous, elsewhere, reason)

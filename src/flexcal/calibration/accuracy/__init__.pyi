@@ -1,19 +1,19 @@
 from .pose_drift import VISITS_PER_SET, PoseDrift, common_displacement, pose_drifts
 from .pose_repeatability import CYCLES, PoseRepeatability, noise_repeatability, repeatability
 from .source_contributions import error_sources
-from .working_volume import AccuracyMap, accuracy_map, random_poses_in
+from .working_volume import PredictedAccuracy, predicted_accuracy, random_poses_in
 
 __all__ = [
     "CYCLES",
     "VISITS_PER_SET",
-    "AccuracyMap",
     "PoseDrift",
     "PoseRepeatability",
-    "accuracy_map",
+    "PredictedAccuracy",
     "common_displacement",
     "error_sources",
     "noise_repeatability",
     "pose_drifts",
+    "predicted_accuracy",
     "random_poses_in",
     "repeatability",
 ]

@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from flexcal.calibration.error_model import joint_rotation_jacobian
-from flexcal.calibration.measurement import Propagation, covariance_root, moving_parameters, predict
+from flexcal.calibration.measurement import (
+    Propagation,
+    covariance_root,
+    moving_parameters,
+    predict_measurements,
+)
 from flexcal.data.poses import PoseSet
 from flexcal.model.robot import MASS_AND_COM
 
@@ -48,7 +53,7 @@ def error_sources(reach: Propagation, q: np.ndarray) -> dict[str, np.ndarray]:
         temperature=None,
         pose=np.arange(size),
     )
-    at = predict(model, poses, jacobians=True)
+    at = predict_measurements(model, poses, jacobians=True)
     roots = at.jacobian(names) @ root
     turned = (joint_rotation_jacobian(at) ** 2).sum(axis=(1, 2))
     scatter = {

@@ -23,7 +23,7 @@ _FEWEST = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class AccuracyMap:
+class PredictedAccuracy:
     """At each pose `q` (N, n), rad or m: the point's `position` (N, 3), base frame, `mean` and 95 % quantile `p95` (N,) of its error, m.
 
     The error is the distance between where the calibrated model has the point and where an instrument at the station finds it, from the
@@ -35,16 +35,16 @@ class AccuracyMap:
     mean: np.ndarray
     p95: np.ndarray
 
-    def scaled(self, factor: float) -> AccuracyMap:
+    def scaled(self, factor: float) -> PredictedAccuracy:
         """With every error `factor` times as large."""
-        return AccuracyMap(self.q, self.position, factor * self.mean, factor * self.p95)
+        return PredictedAccuracy(self.q, self.position, factor * self.mean, factor * self.p95)
 
 
-def accuracy_map(
+def predicted_accuracy(
     reach: Propagation, q: np.ndarray, *, threads: int | None = None, progress: Progress = silent
-) -> AccuracyMap:
+) -> PredictedAccuracy:
     """Mean and 95 % quantile of the tool's error at poses `q` (N, n), to first order in the parameters; `threads` None takes all cores."""
-    result = AccuracyMap(q, np.empty((len(q), 3)), np.empty(len(q)), np.empty(len(q)))
+    result = PredictedAccuracy(q, np.empty((len(q), 3)), np.empty(len(q)), np.empty(len(q)))
     starts = range(0, len(q), _BATCH)
 
     def fill(start: int) -> None:

@@ -9,7 +9,7 @@ from typing import get_args
 import numpy as np
 
 from flexcal.calibration.error_model import ErrorStatistics
-from flexcal.calibration.fit import Calibration
+from flexcal.calibration.fit import GeometricFit
 from flexcal.errors import FlexcalError
 from flexcal.estimation import vuong_statistic
 from flexcal.model.parts import Bearings
@@ -38,7 +38,7 @@ class BearingAxes:
     preferred: Bearings | None
 
     @classmethod
-    def compare(cls, declared: Bearings | None, before: Calibration, after: Calibration) -> BearingAxes:
+    def compare(cls, declared: Bearings | None, before: GeometricFit, after: GeometricFit) -> BearingAxes:
         """Two fits to the same poses; points that either takes for outliers do not count."""
         outliers = {*before.estimate.outliers, *after.estimate.outliers}
         inside = np.setdiff1d(np.arange(len(before.poses)), list(outliers))
@@ -57,7 +57,7 @@ class BearingAxes:
         return self.declared is not None and self.preferred not in (None, self.declared)
 
 
-def compare_bearings(model: RobotModel, fit: Callable[[RobotModel], Calibration]) -> BearingAxes | None:
+def compare_bearings(model: RobotModel, fit: Callable[[RobotModel], GeometricFit]) -> BearingAxes | None:
     """Compare the `fit` of a robot with that of the same robot with the other bearing axes.
 
     Both are to have transmission errors: bearings of the wrong kind can take a part of those up. None for a robot without bearings, or

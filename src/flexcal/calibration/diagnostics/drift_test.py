@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexcal.calibration.fit import Calibration
+from flexcal.calibration.fit import GeometricFit
 from flexcal.units import MILLIMETRE
 
 _CHANCE = 0.0027
@@ -52,7 +52,7 @@ class Drift:
         }
 
     @classmethod
-    def of(cls, fit: Calibration) -> Drift:
+    def of(cls, fit: GeometricFit) -> Drift:
         """From the residuals of a fit, by Rao's score test: what a drift of three coordinates more would estimate, to first order.
 
         The covariance of the errors is that of the fit without what stretches of the measuring order share, scaled by the chi-square

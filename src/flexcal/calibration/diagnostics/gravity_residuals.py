@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.fit import Calibration
+from flexcal.calibration.fit import GeometricFit
 from flexcal.model.parts import vector_rotation
 from flexcal.model.statics import carried_mass, gravity_torque, points_kinematics
 
@@ -26,7 +26,7 @@ class GravityLoads:
     along: Mapping[str, np.ndarray]
 
 
-def gravity_loads(fit: Calibration, residuals: Mapping[str, np.ndarray]) -> GravityLoads:
+def gravity_loads(fit: GeometricFit, residuals: Mapping[str, np.ndarray]) -> GravityLoads:
     """Loads of a calibrated robot, for `residuals` (N, 3) m in the instrument's frame by model.
 
     Of more than 1500 points some, evenly chosen.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.fit import Calibration, manufacturing_tolerances
+from flexcal.calibration.fit import GeometricFit, manufacturing_tolerances
 
 FAR = 50.0
 """Tolerances by which no geometric parameter should be off: 15 mm, 25 mrad."""
@@ -32,12 +32,12 @@ class ImplausibleShift:
     times: float
 
 
-def is_implausible(calibration: Calibration) -> bool:
+def is_implausible(calibration: GeometricFit) -> bool:
     """Whether data and robot are inconsistent, so that the fit must not be used."""
     return bool(implausible_shifts(calibration)) or residuals_implausible(calibration)
 
 
-def residuals_implausible(calibration: Calibration) -> bool:
+def residuals_implausible(calibration: GeometricFit) -> bool:
     """Whether the residuals, without outliers, are larger than plausible for any robot."""
     rows = ~np.isin(np.arange(len(calibration.poses)), calibration.estimate.outliers)
     position = calibration.poses.position[rows]
@@ -45,7 +45,7 @@ def residuals_implausible(calibration: Calibration) -> bool:
     return bool(np.sqrt(np.mean(calibration.residuals[rows] ** 2)) > SCATTERED * extent)
 
 
-def implausible_shifts(calibration: Calibration) -> tuple[ImplausibleShift, ...]:
+def implausible_shifts(calibration: GeometricFit) -> tuple[ImplausibleShift, ...]:
     """Parameters with an implausibly large change from their start values, the largest first."""
     estimate, prior = calibration.estimate.parameters, calibration.prior
     kept = [name for name in calibration.identifiability.kept_names if _has_size(name)]

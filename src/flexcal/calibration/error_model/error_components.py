@@ -8,7 +8,7 @@ import numpy as np
 
 from flexcal.calibration.error_model.groups import ErrorGroups
 from flexcal.calibration.error_model.incidence_matrices import incidence
-from flexcal.calibration.measurement import Prediction
+from flexcal.calibration.measurement import PredictedMeasurements
 from flexcal.model.robot import RobotModel
 
 _SMALLEST = 1e-6
@@ -123,7 +123,7 @@ def known_scatter(model: RobotModel, *, stated: bool) -> ErrorComponents | None:
     return ErrorComponents(share=float(share), robot=float(alone), pose=float(pose), angular=float(angular))
 
 
-def joint_rotation_jacobian(at: Prediction) -> np.ndarray:
+def joint_rotation_jacobian(at: PredictedMeasurements) -> np.ndarray:
     """How every revolute joint, turned by one radian, moves the points: (N, 3, r), m/rad, in the instrument's frame."""
     joints = [joint for joint in at.model.joints if joint.kind == "revolute"]
     return at.jacobian([f"{joint.name}.offset" for joint in joints])

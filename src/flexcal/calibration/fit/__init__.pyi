@@ -6,7 +6,7 @@ from .gauge_freedom import (
     probable_robots,
     with_calibrated_points,
 )
-from .geometric_calibration import Calibration, calibrate
+from .geometric_calibration import GeometricFit, fit_geometry
 from .least_squares_problem import LossName
 from .stratified_sample import StratifiedSample, all_errors
 from .terms import (
@@ -25,12 +25,12 @@ __all__ = [
     "LEAST_POSES",
     "PER_JOINT",
     "TOLERANCE",
-    "Calibration",
     "ElasticPrior",
+    "GeometricFit",
     "LossName",
     "StratifiedSample",
     "all_errors",
-    "calibrate",
+    "fit_geometry",
     "free_joints",
     "geometric_parameters",
     "loaded_compliances",

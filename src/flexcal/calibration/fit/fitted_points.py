@@ -27,7 +27,12 @@ from flexcal.calibration.fit.structural_identifiability import (
     require_enough,
 )
 from flexcal.calibration.fit.terms import LEAST_POSES, geometric_parameters, plausible_size, random_waves
-from flexcal.calibration.measurement import Prediction, predict, register, require_both_flanks
+from flexcal.calibration.measurement import (
+    PredictedMeasurements,
+    predict_measurements,
+    register,
+    require_both_flanks,
+)
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import RANK_TOLERANCE, Estimate, Identifiability, Loss, Parameter, Parameters
 from flexcal.model.robot import SCATTER, RobotModel, unit_of
@@ -80,9 +85,9 @@ class PointFit:
         if not are_different(poses.q, LEAST_POSES):
             terms = tuple(term for term in terms if term != TRANSMISSION)
         bare = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
-        start = register(model, poses, predict(bare, poses, elastic=elastic).position)
+        start = register(model, poses, predict_measurements(bare, poses, elastic=elastic).position)
         if "backlash" in terms:
-            require_both_flanks(model, predict(start, poses, elastic=elastic).rest.flank)
+            require_both_flanks(model, predict_measurements(start, poses, elastic=elastic).rest.flank)
         geometric = geometric_parameters(start, poses, terms)
         seen = kinematic_identifiability(start, poses, geometric)
         require_enough(start, poses, geometric, seen)
@@ -105,9 +110,9 @@ class PointFit:
         return ErrorGroups.of(self.poses)
 
     @cached_property
-    def straight(self) -> Prediction:
+    def straight(self) -> PredictedMeasurements:
         """The points of the robot that the fit starts from, undeflected."""
-        return predict(self.start, self.poses, elastic=False, jacobians=True)
+        return predict_measurements(self.start, self.poses, elastic=False, jacobians=True)
 
     @property
     def first_scatter(self) -> ErrorComponents:
@@ -143,7 +148,7 @@ class PointFit:
         names = [item.name for item in fixed]
         kept = Parameters(item for item in self.free if item.name not in names)
         if near is None:
-            at = predict(self.start, self.poses, elastic=self.elastic, jacobians=True)
+            at = predict_measurements(self.start, self.poses, elastic=self.elastic, jacobians=True)
             turns = joint_rotation_jacobian(at)
         else:
             at, turns = near.at, near.turns
@@ -160,7 +165,7 @@ class PointFit:
             else:
                 estimate = task.reestimated(loss=loss, progress=self.progress)
             fitted = self.start.with_values(estimate.values)
-            after = predict(fitted, self.poses, elastic=self.elastic, jacobians=True)
+            after = predict_measurements(fitted, self.poses, elastic=self.elastic, jacobians=True)
             if (after.rest.flank == flank).all():
                 break
             flank, passes = after.rest.flank, passes + 1
@@ -181,7 +186,7 @@ class FittedPoints:
     fixed: tuple[Undetermined, ...]
     estimate: Estimate
     model: RobotModel
-    at: Prediction
+    at: PredictedMeasurements
     flank: np.ndarray
     task: GeometryProblem
 

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from flexcal.calibration.fit.terms import TOLERANCE
-from flexcal.calibration.measurement import predict
+from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameter, Parameters
 from flexcal.model.kinematics import found_xyz, joint_limits
@@ -60,12 +60,12 @@ def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotMod
             lateral_compliance=np.zeros_like(model.geometry.lateral_compliance),
         ),
     )
-    wanted = predict(stiff, poses, elastic=False).position
+    wanted = predict_measurements(stiff, poses, elastic=False).position
     scale = np.where(np.isfinite(std), std, 1.0)
     weight = np.where(np.isfinite(std), 1 / std, 0.0)
     robot, free = stiff, np.zeros((len(names), 0))
     for _ in range(_STEPS):
-        at = predict(robot, poses, elastic=False, jacobians=True)
+        at = predict_measurements(robot, poses, elastic=False, jacobians=True)
         columns = at.jacobian(names).reshape(-1, len(names)) * scale
         left, sizes, right = np.linalg.svd(columns, full_matrices=len(columns) < len(names))
         rank = int(np.sum(sizes > _UNSEEN * sizes[0]))

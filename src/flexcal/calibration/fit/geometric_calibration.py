@@ -26,7 +26,7 @@ _SETTLED = 2e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Calibration:
+class GeometricFit:
     """A fitted geometry.
 
     `model` is the calibrated robot; `estimate` holds all geometric parameters (dropped and undetermined ones at their start, not
@@ -90,7 +90,7 @@ class Calibration:
         }
 
 
-def calibrate(
+def fit_geometry(
     model: RobotModel,
     poses: PoseSet,
     *,
@@ -100,7 +100,7 @@ def calibrate(
     secant_scale: float = 0.0,
     loss: Loss | LossName = "auto",
     progress: Callable[[int, float], None] | None = None,
-) -> Calibration:
+) -> GeometricFit:
     """Fit the geometry of `model` to measured points, Levenberg-Marquardt on the vector error (28) with the Jacobian (29).
 
     Rank and dropped parameters come from the kinematic Jacobian at zero deflection. What the model's posterior holds of stiffness and
@@ -163,11 +163,11 @@ def _settled(fit: PointFit, loss: Loss | Literal["squares", "huber", "cauchy"]) 
     return fitted
 
 
-def _calibration(fitted: FittedPoints) -> Calibration:
+def _calibration(fitted: FittedPoints) -> GeometricFit:
     fit = fitted.fit
     estimate = fitted.whole_estimate()
     calibrated = fitted.model.with_estimate(estimate)
-    return Calibration(
+    return GeometricFit(
         model=calibrated,
         estimate=estimate,
         prior=fitted.task.prior,

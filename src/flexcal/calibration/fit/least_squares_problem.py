@@ -10,7 +10,7 @@ import numpy as np
 
 from flexcal.calibration.error_model import whitened
 from flexcal.calibration.fit.elastic_prior import ElasticPrior
-from flexcal.calibration.measurement import Prediction, predict
+from flexcal.calibration.measurement import PredictedMeasurements, predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Estimate, Loss, Parameters, Problem, solve
 from flexcal.model.robot import RobotModel
@@ -35,16 +35,18 @@ class GeometryProblem:
     elastic: bool
     whitening: np.ndarray
 
-    def predicted(self, values: Mapping[str, float], *, jacobians: bool = False) -> Prediction:
+    def predicted(self, values: Mapping[str, float], *, jacobians: bool = False) -> PredictedMeasurements:
         """Where the robot with some named values should be seen, on the flanks of this fit."""
         robot = self.start.with_values(values)
-        return predict(robot, self.poses, flank=self.flank, elastic=self.elastic, jacobians=jacobians)
+        return predict_measurements(
+            robot, self.poses, flank=self.flank, elastic=self.elastic, jacobians=jacobians
+        )
 
-    def residual(self, at: Prediction) -> np.ndarray:
+    def residual(self, at: PredictedMeasurements) -> np.ndarray:
         """Whitened measured minus predicted coordinates (3 N,), Eq. (28)."""
         return whitened(self.whitening, self.poses.position - at.position)
 
-    def columns(self, at: Prediction, names: tuple[str, ...]) -> np.ndarray:
+    def columns(self, at: PredictedMeasurements, names: tuple[str, ...]) -> np.ndarray:
         """Whitened Jacobian of all coordinates (3 N, p) by some parameters, natural units."""
         return whitened(self.whitening, at.jacobian(names))
 

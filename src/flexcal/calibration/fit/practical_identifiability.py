@@ -8,7 +8,7 @@ import numpy as np
 
 from flexcal.calibration.error_model import whitened
 from flexcal.calibration.fit.terms import plausible_size
-from flexcal.calibration.measurement import Prediction
+from flexcal.calibration.measurement import PredictedMeasurements
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameters, analyse
 from flexcal.model.kinematics import point_kinematics
@@ -33,7 +33,7 @@ class Undetermined:
 
 
 def undetermined(
-    at: Prediction, kept: Parameters, whitening: np.ndarray, hidden: tuple[str, ...]
+    at: PredictedMeasurements, kept: Parameters, whitening: np.ndarray, hidden: tuple[str, ...]
 ) -> tuple[Undetermined, ...]:
     """Parameters whose standard deviation from the data alone exceeds their plausible size.
 

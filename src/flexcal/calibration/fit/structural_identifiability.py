@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from flexcal.calibration.fit.terms import manufacturing_tolerances
-from flexcal.calibration.measurement import predict
+from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Identifiability, Parameters, analyse
@@ -29,7 +29,7 @@ def kinematic_identifiability(
 
     `scale` (p,) is the size of a change that matters, tolerances of manufacture by default: larger columns are kept first.
     """
-    straight = predict(model, poses, elastic=False, jacobians=True)
+    straight = predict_measurements(model, poses, elastic=False, jacobians=True)
     columns = straight.jacobian(parameters.names).reshape(-1, len(parameters))
     preferred = [name for name in parameters.names if name.endswith("backlash")]
     if np.isfinite(parameters.prior_std()).any():

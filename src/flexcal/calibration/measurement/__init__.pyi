@@ -1,15 +1,15 @@
 from .backlash_flanks import ambiguous_poses, require_both_flanks
-from .prediction import Prediction, predict, predicted_positions, require_points
+from .prediction import PredictedMeasurements, predict_measurements, predicted_positions, require_points
 from .propagated_covariance import Propagation, covariance_root, moving_parameters, propagation
 from .registration import register, rigid_motion
 
 __all__ = [
-    "Prediction",
+    "PredictedMeasurements",
     "Propagation",
     "ambiguous_poses",
     "covariance_root",
     "moving_parameters",
-    "predict",
+    "predict_measurements",
     "predicted_positions",
     "propagation",
     "register",

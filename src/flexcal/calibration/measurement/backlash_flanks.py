@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexcal.calibration.measurement.prediction import Prediction
+from flexcal.calibration.measurement.prediction import PredictedMeasurements
 from flexcal.errors import FlexcalError
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import carried_mass, certain_flank
 
 
-def ambiguous_poses(model: RobotModel, prediction: Prediction) -> np.ndarray:
+def ambiguous_poses(model: RobotModel, prediction: PredictedMeasurements) -> np.ndarray:
     """Poses (N,) at which a joint with backlash carries too little torque for its sign to be certain.
 
     The torque is that of the `prediction` at rest; its standard deviation comes from what `model` knows of masses and centres of mass.

@@ -42,7 +42,7 @@ _BLOCK = 20_000
 
 
 @dataclass(frozen=True, eq=False)
-class Prediction:
+class PredictedMeasurements:
     """Points (N, 3) in the instrument's frame at the poses, with what their derivatives need."""
 
     model: RobotModel
@@ -166,14 +166,14 @@ def left_jacobian(vector: np.ndarray) -> np.ndarray:
     )
 
 
-def predict(
+def predict_measurements(
     model: RobotModel,
     poses: PoseSet,
     *,
     flank: np.ndarray | None = None,
     elastic: bool = True,
     jacobians: bool = False,
-) -> Prediction:
+) -> PredictedMeasurements:
     """Predicted positions of the target of every pose in the instrument's frame, for the deflected, calibrated robot.
 
     `flank` (N, n) fixes the side of the backlash; without, the drive torque at rest decides. Without `elastic` the arm is rigid.
@@ -187,16 +187,18 @@ def predict(
         own, place = poses.station == name, model.stations.pose[model.station_index(name)]
         at[own], base[own] = place[:3], vector_rotation(place[3:])
     position = np.matmul(base, tool.kinematics.position[:, :, None])[:, :, 0] + at
-    return Prediction(model, poses, position, base, tool.rest, tool.kinematics)
+    return PredictedMeasurements(model, poses, position, base, tool.rest, tool.kinematics)
 
 
 def predicted_positions(
     model: RobotModel, poses: PoseSet, *, elastic: bool = True, progress: Progress = silent
 ) -> np.ndarray:
-    """The positions (N, 3) of `predict`, m, for any number of poses: block by block."""
+    """The positions (N, 3) of `predict_measurements`, m, for any number of poses: block by block."""
     parts = [np.zeros((0, 3))]
     for first in range(0, len(poses), _BLOCK):
         progress("all points", first / len(poses))
-        parts.append(predict(model, poses.subset(slice(first, first + _BLOCK)), elastic=elastic).position)
+        parts.append(
+            predict_measurements(model, poses.subset(slice(first, first + _BLOCK)), elastic=elastic).position
+        )
     progress("all points", 1.0)
     return np.concatenate(parts)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.calibration.error_model import order_folds, repeated_pose_numbers, workspace_folds
-from flexcal.calibration.fit import LEAST_POSES, Calibration, calibrate
+from flexcal.calibration.fit import LEAST_POSES, GeometricFit, fit_geometry
 from flexcal.calibration.term_selection.candidates import candidates
 from flexcal.calibration.term_selection.trials import TermComparison, TermTrials, not_tried
 from flexcal.data.poses import PoseSet
@@ -51,7 +51,7 @@ class CrossValidation:
     freedom: float
 
 
-def cross_validated(fit: Calibration) -> CrossValidation | None:
+def cross_validated(fit: GeometricFit) -> CrossValidation | None:
     """The fit with all its terms, linear about itself and without its outliers; None with fewer than 20 different poses."""
     rows = np.setdiff1d(np.arange(len(fit.poses)), list(fit.estimate.outliers))
     inside = replace(fit, poses=fit.poses.subset(rows), residuals=fit.residuals[rows])
@@ -90,7 +90,7 @@ def select_terms(model: RobotModel, poses: PoseSet) -> TermSelection:
         more = LEAST_POSES - distinct
         return TermSelection(base, model, (), "nothing", _too_few(distinct, more))
     open_terms = candidates(model, poses)
-    rigid = calibrate(model, poses, terms=base, elastic=bool(model.elastic))
+    rigid = fit_geometry(model, poses, terms=base, elastic=bool(model.elastic))
     trials = TermTrials(rigid, open_terms.model, base, folds, many=distinct >= MANY_POSES)
     chosen, rows = base, [trials.start()]
     left: dict[str, TermComparison] = {}

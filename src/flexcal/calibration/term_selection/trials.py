@@ -8,8 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from flexcal.calibration.fit import Calibration, geometric_parameters
-from flexcal.calibration.measurement import Prediction, predict
+from flexcal.calibration.fit import GeometricFit, geometric_parameters
+from flexcal.calibration.measurement import PredictedMeasurements, predict_measurements
 from flexcal.calibration.term_selection.leave_out_errors import LeaveOutErrors, leave_out_fit
 from flexcal.model.robot import RobotModel
 from flexcal.units import MILLIMETRE
@@ -63,7 +63,7 @@ class TermTrials:
 
     def __init__(
         self,
-        rigid: Calibration,
+        rigid: GeometricFit,
         model: RobotModel,
         base: tuple[str, ...],
         folds: tuple[np.ndarray, ...],
@@ -141,8 +141,10 @@ class TermTrials:
         return float(gains.mean()), float(gains.std(ddof=1) / np.sqrt(len(gains))) + _LEAST_GAIN
 
     @cached_property
-    def _prediction(self) -> Prediction:
-        return predict(self.model, self.rigid.poses, elastic=bool(self.model.elastic), jacobians=True)
+    def _prediction(self) -> PredictedMeasurements:
+        return predict_measurements(
+            self.model, self.rigid.poses, elastic=bool(self.model.elastic), jacobians=True
+        )
 
     @cached_property
     def _noise(self) -> float:

@@ -10,7 +10,12 @@ from .error_scale_test import ErrorScale, error_scale, prediction_document
 from .errors_by_model import CALIBRATED, DECLARED, NOMINAL, OWN, RIGID, MeasuredPoints, errors_before
 from .refitted_placement import Refit, RefittedVerification, verify_refitted
 from .uncalibrated_robot import UncalibratedErrors, UncalibratedRobot, uncalibrated_model
-from .unseen_poses import ErrorCovariance, Verification, verify, verify_jointly
+from .unseen_poses import (
+    ErrorCovariance,
+    PredictionErrors,
+    prediction_errors,
+    prediction_errors_with_covariance,
+)
 
 __all__ = [
     "CALIBRATED",
@@ -23,11 +28,11 @@ __all__ = [
     "ErrorScale",
     "MeasuredPoints",
     "Placement",
+    "PredictionErrors",
     "Refit",
     "RefittedVerification",
     "UncalibratedErrors",
     "UncalibratedRobot",
-    "Verification",
     "arms_at",
     "best_placement",
     "can_register",
@@ -35,9 +40,9 @@ __all__ = [
     "error_scale",
     "errors_before",
     "prediction_document",
+    "prediction_errors",
+    "prediction_errors_with_covariance",
     "rigid_placement",
     "uncalibrated_model",
-    "verify",
-    "verify_jointly",
     "verify_refitted",
 ]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.verification.unseen_poses import ErrorCovariance, Verification
+from flexcal.calibration.verification.unseen_poses import ErrorCovariance, PredictionErrors
 from flexcal.errors import FlexcalError
 from flexcal.estimation import distance_probability, principal_variances
 
@@ -63,8 +63,8 @@ class ErrorScale:
         return "cautious" if self.high < 1 else "right"
 
 
-def error_scale(verification: Verification, covariance: ErrorCovariance) -> ErrorScale:
-    """Compare the errors of a verification with their prediction, as `verify_jointly` gives both.
+def error_scale(verification: PredictionErrors, covariance: ErrorCovariance) -> ErrorScale:
+    """Compare the errors of a verification with their prediction, as `prediction_errors_with_covariance` gives both.
 
     With the errors' covariance f² A Aᵀ + S, A the roots of all poses together and S what is independent, their squared size has the mean
     f² tr A Aᵀ + tr S, which gives f, and is taken as χ² distributed with ν = (tr V)² / tr V² degrees of freedom (Satterthwaite, 1946),
@@ -120,7 +120,7 @@ def error_scale(verification: Verification, covariance: ErrorCovariance) -> Erro
 
 
 def prediction_document(
-    verification: Verification, covariance: ErrorCovariance
+    verification: PredictionErrors, covariance: ErrorCovariance
 ) -> dict[str, float | str | int] | None:
     """`error_scale` for JSON documents; None where errors and prediction cannot be compared."""
     try:

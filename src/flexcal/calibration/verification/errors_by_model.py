@@ -9,7 +9,7 @@ import numpy as np
 
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.verification.uncalibrated_robot import UncalibratedErrors
-from flexcal.calibration.verification.unseen_poses import Verification
+from flexcal.calibration.verification.unseen_poses import PredictionErrors
 from flexcal.data.poses import PoseSet
 
 DECLARED, NOMINAL, OWN = "declared", "nominal", "own"
@@ -44,13 +44,15 @@ class MeasuredPoints:
         return self.errors.get(OWN, self.errors.get(NOMINAL))
 
     @property
-    def verification(self) -> Verification:
+    def verification(self) -> PredictionErrors:
         """Errors of the model that is used, and what the parameters' covariance says of them; raises `ValueError` where that was not asked
         for."""
         if self.parameter_rms is None or self.scatter_rms is None:
             raise ValueError("points of a verification have the distances that the covariance predicts")
         position = self.poses.position - self.calibrated
-        return Verification(position, self.calibrated, self.parameter_rms, self.scatter_rms, self.ambiguous)
+        return PredictionErrors(
+            position, self.calibrated, self.parameter_rms, self.scatter_rms, self.ambiguous
+        )
 
     @property
     def shown(self) -> dict[str, np.ndarray]:

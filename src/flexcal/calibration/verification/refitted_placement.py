@@ -8,9 +8,13 @@ from typing import Literal
 
 import numpy as np
 
-from flexcal.calibration.measurement import predict, require_points
+from flexcal.calibration.measurement import predict_measurements, require_points
 from flexcal.calibration.verification.best_fit_registration import best_placement, rigid_placement
-from flexcal.calibration.verification.unseen_poses import ErrorCovariance, Verification, verify_jointly
+from flexcal.calibration.verification.unseen_poses import (
+    ErrorCovariance,
+    PredictionErrors,
+    prediction_errors_with_covariance,
+)
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.model.robot import RobotModel
@@ -35,7 +39,7 @@ class RefittedVerification:
     what: tuple[Refit, ...]
     model: RobotModel
     parameters: int
-    result: Verification
+    result: PredictionErrors
     covariance: ErrorCovariance
 
 
@@ -47,7 +51,7 @@ def verify_refitted(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) ->
     """
     require_points(poses)
     placed = _placed(model, poses, what)
-    at = predict(placed, poses, jacobians=True)
+    at = predict_measurements(placed, poses, jacobians=True)
     columns = at.jacobian(_names(poses, what)).reshape(3 * len(poses), -1)
     scale = np.linalg.norm(columns, axis=0)
     left, sizes, _ = np.linalg.svd(columns / np.where(scale > 0, scale, 1.0), full_matrices=False)
@@ -67,7 +71,7 @@ def verify_refitted(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) ->
         return np.linalg.solve(own, rest.reshape(len(poses), 3, -1))
 
     errors = left_out((poses.position - at.position).reshape(-1, 1))[:, :, 0]
-    standing, covariance = verify_jointly(placed, poses)
+    standing, covariance = prediction_errors_with_covariance(placed, poses)
     roots = left_out(covariance.roots.reshape(3 * len(poses), -1))
     independent = (
         None if covariance.independent is None else _left_out_noise(covariance.independent, blocks, own)
@@ -76,7 +80,7 @@ def verify_refitted(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) ->
     scatter = (roots[:, :, count:] ** 2).sum(axis=(1, 2))
     if independent is not None:
         scatter = scatter + np.trace(independent, axis1=1, axis2=2)
-    result = Verification(
+    result = PredictionErrors(
         position=poses.position - errors,
         errors=errors,
         parameter_rms=np.sqrt((roots[:, :, :count] ** 2).sum(axis=(1, 2))),
@@ -103,7 +107,7 @@ def _placed(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) -> RobotMo
     """The robot with what is refitted placed by all poses."""
     if "station" not in what:
         return _points_found(model, poses)
-    base = predict(
+    base = predict_measurements(
         replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose))), poses
     )
     at, turned = base.position, base.kinematics.orientation
@@ -116,7 +120,7 @@ def _points_found(model: RobotModel, poses: PoseSet) -> RobotModel:
     names = _names(poses, ("point",))
     robot = model
     for _ in range(_STEPS):
-        at = predict(robot, poses, jacobians=True)
+        at = predict_measurements(robot, poses, jacobians=True)
         columns = at.jacobian(names).reshape(3 * len(poses), -1)
         step = np.linalg.lstsq(columns, (poses.position - at.position).ravel(), rcond=_RANK)[0]
         values = {name: robot.value(name) + float(v) for name, v in zip(names, step, strict=True)}

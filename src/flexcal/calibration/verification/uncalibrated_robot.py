@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from flexcal.calibration.error_model import ErrorStatistics
-from flexcal.calibration.measurement import predict, predicted_positions
+from flexcal.calibration.measurement import predict_measurements, predicted_positions
 from flexcal.calibration.verification.best_fit_registration import (
     best_placement,
     can_register,
@@ -103,7 +103,7 @@ def uncalibrated_model(model: RobotModel, poses: PoseSet) -> UncalibratedRobot:
 def _tools(model: RobotModel, poses: PoseSet) -> tuple[np.ndarray, np.ndarray]:
     """Positions (N, 3) and orientations (N, 3, 3) of the rigid robot's targets in its base frame."""
     blocks = [poses.subset(slice(first, first + _BLOCK)) for first in range(0, len(poses), _BLOCK)]
-    predictions = (predict(model, block, elastic=False) for block in blocks)
+    predictions = (predict_measurements(model, block, elastic=False) for block in blocks)
     positions, orientations = zip(
         *((at.position, at.kinematics.orientation) for at in predictions), strict=True
     )

@@ -15,11 +15,11 @@ from flexcal.calibration.error_model import (
     known_scatter,
 )
 from flexcal.calibration.measurement import (
-    Prediction,
+    PredictedMeasurements,
     ambiguous_poses,
     covariance_root,
     moving_parameters,
-    predict,
+    predict_measurements,
     require_points,
 )
 from flexcal.data.poses import PoseSet
@@ -28,7 +28,7 @@ from flexcal.units import MILLIMETRE
 
 
 @dataclass(frozen=True, eq=False)
-class Verification:
+class PredictionErrors:
     """Predicted and measured points of a set of poses.
 
     `position` (N, 3) as predicted, m; `errors` (N, 3) measured minus predicted. Root mean square distance errors (N,) m that are predicted:
@@ -101,23 +101,23 @@ class ErrorCovariance:
         return visits.gathered(roots), together
 
 
-def verify(
+def prediction_errors(
     model: RobotModel, poses: PoseSet, *, elastic: bool = True, noise_free: bool = False
-) -> Verification:
+) -> PredictionErrors:
     """Compare a calibrated robot with points; `poses` should be none of those it was fitted to.
 
     The instrument must stand where it stood during calibration: `model` holds its place. `noise_free` points are those of the true robot,
-    without instrument and repeatability. Raises `FlexcalError` for measured lengths and orientations, and as `predict` does.
+    without instrument and repeatability. Raises `FlexcalError` for measured lengths and orientations, and as `predict_measurements` does.
     """
-    return verify_jointly(model, poses, elastic=elastic, noise_free=noise_free)[0]
+    return prediction_errors_with_covariance(model, poses, elastic=elastic, noise_free=noise_free)[0]
 
 
-def verify_jointly(
+def prediction_errors_with_covariance(
     model: RobotModel, poses: PoseSet, *, elastic: bool = True, noise_free: bool = False
-) -> tuple[Verification, ErrorCovariance]:
-    """As `verify`, with the joint covariance of the errors at all poses predicted from parameters and scatter."""
+) -> tuple[PredictionErrors, ErrorCovariance]:
+    """As `prediction_errors`, with the joint covariance of the errors at all poses predicted from parameters and scatter."""
     require_points(poses)
-    at = predict(model, poses, elastic=elastic, jacobians=True)
+    at = predict_measurements(model, poses, elastic=elastic, jacobians=True)
     used = moving_parameters(model, elastic=elastic)
     roots = at.jacobian(used) @ covariance_root(model, used)
     cells = ErrorGroups.of(poses)
@@ -128,7 +128,7 @@ def verify_jointly(
     squares = (shared**2).sum(axis=(1, 2))
     if independent is not None:
         squares = squares + np.trace(independent, axis1=1, axis2=2)
-    verification = Verification(
+    verification = PredictionErrors(
         position=at.position,
         errors=poses.position - at.position,
         parameter_rms=np.sqrt((roots**2).sum(axis=(1, 2))),
@@ -148,7 +148,7 @@ def verify_jointly(
     )
 
 
-def _freedom(model: RobotModel, at: Prediction, poses: PoseSet, predicted: float) -> float:
+def _freedom(model: RobotModel, at: PredictedMeasurements, poses: PoseSet, predicted: float) -> float:
     """Degrees of freedom of the `predicted` sum of squares, m², from the standard deviations of the scatter (Satterthwaite, 1946)."""
     known, rows = model.posterior, 3 * len(at.position)
     weights = {
@@ -170,7 +170,9 @@ def _shared_errors(model: RobotModel, cells: ErrorGroups) -> np.ndarray:
     )
 
 
-def _independent(model: RobotModel, scatter: ErrorComponents, at: Prediction, poses: PoseSet) -> np.ndarray:
+def _independent(
+    model: RobotModel, scatter: ErrorComponents, at: PredictedMeasurements, poses: PoseSet
+) -> np.ndarray:
     """Covariance (N, 3, 3) m² of instrument and repeatability."""
     sigma = (
         poses.sigma if poses.sigma_given else np.full(poses.sigma.shape, model.value("scatter.instrument"))

@@ -24,7 +24,7 @@ from flexcal.files.transaction import current_path, write_text
 from flexcal.units import MILLIMETRE
 
 if TYPE_CHECKING:
-    from flexcal.jobs.calibration import RobotCalibration
+    from flexcal.jobs.calibration import Calibration
     from flexcal.progress import Progress
 
 
@@ -139,7 +139,7 @@ class Calibrate:
             )
         console.finish(document, following)
 
-    def _calibrated(self, terms: Sequence[str], progress: Progress) -> RobotCalibration:
+    def _calibrated(self, terms: Sequence[str], progress: Progress) -> Calibration:
         from flexcal.jobs.calibration import calibrate_robot
 
         return calibrate_robot(
@@ -154,7 +154,7 @@ class Calibrate:
             progress=progress,
         )
 
-    def _with_points_written(self, calibration: RobotCalibration, progress: Progress) -> RobotCalibration:
+    def _with_points_written(self, calibration: Calibration, progress: Progress) -> Calibration:
         """Write the points to robot.yaml, and calibrate again: the estimates are relative to the declared points."""
         from flexcal.jobs.setup import write_point_position
 

@@ -10,8 +10,8 @@ from .geometry_sensitivity import (
 )
 from .gravity_preload import preloaded
 from .ordering import MeasurementOrder, measurement_order
-from .selection import CriterionName, PoseDesign, choose_poses, design_poses, fewest_poses, random_poses
-from .sequential_selection import NextPoses, next_poses
+from .selection import CriterionName, PoseDesign, choose_poses, fewest_poses, random_poses, select_poses
+from .sequential_selection import NextPoses, select_next_poses
 from .working_volume import WorkingVolume, working_box, working_points
 
 __all__ = [
@@ -26,17 +26,17 @@ __all__ = [
     "WorkingVolume",
     "base_sensitivity",
     "choose_poses",
-    "design_poses",
     "fewest_poses",
     "geometry_jacobian",
     "measurement_order",
-    "next_poses",
     "pose_candidates",
     "pose_curve",
     "pose_sensitivity",
     "preloaded",
     "random_candidates",
     "random_poses",
+    "select_next_poses",
+    "select_poses",
     "working_box",
     "working_points",
 ]

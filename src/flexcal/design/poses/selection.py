@@ -137,7 +137,7 @@ def tool_error(base: BaseSensitivity, tool_error_weight: np.ndarray, chosen: np.
     return TraceOptimal(tool_error_weight, "c").trace(factor.T @ factor) ** 0.5
 
 
-def design_poses(
+def select_poses(
     model: RobotModel,
     count: int,
     *,
@@ -179,7 +179,7 @@ def choose_poses(
     criterion: CriterionName = "c",
     progress: Progress = silent,
 ) -> PoseDesign:
-    """As `design_poses`, from candidates that have been found; `rng` draws the plan's seed."""
+    """As `select_poses`, from candidates that have been found; `rng` draws the plan's seed."""
     rank = candidates.base.identifiability.rank
     if 3 * count < rank:
         raise FlexcalError(

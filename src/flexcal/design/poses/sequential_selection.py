@@ -40,7 +40,7 @@ class NextPoses:
         return int(good[0]) if len(good) else None
 
 
-def next_poses(
+def select_next_poses(
     candidates: PoseCandidates,
     measured: PoseSet,
     count: int,

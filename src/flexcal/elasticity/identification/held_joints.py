@@ -9,7 +9,7 @@ import numpy as np
 
 from flexcal.elasticity.identification.fit import ResponseData, ResponseFit
 from flexcal.elasticity.identification.score_test import score_test_rejects
-from flexcal.elasticity.response_model import Prediction, ResponseModel, held_inertia_name
+from flexcal.elasticity.response_model import PredictedMeasurements, ResponseModel, held_inertia_name
 from flexcal.estimation import profile_cost_increase
 from flexcal.frequency.periodic import FrequencyResponse
 from flexcal.model.robot import RobotModel
@@ -78,7 +78,9 @@ class CompliantHeldJoints:
             columns.append(
                 np.concatenate(
                     [
-                        pose.jacobian(Prediction(still, NEARLY_RIGID * (g - still)[..., None], none))[:, 0]
+                        pose.jacobian(
+                            PredictedMeasurements(still, NEARLY_RIGID * (g - still)[..., None], none)
+                        )[:, 0]
                         for pose, still, g in zip(residual.poses, base, moved, strict=True)
                     ]
                 )

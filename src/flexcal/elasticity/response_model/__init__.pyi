@@ -2,7 +2,7 @@ from .experiment_effect import ExperimentEffect, experiment_effects
 from .model_error import ModelError, Tolerances
 from .parameter_names import hardening_name, held_inertia_name
 from .parameters import check_responses, check_sensors, stiffness_parameters
-from .prediction import Prediction, ResponseModel
+from .prediction import PredictedMeasurements, ResponseModel
 from .residual import CLUSTER_LINES, ResponseResidual, element_scale
 from .weighting import CovarianceWeighting, ResonanceWeighting, UniformWeighting, Weighting
 
@@ -11,7 +11,7 @@ __all__ = [
     "CovarianceWeighting",
     "ExperimentEffect",
     "ModelError",
-    "Prediction",
+    "PredictedMeasurements",
     "ResonanceWeighting",
     "ResponseModel",
     "ResponseResidual",

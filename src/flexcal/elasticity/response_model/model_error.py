@@ -9,7 +9,7 @@ import numpy as np
 
 from flexcal.elasticity.response_model.experiment_effect import ExperimentEffect
 from flexcal.elasticity.response_model.parameter_names import pose_labels, viscous_name
-from flexcal.elasticity.response_model.prediction import Prediction, ResponseModel
+from flexcal.elasticity.response_model.prediction import PredictedMeasurements, ResponseModel
 from flexcal.elasticity.response_model.residual import ResponseResidual
 from flexcal.frequency.periodic import FrequencyResponse
 from flexcal.model.robot import (
@@ -144,9 +144,9 @@ class ModelError:
                     octave=tolerances.octave,
                 )
             change = np.concatenate([change, 0.5 * form, 0.5 * uneven], axis=-1)
-            blocks.append(LowRank.of(pose.jacobian(Prediction(nominal, change, none))))
+            blocks.append(LowRank.of(pose.jacobian(PredictedMeasurements(nominal, change, none))))
             shared = np.concatenate([shifts[k], uneven, form], axis=-1)
-            columns.append(blocks[-1].whiten(pose.jacobian(Prediction(nominal, shared, none))))
+            columns.append(blocks[-1].whiten(pose.jacobian(PredictedMeasurements(nominal, shared, none))))
         return cls(tuple(blocks), LowRank.of(np.concatenate(columns)))
 
     def whiten(self, rows: np.ndarray) -> np.ndarray:

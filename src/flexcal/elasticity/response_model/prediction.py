@@ -25,7 +25,7 @@ _MOUNTING_STEP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Prediction:
+class PredictedMeasurements:
     """G (lines, E + S, E) in one pose, and ∂G (lines, E + S, E, c) by the parameters numbered `columns` (c,), in estimation coordinates."""
 
     response: np.ndarray
@@ -214,7 +214,7 @@ class ResponseModel:
             poses.append(replace(pose, backlash_compliance=loaded.backlash_compliance(), torque=loaded))
         return replace(self, poses=tuple(poses))
 
-    def predict(self, x: np.ndarray) -> list[Prediction]:
+    def predict(self, x: np.ndarray) -> list[PredictedMeasurements]:
         """Responses and derivatives of every pose."""
         values, slopes = self.parameters.natural(x), self.parameters.natural_slope(x)
         return [self._pose(pose, values, slopes, derivatives=True) for pose in self.poses]
@@ -226,7 +226,7 @@ class ResponseModel:
 
     def _pose(
         self, pose: PoseModel, values: np.ndarray, slopes: np.ndarray, *, derivatives: bool
-    ) -> Prediction:
+    ) -> PredictedMeasurements:
         known, payload = pose.values(self.robot, values)
         robot = self.robot.with_values(known)
         softened = {name: axis for axis in pose.changing for name in _drive(robot, axis)}
@@ -239,7 +239,7 @@ class ResponseModel:
         factor = pose.measured(values)
         response = response * factor
         if not derivatives:
-            return Prediction(response, np.empty((*response.shape, 0)), np.empty(0, dtype=int))
+            return PredictedMeasurements(response, np.empty((*response.shape, 0)), np.empty(0, dtype=int))
         change = change * factor[..., None]
         drive_changes = {axis: np.zeros_like(response) for axis in pose.changing}
         blocks: dict[int, np.ndarray] = {}
@@ -271,7 +271,9 @@ class ResponseModel:
             blocks[number] = np.zeros_like(response)
             change = nearby.response[:, -1] * factor[:, at] - response[:, at]
             blocks[number][:, at] = change / _MOUNTING_STEP * slopes[number]
-        return Prediction(response, np.stack(list(blocks.values()), axis=-1), np.array(list(blocks)))
+        return PredictedMeasurements(
+            response, np.stack(list(blocks.values()), axis=-1), np.array(list(blocks))
+        )
 
 
 def _drive(robot: RobotModel, axis: int) -> tuple[str, str]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexcal.elasticity.response_model.prediction import Prediction, ResponseModel
+from flexcal.elasticity.response_model.prediction import PredictedMeasurements, ResponseModel
 from flexcal.elasticity.response_model.weighting import Weighting
 from flexcal.frequency.periodic import FrequencyResponse, vec
 
@@ -61,7 +61,7 @@ class PoseResidual:
         white = self.factor @ vec(self.errors(predicted + self.shift))[:, :, None]
         return _real(white)[:, 0]
 
-    def jacobian(self, prediction: Prediction) -> np.ndarray:
+    def jacobian(self, prediction: PredictedMeasurements) -> np.ndarray:
         """∂(residual)/∂x (2 L m n, c) by the parameters of `prediction.columns`."""
         unit = np.where(self.logarithmic, prediction.response + self.shift, self.scale)
         change = prediction.derivatives / -unit[..., None]

@@ -17,14 +17,14 @@ from flexcal.calibration.fit import StratifiedSample
 from flexcal.calibration.verification import (
     ErrorCovariance,
     ErrorScale,
-    Verification,
+    PredictionErrors,
     best_placement,
     can_register,
     can_register_with_points,
     error_scale,
+    prediction_errors_with_covariance,
     rigid_placement,
     uncalibrated_model,
-    verify_jointly,
 )
 from flexcal.compensation import desired_pose
 from flexcal.data.poses import PoseSet, ToolTargets, read_targets
@@ -92,7 +92,7 @@ class RobotCertificate:
     after: MeasuredTargets
     refitted: MeasuredTargets
     unmatched_targets: int
-    verification: Verification
+    verification: PredictionErrors
     scale: ErrorScale
     sample: StratifiedSample | None
     files: Mapping[str, str]
@@ -236,7 +236,7 @@ def certify_robot(
         )
     sample = StratifiedSample.of(visited[after][0])
     judged = slice(None) if sample is None else sample.rows
-    known, covariance = verify_jointly(model, visited[after][0].subset(judged))
+    known, covariance = prediction_errors_with_covariance(model, visited[after][0].subset(judged))
     there = _visited(visited[after][0], _placed(model, *visited[after]))
     start = visited[before][0]
     declared = as_declared[rows[before][np.isin(wanted.pose[rows[before]], common)]]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration.verification import Refit, RefittedVerification, Verification, verify_refitted
+from flexcal.calibration.verification import PredictionErrors, Refit, RefittedVerification, verify_refitted
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.model.robot import RobotModel
@@ -35,7 +35,7 @@ _CHANGED = {
 
 
 def proposed_refit(
-    model: RobotModel, poses: PoseSet, verification: Verification
+    model: RobotModel, poses: PoseSet, verification: PredictionErrors
 ) -> RefittedVerification | None:
     """The refit that reduces the leave-one-out errors to less than half; None where there is none.
 
@@ -66,7 +66,7 @@ def _explains(best: RefittedVerification, rms: float) -> bool:
 
 
 def refit_remarks(
-    verification: Verification,
+    verification: PredictionErrors,
     poses: PoseSet,
     refit: RefittedVerification | None,
     better: RefittedVerification | None,
@@ -104,5 +104,5 @@ def _poses(refit: RefittedVerification) -> int:
     return -(-refit.parameters // 3)
 
 
-def _rms(verification: Verification) -> float:
+def _rms(verification: PredictionErrors) -> float:
     return float(np.sqrt((verification.errors**2).sum(axis=1).mean()))

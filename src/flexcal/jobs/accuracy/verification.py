@@ -17,15 +17,15 @@ from flexcal.calibration.verification import (
     CALIBRATED,
     ErrorCovariance,
     MeasuredPoints,
+    PredictionErrors,
     Refit,
     RefittedVerification,
     UncalibratedErrors,
-    Verification,
     arms_at,
     errors_before,
     prediction_document,
+    prediction_errors_with_covariance,
     uncalibrated_model,
-    verify_jointly,
     verify_refitted,
 )
 from flexcal.data.poses import PoseSet, read_poses
@@ -55,7 +55,7 @@ from flexcal.units import MILLIMETRE
 
 
 @dataclass(frozen=True, eq=False)
-class RobotVerification:
+class Verification:
     """Errors of the calibrated robot `model` at `poses`, and `before` those of the uncalibrated one.
 
     `covariance` is that of the errors, as predicted. `refit` says what was fitted to these poses, None where nothing: then `result` has
@@ -67,11 +67,11 @@ class RobotVerification:
 
     model: RobotModel
     poses: PoseSet
-    result: Verification
+    result: PredictionErrors
     covariance: ErrorCovariance
     before: UncalibratedErrors
     refit: RefittedVerification | None
-    as_calibrated: Verification | None
+    as_calibrated: PredictionErrors | None
     better: RefittedVerification | None
     uncalibrated: tuple[str, ...]
     outside: str
@@ -165,7 +165,7 @@ def verify_robot(
     out: Path | None = None,
     command: str = "",
     progress: Progress = silent,
-) -> RobotVerification:
+) -> Verification:
     """Predict the points of `files` with the calibrated robot and compare.
 
     `refit` names what is placed anew by these poses, the instrument (`station`), the measured points (`point`) or both; the geometry
@@ -187,12 +187,12 @@ def verify_robot(
     origin = provenance([robot, bare.urdf, *files], None, calibrated.stored, tuple(blocks))
     fitted = already_fitted(calibrated, files, poses)
     known = all(is_station_identified(model, station) for station in poses.stations)
-    stands = verify_jointly(model, poses) if known else None
+    stands = prediction_errors_with_covariance(model, poses) if known else None
     anew = verify_refitted(model, poses, refit) if refit else None
     verified = stands if anew is None else (anew.result, anew.covariance)
     assert verified is not None
     standing = model if anew is None else anew.model
-    result = RobotVerification(
+    result = Verification(
         model=standing,
         poses=poses,
         result=verified[0],

@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration.accuracy import AccuracyMap, accuracy_map, error_sources, random_poses_in
+from flexcal.calibration.accuracy import PredictedAccuracy, error_sources, predicted_accuracy, random_poses_in
 from flexcal.calibration.fit import StratifiedSample
 from flexcal.calibration.measurement import Propagation, propagation
 from flexcal.calibration.verification import (
     ErrorScale,
+    PredictionErrors,
     UncalibratedErrors,
-    Verification,
     error_scale,
+    prediction_errors_with_covariance,
     uncalibrated_model,
-    verify_jointly,
 )
 from flexcal.data.plans import page_beside
 from flexcal.data.tables import write_table
@@ -51,7 +51,7 @@ _SOURCE_POSES = 200
 
 
 @dataclass(frozen=True, eq=False)
-class RobotMap:
+class AccuracyMap:
     """The map as it is to be believed, its worst rows, where its errors come from, and what verification poses say.
 
     `scale` is what they say of the map, `before` of the uncalibrated robot; `unmeasured` what there is to say of a point that the
@@ -60,7 +60,7 @@ class RobotMap:
     """
 
     reach: Propagation
-    map: AccuracyMap
+    map: PredictedAccuracy
     box: np.ndarray | None
     worst: np.ndarray
     sources: dict[str, float]
@@ -156,7 +156,7 @@ def map_accuracy(
     seed: int = 0,
     command: str = "",
     progress: Progress = silent,
-) -> RobotMap:
+) -> AccuracyMap:
     """Predict the tool's error at `count` random poses in a box, or at the poses or points of a file, and write the map to `out`.
 
     `working` is a box "x:X,y:Y,z:Z", m, base frame, or a file as `read_working` reads it; None for what robot.yaml declares, else anywhere.
@@ -173,7 +173,7 @@ def map_accuracy(
     scale, before, study, fitted, sample = _verified(calibrated, verification)
     rng = np.random.default_rng([seed, 7])
     box, q = _poses(reach, working, count, seed, rng, progress)
-    predicted = accuracy_map(reach, q, progress=progress).scaled(error_scale_factor(scale))
+    predicted = predicted_accuracy(reach, q, progress=progress).scaled(error_scale_factor(scale))
     worst = _worst(predicted)
     some = q[rng.permutation(len(q))[:_SOURCE_POSES]]
     shares = {kind: float(values.mean()) for kind, values in error_sources(reach, some).items()}
@@ -185,7 +185,7 @@ def map_accuracy(
         tuple(calibrated.blocks),
     )
     sources = error_sources(reach, q[worst])
-    result = RobotMap(
+    result = AccuracyMap(
         reach,
         predicted,
         box,
@@ -234,7 +234,7 @@ def _verified(
 ) -> tuple[
     ErrorScale | None,
     UncalibratedErrors | None,
-    Verification | None,
+    PredictionErrors | None,
     tuple[str, ...],
     StratifiedSample | None,
 ]:
@@ -245,7 +245,7 @@ def _verified(
     poses = verification_poses(calibrated, files)
     sample = StratifiedSample.of(poses)
     poses = poses if sample is None else poses.subset(sample.rows)
-    verification, covariance = verify_jointly(calibrated.model, poses)
+    verification, covariance = prediction_errors_with_covariance(calibrated.model, poses)
     if (moved := proposed_refit(calibrated.model, poses, verification)) is not None:
         (said,) = refit_remarks(verification, poses, None, moved)
         named = " and ".join(str(file) for file in files)
@@ -258,7 +258,7 @@ def _verified(
     return scale, before, verification, already_fitted(calibrated, files, poses), sample
 
 
-def _worst(predicted: AccuracyMap) -> np.ndarray:
+def _worst(predicted: PredictedAccuracy) -> np.ndarray:
     """Rows of the worst places that are apart from each other, the worst first."""
     least = _APART * float(np.linalg.norm(np.ptp(predicted.position, axis=0)))
     chosen: list[int] = []
@@ -270,7 +270,7 @@ def _worst(predicted: AccuracyMap) -> np.ndarray:
     return np.array(chosen)
 
 
-def _write_table(out: Path, predicted: AccuracyMap) -> None:
+def _write_table(out: Path, predicted: PredictedAccuracy) -> None:
     columns = {name: predicted.position[:, i] for i, name in enumerate("xyz")}
     columns |= {f"q{i + 1}": predicted.q[:, i] for i in range(predicted.q.shape[1])}
     errors = {"mean_mm": predicted.mean / MILLIMETRE, "p95_mm": predicted.p95 / MILLIMETRE}

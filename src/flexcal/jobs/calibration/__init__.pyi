@@ -1,11 +1,11 @@
 from .fitted_measurements import already_fitted, measurement_digests
 from .ignored_columns import ignored_columns_remarks
-from .job import RobotCalibration, calibrate_robot
+from .job import Calibration, calibrate_robot
 from .joint_ranges import outside_ranges
 from .subsample import subsample_document, verification_subsample_remark
 
 __all__ = [
-    "RobotCalibration",
+    "Calibration",
     "already_fitted",
     "calibrate_robot",
     "ignored_columns_remarks",

@@ -20,11 +20,11 @@ from flexcal.calibration.diagnostics import (
 from flexcal.calibration.error_model import TRANSMISSION, ErrorStatistics
 from flexcal.calibration.fit import (
     PER_JOINT,
-    Calibration,
+    GeometricFit,
     LossName,
     StratifiedSample,
     all_errors,
-    calibrate,
+    fit_geometry,
     point_uncertainty,
     probable_robot,
 )
@@ -79,7 +79,7 @@ AUTO = "auto"
 
 
 @dataclass(frozen=True, eq=False)
-class RobotCalibration:
+class Calibration:
     """What `calibrate_robot` found.
 
     `before` are the errors of the uncalibrated robot; `rigid` is the fit without elasticity and further terms, `selected` the one that is
@@ -90,9 +90,9 @@ class RobotCalibration:
     """
 
     before: UncalibratedErrors
-    rigid: Calibration
+    rigid: GeometricFit
     selection: TermSelection | None
-    selected: Calibration
+    selected: GeometricFit
     estimate: Estimate
     estimates: Path
     command: str = ""
@@ -214,7 +214,7 @@ def calibrate_robot(
     out: Path | None = None,
     command: str = "",
     progress: Progress = silent,
-) -> RobotCalibration:
+) -> Calibration:
     """Calibrate the robot of a robot.yaml on files of measured poses, and store the estimate as its block `calibration`.
 
     The robot starts from nominal and the other blocks of its estimates; stiffness found by stage 1 enters with its uncertainty. `terms`
@@ -222,7 +222,7 @@ def calibrate_robot(
     instrument; the scatter of robot and model are found from the points.
 
     With `out`, estimates, results.json, points.csv, arm.npz, gravity_loads.npz and report.html go to that folder, and nothing beside
-    robot.yaml changes. Raises `FlexcalError` as reading and `calibrate` do; nothing is written then.
+    robot.yaml changes. Raises `FlexcalError` as reading and `fit_geometry` do; nothing is written then.
     """
     progress("reading", 0.0)
     require_distinct_files(files)
@@ -238,9 +238,9 @@ def calibrate_robot(
     wanted = _terms(model, terms)
     progress("reading", 1.0)
 
-    def fit(robot_: RobotModel, chosen: Sequence[str], stage: str, *, elastic: bool) -> Calibration:
+    def fit(robot_: RobotModel, chosen: Sequence[str], stage: str, *, elastic: bool) -> GeometricFit:
         progress(stage, 0.0)
-        calibration = calibrate(
+        calibration = fit_geometry(
             robot_,
             poses,
             terms=chosen,
@@ -284,7 +284,7 @@ def calibrate_robot(
         measurements=measurement_digests(poses),
     )
     before = uncalibrated_model(model, poses).errors(poses)
-    result = RobotCalibration(
+    result = Calibration(
         before,
         rigid,
         selection,

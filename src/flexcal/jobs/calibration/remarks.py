@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.calibration.diagnostics import Drift, implausible_shifts, is_implausible, residuals_implausible
-from flexcal.calibration.fit import Calibration
+from flexcal.calibration.fit import GeometricFit
 from flexcal.jobs.calibration.ignored_columns import ignored_columns_remarks
 from flexcal.units import MILLIMETRE
 
@@ -34,14 +34,14 @@ class Outlier:
     error: float
 
 
-def outliers_of(fit: Calibration) -> tuple[Outlier, ...]:
+def outliers_of(fit: GeometricFit) -> tuple[Outlier, ...]:
     """The outliers of a fit, the farthest first."""
     distance = np.linalg.norm(fit.residuals, axis=1)
     rows = sorted(fit.estimate.outliers, key=lambda row: -distance[row])
     return tuple(Outlier(int(fit.poses.pose[i]), str(fit.poses.target[i]), float(distance[i])) for i in rows)
 
 
-def calibration_remarks(fit: Calibration, cause: Sequence[str] = ()) -> tuple[str, ...]:
+def calibration_remarks(fit: GeometricFit, cause: Sequence[str] = ()) -> tuple[str, ...]:
     """One sentence each, the most important last; a known `cause` of a bad fit precedes its consequences."""
     remarks = [*ignored_columns_remarks(fit.poses), *_nominal_springs(fit)]
     if fit.ambiguous.any():
@@ -74,7 +74,7 @@ def calibration_remarks(fit: Calibration, cause: Sequence[str] = ()) -> tuple[st
     return tuple(remarks)
 
 
-def _nominal_springs(fit: Calibration) -> Sequence[str]:
+def _nominal_springs(fit: GeometricFit) -> Sequence[str]:
     """Springs that stage 1 did not identify have a declared prior of their own in place of its posterior."""
     springs = [p for p in fit.prior.parameters if p.name.endswith(".stiffness")]
     nominal = [p.name.removesuffix(".stiffness") for p in springs if np.isfinite(p.prior_std)]
@@ -87,7 +87,7 @@ def _nominal_springs(fit: Calibration) -> Sequence[str]:
     )
 
 
-def _undetermined(fit: Calibration) -> Sequence[str]:
+def _undetermined(fit: GeometricFit) -> Sequence[str]:
     """Parameters that the poses do not determine, one sentence per cause."""
     causes: dict[str, list[str]] = {}
     for item in fit.undetermined:
@@ -98,7 +98,7 @@ def _undetermined(fit: Calibration) -> Sequence[str]:
     ]
 
 
-def _noise(fit: Calibration) -> Sequence[str]:
+def _noise(fit: GeometricFit) -> Sequence[str]:
     budget = fit.variances
     instrument, stated, robot, model = (
         budget[key] for key in ("instrument_mm", "stated_mm", "robot_mm", "model_mm")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from flexcal.calibration.fit import KNOWN_POINT_STD, point_uncertainty
-from flexcal.compensation import Compensation, best_posture, compensate
+from flexcal.compensation import MotorCommands, best_posture, motor_commands
 from flexcal.data.poses import ToolTargets, read_targets, write_commands
 from flexcal.data.tables import TableFile, open_table
 from flexcal.errors import FlexcalError, InputError
@@ -26,7 +26,7 @@ _FAR = 0.25
 
 
 @dataclass(frozen=True, eq=False)
-class RobotCompensation:
+class Compensation:
     """The commands for the `targets` of a `file`; `start` (n,): where inverse kinematics started, None with joint positions.
 
     `nominal` is the uncalibrated robot with the `measured` points where they were found.
@@ -35,7 +35,7 @@ class RobotCompensation:
     model: RobotModel
     file: TableFile
     targets: ToolTargets
-    result: Compensation
+    result: MotorCommands
     start: np.ndarray | None
     nominal: RobotModel
     measured: tuple[str, ...]
@@ -107,7 +107,7 @@ def compensate_robot(
     frame: str | None = None,
     start: Sequence[float] = (),
     progress: Progress = silent,
-) -> RobotCompensation:
+) -> Compensation:
     """Write the motor commands that bring the calibrated robot's tool to the targets of `file` to `out`, CSV or Parquet.
 
     The targets are of the point `target` under `points:`, or of the origin of the URDF frame `frame`; by default of what the column
@@ -144,7 +144,7 @@ def compensate_robot(
             "E-RUN-015",
             f"{file} has joint positions, which are the start of the inverse kinematics; leave --start out.",
         )
-    result = compensate(model, nominal, targets, start=origin, progress=progress)
+    result = motor_commands(model, nominal, targets, start=origin, progress=progress)
     if not result.reached.any():
         raise FlexcalError(
             "E-RUN-016",
@@ -154,7 +154,7 @@ def compensate_robot(
     commands = ToolTargets(reached.pose, reached.target, result.q[result.reached], payload=reached.payload)
     table = open_table(file)
     write_commands(out, model, commands, result.unambiguous[result.reached], table)
-    return RobotCompensation(model, table, targets, result, origin, nominal, calibrated.measured)
+    return Compensation(model, table, targets, result, origin, nominal, calibrated.measured)
 
 
 def _of_point(targets: ToolTargets, file: Path, name: str | None) -> ToolTargets:

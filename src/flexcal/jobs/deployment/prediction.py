@@ -20,7 +20,7 @@ _BLOCK = 20_000
 
 
 @dataclass(frozen=True, eq=False)
-class RobotPrediction:
+class Prediction:
     """Where the real tool is: `tool` in the base frame, `beside` (N, 3) m away from where the nominal robot has it.
 
     `unambiguous` (N,): the flank of every backlash is certain there.
@@ -41,7 +41,7 @@ class RobotPrediction:
 
 def predict_robot(
     robot: Path, file: Path, out: Path, *, estimates: Path | None = None, progress: Progress = silent
-) -> RobotPrediction:
+) -> Prediction:
     """Write position and orientation of the real tool at the commands of `file`, in the base frame, to `out`, CSV or Parquet.
 
     Raises `FlexcalError` where there is no calibration or a file does not fit; then nothing is written.
@@ -59,7 +59,7 @@ def predict_robot(
     position, rotation, beside, certain = (np.concatenate(part) for part in zip(*parts, strict=True))
     tool = replace(commands, q=None, position=position, rotation=rotation)
     write_targets(out, tool)
-    return RobotPrediction(tool, beside, certain)
+    return Prediction(tool, beside, certain)
 
 
 def _predicted(

@@ -11,7 +11,7 @@ import numpy as np
 
 from flexcal.data.plans import PosePlan
 from flexcal.data.poses import PosePool, read_poses
-from flexcal.design.poses import NextPoses, WorkingVolume, next_poses
+from flexcal.design.poses import NextPoses, WorkingVolume, select_next_poses
 from flexcal.jobs.experiments.candidate_poses import CandidatePoses, PoseRequest
 from flexcal.jobs.experiments.poses import flank_block, pool_block, working_block, write_pose_plan
 from flexcal.jobs.inputs import robot_provenance
@@ -74,13 +74,13 @@ def plan_next_poses(
     """Write to `out` the next poses, after the files of `measured` ones; nothing where these are enough.
 
     They end where the predicted tool error is the wanted one, or without it where more poses only average. Raises `FlexcalError` as
-    `next_poses`, `read_poses`, `read_pose_pool` and `working_volume` do.
+    `select_next_poses`, `read_poses`, `read_pose_pool` and `working_volume` do.
     """
     model, count, wanted = RobotModel.from_yaml(robot), request.count, request.wanted
     known = read_poses(measured, model, require_motion=False)
     rng = np.random.default_rng([request.seed, 7])
     choice = CandidatePoses.of(model, request, rng, progress)
-    after = next_poses(choice.candidates, known, count, rng=rng, criterion=request.criterion)
+    after = select_next_poses(choice.candidates, known, count, rng=rng, criterion=request.criterion)
     stop = after.enough(wanted)
     origin = robot_provenance(model, (*measured, *choice.files))
     if stop == 0:

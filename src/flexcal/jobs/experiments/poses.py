@@ -146,7 +146,7 @@ def plan_calibration_poses(
     """Choose poses for the calibration of the robot as it is known, and write the plan to `out`, its page beside it.
 
     The poses are in an order of short moves; where a tool error is wanted, only as many as bring the predicted one down to it. Raises
-    `FlexcalError` as `design_poses`, `fewest_poses`, `read_pose_pool` and `working_volume` do.
+    `FlexcalError` as `select_poses`, `fewest_poses`, `read_pose_pool` and `working_volume` do.
     """
     model, seed, count = RobotModel.from_yaml(robot), request.seed, request.count
     rng = np.random.default_rng([seed, 2])

@@ -17,7 +17,7 @@ CUSTOMER = "customer.html"
 
 
 def customer_report(folder: Path, particulars: MeasurementDetails) -> Path:
-    """Write customer.html of a folder of `calibrate` or `verify`.
+    """Write customer.html of a folder of `fit_geometry` or `prediction_errors`.
 
     Raises `InputError` for the folder of another verb, and where a file is not there or cannot be read.
     """

@@ -110,7 +110,7 @@ def missing_key_error(folder: Path, problem: KeyError) -> InputError:
 
 
 def calibration_study(folder: Path) -> CalibrationStudy:
-    """What `calibrate` left in a folder; raises `InputError` where a file is not there or cannot be read."""
+    """What `fit_geometry` left in a folder; raises `InputError` where a file is not there or cannot be read."""
     results = read_results(folder)
     points = read_points(folder, sigma=results["fit"]["sigma_mm"] * MILLIMETRE)
     return CalibrationStudy(

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from flexcal.calibration.diagnostics import BearingAxes
-from flexcal.calibration.fit import Calibration
+from flexcal.calibration.fit import GeometricFit
 from flexcal.elasticity.identification import ResponseBearings
 from flexcal.units import MILLIMETRE
 
 _AXES = {"before": "fixed to the parent link", "after": "that turn with the child link"}
 
 
-def bearing_remarks(axes: BearingAxes | None, fit: Calibration) -> tuple[str, ...]:
+def bearing_remarks(axes: BearingAxes | None, fit: GeometricFit) -> tuple[str, ...]:
     """A sentence where the points of a `fit` determined the bearing axes, or contradict the declared ones."""
     if axes is None:
         return ()

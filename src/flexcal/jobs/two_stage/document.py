@@ -8,7 +8,7 @@ import numpy as np
 
 from flexcal.calibration.diagnostics import Drift, is_implausible
 from flexcal.calibration.error_model import ErrorStatistics
-from flexcal.calibration.verification import Verification, prediction_document
+from flexcal.calibration.verification import PredictionErrors, prediction_document
 from flexcal.estimation import Estimate
 from flexcal.export import ExportedFile
 from flexcal.jobs.result_files import (
@@ -102,7 +102,7 @@ def _measured(run: TwoStageRun) -> dict[str, Any]:
     }
 
 
-def _verified(verification: Verification) -> dict[str, Any]:
+def _verified(verification: PredictionErrors) -> dict[str, Any]:
     """Errors of an elastic calibration, and the root mean square that the covariance of its parameters expects."""
     return {
         "elastic": verification.all.in_millimetres(),

@@ -13,22 +13,22 @@ from pathlib import Path
 import numpy as np
 
 from flexcal.calibration.error_model import ErrorStatistics
-from flexcal.calibration.fit import calibrate
-from flexcal.calibration.measurement import predict
+from flexcal.calibration.fit import fit_geometry
+from flexcal.calibration.measurement import predict_measurements
 from flexcal.calibration.verification import (
     CALIBRATED,
     MeasuredPoints,
     arms_at,
     errors_before,
+    prediction_errors,
+    prediction_errors_with_covariance,
     uncalibrated_model,
-    verify,
-    verify_jointly,
 )
 from flexcal.data.experiments import Cell
 from flexcal.data.plans import MultisinePlan, write_plan
 from flexcal.data.poses import write_poses
 from flexcal.data.recordings import Recording
-from flexcal.design.poses import design_poses, random_poses
+from flexcal.design.poses import random_poses, select_poses
 from flexcal.design.scene import MeasuringSetup
 from flexcal.elasticity.identification import SpringFit, fit_springs
 from flexcal.estimation import Estimate
@@ -158,10 +158,10 @@ def run_two_stage(
         progress("poses", 0.0)
         setup = MeasuringSetup(payload=frequency.payload)
         count = QUICK_POSES if plan == "quick" else CALIBRATION_POSES
-        chosen = design_poses(elastic, count, rng=np.random.default_rng([seed, 2]), setup=setup).plan
+        chosen = select_poses(elastic, count, rng=np.random.default_rng([seed, 2]), setup=setup).plan
         progress("poses", 0.25)
         for_rigid = [
-            design_poses(believed, n, rng=np.random.default_rng([seed, 3, n]), setup=setup).plan
+            select_poses(believed, n, rng=np.random.default_rng([seed, 3, n]), setup=setup).plan
             for n in RIGID_POSES
         ]
         progress("poses", 0.9)
@@ -170,10 +170,11 @@ def run_two_stage(
     with watch.stage("stage2"):
         progress("stage2", 0.0)
         measured = robot_in_cell.measure(chosen)
-        calibration = calibrate(elastic, measured)
+        calibration = fit_geometry(elastic, measured)
         progress("stage2", 0.5)
         rigid = tuple(
-            calibrate(believed, robot_in_cell.measure(p), terms=RIGID_TERMS, elastic=False) for p in for_rigid
+            fit_geometry(believed, robot_in_cell.measure(p), terms=RIGID_TERMS, elastic=False)
+            for p in for_rigid
         )
         progress("stage2", 1.0)
     write_poses(out / "calibration_poses.csv", measured)
@@ -191,10 +192,14 @@ def run_two_stage(
         exact = replace(seen, position=robot_in_cell.noise_free(anywhere))
         floor = None
         if cell == "virtual":
-            floor = ErrorStatistics.of(exact.position - predict(nominal.with_values(known), exact).position)
+            floor = ErrorStatistics.of(
+                exact.position - predict_measurements(nominal.with_values(known), exact).position
+            )
         placed = uncalibrated_model(nominal, measured)
         assert placed.registered is not None and placed.own is not None
-        measured_verification, measured_covariance = verify_jointly(calibration.model, seen)
+        measured_verification, measured_covariance = prediction_errors_with_covariance(
+            calibration.model, seen
+        )
         run = TwoStageRun(
             nominal=nominal,
             informed=believed,
@@ -206,10 +211,12 @@ def run_two_stage(
             rigid=rigid,
             before=placed.errors(measured),
             verification_poses=exact,
-            nominal_verification=verify(placed.registered, exact, elastic=False, noise_free=True),
-            own_verification=verify(placed.own, exact, elastic=False, noise_free=True),
-            elastic_verification=verify(calibration.model, exact, noise_free=True),
-            rigid_verification=tuple(verify(c.model, exact, elastic=False, noise_free=True) for c in rigid),
+            nominal_verification=prediction_errors(placed.registered, exact, elastic=False, noise_free=True),
+            own_verification=prediction_errors(placed.own, exact, elastic=False, noise_free=True),
+            elastic_verification=prediction_errors(calibration.model, exact, noise_free=True),
+            rigid_verification=tuple(
+                prediction_errors(c.model, exact, elastic=False, noise_free=True) for c in rigid
+            ),
             measured_verification=measured_verification,
             measured_covariance=measured_covariance,
             floor=floor,
@@ -223,9 +230,12 @@ def run_two_stage(
     if dynamics is not None and cell == "virtual":
         with watch.stage("cad_alone"):
             springs = stage_one(nominal, "cad_alone")
-            fitted = calibrate(springs.robot(nominal), measured)
+            fitted = fit_geometry(springs.robot(nominal), measured)
             run = replace(
-                run, cad_alone=CadInertialsRun(springs, fitted, verify(fitted.model, exact, noise_free=True))
+                run,
+                cad_alone=CadInertialsRun(
+                    springs, fitted, prediction_errors(fitted.model, exact, noise_free=True)
+                ),
             )
             progress("cad_alone", 1.0)
     run = replace(run, results=two_stage_document(run, exported))

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from flexcal.calibration.error_model import ErrorStatistics
-from flexcal.calibration.fit import Calibration
-from flexcal.calibration.verification import ErrorCovariance, UncalibratedErrors, Verification
+from flexcal.calibration.fit import GeometricFit
+from flexcal.calibration.verification import ErrorCovariance, PredictionErrors, UncalibratedErrors
 from flexcal.data.plans import MultisinePlan
 from flexcal.data.poses import PoseSet
 from flexcal.elasticity.identification import SpringFit
@@ -24,8 +24,8 @@ class CadInertialsRun:
     """Both stages fitted again, to the same data, with the inertials of CAD in place of those that trajectories identified."""
 
     stiffness: SpringFit
-    calibration: Calibration
-    verification: Verification
+    calibration: GeometricFit
+    verification: PredictionErrors
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,15 +47,15 @@ class TwoStageRun:
     plan: MultisinePlan
     responses: tuple[FrequencyResponse, ...]
     stiffness: SpringFit
-    calibration: Calibration
-    rigid: tuple[Calibration, ...]
+    calibration: GeometricFit
+    rigid: tuple[GeometricFit, ...]
     before: UncalibratedErrors
     verification_poses: PoseSet
-    nominal_verification: Verification
-    own_verification: Verification
-    elastic_verification: Verification
-    rigid_verification: tuple[Verification, ...]
-    measured_verification: Verification
+    nominal_verification: PredictionErrors
+    own_verification: PredictionErrors
+    elastic_verification: PredictionErrors
+    rigid_verification: tuple[PredictionErrors, ...]
+    measured_verification: PredictionErrors
     measured_covariance: ErrorCovariance
     floor: ErrorStatistics | None
     truth: Mapping[str, float]

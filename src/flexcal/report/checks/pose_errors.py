@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from flexcal.calibration.error_model import ErrorStatistics
-from flexcal.calibration.verification import Verification
+from flexcal.calibration.verification import PredictionErrors
 from flexcal.estimation import Estimate
 from flexcal.report.layout import Check, document_millimetres, millimetres, p_value
 
@@ -181,7 +181,7 @@ def check_springs(estimate: Estimate, stiffness: Sequence[str], damping: Sequenc
     )
 
 
-def check_flanks(verification: Verification) -> Check:
+def check_flanks(verification: PredictionErrors) -> Check:
     """Whether the flank of every backlash is certain at every pose."""
     question = "Is the flank of the backlash certain at every pose?"
     unclear, all_ = int(verification.ambiguous.sum()), len(verification.ambiguous)

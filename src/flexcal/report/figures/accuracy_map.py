@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import plotly.graph_objects as go
 
-from flexcal.calibration.accuracy import AccuracyMap
+from flexcal.calibration.accuracy import PredictedAccuracy
 from flexcal.report.figures.robot_arm import space_axes
 from flexcal.report.layout import ELASTIC, GRID, RIGID, as_float32, canvas, panels
 from flexcal.units import MILLIMETRE
@@ -17,7 +17,7 @@ SHOWN = 4000
 """Points drawn; of more, every so manieth."""
 
 
-def accuracy_space(accuracy: AccuracyMap) -> go.Figure:
+def accuracy_space(accuracy: PredictedAccuracy) -> go.Figure:
     """Points in the robot's base frame, coloured by the distance (mm) that 95 % of errors stay below."""
     rows = slice(None, None, max(1, -(-len(accuracy.q) // SHOWN)))
     at, error = accuracy.position[rows], accuracy.p95[rows] / MILLIMETRE
@@ -62,7 +62,7 @@ _POINTS = 8
 _VIEWS = {"from above": (0, 1), "from the side": (0, 2), "from the front": (1, 2)}
 
 
-def accuracy_views(accuracy: AccuracyMap) -> go.Figure:
+def accuracy_views(accuracy: PredictedAccuracy) -> go.Figure:
     """For each cell of three views of the volume (base frame) the 95 % error in mm, averaged over the poses behind it."""
     cells = int(np.clip(np.sqrt(len(accuracy.q) / _POINTS), 3, _CELLS))
     titles = [f"{'xyz'[up]} / m, {view}" for view, (_, up) in _VIEWS.items()]

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import plotly.graph_objects as go
 
-from flexcal.calibration.verification import CALIBRATED, NOMINAL, Verification
+from flexcal.calibration.verification import CALIBRATED, NOMINAL, PredictionErrors
 from flexcal.report.figures.pose_errors import ErrorSeries
 from flexcal.report.layout import (
     AXIS,
@@ -111,7 +111,7 @@ def error_histogram(errors: Mapping[str, np.ndarray]) -> go.Figure:
     return figure
 
 
-def predicted_quantiles(verification: Verification) -> go.Figure:
+def predicted_quantiles(verification: PredictionErrors) -> go.Figure:
     """Quantiles of the observed distance against those predicted from parameters and scatter, in millimetres.
 
     Poses with an uncertain flank are left out: the

@@ -10,7 +10,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from flexcal.calibration.error_model import ErrorStatistics
-from flexcal.calibration.verification import Verification
+from flexcal.calibration.verification import PredictionErrors
 from flexcal.data.poses import PoseSet
 from flexcal.report.layout import (
     ELASTIC,
@@ -106,7 +106,7 @@ class ErrorSeries:
 
 
 def verification_errors(
-    poses: PoseSet, series: Sequence[ErrorSeries], calibrated: Verification, paper: ErrorStatistics | None
+    poses: PoseSet, series: Sequence[ErrorSeries], calibrated: PredictionErrors, paper: ErrorStatistics | None
 ) -> go.Figure:
     """Distances in millimetres (log scale) against the number of the pose; poses with an uncertain flank are ringed."""
     figure = canvas(420)

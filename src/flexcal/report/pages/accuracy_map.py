@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration.accuracy import AccuracyMap
-from flexcal.calibration.verification import ErrorScale, Verification
+from flexcal.calibration.accuracy import PredictedAccuracy
+from flexcal.calibration.verification import ErrorScale, PredictionErrors
 from flexcal.model.robot import RobotModel
 from flexcal.report.checks import Trust, prediction_checks
 from flexcal.report.figures import SHOWN, accuracy_space, accuracy_views, predicted_quantiles, variance_shares
@@ -34,11 +34,11 @@ class MapStudy:
     """A map, its `box` (2, 3) m where there is one, `results` as the verb prints them; what a verification says, and that verification."""
 
     model: RobotModel
-    map: AccuracyMap
+    map: PredictedAccuracy
     box: np.ndarray | None
     results: Mapping[str, Any]
     scale: ErrorScale | None = None
-    verification: Verification | None = None
+    verification: PredictionErrors | None = None
 
 
 def map_page(study: MapStudy) -> Page:

@@ -34,7 +34,7 @@ _REMARKS = 4
 
 @dataclass(frozen=True, eq=False)
 class CustomerStudy:
-    """Results of `calibrate` or `verify`, its points, the verdict, and the files it was made from (name: SHA-256)."""
+    """Results of `fit_geometry` or `prediction_errors`, its points, the verdict, and the files it was made from (name: SHA-256)."""
 
     results: Mapping[str, Any]
     points: MeasuredPoints

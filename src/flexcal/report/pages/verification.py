@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from flexcal.calibration.error_model import ErrorStatistics
-from flexcal.calibration.verification import ArmPoses, MeasuredPoints, Verification
+from flexcal.calibration.verification import ArmPoses, MeasuredPoints, PredictionErrors
 from flexcal.report.checks import (
     Trust,
     check_claimed_uncertainty,
@@ -66,7 +66,7 @@ class VerificationStudy:
     arms: ArmPoses
 
     @property
-    def verification(self) -> Verification:
+    def verification(self) -> PredictionErrors:
         """Prediction, errors and their predicted standard deviations."""
         return self.points.verification
 

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any, Literal
 
 from flexcal.calibration.error_model import ErrorStatistics
-from flexcal.calibration.verification import ArmPoses, MeasuredPoints, Verification
+from flexcal.calibration.verification import ArmPoses, MeasuredPoints, PredictionErrors
 from flexcal.data.plans import MultisinePlan
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block
@@ -71,7 +71,7 @@ class TwoStageStudy:
         return tuple(self.results["identifiability"]["kept"])
 
     @property
-    def verification(self) -> Verification:
+    def verification(self) -> PredictionErrors:
         """The calibrated robot at the fresh poses, as the tracker read them."""
         return self.fresh.verification
 
