@@ -1,9 +1,8 @@
-from .calibration.accuracy import PredictedAccuracy, predicted_accuracy, repeatability
-from .calibration.fit import GeometricFit, fit_geometry
+from .calibration.accuracy import repeatability
+from .calibration.fit import fit_geometry
 from .calibration.measurement import predict_measurements, register, rigid_motion
 from .calibration.term_selection import select_terms
-from .calibration.verification import PredictionErrors, prediction_errors
-from .compensation import MotorCommands, motor_commands
+from .calibration.verification import prediction_errors
 from .data.plans import MultisinePlan, PosePlan, TrajectoryPlan, read_plan
 from .data.poses import PoseSet, ToolTargets, read_poses, read_targets
 from .data.recordings import Decimation, Recording, read_recording
@@ -43,9 +42,13 @@ from .frequency.periodic import (
     frequency_responses,
     local_polynomial_responses,
 )
+from .jobs.accuracy import AccuracyMap, Verification, accuracy_map, verify
+from .jobs.calibration import Calibration, calibrate
+from .jobs.deployment import Compensation, Prediction, compensate, predict
 from .jobs.dynamics import DynamicsIdentification, identify_dynamics
 from .jobs.experiments import exciting_plan, frequency_plan
 from .jobs.payload import PayloadIdentification, identify_payload
+from .jobs.inputs import CalibratedRobot
 from .jobs.stiffness import StiffnessIdentification, identify_stiffness
 from .model.kinematics import point_kinematics
 from .model.parts import is_physically_consistent
@@ -67,8 +70,12 @@ __all__ = [
     "SDP",
     "TLS",
     "WLS",
+    "AccuracyMap",
     "BaseParameters",
+    "CalibratedRobot",
+    "Calibration",
     "CellConfig",
+    "Compensation",
     "Decimation",
     "DynamicsIdentification",
     "EnergyModel",
@@ -76,27 +83,28 @@ __all__ = [
     "Estimator",
     "FlexcalError",
     "FrequencyResponse",
-    "GeometricFit",
     "InputError",
     "JointLog",
     "MeasuringSetup",
-    "MotorCommands",
     "MultisinePlan",
     "Observation",
     "PayloadIdentification",
     "PosePlan",
     "PoseSet",
     "PowerModel",
-    "PredictedAccuracy",
-    "PredictionErrors",
+    "Prediction",
     "Recording",
     "RobotModel",
     "StiffnessIdentification",
     "ToolTargets",
     "TrajectoryPlan",
+    "Verification",
     "VirtualCell",
     "Window",
+    "accuracy_map",
     "assemble_regression",
+    "calibrate",
+    "compensate",
     "design_trajectories",
     "draw_truth",
     "exciting_plan",
@@ -113,11 +121,10 @@ __all__ = [
     "identify_with_prior",
     "is_physically_consistent",
     "local_polynomial_responses",
-    "motor_commands",
     "point_kinematics",
+    "predict",
     "predict_measurements",
     "predict_torques",
-    "predicted_accuracy",
     "prediction_errors",
     "random_poses",
     "read_learned_residual",
@@ -137,6 +144,7 @@ __all__ = [
     "tool_at_rest",
     "torque_regressor",
     "trajectory_error",
+    "verify",
     "weighted_least_squares",
     "write_mjcf",
     "write_urdf",

@@ -32,7 +32,7 @@ from flexcal.errors import InputError
 from flexcal.files.formats import sha256_of
 from flexcal.jobs.accuracy.verification import verification_poses
 from flexcal.jobs.calibration import already_fitted
-from flexcal.jobs.inputs import CalibratedRobot, calibrated_robot, unmeasured_targets_remark
+from flexcal.jobs.inputs import CalibratedRobot, unmeasured_targets_remark
 from flexcal.model.parts import vector_rotation
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import carried_mass, points_kinematics
@@ -177,7 +177,7 @@ class RobotCertificate:
 
 
 def certify_robot(
-    robot: Path,
+    robot_file: Path,
     targets: Path,
     before: Path,
     after: Path,
@@ -201,7 +201,8 @@ def certify_robot(
             "E-RUN-002",
             f"{before} is given as --before and as --after; measure the compensated commands too.",
         )
-    calibrated = calibrated_robot(robot, estimates, "certify")
+    calibrated = CalibratedRobot.from_yaml(robot_file, estimates)
+    assert calibrated.stored is not None
     model = calibrated.probable
     progress("reading", 0.0)
     wanted = read_targets(targets, model)
@@ -253,7 +254,7 @@ def certify_robot(
         error_scale(known, _measured_noise(there, covariance)),
         sample,
         _files(
-            [robot, calibrated.nominal.urdf],
+            [robot_file, calibrated.nominal.urdf],
             {"estimates": calibrated.stored, "targets": targets, "before": before, "after": after},
         ),
         already_fitted(calibrated, [after], visited[after][0]),

@@ -26,7 +26,6 @@ from flexcal.files.formats import provenance
 from flexcal.jobs.calibration import ignored_columns_remarks
 from flexcal.jobs.inputs import (
     CalibratedRobot,
-    calibrated_robot,
     is_station_identified,
     require_distinct_files,
     stored_estimates,
@@ -152,7 +151,7 @@ class RobotRepeatability:
 
 
 def repeat_robot(
-    robot: Path,
+    robot_file: Path,
     files: Sequence[Path],
     *,
     estimates: Path | None = None,
@@ -166,14 +165,14 @@ def repeat_robot(
     `FlexcalError` where no pose was visited twice, or a file does not fit.
     """
     require_distinct_files(files)
-    nominal = RobotModel.from_yaml(robot, estimates=False)
+    nominal = RobotModel.from_yaml(robot_file, estimates=False)
     progress("reading", 0.0)
     poses = read_poses(list(files), nominal, require_motion=False)
     progress("reading", 1.0)
     progress("visits", 0.0)
     visited = repeatability(poses)
     progress("visits", 0.5)
-    calibrated = _calibrated(robot, estimates, nominal)
+    calibrated = _calibrated(robot_file, estimates, nominal)
     errors: dict[str, np.ndarray] = {}
     before = uncalibrated_model(nominal, poses).errors(poses).robots_own
     if before is not None:
@@ -183,7 +182,7 @@ def repeat_robot(
     progress("visits", 1.0)
     stored = None if calibrated is None else calibrated.stored
     blocks = () if calibrated is None else tuple(calibrated.blocks)
-    origin = provenance([robot, nominal.urdf, *files], None, stored, blocks)
+    origin = provenance([robot_file, nominal.urdf, *files], None, stored, blocks)
     result = RobotRepeatability(
         poses, visited, errors, pose_drifts(poses, visited), RunRecord(origin, command)
     )
@@ -195,11 +194,11 @@ def repeat_robot(
     return result
 
 
-def _calibrated(robot: Path, estimates: Path | None, nominal: RobotModel) -> CalibratedRobot | None:
+def _calibrated(robot_file: Path, estimates: Path | None, nominal: RobotModel) -> CalibratedRobot | None:
     """The calibrated robot; None where none was named and there is none beside robot.yaml."""
     if estimates is None and not stored_estimates(nominal, None).exists():
         return None
-    return calibrated_robot(robot, estimates, "compare with")
+    return CalibratedRobot.from_yaml(robot_file, estimates)
 
 
 def _spread(values: Sequence[float]) -> dict[str, float] | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -41,33 +41,30 @@ from flexcal.jobs.calibration import (
 )
 from flexcal.jobs.inputs import (
     CalibratedRobot,
-    calibrated_robot,
     is_station_identified,
     require_distinct_files,
 )
-from flexcal.jobs.pages import report_folder
-from flexcal.jobs.result_files import RunRecord, header, write_arm, write_points, write_results
-from flexcal.model.robot import RobotModel
+from flexcal.jobs.pages import ReportedResult
+from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, header, write_arm, write_points
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust
 from flexcal.report.pages import verification_checks
 from flexcal.units import MILLIMETRE
 
 
-@dataclass(frozen=True, eq=False)
-class Verification:
-    """Errors of the calibrated robot `model` at `poses`, and `before` those of the uncalibrated one.
+@dataclass(frozen=True, eq=False, repr=False)
+class Verification(ReportedResult):
+    """Result of `verify`: errors of the calibrated robot `model` at `poses`, and `before` those of the uncalibrated one.
 
-    `covariance` is that of the errors, as predicted. `refit` says what was fitted to these poses, None where nothing: then `result` has
+    `covariance` is that of the errors, as predicted. `refit` says what was fitted to these poses, None where nothing: then `predicted` has
     leave-one-out errors, and `as_calibrated` those without. `better` has what would explain most of the errors placed again, None where
     nothing would. `uncalibrated` are points that the calibration did not measure and that were not refitted; `outside` says which poses
-    lie outside the joint ranges of the calibration. `fitted` are the files among them that the calibration was made from, `record` says
-    what all this comes from. Of very many points it is of a `sample`, and `everywhere` are the errors at all of them.
+    lie outside the joint ranges of the calibration. `fitted` are the files or points among them that the calibration was made from,
+    `record` says what all this comes from. Of very many points it is of a `sample`, and `everywhere` are the errors at all of them.
     """
 
-    model: RobotModel
     poses: PoseSet
-    result: PredictionErrors
+    predicted: PredictionErrors
     covariance: ErrorCovariance
     before: UncalibratedErrors
     refit: RefittedVerification | None
@@ -76,16 +73,45 @@ class Verification:
     uncalibrated: tuple[str, ...]
     outside: str
     fitted: tuple[str, ...]
-    record: RunRecord
+    record: RunRecord = NOT_RECORDED
     sample: StratifiedSample | None = None
     everywhere: ErrorStatistics | None = None
 
     @property
+    def residuals(self) -> np.ndarray:
+        """Measured minus predicted positions (N, 3), m."""
+        return self.predicted.errors
+
+    @property
+    def errors(self) -> ErrorStatistics:
+        """Distances between predicted and measured points, at all poses."""
+        return self.everywhere or self.predicted.all
+
+    @property
+    def headline(self) -> str:
+        """The errors."""
+        return str(self.errors)
+
+    def summary(self) -> str:
+        """Errors, how large they were predicted to be, remarks and verdict."""
+        return "\n".join([self.predicted.summary(), *self.remarks, self.trust.sentence])
+
+    def write_arrays(self, folder: Path) -> None:
+        """Leave points.csv and arm.npz in a folder."""
+        points = self.points
+        write_points(folder, points)
+        write_arm(folder, arms_at(self.model, self.poses, points.shown))
+
+    @property
     def points(self) -> MeasuredPoints:
         """The points with the errors before and after."""
-        errors = errors_before(self.before) | {CALIBRATED: self.result.errors}
+        errors = errors_before(self.before) | {CALIBRATED: self.predicted.errors}
         return MeasuredPoints(
-            self.poses, errors, self.result.ambiguous, self.result.parameter_rms, self.result.scatter_rms
+            self.poses,
+            errors,
+            self.predicted.ambiguous,
+            self.predicted.parameter_rms,
+            self.predicted.scatter_rms,
         )
 
     @property
@@ -95,7 +121,7 @@ class Verification:
             *verification_subsample_remark(self.sample, self.everywhere),
             *ignored_columns_remarks(self.poses),
             *([self.outside] if self.outside else []),
-            *refit_remarks(self.result, self.poses, self.refit, self.better),
+            *refit_remarks(self.predicted, self.poses, self.refit, self.better),
         ]
         if self.uncalibrated:
             remarks.append(
@@ -125,8 +151,8 @@ class Verification:
         `parameters` is what the parameters' covariance predicts, `expected` with instrument, robot and model error on top (null where
         neither instrument nor robot are known), `measured` what was found.
         """
-        result = self.result
-        measured = (self.everywhere or result.all).in_millimetres()
+        result = self.predicted
+        measured = self.errors.in_millimetres()
         blocks = {"measured": measured, "measured_unambiguous": result.unambiguous.in_millimetres()}
         if self.as_calibrated is not None:
             blocks["as_calibrated"] = self.as_calibrated.all.in_millimetres()
@@ -156,8 +182,73 @@ class Verification:
         }
 
 
+def verify(
+    robot: CalibratedRobot, poses: PoseSet, *, refit: Sequence[Refit] = (), progress: Progress = silent
+) -> Verification:
+    """Compare a calibrated robot with points measured outside the fit.
+
+    Parameters
+    ----------
+    robot : CalibratedRobot
+        `Calibration.robot`, or ``CalibratedRobot.from_yaml(path)``.
+    poses : PoseSet
+        Joint positions (N, n) in rad or m and measured points (N, 3) in m, none of them fitted.
+    refit : sequence of {"station", "point"}
+        What is placed anew by these poses, the instrument or the measured points; the geometry stays, and errors are then leave-one-out.
+    progress : Progress
+        Told of the stages and their shares.
+
+    Returns
+    -------
+    Verification
+        Its `errors`, `residuals`, `before`, `summary()`, `report(path)` and `write(folder)`.
+
+    Raises
+    ------
+    FlexcalError
+        For measured lengths and orientations, and where a station was not calibrated and is not refitted.
+
+    Examples
+    --------
+    >>> from flexcal import RobotModel, calibrate, read_poses, verify
+    >>> model = RobotModel.from_yaml("examples/ur5_tracker/robot.yaml")
+    >>> calibration = calibrate(model, read_poses("examples/ur5_tracker/grid.csv", model))
+    >>> verification = verify(calibration.robot, read_poses("examples/ur5_tracker/random.csv", model))
+    >>> print(f"{verification.errors.mean * 1e3:.2f} mm")
+    0.09 mm
+    """
+    require_points(poses)
+    _require_stations(robot, poses, "station" in refit)
+    measured = poses
+    sample = StratifiedSample.of(measured)
+    poses = measured if sample is None else measured.subset(sample.rows)
+    unmeasured = tuple(name for name in poses.targets if name not in robot.measured)
+    model = robot.probable if unmeasured else robot.model
+    known = all(is_station_identified(model, station) for station in poses.stations)
+    stands = prediction_errors_with_covariance(model, poses) if known else None
+    anew = verify_refitted(model, poses, refit) if refit else None
+    verified = stands if anew is None else (anew.result, anew.covariance)
+    assert verified is not None
+    standing = model if anew is None else anew.model
+    return Verification(
+        model=standing,
+        poses=poses,
+        predicted=verified[0],
+        covariance=verified[1],
+        before=uncalibrated_model(robot.nominal, poses).errors(poses),
+        refit=anew,
+        as_calibrated=stands[0] if stands is not None and refit else None,
+        better=proposed_refit(model, poses, verified[0]) if anew is None else None,
+        uncalibrated=() if "point" in refit else unmeasured,
+        outside=outside_ranges(robot, measured.q),
+        fitted=already_fitted(robot, (), poses),
+        sample=sample,
+        everywhere=None if sample is None else all_errors(standing, measured, progress),
+    )
+
+
 def verify_robot(
-    robot: Path,
+    robot_file: Path,
     files: Sequence[Path],
     *,
     estimates: Path | None = None,
@@ -166,75 +257,47 @@ def verify_robot(
     command: str = "",
     progress: Progress = silent,
 ) -> Verification:
-    """Predict the points of `files` with the calibrated robot and compare.
+    """`verify` of the robot of a robot.yaml on files of measured poses.
 
-    `refit` names what is placed anew by these poses, the instrument (`station`), the measured points (`point`) or both; the geometry
-    stays, and errors are then leave-one-out. `estimates` is an estimates.yaml, or a folder with one, in place of that beside robot.yaml;
-    with `out`, results.json, points.csv, arm.npz and report.html are left in that folder. Raises `FlexcalError` where there is no
-    calibration, a station stands where no calibration pose was measured and is not refitted, or a file does not fit.
+    `estimates` is an estimates.yaml, or a folder with one, in place of that beside robot.yaml; with `out`, results.json, points.csv,
+    arm.npz and report.html are left in that folder. Raises `FlexcalError` as reading and `verify` do.
     """
     require_distinct_files(files)
-    calibrated = calibrated_robot(robot, estimates, "verify")
-    bare, blocks = calibrated.nominal, calibrated.blocks
+    robot = CalibratedRobot.from_yaml(robot_file, estimates)
     progress("reading", 0.0)
-    measured = verification_poses(calibrated, files, placed_again="station" in refit)
-    sample = StratifiedSample.of(measured)
-    poses = measured if sample is None else measured.subset(sample.rows)
+    poses = verification_poses(robot, files, placed_again="station" in refit)
     progress("reading", 1.0)
-    unmeasured = tuple(name for name in poses.targets if name not in calibrated.measured)
-    model = calibrated.probable if unmeasured else calibrated.model
-    before = uncalibrated_model(bare, poses).errors(poses)
-    origin = provenance([robot, bare.urdf, *files], None, calibrated.stored, tuple(blocks))
-    fitted = already_fitted(calibrated, files, poses)
-    known = all(is_station_identified(model, station) for station in poses.stations)
-    stands = prediction_errors_with_covariance(model, poses) if known else None
-    anew = verify_refitted(model, poses, refit) if refit else None
-    verified = stands if anew is None else (anew.result, anew.covariance)
-    assert verified is not None
-    standing = model if anew is None else anew.model
-    result = Verification(
-        model=standing,
-        poses=poses,
-        result=verified[0],
-        covariance=verified[1],
-        before=before,
-        refit=anew,
-        as_calibrated=stands[0] if stands is not None and refit else None,
-        better=proposed_refit(model, poses, verified[0]) if anew is None else None,
-        uncalibrated=() if "point" in refit else unmeasured,
-        outside=outside_ranges(calibrated, measured.q),
-        fitted=fitted,
-        record=RunRecord(origin, command),
-        sample=sample,
-        everywhere=None if sample is None else all_errors(standing, measured, progress),
-    )
+    verification = verify(robot, poses, refit=refit, progress=progress)
+    origin = provenance([robot_file, robot.nominal.urdf, *files], None, robot.stored, tuple(robot.blocks))
+    fitted = already_fitted(robot, files, verification.poses)
+    result = replace(verification, fitted=fitted, record=RunRecord(origin, command))
     if out is not None:
-        write_results(out, result.document())
-        write_points(out, result.points)
-        write_arm(out, arms_at(model, poses, result.points.shown))
-        report_folder(out)
+        result.write(out)
     return result
 
 
 def verification_poses(
-    calibrated: CalibratedRobot, files: Sequence[Path], *, placed_again: bool = False
+    robot: CalibratedRobot, files: Sequence[Path], *, placed_again: bool = False
 ) -> PoseSet:
     """Measured points of the `files`, from stations that the calibration found, or any with `placed_again`.
 
     Raises `FlexcalError` where they are not that.
     """
-    model = calibrated.model
-    poses = read_poses(list(files), model, require_motion=False)
+    poses = read_poses(list(files), robot.model, require_motion=False)
     require_points(poses, " and ".join(str(file) for file in files))
+    _require_stations(robot, poses, placed_again)
+    return poses
+
+
+def _require_stations(robot: CalibratedRobot, poses: PoseSet, placed_again: bool) -> None:
     for station in poses.stations:
-        if not placed_again and not is_station_identified(model, station):
+        if not placed_again and not is_station_identified(robot.model, station):
             raise FlexcalError(
                 "E-RUN-008",
                 f"the station '{station}' was not calibrated, so its position is unknown; add poses measured from there to the "
                 "calibration, "
                 "or fit it to these poses: 'flexcal verify' with --refit station.",
             )
-    return poses
 
 
 def _rms(distance: np.ndarray) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +21,10 @@ from flexcal.calibration.verification import (
     uncalibrated_model,
 )
 from flexcal.data.plans import page_beside
+from flexcal.data.poses import PoseSet
 from flexcal.data.tables import write_table
 from flexcal.design.scene import CollisionChecker
-from flexcal.errors import InputError, naming
+from flexcal.errors import FlexcalError, InputError
 from flexcal.files.formats import provenance
 from flexcal.jobs.accuracy.registration_refit import proposed_refit, refit_remarks
 from flexcal.jobs.accuracy.verification import verification_poses
@@ -31,12 +32,12 @@ from flexcal.jobs.calibration import already_fitted, outside_ranges
 from flexcal.jobs.experiments import box_corners, working_file, working_volume
 from flexcal.jobs.inputs import (
     CalibratedRobot,
-    calibrated_robot,
     is_station_identified,
     require_distinct_files,
     unmeasured_targets_remark,
 )
-from flexcal.jobs.result_files import RunRecord
+from flexcal.jobs.pages import Result
+from flexcal.jobs.result_files import NOT_RECORDED, RunRecord
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust, prediction_checks
 from flexcal.report.layout import write_page
@@ -50,28 +51,50 @@ _SOURCE_POSES = 200
 """Poses at which the sources of the error are averaged."""
 
 
-@dataclass(frozen=True, eq=False)
-class AccuracyMap:
-    """The map as it is to be believed, its worst rows, where its errors come from, and what verification poses say.
+@dataclass(frozen=True, eq=False, repr=False)
+class AccuracyMap(Result):
+    """Result of `accuracy_map`: the map as it is to be believed, its worst rows, where its errors come from, and what poses outside say.
 
-    `scale` is what they say of the map, `before` of the uncalibrated robot; `unmeasured` what there is to say of a point that the
-    calibration did not measure. `box` (2, 3) m, None for given poses or anywhere; `sources` over all poses, `worst_sources` at each of the
-    `worst` rows. `record` says what this comes from. `sample` says which of very many verification points were taken.
+    `scale` is what verification poses say of the map, `before` of the uncalibrated robot; `unmeasured` what there is to say of a point that
+    the calibration did not measure. `box` (2, 3) m, None for given poses or anywhere; `sources` over all poses, `worst_sources` at each of
+    the `worst` rows. `record` says what this comes from. `sample` says which of very many verification points were taken.
     """
 
     reach: Propagation
-    map: PredictedAccuracy
+    predicted: PredictedAccuracy
     box: np.ndarray | None
     worst: np.ndarray
     sources: dict[str, float]
     worst_sources: dict[str, np.ndarray]
     scale: ErrorScale | None
     before: UncalibratedErrors | None
+    verification: PredictionErrors | None
     unmeasured: tuple[str, ...]
     fitted: tuple[str, ...]
     outside: str
-    record: RunRecord
     sample: StratifiedSample | None = None
+    record: RunRecord = NOT_RECORDED
+
+    @property
+    def headline(self) -> str:
+        """Median and largest 95 % bound of the error."""
+        bound = _quantiles(self.predicted.p95)
+        return (
+            f"95 % bound of the tool's error at {len(self.predicted.q)} poses: median {bound['median_mm']:.3f}, "
+            f"largest {bound['worst_mm']:.3f} mm"
+        )
+
+    def summary(self) -> str:
+        """The bound, the shares of its sources, remarks and verdict."""
+        shares = ", ".join(f"{kind} {100 * share:.0f} %" for kind, share in self.sources.items())
+        return "\n".join([self.headline, f"sources: {shares}", *self.remarks, self.trust.sentence])
+
+    def report(self, path: str | Path) -> Path:
+        """Write the map as one HTML page; returns its path."""
+        path = Path(path)
+        study = MapStudy(self.model, self.predicted, self.box, self.document(), self.scale, self.verification)
+        write_page(path, map_page(study))
+        return path
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -106,7 +129,7 @@ class AccuracyMap:
 
     def document(self) -> dict[str, Any]:
         """The JSON document."""
-        predicted, scale = self.map, self.scale
+        predicted, scale = self.predicted, self.scale
         return {
             "poses": len(predicted.q),
             "target": self.reach.target,
@@ -114,7 +137,7 @@ class AccuracyMap:
             "payload_kg": self.reach.payload,
             "box_m": self.box,
             "before": None if self.before is None else self.before.document(),
-            "predicted": {"mean": _spread(predicted.mean), "p95": _spread(predicted.p95)},
+            "predicted": {"mean": _quantiles(predicted.mean), "p95": _quantiles(predicted.p95)},
             "sources": self.sources,
             "worst": [
                 {
@@ -144,8 +167,82 @@ def error_scale_factor(scale: ErrorScale | None) -> float:
     return scale.factor if scale is not None and scale.low > 1 else 1.0
 
 
+def accuracy_map(
+    robot: CalibratedRobot,
+    *,
+    box: np.ndarray | None = None,
+    q: np.ndarray | None = None,
+    count: int = 20_000,
+    verification: PoseSet | None = None,
+    payload: float | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> AccuracyMap:
+    """Predict the error of a calibrated robot's tool over its working volume, from the covariance of the calibration.
+
+    Parameters
+    ----------
+    robot : CalibratedRobot
+        `Calibration.robot`, or ``CalibratedRobot.from_yaml(path)``.
+    box : ndarray, optional
+        Smallest and largest x, y, z (2, 3), m, in the base frame; by default what robot.yaml declares, else anywhere.
+    q : ndarray, optional
+        Joint positions (N, n), rad or m, to take instead of random ones.
+    count : int
+        Number of random poses.
+    verification : PoseSet, optional
+        Points measured outside the fit. Where errors there are larger than predicted, the map is scaled up; never down.
+    payload : float, optional
+        Mass, kg; by default as declared.
+    seed : int
+        Seed of the random poses.
+    progress : Progress
+        Told of the stages and their shares.
+
+    Returns
+    -------
+    AccuracyMap
+        `predicted.position` (N, 3), `predicted.mean` and `predicted.p95` (N,), m; `sources`, `summary()` and `report(path)`.
+
+    Raises
+    ------
+    FlexcalError
+        Where the robot does not reach the box, and where the verification poses were measured from another place than the calibration's.
+    """
+    model = robot.model
+    stations = [s for s in model.stations if is_station_identified(model, s)]
+    reach = propagation(model, station=stations[0] if stations else None, payload=payload)
+    check = None if verification is None else _Check.of(robot, verification)
+    rng = np.random.default_rng([seed, 7])
+    if q is None:
+        declared = model.config.working_volume
+        if box is None and declared is not None:
+            box = np.array([declared.lower, declared.upper])
+        q = random_poses_in(reach, count, rng, box, progress)
+    scale = None if check is None else check.scale
+    predicted = predicted_accuracy(reach, q, progress=progress).scaled(error_scale_factor(scale))
+    worst = _worst(predicted)
+    some = q[rng.permutation(len(q))[:_SOURCE_POSES]]
+    return AccuracyMap(
+        model,
+        reach,
+        predicted,
+        box,
+        worst,
+        {kind: float(values.mean()) for kind, values in error_sources(reach, some).items()},
+        error_sources(reach, q[worst]),
+        scale,
+        None if check is None else check.before,
+        None if check is None else check.errors,
+        unmeasured_targets_remark(robot, [reach.target]),
+        () if check is None else check.fitted,
+        outside_ranges(robot, q),
+        None if check is None else check.sample,
+    )
+
+
 def map_accuracy(
-    robot: Path,
+    robot_file: Path,
     out: Path,
     *,
     working: str | None = None,
@@ -157,105 +254,72 @@ def map_accuracy(
     command: str = "",
     progress: Progress = silent,
 ) -> AccuracyMap:
-    """Predict the tool's error at `count` random poses in a box, or at the poses or points of a file, and write the map to `out`.
+    """`accuracy_map` of the robot of a robot.yaml, written to `out`, a page (.html), or a table (.csv, .parquet) with the page beside it.
 
     `working` is a box "x:X,y:Y,z:Z", m, base frame, or a file as `read_working` reads it; None for what robot.yaml declares, else anywhere.
-    `out` is a page (.html), or a table (.csv, .parquet) with the page beside it. `payload` in kg, None for the declared one. Raises
-    `FlexcalError` where there is no calibration, files do not fit, or the robot does not reach.
+    `verification` are files of measured poses. Raises `FlexcalError` where there is no calibration, files do not fit, and as
+    `accuracy_map` does.
     """
     if out.suffix not in (".html", ".csv", ".parquet"):
         raise InputError("E-RUN-009", f"{out} must end in .html, .csv or .parquet; give another --out.")
     require_distinct_files(verification)
-    calibrated = calibrated_robot(robot, estimates, "map")
-    model = calibrated.model
-    stations = [s for s in model.stations.names if is_station_identified(model, s)]
-    reach = propagation(model, station=stations[0] if stations else None, payload=payload)
-    scale, before, study, fitted, sample = _verified(calibrated, verification)
-    rng = np.random.default_rng([seed, 7])
-    box, q = _poses(reach, working, count, seed, rng, progress)
-    predicted = predicted_accuracy(reach, q, progress=progress).scaled(error_scale_factor(scale))
-    worst = _worst(predicted)
-    some = q[rng.permutation(len(q))[:_SOURCE_POSES]]
-    shares = {kind: float(values.mean()) for kind, values in error_sources(reach, some).items()}
+    robot = CalibratedRobot.from_yaml(robot_file, estimates)
+    poses = verification_poses(robot, verification) if verification else None
+    box, q = None, None
     place = working_file(working)
+    if place is not None:
+        volume = working_volume(CollisionChecker(robot.model), working, seed)
+        assert volume is not None
+        q = volume.q
+    elif working is not None:
+        box = box_corners(working)
+    accuracy = accuracy_map(
+        robot,
+        box=box,
+        q=q,
+        count=count,
+        verification=poses,
+        payload=payload,
+        seed=seed,
+        progress=progress,
+    )
     origin = provenance(
-        [robot, calibrated.nominal.urdf, *verification, *(() if place is None else (place,))],
+        [robot_file, robot.nominal.urdf, *verification, *(() if place is None else (place,))],
         {"seed": seed},
-        calibrated.stored,
-        tuple(calibrated.blocks),
+        robot.stored,
+        tuple(robot.blocks),
     )
-    sources = error_sources(reach, q[worst])
-    result = AccuracyMap(
-        reach,
-        predicted,
-        box,
-        worst,
-        shares,
-        sources,
-        scale,
-        before,
-        unmeasured_targets_remark(calibrated, [reach.target]),
-        fitted,
-        outside_ranges(calibrated, q),
-        RunRecord(origin, command),
-        sample,
-    )
-    page = MapStudy(model, predicted, box, result.document(), scale, study)
+    fitted = already_fitted(robot, verification, poses) if poses is not None else ()
+    result = replace(accuracy, fitted=fitted, record=RunRecord(origin, command))
     if out != page_beside(out):
-        _write_table(out, predicted)
-    write_page(page_beside(out), map_page(page))
+        _write_table(out, result.predicted)
+    result.report(page_beside(out))
     return result
 
 
-def _poses(
-    reach: Propagation,
-    working: str | None,
-    count: int,
-    seed: int,
-    rng: np.random.Generator,
-    progress: Progress,
-) -> tuple[np.ndarray | None, np.ndarray]:
-    """The box, where there is one, and the poses."""
-    if working_file(working) is not None:
-        place = working_volume(CollisionChecker(reach.model), working, seed)
-        assert place is not None
-        return None, place.q
-    declared = reach.model.config.working_volume
-    box = None
-    if working is not None:
-        box = box_corners(working)
-    elif declared is not None:
-        box = np.array([declared.lower, declared.upper])
-    return box, random_poses_in(reach, count, rng, box, progress)
+@dataclass(frozen=True, eq=False)
+class _Check:
+    """What verification poses say: their errors, those before, how large they are against their prediction, and what was fitted."""
 
+    errors: PredictionErrors
+    before: UncalibratedErrors
+    scale: ErrorScale
+    fitted: tuple[str, ...]
+    sample: StratifiedSample | None
 
-def _verified(
-    calibrated: CalibratedRobot, files: Sequence[Path]
-) -> tuple[
-    ErrorScale | None,
-    UncalibratedErrors | None,
-    PredictionErrors | None,
-    tuple[str, ...],
-    StratifiedSample | None,
-]:
-    """How large errors at the poses of the `files` are against their prediction, those before, the verification, what was fitted, and which
-    of very many poses were taken."""
-    if not files:
-        return None, None, None, (), None
-    poses = verification_poses(calibrated, files)
-    sample = StratifiedSample.of(poses)
-    poses = poses if sample is None else poses.subset(sample.rows)
-    verification, covariance = prediction_errors_with_covariance(calibrated.model, poses)
-    if (moved := proposed_refit(calibrated.model, poses, verification)) is not None:
-        (said,) = refit_remarks(verification, poses, None, moved)
-        named = " and ".join(str(file) for file in files)
-        raise InputError(
-            "E-RUN-010", f"{named} cannot verify the map: {said}; give points measured as the calibration's."
-        )
-    before = uncalibrated_model(calibrated.nominal, poses).errors(poses)
-    with naming(files[0]):
-        scale = error_scale(verification, covariance)
-    return scale, before, verification, already_fitted(calibrated, files, poses), sample
+    @classmethod
+    def of(cls, robot: CalibratedRobot, poses: PoseSet) -> _Check:
+        sample = StratifiedSample.of(poses)
+        poses = poses if sample is None else poses.subset(sample.rows)
+        errors, covariance = prediction_errors_with_covariance(robot.model, poses)
+        if (moved := proposed_refit(robot.model, poses, errors)) is not None:
+            (said,) = refit_remarks(errors, poses, None, moved)
+            raise FlexcalError(
+                "E-RUN-010",
+                f"the verification poses cannot verify the map: {said}; give points measured as the calibration's.",
+            )
+        before = uncalibrated_model(robot.nominal, poses).errors(poses)
+        return cls(errors, before, error_scale(errors, covariance), already_fitted(robot, (), poses), sample)
 
 
 def _worst(predicted: PredictedAccuracy) -> np.ndarray:
@@ -277,7 +341,7 @@ def _write_table(out: Path, predicted: PredictedAccuracy) -> None:
     write_table(out, columns | errors)
 
 
-def _spread(values: np.ndarray) -> dict[str, float]:
+def _quantiles(values: np.ndarray) -> dict[str, float]:
     """Median, P90 and maximum over the poses, mm."""
     median, most, worst = (float(v) / MILLIMETRE for v in np.quantile(values, [0.5, 0.9, 1.0]))
     return {"median_mm": median, "p90_mm": most, "worst_mm": worst}

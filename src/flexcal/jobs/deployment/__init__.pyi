@@ -1,12 +1,16 @@
-from .compensation import compensate_robot
+from .compensation import Compensation, compensate, compensate_robot
 from .export import ExportedRobot, export_dh, export_offsets, export_robot
-from .prediction import predict_robot
+from .prediction import Prediction, predict, predict_robot
 
 __all__ = [
+    "Compensation",
     "ExportedRobot",
+    "Prediction",
+    "compensate",
     "compensate_robot",
     "export_dh",
     "export_offsets",
     "export_robot",
+    "predict",
     "predict_robot",
 ]

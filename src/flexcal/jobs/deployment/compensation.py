@@ -13,8 +13,9 @@ from flexcal.calibration.fit import KNOWN_POINT_STD, point_uncertainty
 from flexcal.compensation import MotorCommands, best_posture, motor_commands
 from flexcal.data.poses import ToolTargets, read_targets, write_commands
 from flexcal.data.tables import TableFile, open_table
-from flexcal.errors import FlexcalError, InputError
-from flexcal.jobs.inputs import calibrated_robot, is_station_identified
+from flexcal.errors import FlexcalError, InputError, naming
+from flexcal.jobs.inputs import CalibratedRobot, is_station_identified
+from flexcal.jobs.pages import Result
 from flexcal.model.kinematics import found_xyz, joint_limits
 from flexcal.model.robot import RobotModel, with_point_at_frame
 from flexcal.model.statics import points_kinematics
@@ -25,20 +26,36 @@ _FAR = 0.25
 """Of the reach: points that are farther than this from the joint positions beside them do not belong to them."""
 
 
-@dataclass(frozen=True, eq=False)
-class Compensation:
-    """The commands for the `targets` of a `file`; `start` (n,): where inverse kinematics started, None with joint positions.
+@dataclass(frozen=True, eq=False, repr=False)
+class Compensation(Result):
+    """Result of `compensate`: motor commands for tool `targets`.
 
-    `nominal` is the uncalibrated robot with the `measured` points where they were found.
+    `commands` has the command of every target, or the reason why it has none. `start` (n,): where inverse kinematics started, None with
+    joint positions. `nominal` is the uncalibrated robot with the `measured` points where they were found. `table` is the file that the
+    targets were read from, if any.
     """
 
-    model: RobotModel
-    file: TableFile
     targets: ToolTargets
-    result: MotorCommands
+    commands: MotorCommands
     start: np.ndarray | None
     nominal: RobotModel
     measured: tuple[str, ...]
+    table: TableFile | None = None
+
+    @property
+    def headline(self) -> str:
+        """How many targets have a command, and how far the tool would be off without."""
+        before = self.commands.before[self.commands.reached] / MILLIMETRE
+        return (
+            f"commands for {int(self.commands.reached.sum())} of {len(self.targets)} targets, errors with nominal commands: "
+            f"mean {before.mean():.3f}, max {before.max():.3f} mm"
+        )
+
+    def summary(self) -> str:
+        """How many targets have a command, and the reasons of the others."""
+        return "\n".join(
+            [self.headline, *(f"pose {item['pose']}: {item['reason']}" for item in self.refused)]
+        )
 
     @property
     def refused(self) -> list[dict[str, Any]]:
@@ -46,10 +63,10 @@ class Compensation:
         return [
             {
                 "pose": int(self.targets.pose[k]),
-                self.file.row_word: int(self.file.first + k),
-                "reason": str(self.result.reason[k]),
+                **({} if self.table is None else {self.table.row_word: int(self.table.first + k)}),
+                "reason": str(self.commands.reason[k]),
             }
-            for k in np.flatnonzero(~self.result.reached)
+            for k in np.flatnonzero(~self.commands.reached)
         ]
 
     @property
@@ -74,15 +91,15 @@ class Compensation:
 
     def document(self) -> dict[str, Any]:
         """The JSON document; `error_before_mm` is how far the real tool would be off with the nominal commands."""
-        result, reached = self.result, self.result.reached
-        before = result.before[reached] / MILLIMETRE
-        change = np.abs(result.q - result.nominal)[reached].max(axis=0)
+        commands, reached = self.commands, self.commands.reached
+        before = commands.before[reached] / MILLIMETRE
+        change = np.abs(commands.q - commands.nominal)[reached].max(axis=0)
         return {
             "targets": len(self.targets),
             "points": self.points,
             "points_not_found_m": self.lost_points,
             "compensated": int(reached.sum()),
-            "ambiguous": int((reached & ~result.unambiguous).sum()),
+            "ambiguous": int((reached & ~commands.unambiguous).sum()),
             "error_before_mm": {
                 "mean_mm": float(before.mean()),
                 "p90_mm": float(np.quantile(before, 0.9)),
@@ -92,13 +109,79 @@ class Compensation:
             "start": None
             if self.start is None
             else dict(zip(self.model.joint_names, self.start.tolist(), strict=True)),
-            "from_other_postures": self.targets.pose[reached & result.elsewhere].tolist(),
+            "from_other_postures": self.targets.pose[reached & commands.elsewhere].tolist(),
             "refused": self.refused,
         }
 
 
+def compensate(
+    robot: CalibratedRobot,
+    targets: ToolTargets,
+    *,
+    frame: str | None = None,
+    start: Sequence[float] = (),
+    progress: Progress = silent,
+) -> Compensation:
+    """Compute the motor commands that bring the tool of a calibrated robot to its targets.
+
+    Geometry, deflection under gravity and payload, and backlash are compensated. The desired poses are those of the nominal robot with the
+    measured point where it was found, so that a ruler's error in its position is not put into the commands. A target that cannot be
+    reached has no command; the others keep theirs.
+
+    Parameters
+    ----------
+    robot : CalibratedRobot
+        `Calibration.robot`, or ``CalibratedRobot.from_yaml(path)``.
+    targets : ToolTargets
+        Nominal joint positions (N, n), rad or m; or positions (N, 3), m, with orientations where they matter; or both.
+    frame : str, optional
+        URDF frame whose origin is brought to the targets, in place of the points that `targets` name.
+    start : sequence of float
+        Joint positions (n,), rad or m, where inverse kinematics starts for targets without their own; by default a posture far from
+        singular.
+    progress : Progress
+        Told of the stages and their shares.
+
+    Returns
+    -------
+    Compensation
+        `commands.q` (N, n), rad or m, with `commands.reached` and `commands.reason`.
+
+    Raises
+    ------
+    FlexcalError
+        Where no target can be reached, for points that are in another frame than said, and for a station that was not calibrated.
+    """
+    model, nominal = robot.probable, robot.with_points
+    if frame is not None:
+        model, nominal = with_point_at_frame(model, frame), with_point_at_frame(nominal, frame)
+        targets = replace(targets, target=np.full(len(targets), frame))
+    for station in dict.fromkeys([] if targets.station is None else targets.station.tolist()):
+        if not is_station_identified(model, station):
+            raise FlexcalError(
+                "E-RUN-014",
+                f"the station '{station}' was not calibrated, so its position is unknown; give points in the base frame.",
+            )
+    _check_frame(nominal, targets)
+    origin = None
+    if targets.q is None:
+        origin = _start(nominal, start) if len(start) else best_posture(nominal, str(targets.target[0]))
+    elif len(start):
+        raise FlexcalError(
+            "E-RUN-015",
+            "it has joint positions, which are the start of the inverse kinematics; leave --start out.",
+        )
+    commands = motor_commands(model, nominal, targets, start=origin, progress=progress)
+    if not commands.reached.any():
+        raise FlexcalError(
+            "E-RUN-016",
+            f"none of the {len(targets)} targets can be compensated; pose {targets.pose[0]}: {commands.reason[0]}.",
+        )
+    return Compensation(model, targets, commands, origin, nominal, robot.measured)
+
+
 def compensate_robot(
-    robot: Path,
+    robot_file: Path,
     file: Path,
     out: Path,
     *,
@@ -108,74 +191,42 @@ def compensate_robot(
     start: Sequence[float] = (),
     progress: Progress = silent,
 ) -> Compensation:
-    """Write the motor commands that bring the calibrated robot's tool to the targets of `file` to `out`, CSV or Parquet.
+    """`compensate` for the targets of `file`; the commands go to `out`, CSV or Parquet.
 
     The targets are of the point `target` under `points:`, or of the origin of the URDF frame `frame`; by default of what the column
-    `target` says, or the first point. Wanted poses are those of the nominal robot with the measured point where it was found, so that
-    its ruler's error is not put into the commands.
-
-    A target without a command is left out there, and stands with its reason in the result; the others keep their numbers and order. `start`
-    (n values, rad or m; none: a posture far from singular) is where inverse kinematics starts for targets without joint positions.
-    Raises `FlexcalError` where there is no calibration, a file does not fit, points are in another frame than said, or no target can be
-    compensated: then nothing is written.
+    `target` says, or the first point. A target without a command is left out there, and stands with its reason in the result. Raises
+    `FlexcalError` where there is no calibration, a file does not fit, and as `compensate` does: then nothing is written.
     """
-    calibrated = calibrated_robot(robot, estimates, "compensate with")
+    robot = CalibratedRobot.from_yaml(robot_file, estimates)
     if target is not None:
-        calibrated.nominal.point(target)
+        robot.nominal.point(target)
         if frame is not None:
             raise InputError("E-RUN-013", "--target and --frame exclude each other; give one of them.")
-    model, nominal = (
-        robot_ if frame is None else with_point_at_frame(robot_, frame)
-        for robot_ in (calibrated.probable, calibrated.with_points)
-    )
-    targets = _of_point(read_targets(file, model), file, target if frame is None else frame)
-    for station in dict.fromkeys([] if targets.station is None else targets.station.tolist()):
-        if not is_station_identified(model, station):
-            raise InputError(
-                "E-RUN-014",
-                f"{file}: the station '{station}' was not calibrated, so its position is unknown; give points in the base frame.",
-            )
-    _check_frame(file, nominal, targets)
-    origin = None
-    if targets.q is None:
-        origin = _start(nominal, start) if len(start) else best_posture(nominal, str(targets.target[0]))
-    elif len(start):
-        raise InputError(
-            "E-RUN-015",
-            f"{file} has joint positions, which are the start of the inverse kinematics; leave --start out.",
-        )
-    result = motor_commands(model, nominal, targets, start=origin, progress=progress)
-    if not result.reached.any():
-        raise FlexcalError(
-            "E-RUN-016",
-            f"{file}: none of the {len(targets)} targets can be compensated; pose {targets.pose[0]}: {result.reason[0]}.",
-        )
-    reached = targets.subset(result.reached)
-    commands = ToolTargets(reached.pose, reached.target, result.q[result.reached], payload=reached.payload)
     table = open_table(file)
-    write_commands(out, model, commands, result.unambiguous[result.reached], table)
-    return Compensation(model, table, targets, result, origin, nominal, calibrated.measured)
-
-
-def _of_point(targets: ToolTargets, file: Path, name: str | None) -> ToolTargets:
-    """The targets as those of the point `name`, where one is given."""
-    if name is None:
-        return targets
-    if "target" in open_table(file).columns:
+    targets = read_targets(file, robot.probable)
+    if "target" in table.columns and (target is not None or frame is not None):
         raise InputError("E-RUN-017", f"{file} has a column 'target'; leave --target and --frame out.")
-    return replace(targets, target=np.full(len(targets), name))
+    if target is not None:
+        targets = replace(targets, target=np.full(len(targets), target))
+    with naming(file):
+        result = replace(compensate(robot, targets, frame=frame, start=start, progress=progress), table=table)
+    commands = result.commands
+    reached = targets.subset(commands.reached)
+    rows = ToolTargets(reached.pose, reached.target, commands.q[commands.reached], payload=reached.payload)
+    write_commands(out, result.model, rows, commands.unambiguous[commands.reached], table)
+    return result
 
 
-def _check_frame(file: Path, nominal: RobotModel, targets: ToolTargets) -> None:
-    """Raise `InputError` where points said to be in the base frame are far from where the joint positions beside them put the tool."""
+def _check_frame(nominal: RobotModel, targets: ToolTargets) -> None:
+    """Raise `FlexcalError` where points said to be in the base frame are far from where the joint positions beside them put the tool."""
     if targets.q is None or targets.position is None or targets.station is not None:
         return
     at = points_kinematics(nominal, targets.q, None, targets.target, jacobians=False).position
     away = float(np.median(np.linalg.norm(targets.position - at, axis=1)))
     if away > _FAR * nominal.reach:
-        raise InputError(
+        raise FlexcalError(
             "E-RUN-018",
-            f"{file}: x, y, z are {away:.3g} m (median) from where the nominal tool is at q1…q{nominal.n}; if they are in an instrument's "
+            f"x, y, z are {away:.3g} m (median) from where the nominal tool is at q1…q{nominal.n}; if they are in an instrument's "
             "frame, name its station in a column 'station', else correct one of them or leave q out.",
         )
 

@@ -10,7 +10,9 @@ import numpy as np
 
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.data.poses import ToolTargets, read_commands, write_targets
-from flexcal.jobs.inputs import calibrated_robot
+from flexcal.errors import FlexcalError
+from flexcal.jobs.inputs import CalibratedRobot
+from flexcal.jobs.pages import Result
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import carried_mass, certain_flank, points_kinematics, tool_at_rest
 from flexcal.progress import Progress, silent
@@ -19,16 +21,27 @@ _BLOCK = 20_000
 """Commands whose tool poses are computed together."""
 
 
-@dataclass(frozen=True, eq=False)
-class Prediction:
-    """Where the real tool is: `tool` in the base frame, `beside` (N, 3) m away from where the nominal robot has it.
+@dataclass(frozen=True, eq=False, repr=False)
+class Prediction(Result):
+    """Result of `predict`: where the real tool is.
 
-    `unambiguous` (N,): the flank of every backlash is certain there.
+    `tool` has its positions and orientations in the base frame; `beside` (N, 3) m is how far these are from where the nominal robot has
+    them. `unambiguous` (N,): the flank of every backlash is certain there.
     """
 
     tool: ToolTargets
     beside: np.ndarray
     unambiguous: np.ndarray
+
+    @property
+    def headline(self) -> str:
+        """Distance from the nominal robot's tool."""
+        return f"{len(self.tool)} poses, beside the nominal robot's: {ErrorStatistics.of(self.beside)}"
+
+    def summary(self) -> str:
+        """Distance from the nominal robot's tool, and poses whose flank is uncertain."""
+        ambiguous = int((~self.unambiguous).sum())
+        return self.headline + (f"\nflank of a backlash uncertain in {ambiguous} poses" if ambiguous else "")
 
     def document(self) -> dict[str, Any]:
         """The JSON document."""
@@ -39,27 +52,62 @@ class Prediction:
         }
 
 
-def predict_robot(
-    robot: Path, file: Path, out: Path, *, estimates: Path | None = None, progress: Progress = silent
-) -> Prediction:
-    """Write position and orientation of the real tool at the commands of `file`, in the base frame, to `out`, CSV or Parquet.
+def predict(robot: CalibratedRobot, commands: ToolTargets, *, progress: Progress = silent) -> Prediction:
+    """Predict the pose of the real tool for motor commands: geometry, deflection under gravity and payload, backlash.
 
-    Raises `FlexcalError` where there is no calibration or a file does not fit; then nothing is written.
+    Parameters
+    ----------
+    robot : CalibratedRobot
+        `Calibration.robot`, or ``CalibratedRobot.from_yaml(path)``.
+    commands : ToolTargets
+        Commanded joint positions `q` (N, n), rad or m, the names of the points (N,) that are looked at, and payloads (N,), kg, where
+        they are not as declared.
+    progress : Progress
+        Told of the stages and their shares.
+
+    Returns
+    -------
+    Prediction
+        `tool.position` (N, 3), m, and `tool.rotation` (N, 3, 3) in the base frame, and `beside`, the distances from the nominal robot's.
+
+    Raises
+    ------
+    FlexcalError
+        For targets without joint positions.
+
+    Examples
+    --------
+    >>> from flexcal import CalibratedRobot, predict, read_targets
+    >>> robot = CalibratedRobot.from_yaml("robot.yaml")  # doctest: +SKIP
+    >>> predict(robot, read_targets("commands.csv", robot.model)).tool.position  # doctest: +SKIP
     """
-    calibrated = calibrated_robot(robot, estimates, "predict with")
-    progress("reading", 0.0)
-    commands = read_commands(file, calibrated.probable)
-    progress("reading", 1.0)
+    if commands.q is None:
+        raise FlexcalError("E-RUN-094", "the commands hold no joint positions q; give those of the motors.")
     parts = []
     for first in range(0, len(commands), _BLOCK):
         progress("predicting", first / len(commands))
         block = commands.subset(slice(first, first + _BLOCK))
-        parts.append(_predicted(calibrated.probable, calibrated.with_points, block))
+        parts.append(_predicted(robot.probable, robot.with_points, block))
     progress("predicting", 1.0)
     position, rotation, beside, certain = (np.concatenate(part) for part in zip(*parts, strict=True))
     tool = replace(commands, q=None, position=position, rotation=rotation)
-    write_targets(out, tool)
-    return Prediction(tool, beside, certain)
+    return Prediction(robot.probable, tool, beside, certain)
+
+
+def predict_robot(
+    robot_file: Path, file: Path, out: Path, *, estimates: Path | None = None, progress: Progress = silent
+) -> Prediction:
+    """`predict` for the commands of `file`; the tool's poses go to `out`, CSV or Parquet.
+
+    Raises `FlexcalError` where there is no calibration or a file does not fit; then nothing is written.
+    """
+    robot = CalibratedRobot.from_yaml(robot_file, estimates)
+    progress("reading", 0.0)
+    commands = read_commands(file, robot.probable)
+    progress("reading", 1.0)
+    prediction = predict(robot, commands, progress=progress)
+    write_targets(out, prediction.tool)
+    return prediction
 
 
 def _predicted(

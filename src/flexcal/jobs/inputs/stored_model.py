@@ -21,12 +21,36 @@ TARGETS_BETWEEN = ", "
 
 @dataclass(frozen=True, eq=False)
 class CalibratedRobot:
-    """`nominal` as robot.yaml and URDF have it, `model` with the `blocks` of the estimates in the file `stored`."""
+    """A calibrated robot beside the nominal one: `model` is `nominal` with the `blocks` of its estimates.
+
+    `stored` is the file that these were read from, None where they were not.
+    """
 
     nominal: RobotModel
     model: RobotModel
-    stored: Path
     blocks: Mapping[Block, Estimate]
+    stored: Path | None = None
+
+    @classmethod
+    def from_yaml(cls, path: str | Path, estimates: str | Path | None = None) -> CalibratedRobot:
+        """Read robot.yaml and its estimates: a file, or a folder with an estimates.yaml, in place of that beside robot.yaml.
+
+        Raises `FlexcalError` as reading does, and `InputError` where there is no calibration.
+        """
+        nominal = RobotModel.from_yaml(path, estimates=False)
+        stored = stored_estimates(nominal, None if estimates is None else Path(estimates))
+        if not stored.exists():
+            raise InputError(
+                "E-RUN-055",
+                f"{stored} does not exist, so there is no calibration; run 'flexcal calibrate {nominal.path} POSES…' first.",
+            )
+        blocks = read_estimates(stored)
+        if "calibration" not in blocks:
+            raise InputError(
+                "E-RUN-056",
+                f"{stored}: there is no calibration in it; run 'flexcal calibrate {path} POSES…' first.",
+            )
+        return cls(nominal, with_blocks(nominal, blocks, stored), blocks, stored)
 
     @property
     def measured(self) -> tuple[str, ...]:
@@ -91,24 +115,3 @@ def stored_estimates(nominal: RobotModel, estimates: Path | None) -> Path:
 def is_station_identified(model: RobotModel, station: str) -> bool:
     """Whether the calibration estimated the placement of this station."""
     return f"station.{station}.x" in model.posterior.parameters
-
-
-def calibrated_robot(robot: Path, estimates: Path | None, task: str) -> CalibratedRobot:
-    """Read a robot and its estimates: a file, or a folder with an estimates.yaml, in place of that beside robot.yaml.
-
-    Raises `FlexcalError` as reading does, and `InputError` where there is no calibration, and so nothing to `task`.
-    """
-    nominal = RobotModel.from_yaml(robot, estimates=False)
-    stored = stored_estimates(nominal, estimates)
-    if not stored.exists():
-        raise InputError(
-            "E-RUN-055",
-            f"{stored} does not exist, so there is nothing to {task}; run 'flexcal calibrate {nominal.path} POSES…' first.",
-        )
-    blocks = read_estimates(stored)
-    if "calibration" not in blocks:
-        raise InputError(
-            "E-RUN-056",
-            f"{stored}: there is no calibration in it; run 'flexcal calibrate {robot} POSES…' first.",
-        )
-    return CalibratedRobot(nominal, with_blocks(nominal, blocks, stored), stored, blocks)

@@ -1,11 +1,12 @@
 from .comparison import compare_folders
 from .customer import customer_report
 from .report import REPORT, report_folder, two_stage_study
-from .result import Identification, Result, summary_row
+from .result import Identification, ReportedResult, Result, summary_row
 
 __all__ = [
     "REPORT",
     "Identification",
+    "ReportedResult",
     "Result",
     "compare_folders",
     "customer_report",

@@ -20,7 +20,7 @@ from flexcal.model.robot import RobotModel
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Result(ABC):
-    """Result of a verb about the robot `model`: a short `repr`, a summary in text, the content of results.json, and the report."""
+    """Result of a verb about the robot `model`: a short `repr`, a summary in text, and all numbers as a document."""
 
     model: RobotModel
 
@@ -35,17 +35,22 @@ class Result(ABC):
 
     @abstractmethod
     def document(self) -> dict[str, Any]:
-        """The content of results.json."""
-
-    @abstractmethod
-    def write_arrays(self, folder: Path) -> None:
-        """Leave the arrays of the result in a folder, beside results.json."""
+        """All numbers, as results.json or --json has them."""
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.model.name}: {self.headline}>"
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(self.summary())}</pre>"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ReportedResult(Result):
+    """Result with a report and a folder of files that it is made from."""
+
+    @abstractmethod
+    def write_arrays(self, folder: Path) -> None:
+        """Leave the arrays of the result in a folder, beside results.json."""
 
     def write(self, folder: str | Path) -> None:
         """Leave results.json, report.html and the arrays that it shows in a folder, which is created where it is missing."""
@@ -65,14 +70,14 @@ class Result(ABC):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Identification(Result):
+class Identification(ReportedResult):
     """Result of a verb that estimates parameters: `estimate`, which `model` has, is the block `block` of estimates.yaml."""
 
     block: ClassVar[Block]
     estimate: Estimate
 
     def write(self, folder: str | Path) -> None:
-        """As `Result.write`, with estimates.yaml, whose other blocks stay as they are."""
+        """As `ReportedResult.write`, with estimates.yaml, whose other blocks stay as they are."""
         write_estimates(Path(folder) / ESTIMATES, self.block, self.estimate)
         super().write(folder)
 

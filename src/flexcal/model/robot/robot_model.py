@@ -13,6 +13,7 @@ import numpy as np
 
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
+from flexcal.files.formats import Block
 from flexcal.files.structuring import suggestion
 from flexcal.files.transaction import current_path
 from flexcal.kernels import Tree
@@ -79,14 +80,23 @@ class RobotModel:
     sensors: Mapping[str, ArmSensor] = field(default_factory=dict)
 
     @classmethod
-    def from_yaml(cls, path: str | Path, *, estimates: bool = True) -> RobotModel:
-        """Read robot.yaml, its URDF and, where present, the estimates beside it; raises `InputError` with file and line."""
+    def from_yaml(
+        cls, path: str | Path, *, estimates: bool = True, without: Block | None = None
+    ) -> RobotModel:
+        """Read robot.yaml, its URDF and, where present and wanted, the estimates beside it, all blocks or all but one.
+
+        Raises `InputError` with file and line.
+        """
         from flexcal.model.robot.loading import read_robot
         from flexcal.model.robot.stored_estimates import apply_estimates
 
         model = read_robot(cls, Path(path))
         stored = model.path.parent / model.config.estimates
-        return apply_estimates(model, stored) if estimates and current_path(stored).exists() else model
+        return (
+            apply_estimates(model, stored, without=without)
+            if estimates and current_path(stored).exists()
+            else model
+        )
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the kernels' view, which is built anew where the robot arrives: other processes can be handed robots."""

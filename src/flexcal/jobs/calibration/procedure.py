@@ -1,0 +1,200 @@
+"""Calibration from measured positions: rigid fit, bearing axes, selection of terms, final fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from flexcal.calibration.diagnostics import (
+    compare_bearings,
+)
+from flexcal.calibration.error_model import TRANSMISSION
+from flexcal.calibration.fit import (
+    PER_JOINT,
+    GeometricFit,
+    LossName,
+    StratifiedSample,
+    all_errors,
+    fit_geometry,
+)
+from flexcal.calibration.measurement import require_points
+from flexcal.calibration.term_selection import (
+    cross_validated,
+    select_terms,
+)
+from flexcal.calibration.verification import (
+    uncalibrated_model,
+)
+from flexcal.data.poses import PoseSet
+from flexcal.errors import FlexcalError
+from flexcal.files.formats import provenance
+from flexcal.jobs.calibration.fitted_measurements import measurement_digests
+from flexcal.jobs.calibration.joint_ranges import joint_extents
+from flexcal.jobs.calibration.result import Calibration
+from flexcal.jobs.inputs import TARGETS, TARGETS_BETWEEN, is_station_identified
+from flexcal.model.robot import RobotModel
+from flexcal.progress import Progress, silent
+
+AUTO = "auto"
+
+
+def calibrate(
+    model: RobotModel,
+    poses: PoseSet,
+    *,
+    terms: Sequence[str] | None = None,
+    loss: LossName = "auto",
+    secant_scale: float = 0.0,
+    elasticity: Literal["reestimated", "marginalised"] = "reestimated",
+    progress: Progress = silent,
+) -> Calibration:
+    """Calibrate the geometry of a robot from measured points, with its elastic deflection taken into account.
+
+    A rigid fit, the choice of the bearing axes where robot.yaml leaves them open, the selection of terms by cross-validation and the
+    final fit, as 'flexcal calibrate' does them (Neubauer et al. 2015, sections 3 and 5).
+
+    Parameters
+    ----------
+    model : RobotModel
+        Nominal robot, with the dynamics and stiffness that were identified, and without an earlier calibration:
+        ``RobotModel.from_yaml(path, without="calibration")``.
+    poses : PoseSet
+        Joint positions (N, n) in rad or m and measured points (N, 3) in m. Its sigma is that of the instrument; the scatter of robot
+        and model are estimated from the points. Of very many points a stratified sample is fitted.
+    terms : sequence of str, optional
+        Names of the error terms, or "auto" alone for those that cross-validation supports; by default as robot.yaml declares.
+    loss : {"auto", "squares", "huber", "cauchy"}
+        Loss function; "auto" takes the robust "cauchy" where squares leave outliers.
+    secant_scale : float
+        Relative standard deviation of the ratio of each drive's secant stiffness under gravity to its tangent stiffness.
+    elasticity : {"reestimated", "marginalised"}
+        How the uncertainty of stiffness and inertia enters; both give the same estimate to first order.
+    progress : Progress
+        Told of the stages and their shares.
+
+    Returns
+    -------
+    Calibration
+        Its `model`, `estimate`, `residuals`, `errors`, `summary()`, `report(path)` and `write(folder)`; its `robot` is what `verify`,
+        `predict`, `compensate` and `accuracy_map` take.
+
+    Raises
+    ------
+    FlexcalError
+        For a robot that has been calibrated already, an unknown term, measured lengths and orientations, fewer coordinates than
+        parameters, joints that never move, and stations that robot.yaml does not know.
+
+    Examples
+    --------
+    >>> from flexcal import RobotModel, calibrate, read_poses
+    >>> model = RobotModel.from_yaml("examples/ur5_tracker/robot.yaml")
+    >>> calibration = calibrate(model, read_poses("examples/ur5_tracker/grid.csv", model))
+    >>> print(f"{calibration.errors.mean * 1e3:.2f} mm")
+    0.08 mm
+    """
+    _require_uncalibrated(model)
+    require_points(poses)
+    nominal, measured = model, poses
+    sample = StratifiedSample.of(measured)
+    poses = measured if sample is None else measured.subset(sample.rows)
+    requested = _terms(model, terms)
+
+    def fit(robot_: RobotModel, chosen: Sequence[str], stage: str, *, elastic: bool) -> GeometricFit:
+        progress(stage, 0.0)
+        calibration = fit_geometry(
+            robot_,
+            poses,
+            terms=chosen,
+            elastic=elastic,
+            elasticity=elasticity,
+            secant_scale=secant_scale,
+            loss=loss,
+        )
+        progress(stage, 1.0)
+        return calibration
+
+    base = ("kinematic", "backlash") if model.backlash_joints else ("kinematic",)
+    rigid = fit(model, base, "rigid fit", elastic=False)
+    bearings = compare_bearings(
+        model, lambda robot_: fit(robot_, (*base, TRANSMISSION), "bearing axes", elastic=True)
+    )
+    if bearings is not None and bearings.declared is None and bearings.preferred is not None:
+        model = model.with_bearings(bearings.preferred)
+    selection = None
+    if requested is None:
+        progress("terms", 0.0)
+        good = np.setdiff1d(np.arange(len(poses)), rigid.estimate.outliers)
+        selection = select_terms(model, poses.subset(good))
+        progress("terms", 1.0)
+        model, requested = selection.model, _with_random_waves(selection.terms)
+    elastic = bool(model.elastic)
+    same = not elastic and tuple(requested) == base
+    selected = rigid if same else fit(model, requested, "selected fit", elastic=elastic)
+    options = {
+        "terms": " ".join(requested),
+        "loss": loss,
+        "secant_scale": secant_scale,
+        "elasticity": elasticity,
+        TARGETS: TARGETS_BETWEEN.join(poses.targets),
+    } | ({"bearings": model.bearings} if model.has_bearings else {})
+    estimate = replace(
+        selected.estimate,
+        provenance=provenance((), options),
+        ranges=joint_extents(selected.model, selected.poses.q),
+        measurements=measurement_digests(poses),
+    )
+    return Calibration(
+        model=selected.model,
+        estimate=estimate,
+        nominal=nominal,
+        before=uncalibrated_model(model, poses).errors(poses),
+        rigid=rigid,
+        selection=selection,
+        selected=selected,
+        bearings=bearings,
+        validated=None if selection is None else cross_validated(selected),
+        sample=sample,
+        everywhere=None if sample is None else all_errors(selected.model, measured, progress),
+    )
+
+
+def _require_uncalibrated(model: RobotModel) -> None:
+    if any(is_station_identified(model, station) for station in model.stations):
+        raise FlexcalError(
+            "E-RUN-095",
+            f"{model.name} has been calibrated already, and its points would count twice; read it with "
+            "RobotModel.from_yaml(path, without='calibration').",
+        )
+
+
+def _with_random_waves(terms: Sequence[str]) -> tuple[str, ...]:
+    """Selected terms with all transmission errors as random effects, in place of those of single orders."""
+    return (*(term for term in terms if not term.startswith(TRANSMISSION)), TRANSMISSION)
+
+
+def _terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str, ...] | None:
+    """The terms to fit, None for those that cross-validation supports."""
+    declared = model.config.geometry.terms
+    asked = tuple(given) if given else ((declared,) if isinstance(declared, str) else declared)
+    if asked == (AUTO,):
+        return None
+    harmonics = tuple(f"transmission_{order}" for order in model.harmonics)
+    known = ("kinematic", "backlash", *PER_JOINT, TRANSMISSION, *harmonics)
+    for term in asked:
+        owner, _, kind = term.rpartition(".")
+        if owner:
+            model.joint_index(owner)
+        if kind not in (PER_JOINT if owner else known):
+            raise FlexcalError(
+                "E-RUN-011",
+                f"there is no geometry term '{term}'; there are {', '.join(known)}, or {AUTO} alone.",
+            )
+    if "backlash" in asked and not model.backlash_joints:
+        raise FlexcalError(
+            "E-RUN-012",
+            f"the term backlash is asked for but {model.path} names no joint with it; add `geometry: {{backlash: [joint]}}`.",
+        )
+    return tuple(dict.fromkeys(["kinematic", *asked]))

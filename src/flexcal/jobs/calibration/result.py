@@ -1,0 +1,216 @@
+"""Result of a calibration, and the content of its results.json."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from flexcal.calibration.diagnostics import (
+    BearingAxes,
+    Drift,
+    gravity_loads,
+    is_implausible,
+)
+from flexcal.calibration.error_model import ErrorStatistics
+from flexcal.calibration.fit import (
+    GeometricFit,
+    StratifiedSample,
+    point_uncertainty,
+    probable_robot,
+)
+from flexcal.calibration.term_selection import (
+    CrossValidation,
+    TermSelection,
+    considered_document,
+)
+from flexcal.calibration.verification import (
+    CALIBRATED,
+    RIGID,
+    MeasuredPoints,
+    UncalibratedErrors,
+    arms_at,
+    errors_before,
+)
+from flexcal.estimation import Estimate
+from flexcal.files.formats import Block, json_values
+from flexcal.jobs.calibration.remarks import calibration_remarks, outliers_of
+from flexcal.jobs.calibration.subsample import calibration_subsample_remark, subsample_document
+from flexcal.jobs.inputs import CalibratedRobot
+from flexcal.jobs.pages import Identification
+from flexcal.jobs.result_files import (
+    header,
+    identifiability_block,
+    identifiability_spectrum,
+    quantities,
+    write_arm,
+    write_loads,
+    write_points,
+)
+from flexcal.jobs.stiffness import bearing_remarks, bearings_block
+from flexcal.model.kinematics import found_xyz
+from flexcal.model.robot import RobotModel
+from flexcal.report.checks import Trust, misfit_document, misfit_sentences
+from flexcal.report.pages import calibration_checks
+from flexcal.units import MILLIMETRE
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration(Identification):
+    """Result of `calibrate`: the calibrated robot, its errors before and after, and what the points say of it.
+
+    `nominal` is the robot before; `before` are its errors; `rigid` is the fit without elasticity and further terms, `selected` the one
+    that `estimate` is of; `selection`, and `validated`, the errors of `selected` at poses left out, are None where the terms were
+    given. `bearings` says which bearing axes the points prefer; `stiffness` is what stage 1 left in the estimates, where they were
+    read from a file. Of more points than a fit takes, `sample` says which were fitted, and `everywhere` are the errors of `selected`
+    at all of them. `estimates` is the file that the estimate was stored in, `command` the command line, where there was one.
+    """
+
+    block: ClassVar[Block] = "calibration"
+    nominal: RobotModel
+    before: UncalibratedErrors
+    rigid: GeometricFit
+    selection: TermSelection | None
+    selected: GeometricFit
+    bearings: BearingAxes | None = None
+    stiffness: Estimate | None = None
+    validated: CrossValidation | None = None
+    sample: StratifiedSample | None = None
+    everywhere: ErrorStatistics | None = None
+    estimates: Path | None = None
+    command: str = ""
+
+    @property
+    def robot(self) -> CalibratedRobot:
+        """The calibrated robot beside the nominal one, as `verify`, `predict`, `compensate` and `accuracy_map` take it."""
+        return CalibratedRobot(self.nominal, self.model, {self.block: self.estimate})
+
+    @property
+    def residuals(self) -> np.ndarray:
+        """Measured minus predicted positions (N, 3), m, at the poses of the fit."""
+        return self.selected.residuals
+
+    @property
+    def errors(self) -> ErrorStatistics:
+        """Distances between predicted and measured points at the poses of the fit."""
+        return self.selected.errors
+
+    @property
+    def headline(self) -> str:
+        """The errors at the poses of the fit."""
+        return str(self.errors)
+
+    def summary(self) -> str:
+        """Errors, terms, remarks and verdict."""
+        return "\n".join([self.selected.summary(), *self._numbers["remarks"], self.trust.sentence])
+
+    def write_arrays(self, folder: Path) -> None:
+        """Leave points.csv, arm.npz and gravity_loads.npz in a folder."""
+        points, selected = self.points, self.selected
+        write_points(folder, points)
+        write_arm(folder, arms_at(selected.model, selected.poses, points.shown))
+        fits = {name: points.errors[name] for name in (RIGID, CALIBRATED) if name in points.errors}
+        write_loads(folder, gravity_loads(selected, fits))
+
+    @property
+    def points(self) -> MeasuredPoints:
+        """The points of the fit with the errors of every model, the rigid one where it is not the selected."""
+        fit = self.selected
+        errors = errors_before(self.before) | {RIGID: self.rigid.residuals, CALIBRATED: fit.residuals}
+        if self.rigid is fit:
+            del errors[RIGID]
+        return MeasuredPoints(fit.poses, errors, fit.ambiguous)
+
+    @cached_property
+    def trust(self) -> Trust:
+        """The verdict, from the same checks as on the page."""
+        return Trust(calibration_checks(json_values(self._numbers), self.estimate, self.points))
+
+    def document(self) -> dict[str, Any]:
+        """The content of results.json; `identifiability` is that of kinematics and backlash, within it `selected` of all terms."""
+        return {**header("calibration"), **self._numbers, "verdict": self.trust.document()}
+
+    @cached_property
+    def found_points(self) -> dict[str, dict[str, Any]]:
+        """The measured points: their frames, and where they are in it, m, as declared and as found, with the 1σ distance of the latter."""
+        fit = self.selected
+        targets = fit.poses.targets
+        robot = probable_robot(fit.model, targets)
+        return {
+            name: {
+                "frame": fit.model.points[name].frame,
+                "declared_xyz_m": fit.model.points[name].xyz,
+                "found_xyz_m": found_xyz(robot, name),
+                "std_m": point_uncertainty(robot, name),
+            }
+            for name in targets
+        }
+
+    @cached_property
+    def _numbers(self) -> dict[str, Any]:
+        selected, chosen, before = self.selected, self.selection, self.before.document()
+        identifiability, drift = selected.identifiability, Drift.of(selected)
+        bearings = bearing_remarks(self.bearings, selected)
+        blamed = self.bearings is not None and self.bearings.contradicted
+        misfit = None if self.stiffness is None else self.stiffness.misfit
+        return {
+            "robot": selected.model.name,
+            "joints": {joint.name: joint.kind for joint in selected.model.joints},
+            "identifiability": identifiability_block(self.rigid.identifiability)
+            | {
+                "selected": identifiability_block(identifiability)
+                | identifiability_spectrum(identifiability)
+                | {"undetermined": [{"name": u.name, "cause": u.cause} for u in selected.undetermined]}
+            },
+            "terms": list(selected.terms),
+            "term_selection": [considered_document(row) for row in chosen.considered] if chosen else [],
+            "term_selection_by": chosen.by if chosen else None,
+            "cross_validation": None
+            if self.validated is None
+            else {
+                "by": self.validated.by,
+                "mean_mm": self.validated.mean / MILLIMETRE,
+                "parameters": self.validated.freedom,
+            },
+            "before": before,
+            "points": self.found_points,
+            "calibration": {
+                "nominal": before["registered"],
+                "rigid": self.rigid.errors.in_millimetres(),
+                "selected": selected.errors.in_millimetres(),
+            },
+            "fit": {
+                "status": selected.estimate.status,
+                "reduced_chi2": selected.estimate.reduced_chi2,
+                "sigma_given": selected.poses.sigma_given,
+                "sigma_mm": float(np.sqrt(np.mean(selected.poses.sigma**2))) / MILLIMETRE,
+                "ambiguous_poses": int(selected.ambiguous.sum()),
+                "is_implausible": is_implausible(selected),
+            },
+            "variances": selected.variances,
+            "drift": drift.document(),
+            "sample": subsample_document(self.sample, self.everywhere),
+            "outliers": [
+                {"pose": o.pose, "target": o.target, "error_mm": o.error / MILLIMETRE}
+                for o in outliers_of(selected)
+            ],
+            "bearings": bearings_block(self.bearings),
+            "stage1": None if self.stiffness is None else {"misfit": misfit_document(self.stiffness.misfit)},
+            "remarks": [
+                *calibration_subsample_remark(self.sample, self.everywhere),
+                *([chosen.remark] if chosen and chosen.remark else []),
+                *calibration_remarks(selected, bearings if blamed else ()),
+                *(() if blamed else bearings),
+                *(
+                    []
+                    if misfit is None
+                    else [f"the springs of stage 1 are doubtful: {misfit_sentences(misfit).rstrip('.')}"]
+                ),
+            ],
+            "parameters": quantities(self.estimate),
+            "estimates": self.estimates,
+            "command": self.command,
+        }
