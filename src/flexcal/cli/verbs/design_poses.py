@@ -113,19 +113,19 @@ class DesignPoses:
         )
 
     def _planned(self, console: Console, plan: Callable[..., Planned]) -> Planned:
-        from flexcal.jobs.experiments import PoseRequest
+        from flexcal.jobs.experiments import PoseRequest, PoseRequestFiles
 
         request = PoseRequest(
             self.count,
             criterion=self.criterion,
-            candidates=self.candidates if self.pool is None else self.pool,
-            working=self.working,
-            wanted=None if self.wanted is None else self.wanted * MILLIMETRE,
+            candidates=self.candidates,
+            desired_error=None if self.wanted is None else self.wanted * MILLIMETRE,
             payload=self.payload,
             seed=self.seed,
         )
+        files = PoseRequestFiles(self.pool, self.working)
         with console.progress() as progress:
-            return plan(self.robot, self.out, request, command=command_line(), progress=progress)
+            return plan(self.robot, self.out, request, files, command=command_line(), progress=progress)
 
     def _choose(self, console: Console) -> None:
         from flexcal.jobs.experiments import plan_calibration_poses

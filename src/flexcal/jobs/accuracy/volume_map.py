@@ -268,9 +268,8 @@ def map_accuracy(
     box, q = None, None
     place = working_file(working)
     if place is not None:
-        volume = working_volume(CollisionChecker(robot.model), working, seed)
-        assert volume is not None
-        q = volume.q
+        assert working is not None
+        q = working_volume(CollisionChecker(robot.model), working, seed).q
     elif working is not None:
         box = box_corners(working)
     accuracy = accuracy_map(

@@ -1,17 +1,22 @@
-from .candidate_poses import PoseRequest, box_corners, working_file, working_volume
+from .candidate_poses import PoseRequest, PoseRequestFiles, box_corners, working_file, working_volume
 from .frequency_design import plan_frequency_experiments
 from .measurement import measure
-from .next_poses import plan_next_poses
+from .next_poses import DesignedNextPoses, design_next_poses, plan_next_poses
 from .optimised_excitation import PlanName, optimise_excitation, plan_without_poses, response_sensors
-from .poses import plan_calibration_poses, plan_verification_poses
+from .poses import DesignedPoses, design_poses, plan_calibration_poses, plan_verification_poses
 from .standard_plans import frequency_plan
 from .trajectories import TrajectoryRequest, exciting_plan, plan_trajectories
 
 __all__ = [
+    "DesignedNextPoses",
+    "DesignedPoses",
     "PlanName",
     "PoseRequest",
+    "PoseRequestFiles",
     "TrajectoryRequest",
     "box_corners",
+    "design_next_poses",
+    "design_poses",
     "exciting_plan",
     "frequency_plan",
     "measure",

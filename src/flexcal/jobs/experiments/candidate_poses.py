@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,7 @@ from flexcal.design.poses import (
     working_points,
 )
 from flexcal.design.scene import CollisionChecker, MeasuringSetup
-from flexcal.errors import InputError, naming
+from flexcal.errors import InputError
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress
@@ -27,34 +26,62 @@ MOST_GIVEN = 20_000
 """Poses of a file that are considered; more are drawn from."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PoseRequest:
-    """Which poses `plan_calibration_poses` and `plan_next_poses` choose, at most `count`.
+    """Which poses `design_poses` and `design_next_poses` choose.
 
-    `candidates`: so many random poses to choose from, or a file of poses. `working`: where the tool error counts, as in `working_volume`.
-    `wanted`: the predicted tool error, m, at which no more poses are taken, None for no such end. `payload` in kg, None for the file's,
-    else the declared one.
+    Parameters
+    ----------
+    count : int
+        Number of poses; with `desired_error`, and of next poses, the largest.
+    criterion : {"c", "A", "D", "E", "O1", "O2", "O3", "O4", "O5"}
+        Criterion of optimality: c is the tool error predicted over the working volume, A the sum of the parameters' variances in units of
+        their tolerances, D the volume of the confidence ellipsoid, E the least eigenvalue of the information, O1 to O5 the
+        observability indices.
+    candidates : int or PosePool
+        So many random poses to choose from, or given ones.
+    working : WorkingVolume or ndarray, optional
+        Where the tool error counts: configurations, or smallest and largest x, y, z (2, 3), m, in the base frame; by default as robot.yaml
+        declares, else anywhere.
+    desired_error : float, optional
+        Predicted tool error, m, at which no more poses are taken.
+    payload : float, optional
+        Mass, kg; by default that of the pool, else the declared one.
+    seed : int
+        Seed of the random poses.
     """
 
-    count: int
+    count: int = 40
     criterion: CriterionName = "c"
-    candidates: int | Path = 4000
-    working: str | None = None
-    wanted: float | None = None
+    candidates: int | PosePool = 4000
+    working: WorkingVolume | np.ndarray | None = None
+    desired_error: float | None = None
     payload: float | None = None
     seed: int = 0
+
+    def volume(self, checker: CollisionChecker) -> WorkingVolume | None:
+        """Where the robot will work; None for anywhere. Raises `FlexcalError` for a box that it does not reach."""
+        if isinstance(self.working, WorkingVolume):
+            return self.working
+        box, declared = self.working, checker.model.config.working_volume
+        if box is None:
+            if declared is None:
+                return None
+            box = np.array([declared.lower, declared.upper])
+        return working_box(checker, box[0], box[1], np.random.default_rng([self.seed, 6]))
+
+
+DEFAULT_REQUEST = PoseRequest()
 
 
 @dataclass(frozen=True, eq=False)
 class CandidatePoses:
-    """The `candidates`, the given `pool` that they come from, if any, where the robot will work (None: anywhere), and the `files` of
-    both."""
+    """The `candidates`, the given `pool` that they come from, if any, and where the robot will work (None: anywhere)."""
 
     checker: CollisionChecker
     candidates: PoseCandidates
     pool: PosePool | None
     working: WorkingVolume | None
-    files: tuple[Path, ...]
 
     @classmethod
     def of(
@@ -64,29 +91,43 @@ class CandidatePoses:
         rng: np.random.Generator,
         progress: Progress,
     ) -> CandidatePoses:
-        """As many as are to be chosen or more; raises `FlexcalError` as `pose_candidates`, `read_pose_pool`, `working_volume` do."""
-        checker, candidates = CollisionChecker(model), request.candidates
-        place = working_volume(checker, request.working, request.seed)
-        given = (
-            read_pose_pool(candidates, model).drawn(MOST_GIVEN)
-            if isinstance(candidates, Path)
-            else candidates
+        """As many as are to be chosen or more; raises `FlexcalError` as `pose_candidates` and `working_box` do."""
+        checker, given = CollisionChecker(model), request.candidates
+        place = request.volume(checker)
+        candidates = pose_candidates(
+            model,
+            rng=rng,
+            candidates=given,
+            least=request.count,
+            setup=MeasuringSetup.declared(model, request.payload),
+            working=None if place is None else place.q,
+            checker=checker,
+            progress=progress,
         )
-        with naming(candidates) if isinstance(candidates, Path) else nullcontext():
-            pose_pool = pose_candidates(
-                model,
-                rng=rng,
-                candidates=given,
-                least=request.count,
-                setup=MeasuringSetup.declared(model, request.payload),
-                working=None if place is None else place.q,
-                checker=checker,
-                progress=progress,
-            )
-        files = [candidates] if isinstance(candidates, Path) else []
-        if (file := working_file(request.working)) is not None:
-            files.append(file)
-        return cls(checker, pose_pool, given if isinstance(given, PosePool) else None, place, tuple(files))
+        return cls(checker, candidates, given if isinstance(given, PosePool) else None, place)
+
+
+@dataclass(frozen=True)
+class PoseRequestFiles:
+    """Files of a `PoseRequest`: a `pool` of poses to choose from, and `working`, a box "x:X,y:Y,z:Z" (m, base frame) or a file of points or
+    poses where the robot will work."""
+
+    pool: Path | None = None
+    working: str | None = None
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """Those that are files."""
+        return tuple(file for file in (self.pool, working_file(self.working)) if file is not None)
+
+    def read(self, model: RobotModel, request: PoseRequest) -> PoseRequest:
+        """The request with what the files hold; raises `FlexcalError` as `read_pose_pool`, `read_working` and `working_box` do."""
+        if self.working is not None:
+            place = working_volume(CollisionChecker(model), self.working, request.seed)
+            request = replace(request, working=place)
+        if self.pool is not None:
+            request = replace(request, candidates=read_pose_pool(self.pool, model).drawn(MOST_GIVEN))
+        return request
 
 
 def working_file(given: str | None) -> Path | None:
@@ -94,17 +135,12 @@ def working_file(given: str | None) -> Path | None:
     return None if given is None or ":" in given else Path(given)
 
 
-def working_volume(checker: CollisionChecker, given: str | None, seed: int) -> WorkingVolume | None:
-    """Where the robot will work: a box "x:X,y:Y,z:Z" (m, base frame), else a file for `read_working`, else what robot.yaml declares.
+def working_volume(checker: CollisionChecker, given: str, seed: int) -> WorkingVolume:
+    """Where the robot will work: a box "x:X,y:Y,z:Z" (m, base frame), else a file for `read_working`.
 
-    None where nothing does. Raises `FlexcalError` for a box that is none, and what the robot does not reach.
+    Raises `FlexcalError` for a box that is none, and what the robot does not reach.
     """
     model, rng = checker.model, np.random.default_rng([seed, 6])
-    declared = model.config.working_volume
-    if given is None:
-        if declared is None:
-            return None
-        return working_box(checker, np.array(declared.lower), np.array(declared.upper), rng)
     file = working_file(given)
     if file is None:
         corners = box_corners(given)

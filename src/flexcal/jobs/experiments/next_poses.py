@@ -3,40 +3,66 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from flexcal.data.plans import PosePlan
-from flexcal.data.poses import PosePool, read_poses
+from flexcal.data.plans import PosePlan, page_beside, write_plan
+from flexcal.data.poses import PosePool, PoseSet, read_poses
 from flexcal.design.poses import NextPoses, WorkingVolume, select_next_poses
-from flexcal.jobs.experiments.candidate_poses import CandidatePoses, PoseRequest
-from flexcal.jobs.experiments.poses import flank_block, pool_block, working_block, write_pose_plan
+from flexcal.errors import FlexcalError, naming
+from flexcal.jobs.experiments.candidate_poses import (
+    DEFAULT_REQUEST,
+    CandidatePoses,
+    PoseRequest,
+    PoseRequestFiles,
+)
+from flexcal.jobs.experiments.poses import flank_block, pool_block, working_block, write_plan_page
 from flexcal.jobs.inputs import robot_provenance
+from flexcal.jobs.pages import Result
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.units import MILLIMETRE
 
 
-@dataclass(frozen=True, eq=False)
-class NextPosesPlan:
-    """The next poses, best first, up to where to stop; `plan` and `file` are None where nothing is left to measure.
+@dataclass(frozen=True, eq=False, repr=False)
+class DesignedNextPoses(Result):
+    """Result of `design_next_poses`: the next poses, best first, up to where to stop; `plan` is None where nothing is left to measure.
 
-    `pool` are the given poses they were chosen from, if any; else `seed` drew the random ones.
+    `pool` are the given poses they were chosen from, if any; else `seed` drew the random ones. `file` is that of the plan, where it was
+    written.
     """
 
     plan: PosePlan | None
-    file: Path | None
     poses: NextPoses
     stop: int | None
-    wanted: float | None
+    desired_error: float | None
     seed: int
     working: WorkingVolume | None = None
     pool: PosePool | None = None
+    file: Path | None = None
     record: RunRecord = NOT_RECORDED
+
+    @property
+    def headline(self) -> str:
+        """Number of poses and predicted tool error."""
+        errors = self.poses.tool_error / MILLIMETRE
+        count = 0 if self.plan is None else len(self.plan)
+        return f"{count} more poses after {self.poses.measured}, predicted tool error {errors[0]:.4f} mm now, {errors[count]:.4f} mm then"
+
+    def summary(self) -> str:
+        """Predicted tool error now and after the next poses."""
+        return self.headline
+
+    def report(self, path: str | Path) -> Path:
+        """Write the plan's figures as one HTML page; returns its path. Raises `FlexcalError` where nothing is left to measure."""
+        if self.plan is None:
+            raise FlexcalError("E-RUN-096", "no more poses are needed, so there is no plan to show.")
+        return write_plan_page(Path(path), self.model, self.plan, self.document(), self.working)
 
     def document(self) -> dict[str, Any]:
         """The JSON document; `stop_after` counts the next poses, and is null where those asked for do not suffice."""
@@ -51,7 +77,7 @@ class NextPosesPlan:
             | {
                 "criterion": design.criterion.name,
                 "candidates": len(design.candidates),
-                "wanted_mm": None if self.wanted is None else self.wanted / MILLIMETRE,
+                "wanted_mm": None if self.desired_error is None else self.desired_error / MILLIMETRE,
                 "stop_after": self.stop,
                 "working": working_block(self.working),
                 "flanks": flank_block(design),
@@ -62,44 +88,82 @@ class NextPosesPlan:
         )
 
 
+def design_next_poses(
+    model: RobotModel,
+    measured: PoseSet,
+    request: PoseRequest = DEFAULT_REQUEST,
+    *,
+    progress: Progress = silent,
+) -> DesignedNextPoses:
+    """Choose the next poses to measure, best first, and say when to stop.
+
+    Parameters
+    ----------
+    model : RobotModel
+        Robot with what is known of it without these measurements.
+    measured : PoseSet
+        Poses (N, n) that are measured already.
+    request : PoseRequest
+        How many poses at most, by which criterion (c, A or D), from which candidates; they end where the predicted tool error is the
+        desired one, or without that where more poses only average noise.
+    progress : Progress
+        Told of the stages and their shares.
+
+    Returns
+    -------
+    DesignedNextPoses
+        Its `plan` (None where those measured are enough), `stop`, `summary()` and `report(path)`.
+
+    Raises
+    ------
+    FlexcalError
+        For another criterion, too few candidates, and poses measured with another target or from another station.
+    """
+    rng = np.random.default_rng([request.seed, 7])
+    return _designed(CandidatePoses.of(model, request, rng, progress), measured, request, rng)
+
+
+def _designed(
+    choice: CandidatePoses, measured: PoseSet, request: PoseRequest, rng: np.random.Generator
+) -> DesignedNextPoses:
+    after = select_next_poses(
+        choice.candidates, measured, request.count, rng=rng, criterion=request.criterion
+    )
+    stop, plan = after.enough(request.desired_error), None
+    if stop != 0:
+        design = after.design.in_order(np.arange(request.count if stop is None else stop))
+        plan = replace(design.plan, name="calibration")
+        after = replace(after, design=design)
+    model = choice.checker.model
+    return DesignedNextPoses(
+        model, plan, after, stop, request.desired_error, request.seed, choice.working, choice.pool
+    )
+
+
 def plan_next_poses(
-    robot: Path,
+    robot_file: Path,
     out: Path,
     request: PoseRequest,
+    files: PoseRequestFiles,
     *,
     measured: Sequence[Path],
     command: str = "",
     progress: Progress = silent,
-) -> NextPosesPlan:
-    """Write to `out` the next poses, after the files of `measured` ones; nothing where these are enough.
+) -> DesignedNextPoses:
+    """`design_next_poses` for the robot of a robot.yaml after the files of `measured` ones; the plan goes to `out`, if there is one.
 
-    They end where the predicted tool error is the wanted one, or without it where more poses only average. Raises `FlexcalError` as
-    `select_next_poses`, `read_poses`, `read_pose_pool` and `working_volume` do.
+    Raises `FlexcalError` as `design_next_poses`, `read_poses` and reading the `files` do.
     """
-    model, count, wanted = RobotModel.from_yaml(robot), request.count, request.wanted
+    model = RobotModel.from_yaml(robot_file)
     known = read_poses(measured, model, require_motion=False)
+    request = files.read(model, request)
     rng = np.random.default_rng([request.seed, 7])
-    choice = CandidatePoses.of(model, request, rng, progress)
-    after = select_next_poses(choice.candidates, known, count, rng=rng, criterion=request.criterion)
-    stop = after.enough(wanted)
-    origin = robot_provenance(model, (*measured, *choice.files))
-    if stop == 0:
-        return NextPosesPlan(
-            None,
-            None,
-            after,
-            stop,
-            wanted,
-            request.seed,
-            choice.working,
-            choice.pool,
-            RunRecord(origin, command),
-        )
-    design = after.design.in_order(np.arange(count if stop is None else stop))
-    plan = replace(design.plan, name="calibration")
-    after = replace(after, design=design)
-    result = NextPosesPlan(
-        plan, out, after, stop, wanted, request.seed, choice.working, choice.pool, RunRecord(origin, command)
-    )
-    write_pose_plan(out, model, plan, result.document(), choice.working)
+    with nullcontext() if files.pool is None else naming(files.pool):
+        choice = CandidatePoses.of(model, request, rng, progress)
+    designed = _designed(choice, known, request, rng)
+    record = RunRecord(robot_provenance(model, (*measured, *files.paths)), command)
+    result = replace(designed, record=record, file=None if designed.plan is None else out)
+    if result.plan is not None:
+        write_plan(out, result.plan)
+        result.report(page_beside(out))
     return result

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,8 +23,15 @@ from flexcal.design.poses import (
     random_poses,
 )
 from flexcal.design.scene import MeasuringSetup
-from flexcal.jobs.experiments.candidate_poses import CandidatePoses, PoseRequest
+from flexcal.errors import naming
+from flexcal.jobs.experiments.candidate_poses import (
+    DEFAULT_REQUEST,
+    CandidatePoses,
+    PoseRequest,
+    PoseRequestFiles,
+)
 from flexcal.jobs.inputs import robot_provenance
+from flexcal.jobs.pages import Result
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, identifiability_block
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
@@ -36,7 +44,7 @@ VERIFICATION = "verification"
 
 
 @dataclass(frozen=True, eq=False)
-class DesignedPoses:
+class RandomPoses:
     """A plan of random poses for a verification, its file, the seed they were drawn with, and what it comes from."""
 
     plan: PosePlan
@@ -54,22 +62,43 @@ class DesignedPoses:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class CalibrationPosePlan:
-    """A plan of calibration poses, its file, why these, the way through them, and where the robot will work (None: anywhere).
+@dataclass(frozen=True, eq=False, repr=False)
+class DesignedPoses(Result):
+    """Result of `design_poses`: a plan of calibration poses, why these, the way through them, and where the robot will work.
 
-    `pool` are the given poses they were chosen from, if any; else `seed` drew the random ones. `record` says what the plan comes from.
+    `working` is None for anywhere. `pool` are the given poses they were chosen from, if any; else `seed` drew the random ones. `file` is
+    that of the plan, where it was written; `record` says what it comes from.
     """
 
     plan: PosePlan
-    file: Path
     design: PoseDesign
     curve: PoseCurve
     way: MeasurementOrder
     seed: int
     working: WorkingVolume | None = None
     pool: PosePool | None = None
+    file: Path | None = None
     record: RunRecord = NOT_RECORDED
+
+    @property
+    def headline(self) -> str:
+        """Number of poses and predicted tool error."""
+        return f"{len(self.plan)} poses, predicted tool error {self.design.tool_error / MILLIMETRE:.4f} mm from tracker noise alone"
+
+    def summary(self) -> str:
+        """Predicted tool error, rank, and from how many poses on more only average noise."""
+        seen = self.design.identifiability
+        return "\n".join(
+            [
+                self.headline,
+                f"{seen.rank} of {len(seen.names)} parameters are identifiable",
+                f"from {self.curve.enough()} poses on further ones only average noise",
+            ]
+        )
+
+    def report(self, path: str | Path) -> Path:
+        """Write the plan's figures as one HTML page; returns its path."""
+        return write_plan_page(Path(path), self.model, self.plan, self.document(), self.working)
 
     def document(self) -> dict[str, Any]:
         """The JSON document; `chosen` are the poses' numbers in the file they come from; those left out there stand beside, with why.
@@ -135,56 +164,103 @@ def working_block(working: WorkingVolume | None) -> dict[str, Any] | None:
     return {"poses": len(working.q), "reached_share": working.reached, "box_m": working.box}
 
 
-def plan_calibration_poses(
-    robot: Path,
-    out: Path,
-    request: PoseRequest,
-    *,
-    command: str = "",
-    progress: Progress = silent,
-) -> CalibrationPosePlan:
-    """Choose poses for the calibration of the robot as it is known, and write the plan to `out`, its page beside it.
+def design_poses(
+    model: RobotModel, request: PoseRequest = DEFAULT_REQUEST, *, progress: Progress = silent
+) -> DesignedPoses:
+    """Choose calibration poses for a robot as it is known, in an order of short moves (Neubauer et al. 2015, section 5.2).
 
-    The poses are in an order of short moves; where a tool error is wanted, only as many as bring the predicted one down to it. Raises
-    `FlexcalError` as `select_poses`, `fewest_poses`, `read_pose_pool` and `working_volume` do.
+    Parameters
+    ----------
+    model : RobotModel
+        Robot with what is known of it; its posterior and the tolerances are the prior.
+    request : PoseRequest
+        How many poses, by which criterion, from which candidates, for which working volume.
+    progress : Progress
+        Told of the stages and their shares.
+
+    Returns
+    -------
+    DesignedPoses
+        Its `plan`, predicted tool error, `summary()` and `report(path)`.
+
+    Raises
+    ------
+    FlexcalError
+        For an unknown criterion, fewer poses than the parameters need, too few candidates that pass the checks, candidates that press a
+        backlash onto one flank only, and where more poses are needed for the desired error.
+
+    Examples
+    --------
+    >>> from flexcal import PoseRequest, RobotModel, design_poses
+    >>> model = RobotModel.from_yaml("examples/ur5_tracker/robot.yaml", estimates=False)
+    >>> len(design_poses(model, PoseRequest(count=20, candidates=200)).plan)
+    20
     """
-    model, seed, count = RobotModel.from_yaml(robot), request.seed, request.count
-    rng = np.random.default_rng([seed, 2])
-    choice = CandidatePoses.of(model, request, rng, progress)
-    if request.wanted is not None:
-        count = fewest_poses(choice.candidates, count, request.wanted)
+    rng = np.random.default_rng([request.seed, 2])
+    return _designed(CandidatePoses.of(model, request, rng, progress), request, rng, progress)
+
+
+def _designed(
+    choice: CandidatePoses, request: PoseRequest, rng: np.random.Generator, progress: Progress
+) -> DesignedPoses:
+    count = request.count
+    if request.desired_error is not None:
+        count = fewest_poses(choice.candidates, count, request.desired_error)
     design = choose_poses(choice.candidates, count, rng=rng, criterion=request.criterion, progress=progress)
     way = measurement_order(choice.checker, design.plan.q)
     design = design.in_order(way.order)
-    curve = pose_curve(design, rng=np.random.default_rng([seed, 5]), progress=progress)
+    curve = pose_curve(design, rng=np.random.default_rng([request.seed, 5]), progress=progress)
     plan = replace(design.plan, name="calibration")
-    origin = robot_provenance(model, choice.files)
-    result = CalibrationPosePlan(
-        plan, out, design, curve, way, seed, choice.working, choice.pool, RunRecord(origin, command)
+    return DesignedPoses(
+        choice.checker.model, plan, design, curve, way, request.seed, choice.working, choice.pool
     )
-    write_pose_plan(out, model, plan, result.document(), choice.working)
+
+
+def plan_calibration_poses(
+    robot_file: Path,
+    out: Path,
+    request: PoseRequest,
+    files: PoseRequestFiles,
+    *,
+    command: str = "",
+    progress: Progress = silent,
+) -> DesignedPoses:
+    """`design_poses` for the robot of a robot.yaml; the plan goes to `out`, its page beside it.
+
+    Raises `FlexcalError` as `design_poses` and reading the `files` do.
+    """
+    model = RobotModel.from_yaml(robot_file)
+    request = files.read(model, request)
+    rng = np.random.default_rng([request.seed, 2])
+    with nullcontext() if files.pool is None else naming(files.pool):
+        choice = CandidatePoses.of(model, request, rng, progress)
+    designed = _designed(choice, request, rng, progress)
+    result = replace(designed, file=out, record=RunRecord(robot_provenance(model, files.paths), command))
+    write_plan(out, result.plan)
+    result.report(page_beside(out))
     return result
 
 
 def plan_verification_poses(
-    robot: Path, out: Path, count: int, *, payload: float | None = None, seed: int = 0, command: str = ""
-) -> DesignedPoses:
+    robot_file: Path, out: Path, count: int, *, payload: float | None = None, seed: int = 0, command: str = ""
+) -> RandomPoses:
     """Draw `count` random poses over the whole workspace, for a verification, and write the plan to `out`, and its page beside it."""
-    model = RobotModel.from_yaml(robot)
+    model = RobotModel.from_yaml(robot_file)
     setup = MeasuringSetup.declared(model, payload)
     plan = random_poses(model, count, np.random.default_rng([seed, 4]), setup)
     plan = replace(plan, name=VERIFICATION)
-    result = DesignedPoses(plan, out, seed, RunRecord(robot_provenance(model), command))
-    write_pose_plan(out, model, plan, result.document(), None)
+    result = RandomPoses(plan, out, seed, RunRecord(robot_provenance(model), command))
+    write_plan(out, plan)
+    write_plan_page(page_beside(out), model, plan, result.document(), None)
     return result
 
 
-def write_pose_plan(
-    out: Path, model: RobotModel, plan: PosePlan, document: dict[str, Any], working: WorkingVolume | None
-) -> None:
-    """Write a plan to `out`, and its page beside it."""
-    write_plan(out, plan)
+def write_plan_page(
+    path: Path, model: RobotModel, plan: PosePlan, document: dict[str, Any], working: WorkingVolume | None
+) -> Path:
+    """Write the page of a plan of poses; returns its path."""
     study = PoseStudy(model, plan.q, document)
     if working is not None:
         study = replace(study, working=working.points, box=working.box)
-    write_page(page_beside(out), pose_page(study))
+    write_page(path, pose_page(study))
+    return path
