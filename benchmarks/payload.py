@@ -50,7 +50,7 @@ def design(folder: Path) -> None:
     nominal = RobotModel.from_yaml(EXAMPLE / "robot.yaml", estimates=False)
     for name, request in PLANS.items():
         if not (folder / f"{name}.yaml").exists():
-            write_plan(folder / f"{name}.yaml", request.design(nominal)[0].plan)
+            write_plan(folder / f"{name}.yaml", request.optimise(nominal)[0].plan)
 
 
 def truth_of(nominal: RobotModel, seed: int) -> dict[str, float]:

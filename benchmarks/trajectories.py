@@ -27,7 +27,7 @@ import numpy as np
 from benchmarks._judge import Judge
 from benchmarks._random_trajectories import INSTANTS, fourier_motion, random_trajectories
 from benchmarks.peers import ENVIRONMENTS, HERE, environment, run_peer
-from flexcal.design.trajectories import TrajectoryCriterion, design_trajectories
+from flexcal.design.trajectories import TrajectoryCriterion, optimise_trajectories
 from flexcal.model.robot import RobotModel
 
 DURATION, HARMONICS, RANDOM = 10.0, 5, 1000
@@ -175,7 +175,7 @@ def best_random(judge: Judge, seed: int) -> tuple[Outcome, Outcome]:
 def flexcal(judge: Judge, criterion: TrajectoryCriterion, seed: int) -> Outcome:
     """Ours with a seed."""
     started = time.process_time()
-    design = design_trajectories(
+    design = optimise_trajectories(
         judge.model, criterion=criterion, duration=DURATION, harmonics=HARMONICS, seed=seed
     )
     seconds = time.process_time() - started

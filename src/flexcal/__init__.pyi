@@ -6,9 +6,8 @@ from .calibration.verification import prediction_errors
 from .data.plans import MultisinePlan, PosePlan, TrajectoryPlan, read_plan
 from .data.poses import PoseSet, ToolTargets, read_poses, read_targets
 from .data.recordings import Decimation, Recording, read_recording
-from .design.poses import random_poses, select_next_poses, select_poses
+from .design.poses import random_poses
 from .design.scene import MeasuringSetup
-from .design.trajectories import design_trajectories
 from .dynamics.diagnostics import predict_torques
 from .dynamics.estimators import (
     DIDIM,
@@ -46,9 +45,23 @@ from .jobs.accuracy import AccuracyMap, Verification, accuracy_map, verify
 from .jobs.calibration import Calibration, calibrate
 from .jobs.deployment import Compensation, Prediction, compensate, predict
 from .jobs.dynamics import DynamicsIdentification, identify_dynamics
-from .jobs.experiments import exciting_plan, frequency_plan
-from .jobs.payload import PayloadIdentification, identify_payload
+from .jobs.experiments import (
+    DesignedFrequency,
+    DesignedNextPoses,
+    DesignedPoses,
+    DesignedTrajectories,
+    FrequencyRequest,
+    PoseRequest,
+    TrajectoryRequest,
+    design_frequency,
+    design_next_poses,
+    design_poses,
+    design_trajectories,
+    exciting_plan,
+    frequency_plan,
+)
 from .jobs.inputs import CalibratedRobot
+from .jobs.payload import PayloadIdentification, identify_payload
 from .jobs.stiffness import StiffnessIdentification, identify_stiffness
 from .model.kinematics import point_kinematics
 from .model.parts import is_physically_consistent
@@ -77,11 +90,16 @@ __all__ = [
     "CellConfig",
     "Compensation",
     "Decimation",
+    "DesignedFrequency",
+    "DesignedNextPoses",
+    "DesignedPoses",
+    "DesignedTrajectories",
     "DynamicsIdentification",
     "EnergyModel",
     "Estimate",
     "Estimator",
     "FlexcalError",
+    "FrequencyRequest",
     "FrequencyResponse",
     "InputError",
     "JointLog",
@@ -90,6 +108,7 @@ __all__ = [
     "Observation",
     "PayloadIdentification",
     "PosePlan",
+    "PoseRequest",
     "PoseSet",
     "PowerModel",
     "Prediction",
@@ -98,6 +117,7 @@ __all__ = [
     "StiffnessIdentification",
     "ToolTargets",
     "TrajectoryPlan",
+    "TrajectoryRequest",
     "Verification",
     "VirtualCell",
     "Window",
@@ -105,6 +125,9 @@ __all__ = [
     "assemble_regression",
     "calibrate",
     "compensate",
+    "design_frequency",
+    "design_next_poses",
+    "design_poses",
     "design_trajectories",
     "draw_truth",
     "exciting_plan",
@@ -137,8 +160,6 @@ __all__ = [
     "repeatability",
     "rigid_motion",
     "select_friction",
-    "select_next_poses",
-    "select_poses",
     "select_terms",
     "static_equilibrium",
     "tool_at_rest",

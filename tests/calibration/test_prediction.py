@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from flexcal.calibration.measurement import predict
 from flexcal.model.parts import kinematic_tree
 from flexcal.model.robot import GEOMETRY, RobotModel
 

@@ -108,7 +108,7 @@ def test_seeds_end_at_like_conditions(gantry: Path) -> None:
     model = RobotModel.from_yaml(gantry)
     conditions = []
     for seed in range(40, 46):
-        best = TrajectoryRequest(count=1, seed=seed).design(model)[0]
+        best = TrajectoryRequest(count=1, seed=seed).optimise(model)[0]
         conditions.append(condition_number(best.information[-1]))
     assert max(conditions) < 1.3 * min(conditions)
 

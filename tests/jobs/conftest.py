@@ -33,7 +33,7 @@ def arm_side_logs(examples: Path) -> ArmSideLogs:
         robot.write_text("\n".join(lines) + "\n")
         (folder / "tx90l.urdf").write_text((examples / "tx90l" / "tx90l.urdf").read_text())
         nominal = RobotModel.from_yaml(robot, estimates=False)
-        plan = TrajectoryRequest(count=count, seed=seed, share=share, searches=1).design(nominal)[0].plan
+        plan = TrajectoryRequest(count=count, seed=seed, share=share, searches=1).optimise(nominal)[0].plan
         plan = replace(plan, periods=1, settle_periods=0)
         config = CellConfig(sensors=SensorConfig(arm_encoders=True))
         known = {name: value for name, value in truth.items() if not name.startswith("payload.")}

@@ -11,7 +11,7 @@ import pytest
 from flexcal.design.poses import CriterionName
 from flexcal.dynamics.estimators import EstimatorName
 from flexcal.jobs.dynamics import identify_robot_dynamics
-from flexcal.jobs.experiments import PoseRequest, plan_calibration_poses
+from flexcal.jobs.experiments import PoseRequest, PoseRequestFiles, plan_calibration_poses
 
 
 @pytest.mark.parametrize("criterion", ["c", "E"])
@@ -21,6 +21,7 @@ def test_design_of_poses(examples: Path, tmp_path: Path, criterion: CriterionNam
         examples / "tx90l" / "robot.yaml",
         tmp_path / "plan.yaml",
         PoseRequest(20, criterion, candidates=200),
+        PoseRequestFiles(),
         progress=lambda stage, share: told.setdefault(stage, []).append(share),
     )
     assert list(told) == ["candidates", "choosing", "how many"]

@@ -11,7 +11,7 @@ import pytest
 from flexcal.data.plans import MultisinePlan, read_plan_of
 from flexcal.elasticity.identification import fit_springs
 from flexcal.frequency.periodic import frequency_responses
-from flexcal.jobs.experiments import plan_frequency_experiments
+from flexcal.jobs.experiments import FrequencyRequest, plan_frequency_experiments
 from flexcal.model.robot import RobotModel, spring_names
 from flexcal.virtual_cell import CellConfig, SpreadConfig, VirtualCell, draw_truth
 
@@ -33,7 +33,12 @@ def test_two_poses_with_three_sensors(examples: Path, tmp_path: Path, seed: int)
         (tmp_path / name).write_bytes((examples / "tx90l" / name).read_bytes())
     file = tmp_path / "robot.yaml"
     file.write_text(file.read_text("utf-8") + SENSORS, "utf-8")
-    plan_frequency_experiments(file, tmp_path / "plan.yaml", poses=examples / "tx90l" / "frequency_poses.csv")
+    plan_frequency_experiments(
+        file,
+        tmp_path / "plan.yaml",
+        FrequencyRequest("default"),
+        poses=examples / "tx90l" / "frequency_poses.csv",
+    )
     whole = read_plan_of(tmp_path / "plan.yaml", MultisinePlan)
     plan = replace(whole, poses=whole.poses[:2], realisations=3)
     model = RobotModel.from_yaml(file)

@@ -160,7 +160,7 @@ def test_verification_report_is_complete(fit: Calibration, folder: Path) -> None
     assert outline.unbalanced == []
     assert {"figure-10", "figure-joints", "figure-order"} < set(outline.figures())
     assert "figure-predicted" in outline.figures()
-    assert millimetres(found.result.all.max) in outline.words
+    assert millimetres(found.errors.max) in outline.words
     report_folder(folder / "check")
     assert (folder / "check" / "report.html").read_text("utf-8") == page
 

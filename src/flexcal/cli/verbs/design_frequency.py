@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -61,7 +61,7 @@ class DesignFrequency:
     def run(self) -> None:
         """Plan, and print how long it takes."""
         from flexcal.cli.tables.results import predicted_table
-        from flexcal.jobs.experiments import plan_frequency_experiments
+        from flexcal.jobs.experiments import FrequencyRequest, plan_frequency_experiments
 
         require_robot(self.robot)
         require_at_least(0, seed=self.seed)
@@ -76,20 +76,24 @@ class DesignFrequency:
                 "--choose is for --plan designed or quick without --poses; the others take the poses of a file.",
             )
         console = Console(self.json)
+        request = FrequencyRequest(
+            kind=self.plan,
+            candidates=self.candidates,
+            amplitude=self.amplitude,
+            desired_std=self.std,
+            crest=self.crest,
+            detection_lines=self.detection_lines,
+            place_payload=self.place_payload,
+            seed=self.seed,
+        )
+        if self.choose is not None:
+            request = replace(request, choose=self.choose)
         with console.progress() as progress:
             document = plan_frequency_experiments(
                 self.robot,
                 self.out,
-                kind=self.plan,
+                request,
                 poses=self.poses,
-                choose=self.choose,
-                candidates=self.candidates,
-                amplitude=self.amplitude,
-                wanted=self.std,
-                crest=self.crest,
-                detection_lines=self.detection_lines,
-                place_payload=self.place_payload,
-                seed=self.seed,
                 command=command_line(),
                 progress=progress,
             ).document()

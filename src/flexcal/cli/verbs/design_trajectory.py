@@ -87,7 +87,6 @@ class DesignTrajectory:
             criterion=self.criterion,
             of=self.of,
             sequence=self.sequence,
-            after=self.after,
             kind=self.kind,
             duration=self.duration,
             base_frequency_hz=self.base_frequency,
@@ -102,7 +101,13 @@ class DesignTrajectory:
         )
         with console.progress() as progress:
             document = plan_trajectories(
-                self.robot, self.out, request, rate_hz=self.rate, command=command_line(), progress=progress
+                self.robot,
+                self.out,
+                request,
+                after=self.after,
+                rate_hz=self.rate,
+                command=command_line(),
+                progress=progress,
             ).document()
         without = "" if document["payload"] is None else ", without the payload"
         one = document["trajectories"] == 1

@@ -1,7 +1,7 @@
 from .criterion import TrajectoryCriterion
 from .excitation_problem import NEAR
 from .motion_space import Kind
-from .optimisation import TrajectoryDesign, design_trajectories
+from .optimisation import TrajectoryDesign, optimise_trajectories
 from .regressor_columns import BaseRegressor
 from .required_limits import COULOMB, VISCOUS, require_stated_limits, with_assumed_friction
 from .rest_to_rest import TimedMotion, timed_motion
@@ -18,7 +18,7 @@ __all__ = [
     "TimedMotion",
     "TrajectoryCriterion",
     "TrajectoryDesign",
-    "design_trajectories",
+    "optimise_trajectories",
     "require_stated_limits",
     "sequence",
     "timed_motion",

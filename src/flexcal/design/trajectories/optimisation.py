@@ -91,7 +91,7 @@ class TrajectoryDesign:
         return {name: float(std) for name, std, has in zip(unknowns.names, after, known, strict=True) if has}
 
 
-def design_trajectories(
+def optimise_trajectories(
     model: RobotModel,
     count: int = 1,
     *,

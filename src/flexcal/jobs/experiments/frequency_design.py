@@ -10,9 +10,11 @@ import numpy as np
 
 from flexcal.data.plans import MultisinePlan, page_beside, write_plan
 from flexcal.design.frequency import (
+    COMMON_SENSORS,
     FrequencyPoseSelection,
     Placement,
     PlannedResponses,
+    ResponseSensors,
     excitation_margin,
     largest_stiffness_std,
     optimal_amplitudes,
@@ -31,8 +33,9 @@ from flexcal.jobs.experiments.optimised_excitation import (
     plan_without_poses,
     response_sensors,
 )
-from flexcal.jobs.experiments.standard_plans import frequency_plan, read_frequency_poses
+from flexcal.jobs.experiments.standard_plans import read_frequency_poses, reference_amplitude, standard_plan
 from flexcal.jobs.inputs import robot_provenance
+from flexcal.jobs.pages import Result
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
@@ -41,20 +44,81 @@ from flexcal.report.pages import FrequencyDesignStudy, frequency_page
 
 
 @dataclass(frozen=True, eq=False)
-class DesignedFrequency:
-    """A plan, the file it was written to and what it will tell; the `choice` of its poses and their `curve` where they were chosen.
+class FrequencyRequest:
+    """Which frequency experiments `design_frequency` plans.
+
+    Parameters
+    ----------
+    kind : {"designed", "quick", "default", "paper"}
+        For designed and quick, poses are chosen and amplitudes are shaped; default and paper take given poses and flat amplitudes.
+    poses : ndarray, optional
+        Poses (P, n), rad, to take instead of chosen ones; default and paper need them.
+    choose, candidates : int
+        Number of poses that are chosen, out of so many random ones.
+    amplitude : {"flat", "shaped"}, optional
+        How the amplitudes are, in place of what the kind says.
+    desired_std : float, optional
+        Relative standard deviation that every stiffness shall have; realisations and periods follow.
+    crest : {"random", "optimised"}
+        Random phases, or ones with small peaks.
+    detection_lines : bool
+        Whether one line in four is left out, to see odd distortion.
+    place_payload : bool
+        Whether it is predicted what holding the payload elsewhere about the last axis would change in these poses.
+    seed : int
+        Seed of poses and phases.
+    """
+
+    kind: PlanName = "designed"
+    poses: np.ndarray | None = None
+    choose: int = POSES
+    candidates: int = CANDIDATES
+    amplitude: Literal["flat", "shaped"] | None = None
+    desired_std: float | None = None
+    crest: Literal["random", "optimised"] = "random"
+    detection_lines: bool = False
+    place_payload: bool = False
+    seed: int = 0
+
+
+DEFAULT_REQUEST = FrequencyRequest()
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DesignedFrequency(Result):
+    """Result of `design_frequency`: a plan and what it will tell; the `choice` of its poses and their `curve` where they were chosen.
 
     `flat` is the same with equal amplitudes. `curve` holds numbers of poses and the largest standard deviation of a stiffness with as many,
-    chosen and at random, (3, K). `record` says what it comes from.
+    chosen and at random, (3, K). `file` is that of the plan, where it was written; `record` says what it comes from.
     """
 
     planned: PlannedResponses
     flat: PlannedResponses
-    file: Path
     choice: FrequencyPoseSelection | None = None
     curve: np.ndarray | None = None
     placements: tuple[Placement, ...] = ()
+    file: Path | None = None
     record: RunRecord = NOT_RECORDED
+
+    @property
+    def headline(self) -> str:
+        """Size of the plan, and the stiffness that it tells least well."""
+        name, largest = largest_stiffness_std(self.planned.sensitivity)
+        plan = self.plan
+        return f"{len(plan.poses)} poses, {len(plan.lines)} lines, largest standard deviation {100 * largest:.2f} % ({name})"
+
+    def summary(self) -> str:
+        """Size of the plan, and the predicted relative standard deviations."""
+        return "\n".join(
+            [self.headline, *(f"{name:<40} {std:.4f}" for name, std in self.planned.std().items())]
+        )
+
+    def report(self, path: str | Path) -> Path:
+        """Write the plan's figures as one HTML page; returns its path."""
+        path = Path(path)
+        study = FrequencyDesignStudy(self.model, self.planned, self.flat, self.curve, self.document())
+        write_page(path, frequency_page(study))
+        return path
 
     @property
     def plan(self) -> MultisinePlan:
@@ -74,7 +138,7 @@ class DesignedFrequency:
         name, largest = largest_stiffness_std(self.planned.sensitivity)
         result = {
             "plan": self.file,
-            "page": page_beside(self.file),
+            "page": None if self.file is None else page_beside(self.file),
             "poses": len(plan.poses),
             "excited_axes": [joint + 1 for joint in plan.joints],
             "lines": len(plan.lines),
@@ -105,77 +169,100 @@ class DesignedFrequency:
         }
 
 
-def plan_frequency_experiments(
-    robot: Path,
-    out: Path,
+def design_frequency(
+    model: RobotModel,
+    request: FrequencyRequest = DEFAULT_REQUEST,
     *,
-    kind: PlanName = "default",
-    poses: Path | None = None,
-    choose: int | None = None,
-    candidates: int = CANDIDATES,
-    amplitude: Literal["flat", "shaped"] | None = None,
-    wanted: float | None = None,
-    crest: Literal["random", "optimised"] = "random",
-    detection_lines: bool = False,
-    place_payload: bool = False,
-    seed: int = 0,
-    command: str = "",
+    sensors: ResponseSensors = COMMON_SENSORS,
     progress: Progress = silent,
 ) -> DesignedFrequency:
-    """Write the plan `kind` for a robot to `out`, and a page with pictures beside it.
+    """Plan the frequency experiments of a robot, and predict how well they tell its springs.
 
-    `designed` and `quick` choose six poses out of random `candidates`, or `choose` of them, and shape the amplitudes; `default` and `paper`
-    take the poses of frequency_poses.csv beside robot.yaml and flat amplitudes. `poses`: a file of poses to take instead, the rows of
-    this plan. `amplitude` overrides how they are. `wanted`: relative standard deviation that every stiffness shall have; realisations and
-    periods follow. `crest`: random phases, or ones with small peaks; with `detection_lines` one line in four is left out, to see odd
-    distortion; with `place_payload` it is predicted what holding the payload elsewhere about the last axis would change in these poses.
+    Parameters
+    ----------
+    model : RobotModel
+        Robot with elastic joints and a controller.
+    request : FrequencyRequest
+        Kind of plan, poses, amplitudes, and what is asked of it.
+    sensors : ResponseSensors
+        Resolution of the encoders and noise of the torques.
+    progress : Progress
+        Told of the stages and their shares.
 
-    Raises `FlexcalError` where the robot declares no elastic joint or no controller, the poses cannot be read or excited, too few can be
-    found, or the wanted standard deviation is out of reach.
+    Returns
+    -------
+    DesignedFrequency
+        Its `plan`, the predicted standard deviations `planned.std()`, `summary()` and `report(path)`.
+
+    Raises
+    ------
+    FlexcalError
+        Where the robot declares no elastic joint or no controller, poses are missing or cannot be excited, too few can be found, or the
+        desired standard deviation is out of reach.
     """
-    model = RobotModel.from_yaml(robot)
-    sensors = response_sensors(robot)
-    choice = None
-    placed = kind == "default" or kind == "paper"
-    poses = model.path.parent / "frequency_poses.csv" if placed and poses is None else poses
-    _require_all(model, kind, poses)
+    _require_all(model, request)
+    kind, poses, choice = request.kind, request.poses, None
     if kind == "default" or kind == "paper":
         assert poses is not None
-        plan = frequency_plan(model, poses, kind, seed)
-        plan = leave_out_detection_lines(plan) if detection_lines else plan
+        plan = standard_plan(model, poses, kind, request.seed)
+        plan = leave_out_detection_lines(plan) if request.detection_lines else plan
         flat = planned = PlannedResponses.of(model, plan, sensors)
-        if amplitude == "shaped":
+        if request.amplitude == "shaped":
             planned = PlannedResponses.of(model, optimal_amplitudes(model, flat), sensors)
     else:
-        plan = plan_without_poses(model, kind, detection_lines=detection_lines, seed=seed)
+        plan = plan_without_poses(model, kind, detection_lines=request.detection_lines, seed=request.seed)
         if poses is None:
             designed = optimise_excitation(
-                model, plan, count=choose or POSES, candidates=candidates, sensors=sensors, progress=progress
+                model,
+                plan,
+                count=request.choose,
+                candidates=request.candidates,
+                sensors=sensors,
+                progress=progress,
             )
             flat, planned, choice = designed.flat, designed.planned, designed.choice
         else:
-            given = read_frequency_poses(
-                poses, kind, model, excitation_margin(model, plan.reference_amplitude)
-            )
-            flat = PlannedResponses.of(model, within_preload(model, replace(plan, poses=given)), sensors)
+            flat = PlannedResponses.of(model, within_preload(model, replace(plan, poses=poses)), sensors)
             planned = PlannedResponses.of(model, optimal_amplitudes(model, flat), sensors)
-        planned = flat if amplitude == "flat" else planned
-    if wanted is not None:
-        planned = planned.reaching(wanted)
-    planned = replace(planned, plan=replace(planned.plan, crest=crest))
-    curve = None if choice is None else _curve(choice, seed)
-    places = payload_placements(model, planned.plan, sensors, progress) if place_payload else ()
-    files = [file for file in (poses, declared_sensors(robot)) if file is not None]
-    designed = DesignedFrequency(
-        planned, flat, out, choice, curve, places, RunRecord(robot_provenance(model, files), command)
-    )
-    write_plan(out, planned.plan)
-    study = FrequencyDesignStudy(model, planned, flat, designed.curve, designed.document())
-    write_page(page_beside(out), frequency_page(study))
-    return designed
+        planned = flat if request.amplitude == "flat" else planned
+    if request.desired_std is not None:
+        planned = planned.reaching(request.desired_std)
+    planned = replace(planned, plan=replace(planned.plan, crest=request.crest))
+    places = payload_placements(model, planned.plan, sensors, progress) if request.place_payload else ()
+    curve = None if choice is None else _curve(choice, request.seed)
+    return DesignedFrequency(model, planned, flat, choice, curve, places)
 
 
-def _require_all(model: RobotModel, kind: PlanName, poses: Path | None) -> None:
+def plan_frequency_experiments(
+    robot_file: Path,
+    out: Path,
+    request: FrequencyRequest,
+    *,
+    poses: Path | None = None,
+    command: str = "",
+    progress: Progress = silent,
+) -> DesignedFrequency:
+    """`design_frequency` for the robot of a robot.yaml; the plan goes to `out`, its page beside it.
+
+    `poses` is a file whose rows of this plan are taken; by default, for `default` and `paper`, frequency_poses.csv beside robot.yaml.
+    The sensors are those of cell.yaml beside it, if there is one. Raises `FlexcalError` as reading and `design_frequency` do.
+    """
+    model, kind = RobotModel.from_yaml(robot_file), request.kind
+    if poses is None and (kind == "default" or kind == "paper"):
+        poses = model.path.parent / "frequency_poses.csv"
+    _require_all(model, request, poses)
+    if poses is not None:
+        room = excitation_margin(model, reference_amplitude(kind))
+        request = replace(request, poses=read_frequency_poses(poses, kind, model, room))
+    designed = design_frequency(model, request, sensors=response_sensors(robot_file), progress=progress)
+    files = [file for file in (poses, declared_sensors(robot_file)) if file is not None]
+    result = replace(designed, file=out, record=RunRecord(robot_provenance(model, files), command))
+    write_plan(out, result.plan)
+    result.report(page_beside(out))
+    return result
+
+
+def _require_all(model: RobotModel, request: FrequencyRequest, file: Path | None = None) -> None:
     """Raise `InputError` that names everything that a plan needs and is not there, not one thing after another."""
     missing = []
     if not model.driven:
@@ -185,10 +272,12 @@ def _require_all(model: RobotModel, kind: PlanName, poses: Path | None) -> None:
         missing.append(
             f"declares no controller: add `controller: {{kp: […], kd: […], rate_hz: 4000}}` with {n} gains each"
         )
-    if poses is not None and not poses.is_file():
+    placed = request.kind in ("default", "paper") and request.poses is None
+    if (placed and file is None) or (file is not None and not file.is_file()):
         columns = ", ".join(f"q{i}_deg" for i in range(1, model.n + 1))
         missing.append(
-            f"has no {poses} for the poses of the plan '{kind}': write it with the columns plan, pose, {columns}, or let --plan designed "
+            f"has no {file or 'file'} for the poses of the plan '{request.kind}': write it with the columns plan, pose, {columns}, or let "
+            "--plan designed "
             "choose the poses"
         )
     if missing:

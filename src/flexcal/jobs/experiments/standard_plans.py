@@ -21,22 +21,34 @@ _LEAST = 0.5
 """What is left of the excitation at least: a drive that gravity does not load crosses its gap however small that is."""
 
 
+def reference_amplitude(kind: str) -> float:
+    """Amplitude of the reference motion of a plan, rad."""
+    return REFERENCE.get(kind, REFERENCE["default"])
+
+
 def frequency_plan(
     model: RobotModel, poses_file: Path, kind: Literal["default", "paper"], seed: int
 ) -> MultisinePlan:
-    """The plan `default` (payload as declared, 1.5° reference at 2.125 Hz) or `paper` (no payload, 3°); Neubauer et al. 2015, §4.1.3, Fig.
-    4.
+    """`standard_plan` in the poses of that plan in a file.
 
-    Odd lines from 3 to 80 Hz on f0 = 0.25 Hz, flat amplitudes, four realisations of four periods, two of them dropped, both signs. The
-    excitation is lowered, on all axes alike, until its peaks no longer pull a drive with backlash across its gap against gravity.
     Raises `InputError` where the file lacks the plan's poses, robot.yaml a controller, or a pose the room that the motion about it needs.
     """
+    room = excitation_margin(model, reference_amplitude(kind))
+    return standard_plan(model, read_frequency_poses(poses_file, kind, model, room), kind, seed)
+
+
+def standard_plan(
+    model: RobotModel, poses: np.ndarray, kind: Literal["default", "paper"], seed: int
+) -> MultisinePlan:
+    """The plan `default` (payload as declared, 1.5° reference at 2.125 Hz) or `paper` (no payload, 3°) in `poses` (P, n), rad.
+
+    Neubauer et al. 2015, §4.1.3, Fig. 4. Odd lines from 3 to 80 Hz on f0 = 0.25 Hz, flat amplitudes, four realisations of four periods, two
+    of them dropped, both signs. The excitation is lowered, on all axes alike, until its peaks no longer pull a drive with backlash
+    across its gap against gravity. Raises `FlexcalError` where robot.yaml declares no controller.
+    """
     payload = None if kind == "default" else 0.0
-    reference = REFERENCE[kind]
-    anywhere = np.zeros((1, model.n))
-    plan = flat_multisine(model, anywhere, name=kind, payload=payload, reference=reference, seed=seed)
-    plan = replace(
-        plan, poses=read_frequency_poses(poses_file, kind, model, excitation_margin(model, reference))
+    plan = flat_multisine(
+        model, poses, name=kind, payload=payload, reference=reference_amplitude(kind), seed=seed
     )
     share = float(np.clip(static_amplitude_share(model, plan), _LEAST, 1.0))
     return replace(plan, amplitude=share * plan.amplitude)

@@ -20,7 +20,7 @@ from flexcal.design.trajectories import (
     TimedMotion,
     TrajectoryCriterion,
     TrajectoryDesign,
-    design_trajectories,
+    optimise_trajectories,
     require_stated_limits,
     sequence,
     timed_motion,
@@ -28,7 +28,8 @@ from flexcal.design.trajectories import (
 )
 from flexcal.errors import InputError
 from flexcal.files.formats import provenance
-from flexcal.jobs.result_files import RunRecord
+from flexcal.jobs.pages import Result
+from flexcal.jobs.result_files import NOT_RECORDED, RunRecord
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.layout import write_page
@@ -46,13 +47,44 @@ _NEXT_SEED = 7919
 
 @dataclass(frozen=True)
 class TrajectoryRequest:
-    """What is asked of a design; see `design_trajectories`. The best of so many `searches` counts, each from a start of its own."""
+    """Which exciting trajectories `optimise_trajectories` plans.
+
+    Parameters
+    ----------
+    count : int
+        Number of trajectories, each optimised given those before it.
+    criterion : {"compound", "posterior", "condition", "D", "E", "A", "c"}
+        posterior: masses, centres of mass and rotors, with the prior of robot.yaml; condition: condition number of the column-scaled
+        observation matrix; compound: both; D, E, A: of the base parameters without prior; c: variances of the parameters `of`.
+    of : tuple of str
+        Parameters of the criterion c, such as link_3.mass.
+    sequence : {"links", "axes", "kinds"}, optional
+        One trajectory for each link from the last on, for wrist and main axes, or for inertia, gravity and friction; with criterion D.
+    after : TrajectoryPlan, optional
+        Plan that is recorded already; its information is added.
+    kind : {"fourier", "spline"}
+        Fourier series, or cyclic B-splines with three control points for each of the harmonics.
+    duration, base_frequency_hz : float
+        Length of a trajectory, s, without one period to settle, and base frequency, Hz.
+    harmonics : int
+        Number of multiples of the base frequency.
+    rest : bool
+        Whether every period begins and ends at rest.
+    start : tuple of float
+        Joint positions (n,), rad or m, where every period begins and ends at rest.
+    share : float
+        Share of the limits of velocities, accelerations and torques that a motion may use.
+    loaded : bool
+        Whether the declared payload is held.
+    searches, steps, seed : int
+        Number of searches, each from a random start, of which the best is kept; iterations at each level of the barrier; seed.
+    """
 
     count: int = 3
     criterion: TrajectoryCriterion = "compound"
     of: tuple[str, ...] = ()
     sequence: SequenceName | None = None
-    after: Path | None = None
+    after: TrajectoryPlan | None = None
     kind: Kind = "fourier"
     duration: float = 10.0
     base_frequency_hz: float = 0.2
@@ -65,10 +97,10 @@ class TrajectoryRequest:
     steps: int = 20
     seed: int = 0
 
-    def design(self, nominal: RobotModel, progress: Progress = silent) -> list[TrajectoryDesign]:
+    def optimise(self, nominal: RobotModel, progress: Progress = silent) -> list[TrajectoryDesign]:
         """The designs of all searches, best first.
 
-        Raises `FlexcalError` as `design_trajectories` does, and for a start of another number of joints.
+        Raises `FlexcalError` as `optimise_trajectories` does, and for a start of another number of joints.
         """
         if self.start and len(self.start) != nominal.n:
             raise InputError(
@@ -84,13 +116,13 @@ class TrajectoryRequest:
 
     def _search(self, nominal: RobotModel, search: int, progress: Progress) -> TrajectoryDesign:
         loaded = self.loaded or any(name.startswith("payload.") for name in self.of)
-        design = design_trajectories(
+        design = optimise_trajectories(
             nominal,
             self.count,
             criterion=self.criterion,
             of=self.of,
             sequence=() if self.sequence is None else sequence(BaseRegressor.of(nominal), self.sequence),
-            after=None if self.after is None else read_plan_of(self.after, TrajectoryPlan),
+            after=self.after,
             kind=self.kind,
             duration=self.duration,
             base_frequency_hz=self.base_frequency_hz,
@@ -107,20 +139,44 @@ class TrajectoryRequest:
         return replace(design, plan=replace(design.plan, seed=self.seed))
 
 
-@dataclass(frozen=True, eq=False)
-class DesignedTrajectories:
-    """The designs of all searches, best first, and the file that the plan of the first was written to.
+DEFAULT_REQUEST = TrajectoryRequest()
 
-    `timed` are its trajectories as timed joint positions, `rate_hz` apart. `assumed_friction` names the joints of which robot.yaml gives no
-    friction.
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DesignedTrajectories(Result):
+    """Result of `optimise_trajectories`: the designs of all searches, best first.
+
+    `timed` are the trajectories of the best as timed joint positions, `rate_hz` a second. `assumed_friction` names the joints of which
+    robot.yaml gives no friction. `file` is that of the plan, where it was written; `record` says what it comes from.
     """
 
     designs: list[TrajectoryDesign]
     timed: tuple[TimedMotion, ...]
     rate_hz: float
     assumed_friction: tuple[str, ...]
-    file: Path
-    record: RunRecord
+    file: Path | None = None
+    record: RunRecord = NOT_RECORDED
+
+    @property
+    def plan(self) -> TrajectoryPlan:
+        """The trajectories."""
+        return self.design.plan
+
+    @property
+    def headline(self) -> str:
+        """Length and condition number."""
+        plan = self.plan
+        return f"{len(plan)} trajectories, {len(plan) * plan.duration:.0f} s, condition number {self.conditions[0]:.3g}"
+
+    def summary(self) -> str:
+        """Length, condition number and remarks."""
+        return "\n".join([self.headline, *self.remarks])
+
+    def report(self, path: str | Path) -> Path:
+        """Write the trajectories' figures as one HTML page; returns its path."""
+        path = Path(path)
+        write_page(path, trajectory_page(self.design, self.document()))
+        return path
 
     @property
     def design(self) -> TrajectoryDesign:
@@ -128,17 +184,16 @@ class DesignedTrajectories:
         return self.designs[0]
 
     @property
-    def page(self) -> Path:
-        """Where the pictures are: beside the plan."""
-        return page_beside(self.file)
+    def page(self) -> Path | None:
+        """Where the pictures are: beside the plan; None where it was not written."""
+        return None if self.file is None else page_beside(self.file)
 
     @property
     def timed_files(self) -> list[tuple[Path, Path]]:
-        """CSV and ROS message of every trajectory, beside the plan."""
-        stems = [f"{self.file.stem}_{number}" for number in range(1, len(self.timed) + 1)]
-        return [
-            (self.file.with_name(f"{stem}.csv"), self.file.with_name(f"{stem}_ros.yaml")) for stem in stems
-        ]
+        """CSV and ROS message of every trajectory, beside the plan, or where that would be."""
+        plan = Path("trajectory.yaml") if self.file is None else self.file
+        stems = [f"{plan.stem}_{number}" for number in range(1, len(self.timed) + 1)]
+        return [(plan.with_name(f"{stem}.csv"), plan.with_name(f"{stem}_ros.yaml")) for stem in stems]
 
     @cached_property
     def conditions(self) -> list[float]:
@@ -212,37 +267,76 @@ class DesignedTrajectories:
         }
 
 
+def design_trajectories(
+    model: RobotModel,
+    request: TrajectoryRequest = DEFAULT_REQUEST,
+    *,
+    rate_hz: float | None = None,
+    progress: Progress = silent,
+) -> DesignedTrajectories:
+    """Plan exciting trajectories: periodic motions within all limits and without collision that best determine the robot's dynamics.
+
+    Parameters
+    ----------
+    model : RobotModel
+        Nominal robot with limits of position, velocity and torque.
+    request : TrajectoryRequest
+        Number, kind and length of the trajectories, and the criterion.
+    rate_hz : float, optional
+        Timed joint positions a second; by default 100, more where a motion is fast.
+    progress : Progress
+        Told of the stages and their shares.
+
+    Returns
+    -------
+    DesignedTrajectories
+        Its `plan`, `timed` joint positions, `conditions`, `summary()` and `report(path)`.
+
+    Raises
+    ------
+    FlexcalError
+        Where limits are missing, a start has another number of joints, or no motion within the limits is found.
+    """
+    require_stated_limits(model)
+    known, assumed = with_assumed_friction(model)
+    if rate_hz is None:
+        rate_hz = max(LEAST_RATE_HZ, _INSTANTS_A_PERIOD * request.harmonics * request.base_frequency_hz)
+    designs = request.optimise(known, progress)
+    timed = tuple(timed_motion(designs[0], number, rate_hz) for number in range(len(designs[0].plan)))
+    return DesignedTrajectories(model, designs, timed, rate_hz, assumed)
+
+
 def plan_trajectories(
-    robot: Path,
+    robot_file: Path,
     out: Path,
     request: TrajectoryRequest,
     *,
+    after: Path | None = None,
     rate_hz: float | None = None,
     command: str = "",
     progress: Progress = silent,
 ) -> DesignedTrajectories:
-    """Write exciting trajectories of the nominal robot to the file `out`; beside it a page of pictures, and the motions as timed positions.
+    """`optimise_trajectories` for the nominal robot of a robot.yaml, after the recorded plan of the file `after`.
 
-    These come `rate_hz` a second; None: 100, more where a motion is fast. Raises `FlexcalError` as `design_trajectories` does.
+    The plan goes to the file `out`; beside it a page of pictures, and the motions as timed positions. Raises `FlexcalError` as
+    `optimise_trajectories` does.
     """
-    nominal = RobotModel.from_yaml(robot, estimates=False)
+    nominal = RobotModel.from_yaml(robot_file, estimates=False)
     require_stated_limits(nominal)
-    known, assumed = with_assumed_friction(nominal)
-    if rate_hz is None:
-        rate_hz = max(LEAST_RATE_HZ, _INSTANTS_A_PERIOD * request.harmonics * request.base_frequency_hz)
-    origin = provenance([robot, nominal.urdf, *(() if request.after is None else (request.after,))])
-    designs = request.design(known, progress)
-    timed = tuple(timed_motion(designs[0], number, rate_hz) for number in range(len(designs[0].plan)))
-    designed = DesignedTrajectories(designs, timed, rate_hz, assumed, out, RunRecord(origin, command))
-    write_page(designed.page, trajectory_page(designed.design, designed.document()))
-    for motion, (csv, ros) in zip(timed, designed.timed_files, strict=True):
+    if after is not None:
+        request = replace(request, after=read_plan_of(after, TrajectoryPlan))
+    origin = provenance([robot_file, nominal.urdf, *(() if after is None else (after,))])
+    designed = design_trajectories(nominal, request, rate_hz=rate_hz, progress=progress)
+    result = replace(designed, file=out, record=RunRecord(origin, command))
+    result.report(page_beside(out))
+    for motion, (csv, ros) in zip(result.timed, result.timed_files, strict=True):
         motion.positions.write_csv(csv)
         motion.positions.write_ros(ros)
-    write_plan(out, designed.design.plan)
-    return designed
+    write_plan(out, result.plan)
+    return result
 
 
 def exciting_plan(nominal: RobotModel, *, count: int = 3, seed: int) -> TrajectoryPlan:
     """Trajectories of stage 0 of the demonstration: without payload, of one search, by the criterion posterior."""
     request = TrajectoryRequest(count=count, criterion="posterior", searches=1, seed=seed)
-    return request.design(nominal)[0].plan
+    return request.optimise(nominal)[0].plan
