@@ -210,7 +210,7 @@ def accuracy_map(
         Where the robot does not reach the box, and where the verification poses were measured from another place than the calibration's.
     """
     model = robot.model
-    stations = [s for s in model.stations if is_station_identified(model, s)]
+    stations = [s for s in model.stations.names if is_station_identified(model, s)]
     reach = propagation(model, station=stations[0] if stations else None, payload=payload)
     check = None if verification is None else _Check.of(robot, verification)
     rng = np.random.default_rng([seed, 7])

@@ -162,7 +162,7 @@ def calibrate(
 
 
 def _require_uncalibrated(model: RobotModel) -> None:
-    if any(is_station_identified(model, station) for station in model.stations):
+    if any(is_station_identified(model, station) for station in model.stations.names):
         raise FlexcalError(
             "E-RUN-095",
             f"{model.name} has been calibrated already, and its points would count twice; read it with "
@@ -181,7 +181,7 @@ def _terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str, ...] | 
     asked = tuple(given) if given else ((declared,) if isinstance(declared, str) else declared)
     if asked == (AUTO,):
         return None
-    harmonics = tuple(f"transmission_{order}" for order in model.harmonics)
+    harmonics = tuple(f"transmission_{order}" for order in model.drives.harmonics)
     known = ("kinematic", "backlash", *PER_JOINT, TRANSMISSION, *harmonics)
     for term in asked:
         owner, _, kind = term.rpartition(".")
