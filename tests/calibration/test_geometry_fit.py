@@ -285,7 +285,7 @@ def test_stations_and_measurements_that_are_not_known_are_named(
 ) -> None:
     poses = simulate(1).poses
     elsewhere = replace(poses, station=np.full(len(poses), "window"))
-    for call in (calibrate, verify):
+    for call in (fit_geometry, prediction_errors):
         with refused("E-ROBOT-042", "window", "tracker"):
             call(tx90l, elsewhere)
         with refused("E-CAL-012"):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from refusals import refused
 
+from flexcal.calibration.measurement import predict_measurements
 from flexcal.model.parts import kinematic_tree
 from flexcal.model.robot import GEOMETRY, RobotModel
 

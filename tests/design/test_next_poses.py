@@ -5,7 +5,7 @@ import pytest
 from refusals import refused
 
 from flexcal.data.poses import PoseSet
-from flexcal.design.poses import pose_candidates, pose_sensitivity, random_poses
+from flexcal.design.poses import pose_candidates, pose_sensitivity, random_poses, select_next_poses
 
 
 def _measured(q, sigma=2e-5, **other):

@@ -82,7 +82,7 @@ def predict(robot: CalibratedRobot, commands: ToolTargets, *, progress: Progress
     >>> predict(robot, read_targets("commands.csv", robot.model)).tool.position  # doctest: +SKIP
     """
     if commands.q is None:
-        raise FlexcalError("E-RUN-094", "the commands hold no joint positions q; give those of the motors.")
+        raise FlexcalError("E-RUN-097", "the commands hold no joint positions q; give those of the motors.")
     parts = []
     for first in range(0, len(commands), _BLOCK):
         progress("predicting", first / len(commands))
