@@ -1,14 +1,12 @@
 from .calibration.accuracy import repeatability
 from .calibration.fit import fit_geometry
-from .calibration.measurement import predict_measurements, register, rigid_motion
-from .calibration.term_selection import select_terms
+from .calibration.measurement import rigid_motion
 from .calibration.verification import prediction_errors
 from .data.plans import MultisinePlan, PosePlan, TrajectoryPlan, read_plan
 from .data.poses import PoseSet, ToolTargets, read_poses, read_targets
-from .data.recordings import Decimation, Recording, read_recording
+from .data.recordings import Recording, read_recording
 from .design.poses import random_poses
 from .design.scene import MeasuringSetup
-from .dynamics.diagnostics import predict_torques
 from .dynamics.estimators import (
     DIDIM,
     EKF,
@@ -22,25 +20,14 @@ from .dynamics.estimators import (
     EnergyModel,
     Estimator,
     PowerModel,
-    feasible_least_squares,
-    weighted_least_squares,
 )
-from .dynamics.friction import select_friction
 from .dynamics.inertials import identify_with_prior, trajectory_error
-from .dynamics.inverse_model import CLASSIC, BaseParameters, Observation
-from .dynamics.regression import assemble_regression, experiment_system
 from .dynamics.residual import read_learned_residual
-from .dynamics.signals import JointLog, Window
 from .errors import FlexcalError, InputError
 from .estimation import Estimate
 from .export import write_mjcf, write_urdf
 from .files.formats import read_yaml
-from .frequency.periodic import (
-    FrequencyResponse,
-    frequency_response,
-    frequency_responses,
-    local_polynomial_responses,
-)
+from .frequency.periodic import FrequencyResponse, frequency_response, frequency_responses
 from .jobs.accuracy import AccuracyMap, Verification, accuracy_map, verify
 from .jobs.calibration import Calibration, calibrate
 from .jobs.deployment import Compensation, Prediction, compensate, predict
@@ -63,17 +50,13 @@ from .jobs.experiments import (
 from .jobs.inputs import CalibratedRobot
 from .jobs.payload import PayloadIdentification, identify_payload
 from .jobs.stiffness import StiffnessIdentification, identify_stiffness
-from .model.kinematics import point_kinematics
-from .model.parts import is_physically_consistent
 from .model.robot import RobotModel
-from .model.statics import gravity_torque, static_equilibrium, tool_at_rest
-from .model.torques import torque_regressor
+from .model.statics import gravity_torque, tool_at_rest
 from .virtual_cell import CellConfig, VirtualCell, draw_truth
 
 __version__: str
 
 __all__ = [
-    "CLASSIC",
     "DIDIM",
     "EKF",
     "IRLS",
@@ -84,12 +67,10 @@ __all__ = [
     "TLS",
     "WLS",
     "AccuracyMap",
-    "BaseParameters",
     "CalibratedRobot",
     "Calibration",
     "CellConfig",
     "Compensation",
-    "Decimation",
     "DesignedFrequency",
     "DesignedNextPoses",
     "DesignedPoses",
@@ -102,10 +83,8 @@ __all__ = [
     "FrequencyRequest",
     "FrequencyResponse",
     "InputError",
-    "JointLog",
     "MeasuringSetup",
     "MultisinePlan",
-    "Observation",
     "PayloadIdentification",
     "PosePlan",
     "PoseRequest",
@@ -120,9 +99,7 @@ __all__ = [
     "TrajectoryRequest",
     "Verification",
     "VirtualCell",
-    "Window",
     "accuracy_map",
-    "assemble_regression",
     "calibrate",
     "compensate",
     "design_frequency",
@@ -131,8 +108,6 @@ __all__ = [
     "design_trajectories",
     "draw_truth",
     "exciting_plan",
-    "experiment_system",
-    "feasible_least_squares",
     "fit_geometry",
     "frequency_plan",
     "frequency_response",
@@ -142,12 +117,7 @@ __all__ = [
     "identify_payload",
     "identify_stiffness",
     "identify_with_prior",
-    "is_physically_consistent",
-    "local_polynomial_responses",
-    "point_kinematics",
     "predict",
-    "predict_measurements",
-    "predict_torques",
     "prediction_errors",
     "random_poses",
     "read_learned_residual",
@@ -156,17 +126,11 @@ __all__ = [
     "read_recording",
     "read_targets",
     "read_yaml",
-    "register",
     "repeatability",
     "rigid_motion",
-    "select_friction",
-    "select_terms",
-    "static_equilibrium",
     "tool_at_rest",
-    "torque_regressor",
     "trajectory_error",
     "verify",
-    "weighted_least_squares",
     "write_mjcf",
     "write_urdf",
 ]
