@@ -25,7 +25,7 @@ from .dynamics.inertials import identify_with_prior, trajectory_error
 from .dynamics.residual import read_learned_residual
 from .errors import FlexcalError, InputError
 from .estimation import Estimate
-from .export import write_mjcf, write_urdf
+from .export import export_mjcf, export_urdf
 from .files.formats import read_yaml
 from .frequency.periodic import FrequencyResponse, frequency_response, frequency_responses
 from .jobs.accuracy import AccuracyMap, Verification, accuracy_map, verify
@@ -108,6 +108,8 @@ __all__ = [
     "design_trajectories",
     "draw_truth",
     "exciting_plan",
+    "export_mjcf",
+    "export_urdf",
     "fit_geometry",
     "frequency_plan",
     "frequency_response",
@@ -131,6 +133,4 @@ __all__ = [
     "tool_at_rest",
     "trajectory_error",
     "verify",
-    "write_mjcf",
-    "write_urdf",
 ]

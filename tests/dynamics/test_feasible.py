@@ -21,7 +21,7 @@ from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
 from flexcal.dynamics.regression import RegressionData, assemble_regression
 from flexcal.dynamics.signals import Motion, Window
 from flexcal.estimation import Estimate
-from flexcal.export import write_urdf
+from flexcal.export import export_urdf
 from flexcal.model.parts import PSEUDO_INERTIA, is_physically_consistent, pseudo_inertia
 from flexcal.model.robot import RobotModel
 
@@ -239,7 +239,7 @@ def test_the_urdf_has_the_bodies_and_needs_the_torques(
     model: RobotModel = request.getfixturevalue(robot)
     data, _ = simulated(model, swing, every=10, noise=1.0)
     identified = model.with_estimate(feasible_least_squares(data))
-    export = write_urdf(identified, tmp_path / "identified.urdf")
+    export = export_urdf(identified, tmp_path / "identified.urdf")
     assert "Rotor inertia, friction and torque offset of the drives stay in estimates.yaml" in str(export)
     other = pin.buildModelFromUrdf(str(export.path))
     for inertia in list(other.inertias)[1:]:
@@ -265,7 +265,7 @@ def test_links_that_no_body_can_be_stay_nominal_in_a_urdf(
     data, _ = simulated(tx40, swing, every=10, noise=1.0)
     linear = weighted_least_squares(data)
     wrong = [joint.link for joint, ok in zip(tx40.joints, bodies(tx40, linear), strict=True) if not ok]
-    export = write_urdf(tx40.with_estimate(linear), tmp_path / "linear.urdf")
+    export = export_urdf(tx40.with_estimate(linear), tmp_path / "linear.urdf")
     assert wrong and f"identified for {', '.join(wrong)}, which stay nominal" in str(export)
     before, after = (pin.buildModelFromUrdf(str(path)) for path in (tx40.urdf, export.path))
     for joint in tx40.joints:

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from flexcal.export import write_urdf
+from flexcal.export import export_urdf
 from flexcal.model.robot import GEOMETRY, RobotModel
 
 Kinematics = Callable[[np.ndarray], np.ndarray]
@@ -32,7 +32,7 @@ def pinocchio_of(tmp_path: Path) -> Callable[[RobotModel], Kinematics]:
     """Frames (N, 4, 4) of the first point of a robot, by Pinocchio from its exported URDF."""
 
     def make(model: RobotModel) -> Kinematics:
-        export = write_urdf(model, tmp_path / "for_pinocchio.urdf")
+        export = export_urdf(model, tmp_path / "for_pinocchio.urdf")
         read = pin.buildModelFromUrdf(str(export.path))
         data, frame = read.createData(), read.getFrameId(model.point().name)
 

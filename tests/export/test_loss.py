@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.export import measure_export_error, write_urdf
+from flexcal.export import export_urdf, measure_export_error
 from flexcal.export.mjcf_file import mjcf_tool, render_mjcf
 from flexcal.export.representation_error import AT_REST, random_poses
 from flexcal.export.sdf import render_sdf, sdf_tool
@@ -49,7 +49,7 @@ def test_the_declared_working_volume_is_where_it_is_measured(tx90l: RobotModel) 
 def test_a_robot_without_points_names_what_is_lost_without_millimetres(
     tx90l: RobotModel, tmp_path: Path
 ) -> None:
-    export = write_urdf(replace(tx90l, points={}), tmp_path / "robot.urdf")
+    export = export_urdf(replace(tx90l, points={}), tmp_path / "robot.urdf")
     assert export.loss.error is None and export.lost == ("elastic deflection",)
     assert "declares no point" in str(export)
 

@@ -8,7 +8,7 @@ import pytest
 from refusals import refused
 from scipy.linalg import eigh
 
-from flexcal.export import mjcf_spec, write_mjcf
+from flexcal.export import export_mjcf, mjcf_spec
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.robot import RobotModel, carried_inertias
 from flexcal.units import DEGREE
@@ -37,7 +37,7 @@ def test_the_file_stands_where_the_model_stands(
     tx90l: RobotModel, rng: np.random.Generator, tmp_path: Path
 ) -> None:
     model = with_geometric_errors(tx90l, rng)
-    write_mjcf(model, tmp_path / "robot.xml")
+    export_mjcf(model, tmp_path / "robot.xml")
     loaded = mujoco.MjModel.from_xml_path(str(tmp_path / "robot.xml"))
     data = mujoco.MjData(loaded)
     q, deflection = rng.uniform(-1, 1, 6), np.zeros((1, 6, 3))

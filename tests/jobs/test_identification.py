@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from planar_arm import Log
+from planar_arm import Log, swings, torque
 from refusals import refused
 
 from flexcal import IRLS, SDP, RobotModel, identify_dynamics, read_recording
@@ -52,6 +52,15 @@ def test_residuals_and_model_are_those_of_the_estimate(found: DynamicsIdentifica
     values = found.model.values
     shared = [name for name in found.estimate.values if name in values]
     assert shared and all(values[name] == pytest.approx(found.estimate.values[name]) for name in shared)
+
+
+def test_torques_of_another_motion_are_those_of_lagrange(found: DynamicsIdentification) -> None:
+    _, q, dq, ddq = swings(5.0, 200.0, 0.2, np.random.default_rng(8))
+    true, given = torque(q, dq, ddq), found.torque(q, dq, ddq)
+    moving = np.all(np.abs(dq) > 0.02, axis=1)
+    assert np.linalg.norm(given[moving] - true[moving]) < 0.01 * np.linalg.norm(true[moving])
+    with refused("E-MODEL-010"):
+        found.torque(q, dq[:10], ddq)
 
 
 def test_it_shows_itself(found: DynamicsIdentification, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from flexcal.calibration.fit import fit_geometry
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.design.scene import CollisionChecker
-from flexcal.export import write_urdf
+from flexcal.export import export_urdf
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.robot import GEOMETRY, RobotModel
 from flexcal.model.statics import gravity_torque
@@ -127,7 +127,7 @@ def test_points_on_both_arms_calibrate_the_tree(
     np.testing.assert_allclose(predict_measurements(fit.model, fresh).position, fresh.position, atol=1e-6)
     before = predict_measurements(torso, fresh).position
     assert np.linalg.norm(before - fresh.position, axis=1).mean() > 3e-4
-    other = pin.buildModelFromUrdf(str(write_urdf(fit.model, tmp_path / "calibrated.urdf").path))
+    other = pin.buildModelFromUrdf(str(export_urdf(fit.model, tmp_path / "calibrated.urdf").path))
     _, theirs = in_pinocchio(torso, q)
     data = other.createData()
     for tip in TIPS:

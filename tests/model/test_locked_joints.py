@@ -11,7 +11,7 @@ from refusals import refused
 
 from flexcal.design.scene import CollisionChecker
 from flexcal.errors import InputError
-from flexcal.export import write_urdf
+from flexcal.export import export_urdf
 from flexcal.model.robot import RobotModel
 
 LINK = """<link name="{0}"><inertial><origin xyz="0.01 -0.02 {1}"/><mass value="{2}"/>
@@ -106,7 +106,7 @@ def test_meshes_of_a_package_above_the_urdf_stand_where_the_joint_is_locked(tmp_
 def test_an_exported_gripper_weighs_what_was_found(tmp_path: Path) -> None:
     ours = _robot(tmp_path, MOVING, LOCKED)
     found = ours.with_values({"boom.mass": 6.0, "boom.com_x": 0.04})
-    write_urdf(found, tmp_path / "found.urdf")
+    export_urdf(found, tmp_path / "found.urdf")
     (tmp_path / "robot.yaml").write_text(f"robot: found.urdf\nlocked: {LOCKED}\n".replace("'", ""))
     again = RobotModel.from_yaml(tmp_path / "robot.yaml")
     for one, two in (

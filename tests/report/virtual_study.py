@@ -24,7 +24,7 @@ from flexcal.data.plans import MultisinePlan, write_plan
 from flexcal.data.poses import PoseSet
 from flexcal.elasticity.identification import SpringFit
 from flexcal.estimation import Estimate, Parameter, Parameters
-from flexcal.export import write_urdf
+from flexcal.export import export_urdf
 from flexcal.files.formats import Block, write_estimates
 from flexcal.frequency.periodic import FrequencyResponse
 from flexcal.jobs.result_files import (
@@ -238,5 +238,5 @@ def leave_run(folder: Path, run: TwoStageRun) -> None:
     points = MeasuredPoints(fit.poses, errors_before(run.before) | {CALIBRATED: fit.residuals}, fit.ambiguous)
     write_points(folder, points)
     write_arm(folder, arms_at(fit.model, fit.poses, points.shown))
-    exported = write_urdf(fit.model, folder / "calibrated.urdf")
+    exported = export_urdf(fit.model, folder / "calibrated.urdf")
     write_results(folder, two_stage_document(run, exported))

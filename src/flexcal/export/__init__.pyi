@@ -1,11 +1,11 @@
 from .dh_table import Convention, render_dh
 from .formats import FORMATS, PlainFormat, render
-from .mjcf_file import write_mjcf
+from .mjcf_file import export_mjcf
 from .mujoco_spec import mjcf_spec
 from .offset_fit import undetermined_offsets
 from .offset_table import render_offsets
 from .representation_error import ExportErrors, UnrepresentedTerm, measure_export_error
-from .urdf import write_urdf
+from .urdf import export_urdf
 from .written_file import ExportedFile, RenderedModel, write_rendered
 
 __all__ = [
@@ -16,13 +16,13 @@ __all__ = [
     "PlainFormat",
     "RenderedModel",
     "UnrepresentedTerm",
+    "export_mjcf",
+    "export_urdf",
     "measure_export_error",
     "mjcf_spec",
     "render",
     "render_dh",
     "render_offsets",
     "undetermined_offsets",
-    "write_mjcf",
     "write_rendered",
-    "write_urdf",
 ]

@@ -30,7 +30,7 @@ _AT_REST = 1e-12
 """rad: a correction of the springs after which the arm counts as at rest."""
 
 
-def write_mjcf(model: RobotModel, path: str | Path) -> ExportedFile:
+def export_mjcf(model: RobotModel, path: str | Path) -> ExportedFile:
     """Write the robot as MJCF with elastic joints and measure what it lost; see `render_mjcf`."""
     return write_rendered(model, path, render_mjcf(model))
 

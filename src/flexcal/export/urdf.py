@@ -16,7 +16,7 @@ from flexcal.model.parts import rotation_rpy, rpy_rotation
 from flexcal.model.robot import RobotModel
 
 
-def write_urdf(model: RobotModel, path: str | Path) -> ExportedFile:
+def export_urdf(model: RobotModel, path: str | Path) -> ExportedFile:
     """Write the URDF of `model` and measure what it lost; see `render_urdf`. Raises `FlexcalError` where it cannot be written, too."""
     return write_rendered(model, path, render_urdf(model))
 

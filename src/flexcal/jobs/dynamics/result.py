@@ -15,6 +15,8 @@ from flexcal.dynamics.estimators import EstimatorName
 from flexcal.dynamics.friction import FrictionSelection
 from flexcal.dynamics.regression import RegressionData
 from flexcal.dynamics.residual import LEARNED
+from flexcal.dynamics.signals import Motion
+from flexcal.errors import FlexcalError
 from flexcal.files.formats import Block
 from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
 from flexcal.jobs.dynamics.remarks import dynamics_notes, dynamics_remarks, selection_remark
@@ -31,6 +33,7 @@ from flexcal.jobs.result_files import (
 )
 from flexcal.model.parts import is_physically_consistent
 from flexcal.model.robot import torque_units
+from flexcal.model.torques import motion_batch
 from flexcal.report.checks import Trust
 from flexcal.report.pages import dynamics_checks
 
@@ -72,6 +75,39 @@ class DynamicsIdentification(Identification):
     def residuals(self) -> tuple[np.ndarray, ...]:
         """Measured minus predicted torques (M, n), N m, of every log, at the times of its prediction."""
         return tuple(prediction.measured - prediction.predicted for prediction in self.predictions)
+
+    def torque(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
+        """Torques of a motion by the identified inverse dynamics: inertia, gravity and friction.
+
+        Parameters
+        ----------
+        q, dq, ddq : ndarray
+            Positions, velocities and accelerations (N, n) of the joints, rad or m, and s; successive samples of one motion, where the
+            friction depends on what was before.
+
+        Returns
+        -------
+        ndarray
+            Torques (N, n), N m (N at prismatic joints), referred to the joints; a learned residual is not part of them.
+
+        Raises
+        ------
+        FlexcalError
+            Where shapes differ or do not fit the robot, and for a robot that was identified with flexible drives, whose motors have
+            equations of their own.
+        """
+        observation = self.train.observation
+        if self.motors:
+            raise FlexcalError(
+                "E-RUN-098",
+                f"{self.model.name} was identified with flexible drives, whose motors move otherwise than the arm; identify it without.",
+            )
+        motion = Motion(
+            np.arange(len(q), dtype=float), *motion_batch(self.model, q, dq, ddq), np.zeros_like(q)
+        )
+        parameters = self.estimate.parameters.coordinates()
+        columns = zip(observation.columns(motion), observation.column_indices, strict=True)
+        return np.stack([parameters[index] @ values for values, index in columns], axis=1)
 
     def summary(self) -> str:
         """What the fit says, for people: errors of the torques, base parameters, remarks, verdict."""

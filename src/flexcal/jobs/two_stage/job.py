@@ -32,7 +32,7 @@ from flexcal.design.poses import random_poses, select_poses
 from flexcal.design.scene import MeasuringSetup
 from flexcal.elasticity.identification import SpringFit, fit_springs
 from flexcal.estimation import Estimate
-from flexcal.export import write_urdf
+from flexcal.export import export_urdf
 from flexcal.files.formats import Block, provenance, write_estimates
 from flexcal.frequency.periodic import FrequencyResponse, frequency_responses
 from flexcal.jobs.calibration import measurement_digests
@@ -183,7 +183,7 @@ def run_two_stage(
     geometry = replace(calibration.estimate, measurements=measurement_digests(measured))
     stored = _store(out, (robot, nominal.urdf), files, options, stiffness.estimate, geometry)
     calibration = replace(calibration, estimate=stored)
-    exported = write_urdf(calibration.model, out / "calibrated.urdf")
+    exported = export_urdf(calibration.model, out / "calibrated.urdf")
     with watch.stage("verification"):
         progress("verification", 0.0)
         seen = robot_in_cell.measure(anywhere)
