@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -44,7 +46,16 @@ def write_reflectors(
     return path
 
 
-def calibrated(folder: Path, seed: int, kind: str) -> tuple[GeometricFit, float]:
+Calibrated = Callable[[int, str], tuple[GeometricFit, float]]
+
+
+@pytest.fixture(scope="module")
+def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Calibrated:
+    """The calibration of a seed and a kind of scatter, made once; and its mean square as of `calibration_of`."""
+    return cache(lambda seed, kind: calibration_of(tmp_path_factory.mktemp("arm"), seed, kind))
+
+
+def calibration_of(folder: Path, seed: int, kind: str) -> tuple[GeometricFit, float]:
     """A calibration, and the mean square of its standardised errors at fresh poses without noise."""
     arm = robot_with_reflectors(folder, seed)
     rng = np.random.default_rng([seed, 2])
@@ -60,18 +71,20 @@ def calibrated(folder: Path, seed: int, kind: str) -> tuple[GeometricFit, float]
 
 
 @pytest.mark.parametrize("kind", ["common", "joints", "alone"])
-def test_intervals_hold_with_several_reflectors(tmp_path: Path, kind: str) -> None:
+def test_intervals_hold_with_several_reflectors(calibrated: Calibrated, kind: str) -> None:
     """Where the scatter is common to a pose, and where it is not, as of reflectors that were measured one after the other."""
-    squares = [calibrated(tmp_path, seed, kind)[1] for seed in range(10)]
+    squares = [calibrated(seed, kind)[1] for seed in range(10)]
     assert 0.7 < np.mean(squares) < 1.4
 
 
 @pytest.mark.parametrize("kind", ["common", "joints", "alone"])
-def test_verification_counts_poses_rather_than_points(tmp_path: Path, kind: str) -> None:
+def test_verification_counts_poses_rather_than_points(
+    calibrated: Calibrated, tmp_path: Path, kind: str
+) -> None:
     """Observed over predicted errors of 15 fresh poses with three reflectors: their 95 % intervals have 1 in them."""
     covered, freedom = [], []
     for seed in range(20):
-        found, _ = calibrated(tmp_path, seed, kind)
+        found, _ = calibrated(seed, kind)
         rng = np.random.default_rng([seed, 9])
         arm = robot_with_reflectors(tmp_path, seed)
         file = write_reflectors(tmp_path / "fresh.csv", arm, arm.postures(15, rng), rng, kind)
@@ -82,8 +95,8 @@ def test_verification_counts_poses_rather_than_points(tmp_path: Path, kind: str)
     assert (np.mean(freedom) < 60) == (kind != "alone")
 
 
-def test_the_common_scatter_is_found(tmp_path: Path) -> None:
-    common, alone = (calibrated(tmp_path, 20, kind)[0] for kind in ("common", "alone"))
+def test_the_common_scatter_is_found(calibrated: Calibrated) -> None:
+    common, alone = (calibrated(20, kind)[0] for kind in ("common", "alone"))
     assert common.scatter.pose == pytest.approx(ROBOT, rel=0.15) and common.scatter.robot < 5e-6
     assert alone.scatter.robot == pytest.approx(ROBOT, rel=0.15) and alone.scatter.pose == 0
     for found in (common, alone):
