@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 export OPENBLAS_NUM_THREADS ?= 1
 SOURCES := pyproject.toml CMakeLists.txt $(wildcard kernels/*)
 
-.PHONY: install demo test test-all sanitize check bench docs wheels clean
+.PHONY: install demo test test-all coverage sanitize check bench docs wheels clean
 
 install: $(VENV)/.installed
 
@@ -34,6 +34,10 @@ test: $(VENV)/.developer
 
 test-all: $(VENV)/.developer sanitize
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m ""
+
+# the lines and branches that these tests reach: a summary, and pages in build/coverage
+coverage: $(VENV)/.developer
+	$(BIN)/python -m pytest -n 2 --dist loadfile --cov --cov-report=term:skip-covered --cov-report=html
 
 # the kernels' tests on a build that checks every access to memory and every undefined operation; needs g++
 SANITIZED := build/sanitize
