@@ -24,7 +24,7 @@ def assert_named(sentence: str, *names: str) -> None:
     """Names (files, joints, numbers) stand in a sentence in this order, each by itself and not inside a longer word or number."""
     start = 0
     for name in names:
-        found = re.compile(rf"(?<![\w.-]){re.escape(name)}(?!\w|[.-]\w)").search(sentence, start)
+        found = re.compile(rf"(?<![\w-])(?<!\d\.){re.escape(name)}(?!\w|-\w|\.\d)").search(sentence, start)
         before = " after the names before it" if start else ""
         assert found is not None, f"'{name}' does not stand{before} in: {sentence}"
         start = found.end()

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from flexcal.errors import InputError
 from flexcal.estimation import Dropped, Estimate, Parameter, Parameters
 from flexcal.files.formats import (
     block_sha256,
@@ -140,31 +139,28 @@ def test_a_damaged_other_block_is_not_overwritten(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "words"),
+    ("old", "new", "refusal"),
     [
-        ("stiffness:\n", "stifness:\n", ["line 1", "unknown key 'stifness'", "'stiffness'?"]),
-        ("rank: 3", "rnk: 3", ["unknown key 'rnk' in stiffness.fit", "'rank'?"]),
-        ("rank: 3", "rank: -3", ["must not be negative"]),
-        ("std: ", "std: -", ["a standard deviation must not be negative"]),
-        ("rank: 3", "rank: three", ["stiffness.fit.rank", "a whole number"]),
-        ("scale: log", "scale: cubic", ["scale", "'linear', 'log'"]),
-        ("estimate: 47900.0", "estimate: .nan", ["joint_1.drive.stiffness.estimate", "finite"]),
-        ("estimate: 47900.0", "estimate: -1", ["outside its bounds"]),
-        ("name: joint_3.offset", "name: joint_9.offset", ["'joint_9.offset' is not among the values"]),
+        ("stiffness:\n", "stifness:\n", ["E-YAML-001", "line 1", "stifness", "stiffness"]),
+        ("rank: 3", "rnk: 3", ["E-YAML-001", "rnk", "in stiffness.fit", "rank"]),
+        ("rank: 3", "rank: -3", ["E-EST-003"]),
+        ("std: ", "std: -", ["E-EST-001"]),
+        ("rank: 3", "rank: three", ["E-YAML-028", "stiffness.fit.rank"]),
+        ("scale: log", "scale: cubic", ["E-YAML-032", "scale", "linear', 'log"]),
+        ("estimate: 47900.0", "estimate: .nan", ["E-YAML-026", "joint_1.drive.stiffness.estimate"]),
+        ("estimate: 47900.0", "estimate: -1", ["E-FIT-013"]),
+        ("name: joint_3.offset", "name: joint_9.offset", ["E-EST-013", "joint_9.offset"]),
     ],
 )
-def test_yaml_that_does_not_fit(tmp_path: Path, old: str, new: str, words: list[str]) -> None:
+def test_yaml_that_does_not_fit(tmp_path: Path, old: str, new: str, refusal: list[str]) -> None:
     path = tmp_path / "estimates.yaml"
     write_estimates(path, "stiffness", make_estimate())
     text = path.read_text()
     assert old in text
     path.write_text(text.replace(old, new, 1))
-    with pytest.raises(InputError) as caught:
+    with refused(*refusal) as caught:
         read_estimates(path)
-    message = str(caught.value)
-    assert message.startswith(f"{path} line ")
-    for word in words:
-        assert word in message, message
+    assert str(caught.value).startswith(f"{path} line ")
 
 
 @pytest.mark.parametrize(

@@ -57,14 +57,13 @@ def read(folder: Path, text: str) -> Config:
     return read_yaml(path, Config)
 
 
-def fault(folder: Path, text: str) -> str:
-    with pytest.raises(InputError) as caught:
+def check_refused(folder: Path, text: str, code: str, *names: str) -> None:
+    """Reading is refused with this code, by one sentence that names the file and these."""
+    with refused(code, "config.yaml", *names) as caught:
         read(folder, text)
     message = str(caught.value)
-    assert "config.yaml" in message
-    assert message.endswith((".", "?"))
+    assert type(caught.value) is InputError and message.endswith((".", "?"))
     assert "\n" not in message
-    return message
 
 
 @pytest.mark.parametrize(
@@ -92,15 +91,23 @@ def test_numbers_of_yaml_1_2(tmp_path: Path, text: str, value: float) -> None:
     "text", ["'1e3'", "true", "abc", "1e", "1_000", "12:30", "2001-01-01", "[1]", "{a: 1}"]
 )
 def test_not_a_number(tmp_path: Path, text: str) -> None:
-    message = fault(tmp_path, f"name: a\n\ncutoff: {text}\n")
-    assert "line 3" in message
-    assert "cutoff" in message
-    assert "a number is expected" in message
+    check_refused(
+        tmp_path, f"name: a\n\ncutoff: {text}\n", "E-YAML-033", "line 3", "cutoff", "a number is expected"
+    )
 
 
-@pytest.mark.parametrize("text", [".nan", ".inf", "-.INF", "1e999", "1" + "0" * 400])
-def test_not_finite(tmp_path: Path, text: str) -> None:
-    assert "finite" in fault(tmp_path, f"name: a\ncutoff: {text}\n")
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        (".nan", "E-YAML-026"),
+        (".inf", "E-YAML-026"),
+        ("-.INF", "E-YAML-026"),
+        ("1e999", "E-YAML-026"),
+        ("1" + "0" * 400, "E-YAML-015"),
+    ],
+)
+def test_not_finite(tmp_path: Path, text: str, code: str) -> None:
+    check_refused(tmp_path, f"name: a\ncutoff: {text}\n", code, "line 2")
 
 
 def test_everything_of_a_dataclass(tmp_path: Path) -> None:
@@ -126,66 +133,68 @@ def test_everything_of_a_dataclass(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "line", "words"),
+    ("text", "line", "refusal"),
     [
-        ("name: a\nelastik: []\n", 2, ["unknown key 'elastik'", "did you mean 'elastic'?"]),
+        ("name: a\nelastik: []\n", 2, ["E-YAML-001", "elastik", "elastic"]),
         (
             "name: a\nelastic:\n- joint: j\n  drive:\n    stifness: 3\n",
             5,
-            ["unknown key 'stifness' in elastic[0].drive", "'stiffness'?"],
+            ["E-YAML-001", "stifness", "in elastic[0].drive", "stiffness"],
         ),
-        ("name: a\nqqqqq: 1\n", 2, ["unknown key 'qqqqq'", "known are name, elastic"]),
-        ("count: 1\n", 1, ["the key 'name' is missing", "add 'name: …'"]),
+        ("name: a\nqqqqq: 1\n", 2, ["E-YAML-001", "qqqqq", "known are name, elastic"]),
+        ("count: 1\n", 1, ["E-YAML-002", "name", "name"]),
         (
             "name: a\nelastic:\n- joint: j\n  drive: {damping: 1}\n",
             4,
-            ["'stiffness' in elastic[0].drive is missing"],
+            ["E-YAML-002", "stiffness", "in elastic[0].drive"],
         ),
         (
             "name: a\nelastic:\n- joint: j\n  drive:\n    stiffness: -4\n",
             4,
-            ["elastic[0].drive", "stiffness is -4.0"],
+            ["E-TEST-001", "elastic[0].drive", "stiffness is -4.0"],
         ),
-        ("name: 3\n", 1, ["name", "a text is expected, not 3"]),
-        ("name:\n", 1, ["a text is expected, not nothing"]),
-        ("name: a\ncount: 1.5\n", 2, ["count", "a whole number"]),
-        ("name: a\ncount: true\n", 2, ["count", "a whole number"]),
-        ("name: a\nsure: yes\n", 2, ["sure", "true or false"]),
-        ("name: a\nkind: meen\n", 2, ["'held', 'mean'", "did you mean 'mean'?"]),
-        ("name: a\nterms: aut\n", 2, ["'auto' or 'none' or a list is expected"]),
+        ("name: 3\n", 1, ["E-YAML-030", "name", "3"]),
+        ("name:\n", 1, ["E-YAML-030", "nothing"]),
+        ("name: a\ncount: 1.5\n", 2, ["E-YAML-028", "count"]),
+        ("name: a\ncount: true\n", 2, ["E-YAML-028", "count"]),
+        ("name: a\nsure: yes\n", 2, ["E-YAML-031", "sure"]),
+        ("name: a\nkind: meen\n", 2, ["E-YAML-032", "held', 'mean", "mean"]),
+        ("name: a\nterms: aut\n", 2, ["E-YAML-033", "'auto' or 'none' or a list"]),
         (
             "name: a\nelastic: text\n",
             2,
-            ["elastic", "a list is expected (write [ ] around its entries", "not the text"],
+            ["E-YAML-023", "elastic", "a list", "write [ ] around its entries", "the text"],
         ),
-        ("name: a\nelastic: [3]\n", 2, ["elastic[0]", "a mapping"]),
-        ("name: a\nstations: [3]\n", 2, ["stations", "a mapping"]),
-        ("name: a\nstations:\n  a: {stiffness: 1}\n  b: {stiffness: x}\n", 4, ["stations.b.stiffness"]),
-        ("name: a\ngravity: [0, 0]\n", 2, ["gravity", "3 items"]),
-        ("name: a\ngravity:\n- 0\n- x\n- 0\n", 4, ["gravity[1]", "a number"]),
-        ("name: a\nmatrix:\n- [1, 2]\n- [3]\n", 4, ["matrix[1]", "another length"]),
-        ("name: a\nmatrix:\n- [1, 2]\n- [3, x]\n", 4, ["matrix[1][1]", "a number"]),
-        ("name: a\nmatrix: 3\n", 2, ["matrix", "a list"]),
-        ("name: a\nlines: [1.5]\n", 2, ["lines[0]", "a whole number"]),
-        ("name: a\ncount: 1\nname: b\n", 3, ["'name'", "on line 1"]),
-        ("name: a\n  count: 1\n", 2, ["not valid YAML"]),
-        ("name: [a\n", 2, ["not valid YAML"]),
-        ("name: !!python/name:os.system a\n", 1, ["tag"]),
-        ("name: a\nstations: &s {a: *s}\n", 2, ["alias"]),
-        ("? [a]\n: 3\n", 1, ["a key must be a plain name"]),
-        ("", 1, ["empty"]),
-        ("- 3\n", 1, ["a mapping"]),
+        ("name: a\nelastic: [3]\n", 2, ["E-YAML-023", "elastic[0]", "a mapping"]),
+        ("name: a\nstations: [3]\n", 2, ["E-YAML-023", "stations", "a mapping"]),
+        (
+            "name: a\nstations:\n  a: {stiffness: 1}\n  b: {stiffness: x}\n",
+            4,
+            ["E-YAML-025", "stations.b.stiffness"],
+        ),
+        ("name: a\ngravity: [0, 0]\n", 2, ["E-YAML-024", "gravity", "3"]),
+        ("name: a\ngravity:\n- 0\n- x\n- 0\n", 4, ["E-YAML-025", "gravity[1]"]),
+        ("name: a\nmatrix:\n- [1, 2]\n- [3]\n", 4, ["E-YAML-020", "matrix[1]"]),
+        ("name: a\nmatrix:\n- [1, 2]\n- [3, x]\n", 4, ["E-YAML-025", "matrix[1][1]"]),
+        ("name: a\nmatrix: 3\n", 2, ["E-YAML-033", "matrix", "a list"]),
+        ("name: a\nlines: [1.5]\n", 2, ["E-YAML-028", "lines[0]"]),
+        ("name: a\ncount: 1\nname: b\n", 3, ["E-YAML-014", "name", "1"]),
+        ("name: a\n  count: 1\n", 2, ["E-YAML-004"]),
+        ("name: [a\n", 2, ["E-YAML-004"]),
+        ("name: !!python/name:os.system a\n", 1, ["E-YAML-008"]),
+        ("name: a\nstations: &s {a: *s}\n", 2, ["E-YAML-011"]),
+        ("? [a]\n: 3\n", 1, ["E-YAML-013"]),
+        ("", 1, ["E-YAML-006"]),
+        ("- 3\n", 1, ["E-YAML-023", "a mapping"]),
     ],
 )
-def test_sentences(tmp_path: Path, text: str, line: int, words: list[str]) -> None:
-    message = fault(tmp_path, text)
-    assert f"line {line}" in message
-    for word in words:
-        assert word in message
+def test_sentences(tmp_path: Path, text: str, line: int, refusal: list[str]) -> None:
+    code, *names = refusal
+    check_refused(tmp_path, text, code, f"line {line}", *names)
 
 
 def test_first_fault_first(tmp_path: Path) -> None:
-    assert "line 2" in fault(tmp_path, "name: a\ncount: x\nsure: 3\nwrong: 1\n")
+    check_refused(tmp_path, "name: a\ncount: x\nsure: 3\nwrong: 1\n", "E-YAML-028", "line 2")
 
 
 def test_unreadable_files(tmp_path: Path) -> None:
@@ -239,9 +248,17 @@ def test_plain_round_trip(tmp_path_factory: pytest.TempPathFactory, data: Any) -
     assert yaml_text({"data": again}) == yaml_text({"data": data})
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, np.array([1.0, np.nan]), object()])
-def test_what_is_not_written(tmp_path: Path, value: Any) -> None:
-    with pytest.raises(FlexcalError, match="data"):
+@pytest.mark.parametrize(
+    ("value", "refusal"),
+    [
+        (math.nan, ["E-YAML-017", "data"]),
+        (math.inf, ["E-YAML-017", "data"]),
+        (np.array([1.0, np.nan]), ["E-YAML-017", "data[1]"]),
+        (object(), ["E-YAML-018", "data"]),
+    ],
+)
+def test_what_is_not_written(tmp_path: Path, value: Any, refusal: list[str]) -> None:
+    with refused(*refusal):
         write_yaml(tmp_path / "a.yaml", {"data": value})
     assert list(tmp_path.iterdir()) == []
 
@@ -250,40 +267,40 @@ def test_what_is_not_written(tmp_path: Path, value: Any) -> None:
 @pytest.mark.parametrize("form", ["deep: {}{}\n", "{}1{}\n"], ids=["brackets", "dashes"])
 def test_depth_is_bounded(tmp_path: Path, depth: int, form: str) -> None:
     opened, closed = ("[" * depth, "]" * depth) if "deep" in form else ("- " * depth, "")
-    assert "nest more than 50 deep" in fault(tmp_path, form.format(opened, closed))
+    check_refused(tmp_path, form.format(opened, closed), "E-YAML-009", "50")
 
 
 def test_aliases_repeat_a_bounded_number_of_values(tmp_path: Path) -> None:
     levels = "".join(f"a{k + 1}: &a{k + 1} [{', '.join([f'*a{k}'] * 10)}]\n" for k in range(12))
-    assert "aliases repeat more than 100000 values" in fault(tmp_path, "a0: &a0 [1]\n" + levels)
+    check_refused(tmp_path, "a0: &a0 [1]\n" + levels, "E-YAML-012", "100000")
     text = "name: &n arm\nelastic:\n- {joint: *n, drive: &d {stiffness: 5}}\n- {joint: b, drive: *d, bearing: *d}\n"
     config = read(tmp_path, text)
     assert config.elastic[1] == Joint("b", Spring(5.0), Spring(5.0)) and config.elastic[0].joint == "arm"
-    assert "line 2: an alias refers to itself" in fault(tmp_path, "name: x\nterms: &t [*t]\n")
-    assert "line 1: the alias '*t' has no anchor" in fault(tmp_path, "terms: *t\n")
+    check_refused(tmp_path, "name: x\nterms: &t [*t]\n", "E-YAML-011", "line 2")
+    check_refused(tmp_path, "terms: *t\n", "E-YAML-010", "line 1", "'*t'")
 
 
 @pytest.mark.parametrize(
-    ("number", "words"),
+    ("number", "refusal"),
     [
-        ("9" * 5000, "a number has 5000 digits"),
-        ("0x" + "f" * 5000, "a number has 5002 digits"),
-        ("0o9", "not the text '0o9'"),
-        ("1e51", "below 1e+50"),
-        ("-1e308", "below 1e+50"),
-        ("1e999", "finite"),
-        (str(10**60), "below 1e+50"),
+        ("9" * 5000, ["E-YAML-015", "5000"]),
+        ("0x" + "f" * 5000, ["E-YAML-015", "5002"]),
+        ("0o9", ["E-YAML-033", "the text '0o9'"]),
+        ("1e51", ["E-YAML-027", "1e+50"]),
+        ("-1e308", ["E-YAML-027", "1e+50"]),
+        ("1e999", ["E-YAML-026"]),
+        (str(10**60), ["E-YAML-027", "1e+50"]),
     ],
 )
-def test_numbers_beyond_reason(tmp_path: Path, number: str, words: str) -> None:
-    assert words in fault(tmp_path, f"name: a\ncutoff: {number}\n")
+def test_numbers_beyond_reason(tmp_path: Path, number: str, refusal: list[str]) -> None:
+    check_refused(tmp_path, f"name: a\ncutoff: {number}\n", *refusal)
 
 
 @pytest.mark.parametrize("number", [2**63, -(2**63) - 1, 10**40])
 def test_whole_numbers_have_eight_bytes(tmp_path: Path, number: int) -> None:
-    assert "a whole number of at most 8 bytes" in fault(tmp_path, f"name: a\ncount: {number}\n")
-    assert "a whole number of at most 8 bytes" in fault(tmp_path, f"name: a\nlines: [1, {number}]\n")
+    check_refused(tmp_path, f"name: a\ncount: {number}\n", "E-YAML-029", "count")
+    check_refused(tmp_path, f"name: a\nlines: [1, {number}]\n", "E-YAML-029", "lines[1]")
 
 
 def test_a_second_document_is_refused(tmp_path: Path) -> None:
-    assert "line 2: a second document" in fault(tmp_path, "name: a\n---\nname: b\n")
+    check_refused(tmp_path, "name: a\n---\nname: b\n", "E-YAML-007", "line 2")

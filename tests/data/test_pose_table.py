@@ -62,7 +62,7 @@ def test_working_points_and_working_poses(tmp_path: Path, tx90l: RobotModel) -> 
     assert places is None
     np.testing.assert_array_equal(q, [[0, 0.1, 0.2, 0, 0, 0]])
     poses.write_text("pose,q1,q2,q3,q4,q5,q6\n1,0,2.9,0.2,0,0,0\n")
-    with refused("E-TABLE-002", "line 2, column q2: pose 1, at 2.9 rad, is outside the limits of joint_2"):
+    with refused("E-TABLE-002", "line 2, column q2", "pose 1", "2.9", "joint_2"):
         read_working(poses, tx90l)
     points.write_text("target,x,y,z\nsmr,0.5,0,0.4\n")
     np.testing.assert_array_equal(read_working(points, tx90l)[1], [[0.5, 0, 0.4]])

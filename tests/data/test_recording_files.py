@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import polars as pl
 import pytest
+from refusals import refused
 
 from flexcal.data.recordings import Recording, read_recording, read_recording_blocks, write_recording
-from flexcal.errors import FlexcalError, InputError
 from flexcal.units import DEGREE
 
 HEADER = "t,q1,q2,tau1,tau2"
@@ -235,7 +235,7 @@ def test_blocks_join_to_the_whole(tmp_path: Path, robot: Any, ending: str, jitte
 def test_blocks_restart_after_a_gap(tmp_path: Path, robot: Any, hole: int) -> None:
     path = tmp_path / "log.csv"
     t = make_long_log(path, 2000, 0.0, hole)
-    with pytest.raises(InputError, match=rf"line {hole + 2}, column t: a gap of 0\.501 s"):
+    with refused("E-LOG-011", f"line {hole + 2}, column t", "0.501"):
         read_recording(path, robot)
     blocks = list(read_recording_blocks(path, robot, rows=700))
     time = np.concatenate([block.time for block in blocks])
@@ -283,14 +283,17 @@ def test_not_finite_is_not_written(tmp_path: Path, fault: Callable[..., str]) ->
 
 
 @pytest.mark.parametrize(
-    "arguments",
+    ("arguments", "code"),
     [
-        {"time_step": 0.0, "q": np.zeros((3, 2)), "torque": np.zeros((3, 2))},
-        {"time_step": 0.1, "q": np.zeros(3), "torque": np.zeros(3)},
-        {"time_step": 0.1, "q": np.zeros((3, 2)), "torque": np.zeros((3, 1))},
-        {"time_step": 0.1, "q": np.zeros((3, 2)), "torque": np.zeros((3, 2)), "temperature": np.zeros(2)},
+        ({"time_step": 0.0, "q": np.zeros((3, 2)), "torque": np.zeros((3, 2))}, "E-LOG-005"),
+        ({"time_step": 0.1, "q": np.zeros(3), "torque": np.zeros(3)}, "E-LOG-006"),
+        ({"time_step": 0.1, "q": np.zeros((3, 2)), "torque": np.zeros((3, 1))}, "E-LOG-007"),
+        (
+            {"time_step": 0.1, "q": np.zeros((3, 2)), "torque": np.zeros((3, 2)), "temperature": np.zeros(2)},
+            "E-LOG-010",
+        ),
     ],
 )
-def test_shapes_are_checked(arguments: dict[str, Any]) -> None:
-    with pytest.raises(FlexcalError, match="recording"):
+def test_shapes_are_checked(arguments: dict[str, Any], code: str) -> None:
+    with refused(code):
         Recording(**arguments)

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from flexcal import (
     CellConfig,
-    FlexcalError,
     FrequencyResponse,
     MultisinePlan,
     RobotModel,
@@ -99,5 +99,5 @@ def test_it_shows_itself(identified: StiffnessIdentification, tmp_path: Path) ->
 
 def test_responses_of_other_joints_are_refused(nominal: RobotModel, experiment: Experiment) -> None:
     unknown = replace(experiment[1][0], joints=("joint_1", "joint_2", "elbow"))
-    with pytest.raises(FlexcalError, match="elbow"):
+    with refused("E-STIFF-004", "joint_1, joint_2, elbow"):
         identify_stiffness(nominal, [unknown])

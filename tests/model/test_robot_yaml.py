@@ -6,8 +6,8 @@ import shutil
 from pathlib import Path
 
 import pytest
+from refusals import refused
 
-from flexcal.errors import InputError
 from flexcal.model.robot import RobotModel
 
 
@@ -32,66 +32,64 @@ PAYLOAD = "payload: {frame: flange, mass: 6.0, com: [0.10, 0.00, -0.10], mass_st
 
 MISTAKES = [
     # unknown, missing and doubled keys
-    (GRAVITY, "gravty: [0, 0, -9.81]", ["unknown key 'gravty'", "did you mean 'gravity'?"]),
-    (GRAVITY, f"{GRAVITY}\nspeed: 3", ["unknown key 'speed'", "known are robot, points"]),
-    (SPRING, "drive: {stiffness: 143.7e3, dampening: 1}", ["unknown key 'dampening'", "'damping'"]),
-    (SPRING, "drive: {damping: 115.1}", ["'stiffness'", "missing"]),
-    (SPRING, SPRING + "\n    drive: {stiffness: 1}", ["'drive'", "keep one"]),
-    (GRAVITY, f"{GRAVITY}\nbearings: parent", ["bearings", "'before'", "'after'", "'parent'"]),
+    (GRAVITY, "gravty: [0, 0, -9.81]", ["E-YAML-001", "gravty", "gravity"]),
+    (GRAVITY, f"{GRAVITY}\nspeed: 3", ["E-YAML-001", "speed", "known are robot, points"]),
+    (SPRING, "drive: {stiffness: 143.7e3, dampening: 1}", ["E-YAML-001", "dampening", "damping"]),
+    (SPRING, "drive: {damping: 115.1}", ["E-YAML-002", "stiffness"]),
+    (SPRING, SPRING + "\n    drive: {stiffness: 1}", ["E-YAML-014", "drive"]),
+    (GRAVITY, f"{GRAVITY}\nbearings: parent", ["E-YAML-033", "bearings", "before", "after", "parent"]),
     # numbers
-    (SPRING, "drive: {stiffness: '143.7e3', damping: 1}", ["a number is expected", "'143.7e3'"]),
-    (SPRING, "drive: {stiffness: stiff, damping: 1}", ["a number is expected", "'stiff'"]),
-    (SPRING, "drive: {stiffness: .nan, damping: 1}", ["a finite number is expected", "nan"]),
-    (SPRING, "drive: {stiffness: .inf, damping: 1}", ["a finite number is expected", "inf"]),
-    (SPRING, "drive: {stiffness: 0, damping: 1}", ["stiffness must be positive", "0 N m/rad"]),
-    (SPRING, "drive: {stiffness: -5e3, damping: 1}", ["stiffness must be positive", "-5000 N m/rad"]),
-    (SPRING, "drive: {stiffness: 5e3, damping: -1}", ["damping must not be negative", "-1 N m s/rad"]),
-    (INERTIA, "rotor_inertia: [6.4, 9.8, .nan, 0.53, 0.11, 0.087]", ["rotor_inertia", "finite"]),
-    (INERTIA, "rotor_inertia: [6.4, 9.8, -1.49, 0.53, 0.11, 0.087]", ["rotor_inertia must not be negative", "-1.49"]),
-    (RATIO, "ratio: [45, 45, 0, 60, 60, 45]", ["ratio of 0"]),
-    (PRIOR, "prior: {mass: -0.07}", ["mass, com and torque_constant must not be negative"]),
-    (PRIOR, "prior: {rotor_inertia: 0}", ["rotor_inertia must be positive"]),
-    (PAYLOAD, PAYLOAD.replace("6.0", "-6"), ["mass and mass_std must not be negative"]),
+    (SPRING, "drive: {stiffness: '143.7e3', damping: 1}", ["E-YAML-025", "143.7e3"]),
+    (SPRING, "drive: {stiffness: stiff, damping: 1}", ["E-YAML-025", "stiff"]),
+    (SPRING, "drive: {stiffness: .nan, damping: 1}", ["E-YAML-026", "nan"]),
+    (SPRING, "drive: {stiffness: .inf, damping: 1}", ["E-YAML-026", "inf"]),
+    (SPRING, "drive: {stiffness: 0, damping: 1}", ["E-ROBOT-012", "0"]),
+    (SPRING, "drive: {stiffness: -5e3, damping: 1}", ["E-ROBOT-012", "-5000"]),
+    (SPRING, "drive: {stiffness: 5e3, damping: -1}", ["E-ROBOT-013", "-1"]),
+    (INERTIA, "rotor_inertia: [6.4, 9.8, .nan, 0.53, 0.11, 0.087]", ["E-YAML-026", "rotor_inertia"]),
+    (INERTIA, "rotor_inertia: [6.4, 9.8, -1.49, 0.53, 0.11, 0.087]", ["E-ROBOT-034", "rotor_inertia", "-1.49"]),
+    (RATIO, "ratio: [45, 45, 0, 60, 60, 45]", ["E-ROBOT-035"]),
+    (PRIOR, "prior: {mass: -0.07}", ["E-ROBOT-009"]),
+    (PRIOR, "prior: {rotor_inertia: 0}", ["E-ROBOT-010", "rotor_inertia"]),
+    (PAYLOAD, PAYLOAD.replace("6.0", "-6"), ["E-ROBOT-007"]),
     # lengths
-    (INERTIA, "rotor_inertia: [6.4, 9.8]", ["rotor_inertia has 2 entries", "6 joints", "one per joint"]),
-    (RATIO, "ratio: [45, 45, 60, 60, 60, 45, 45]", ["ratio has 7 entries", "6 joints"]),
-    (LOOP, LOOP.replace("3000, 3000, 800", "3000, 800"), ["kp has 5 entries", "6 joints"]),
-    (LOOP, LOOP.replace("20, 8, 4]", "20, 8, 4, 1]"), ["kd has 7 entries", "6 joints"]),
-    (LOOP, LOOP.replace("4000", "0"), ["rate_hz must be positive"]),
-    (LOOP, LOOP.replace("400, 400,", "400, -400,"), ["kp and kd must not be negative"]),
-    (GRAVITY, "gravity: [0, -9.81]", ["gravity", "3 items are expected, not 2"]),
-    (POINT, "smr: {frame: flange, xyz: [0.10, 0.15]}", ["xyz", "3 items are expected, not 2"]),
+    (INERTIA, "rotor_inertia: [6.4, 9.8]", ["E-ROBOT-036", "rotor_inertia", "2", "6"]),
+    (RATIO, "ratio: [45, 45, 60, 60, 60, 45, 45]", ["E-ROBOT-036", "ratio", "7", "6"]),
+    (LOOP, LOOP.replace("3000, 3000, 800", "3000, 800"), ["E-ROBOT-036", "kp", "5", "6"]),
+    (LOOP, LOOP.replace("20, 8, 4]", "20, 8, 4, 1]"), ["E-ROBOT-036", "kd", "7", "6"]),
+    (LOOP, LOOP.replace("4000", "0"), ["E-ROBOT-023"]),
+    (LOOP, LOOP.replace("400, 400,", "400, -400,"), ["E-ROBOT-023"]),
+    (GRAVITY, "gravity: [0, -9.81]", ["E-YAML-024", "gravity", "3", "2"]),
+    (POINT, "smr: {frame: flange, xyz: [0.10, 0.15]}", ["E-YAML-024", "xyz", "3", "2"]),
     # names
-    (POINT, "smr: {frame: flansh, xyz: [0.10, 0.00, 0.15]}", ["lacks the frame 'flansh'", "did you mean 'flange'?"]),
-    (TERMS, "geometry: {backlash: [joint_7]}", ["no movable joint 'joint_7'", "joint_6"]),
-    (TERMS, "geometry: {terms: [kinematik]}", ["unknown geometry term 'kinematik'"]),
-    (RATIO, "coupling: [{motor: joint_6, joint: joint_7, ratio: 1}]", ["no movable joint 'joint_7'"]),
-    (RATIO, "coupling: [{motor: motor_6, joint: joint_5, ratio: 1}]", ["no movable joint 'motor_6'"]),
-    (RATIO, "coupling: [{motor: joint_5, joint: joint_5, ratio: 1}]", ["two different joints"]),
-    (RATIO, "coupling: [{motor: joint_6, joint: joint_5, ratio: 0}]", ["other than 0"]),
-    (TERMS, "dynamics: {friction: coulomb}", ["'auto', 'classic' or a list", "'coulomb'"]),
-    (TERMS, "dynamics: {cutoff_hz: -1}", ["cutoff_hz must be positive"]),
-    (TERMS, "dynamics: {decimation: 0}", ["decimation must be 1 or more"]),
-    (TERMS, "dynamics: {decimation: 1.5}", ["decimation", "a whole number", "1.5"]),
-    (ENTRY + BEARING, ENTRY, ["'joint_1' has one bearing spring", "bearing_x and bearing_y or neither"]),
+    (POINT, "smr: {frame: flansh, xyz: [0.10, 0.00, 0.15]}", ["E-ROBOT-028", "flansh", "flange"]),
+    (TERMS, "geometry: {backlash: [joint_7]}", ["E-ROBOT-027", "joint_7", "joint_6"]),
+    (TERMS, "geometry: {terms: [kinematik]}", ["E-ROBOT-016", "kinematik"]),
+    (RATIO, "coupling: [{motor: joint_6, joint: joint_7, ratio: 1}]", ["E-ROBOT-027", "joint_7"]),
+    (RATIO, "coupling: [{motor: motor_6, joint: joint_5, ratio: 1}]", ["E-ROBOT-027", "motor_6"]),
+    (RATIO, "coupling: [{motor: joint_5, joint: joint_5, ratio: 1}]", ["E-ROBOT-011"]),
+    (RATIO, "coupling: [{motor: joint_6, joint: joint_5, ratio: 0}]", ["E-ROBOT-011"]),
+    (TERMS, "dynamics: {friction: coulomb}", ["E-ROBOT-017", "coulomb"]),
+    (TERMS, "dynamics: {cutoff_hz: -1}", ["E-ROBOT-018"]),
+    (TERMS, "dynamics: {decimation: 0}", ["E-ROBOT-019"]),
+    (TERMS, "dynamics: {decimation: 1.5}", ["E-YAML-033", "decimation", "a whole number", "1.5"]),
+    (ENTRY + BEARING, ENTRY, ["E-ROBOT-014", "joint_1"]),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("right", "wrong", "words"), MISTAKES, ids=[wrong for _, wrong, _ in MISTAKES])
-def test_one_sentence_with_the_line(folder: Path, right: str, wrong: str, words: list[str]) -> None:
+@pytest.mark.parametrize(("right", "wrong", "refusal"), MISTAKES, ids=[wrong for _, wrong, _ in MISTAKES])
+def test_one_sentence_with_the_line(folder: Path, right: str, wrong: str, refusal: list[str]) -> None:
     robot = folder / "robot.yaml"
     text = robot.read_text()
     assert text.count(right) == 1
     robot.write_text(text.replace(right, wrong))
-    with pytest.raises(InputError) as caught:
+    with refused(*refusal) as caught:
         RobotModel.from_yaml(robot)
     sentence = str(caught.value)
     first = text[: text.index(right)].count("\n") + 1
     lines = range(first, first + 1 + wrong.count("\n"))
     assert any(sentence.startswith(f"{robot} line {line}: ") for line in lines), sentence
     assert "\n" not in sentence and sentence.endswith((".", "?"))
-    for word in words:
-        assert word in sentence, sentence
 
 
 def test_numbers_of_yaml_1_2_are_numbers(folder: Path) -> None:
