@@ -13,11 +13,13 @@ from flexcal.errors import FlexcalError
 
 @contextmanager
 def refused(code: str, *names: str) -> Iterator[pytest.ExceptionInfo[FlexcalError]]:
-    """A block that raises the error of this code, whose sentence has these names and numbers, in this order."""
+    """A block that raises the error of this code, in one sentence that has these names and numbers, in this order."""
     with pytest.raises(FlexcalError) as caught:
         yield caught
-    assert caught.value.code == code, f"{caught.value.code}: {caught.value}"
-    assert_named(str(caught.value), *names)
+    sentence = str(caught.value)
+    assert caught.value.code == code, f"{caught.value.code}: {sentence}"
+    assert "\n" not in sentence and sentence.endswith((".", "?")), sentence
+    assert_named(sentence, *names)
 
 
 def assert_named(sentence: str, *names: str) -> None:

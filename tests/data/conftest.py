@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexcal.errors import InputError
 from flexcal.files.formats import read_yaml_file
 from flexcal.model.robot import SignalConfig, Stations
 
@@ -89,18 +88,3 @@ def any_robot() -> Any:
 def robot(make_robot: Callable[..., Any]) -> Any:
     """The robot without `signals:`."""
     return make_robot()
-
-
-@pytest.fixture
-def fault(tmp_path: Path) -> Callable[..., str]:
-    """Runs a function that has to raise an `InputError`, and gives its sentence."""
-
-    def run(function: Callable[..., Any], *arguments: Any, **named: Any) -> str:
-        with pytest.raises(InputError) as caught:
-            function(*arguments, **named)
-        message = str(caught.value)
-        assert "\n" not in message
-        assert message.endswith((".", "?"))
-        return message
-
-    return run

@@ -113,86 +113,106 @@ def test_defaults(tmp_path: Path, robot: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("header", "lines", "words"),
+    ("header", "lines", "refusal"),
     [
-        ("pose,q1,q2,x,y", GOOD, ["line 1", "'z'", "is missing"]),
-        ("q1,q2,x,y,z", GOOD, ["line 1", "'pose'", "is missing"]),
-        ("pose,q1,q2", GOOD, ["line 1", "no measured points x, y, z", "flexcal import"]),
-        ("Nr,J1,J2,X,Y,Z", GOOD, ["line 1", "no column pose, nor q1 … q2", "flexcal import"]),
-        ("Nr;J1;J2;X;Y;Z", GOOD, ["line 1", "not separated by commas", "flexcal import"]),
-        (HEADER + ",colour", GOOD, ["line 1", "'colour' is not known"]),
-        (HEADER + ",sigm_x", GOOD, ["line 1", "'sigm_x' is not known", "did you mean 'sigma_x'?"]),
-        (HEADER + ",sigma_x", GOOD, ["line 1", "'sigma_y'", "is missing"]),
-        (HEADER + ",qw,qx,qy", GOOD, ["line 1", "'qz'", "is missing"]),
-        (HEADER + ",length", GOOD, ["line 1", "both 'length' and x, y, z"]),
-        (HEADER + ",sigma,sigma_x,sigma_y,sigma_z", GOOD, ["line 1", "keep one"]),
-        ("pose,q1,x,y,z", GOOD, ["line 1", "1 columns q1…q1", "2 joints"]),
-        ("pose,q1,q2,q3,x,y,z", GOOD, ["line 1", "3 columns q1…q3", "2 joints"]),
-        (HEADER + ",tau1", GOOD, ["line 1", "tau1", "2 joints"]),
-        (HEADER, [GOOD[0], "2,0.1,0.2,0.3,NaN,0.4"], ["line 3, column y", "NaN"]),
-        (HEADER, [GOOD[0], "2,0.1,0.2,0.3,,0.4"], ["line 3, column y", "missing"]),
-        (HEADER, [GOOD[0], "2,0.1,0.2,0.3"], ["line 3", "4 values", "6 columns"]),
-        (HEADER, [GOOD[0], "2.5,0.1,0.2,0.3,0,0.4"], ["line 3, column pose", "whole number"]),
-        (HEADER, [GOOD[0], "B,0.1,0.2,0.3,0,0.4"], ["line 3, column pose", "'B' is not a number"]),
-        (HEADER, [GOOD[0], "1,0.5,0.2,0.3,0,0.4"], ["line 3, column q1", "pose 1", "line 2", "own number"]),
-        (HEADER, [GOOD[0], "2,10,-90,0.3,0,0.4"], ["line 3, column q1", "base", "degrees", "unit: deg"]),
+        ("pose,q1,q2,x,y", GOOD, ["E-TABLE-006", "line 1", "z"]),
+        ("q1,q2,x,y,z", GOOD, ["E-TABLE-006", "line 1", "pose"]),
+        ("pose,q1,q2", GOOD, ["E-POSES-020", "line 1"]),
+        ("Nr,J1,J2,X,Y,Z", GOOD, ["E-POSES-019", "line 1", "q1 … q2"]),
+        ("Nr;J1;J2;X;Y;Z", GOOD, ["E-TABLE-029", "1"]),
+        (HEADER + ",colour", GOOD, ["E-TABLE-004", "line 1", "colour"]),
+        (HEADER + ",sigm_x", GOOD, ["E-TABLE-004", "line 1", "sigm_x", "sigma_x"]),
+        (HEADER + ",sigma_x", GOOD, ["E-TABLE-006", "line 1", "sigma_y"]),
+        (HEADER + ",qw,qx,qy", GOOD, ["E-TABLE-006", "line 1", "qz"]),
+        (HEADER + ",length", GOOD, ["E-POSES-018", "line 1"]),
+        (HEADER + ",sigma,sigma_x,sigma_y,sigma_z", GOOD, ["E-POSES-017", "line 1"]),
+        ("pose,q1,x,y,z", GOOD, ["E-TABLE-007", "line 1", "1", "q1…q1", "2"]),
+        ("pose,q1,q2,q3,x,y,z", GOOD, ["E-TABLE-007", "line 1", "3", "q1…q3", "2"]),
+        (HEADER + ",tau1", GOOD, ["E-TABLE-007", "line 1", "tau1…tau1", "2"]),
+        (HEADER, [GOOD[0], "2,0.1,0.2,0.3,NaN,0.4"], ["E-TABLE-036", "3", "y", "NaN"]),
+        (HEADER, [GOOD[0], "2,0.1,0.2,0.3,,0.4"], ["E-TABLE-036", "3", "y", "missing"]),
+        (HEADER, [GOOD[0], "2,0.1,0.2,0.3"], ["E-TABLE-035", "3", "4", "6"]),
+        (HEADER, [GOOD[0], "2.5,0.1,0.2,0.3,0,0.4"], ["E-POSES-012", "line 3, column pose"]),
+        (HEADER, [GOOD[0], "B,0.1,0.2,0.3,0,0.4"], ["E-TABLE-036", "3", "pose", "'B' is not a number"]),
+        (HEADER, [GOOD[0], "1,0.5,0.2,0.3,0,0.4"], ["E-POSES-006", "line 3, column q1", "pose 1", "line 2"]),
+        (
+            HEADER,
+            [GOOD[0], "2,10,-90,0.3,0,0.4"],
+            ["E-TABLE-001", "line 3, column q1", "base", "degrees", "unit: deg"],
+        ),
         (
             HEADER,
             ["1,0,0.2,500,100,900", "2,1,0.1,400,-300,800"],
-            ["line 2, column z", "millimetres", "unit: mm", "1.2 m"],
+            ["E-POSES-007", "line 2, column z", "1.2", "millimetres", "unit: mm"],
         ),
-        (HEADER, [*GOOD, *GOOD[:2], "9,0.1,0,0.2,70,0.1"], ["line 7, column y", "correct or remove"]),
-        (HEADER, ["1,0.1,0.2,0.3,0,0.4"], ["one pose only", "measure more"]),
-        (HEADER, ["1,0.1,0.2,0.3,0,0.4", "2,0.1,0.2,0.3,0,0.4"], ["all poses are equal", "q1…q2"]),
+        (
+            HEADER,
+            [*GOOD, *GOOD[:2], "9,0.1,0,0.2,70,0.1"],
+            ["E-POSES-007", "line 7, column y", "correct or remove"],
+        ),
+        (HEADER, ["1,0.1,0.2,0.3,0,0.4"], ["E-POSES-003"]),
+        (HEADER, ["1,0.1,0.2,0.3,0,0.4", "2,0.1,0.2,0.3,0,0.4"], ["E-POSES-004", "q1…q2"]),
         (
             HEADER,
             ["1,0.1,0.2,0.3,0,0.4", "2,0.1,0.9,0.5,0,0.4"],
-            ["joint never moves", "base (column q1)", "add poses"],
+            ["E-POSES-005", "joint never moves", "base (column q1)"],
         ),
         (
             HEADER + ",target",
             [GOOD[0] + ",smr", GOOD[1] + ",bal"],
-            ["line 3, column target", "'bal'", "'ball'?"],
+            ["E-POSES-010", "line 3, column target", "bal", "ball"],
         ),
-        (HEADER + ",target", [GOOD[0] + ",zzz"], ["line 2, column target", "known are smr, ball"]),
-        (HEADER + ",target", [GOOD[0] + ","], ["line 2, column target", "missing"]),
-        (HEADER + ",payload", [GOOD[0] + ",-1"], ["line 2, column payload", "-1", "not negative"]),
-        (HEADER + ",sigma", [GOOD[0] + ",0"], ["line 2, column sigma", "positive"]),
-        ("pose,q1,q2,length", ["1,0,0,1", "2,0.1,0.1,-1"], ["line 3, column length", "positive"]),
-        ("pose,q1,q2,length", ["1,0,0,900", "2,0.1,0.1,800"], ["line 2, column length", "millimetres"]),
+        (
+            HEADER + ",target",
+            [GOOD[0] + ",zzz"],
+            ["E-POSES-010", "line 2, column target", "known are smr, ball"],
+        ),
+        (HEADER + ",target", [GOOD[0] + ","], ["E-TABLE-036", "2", "target", "missing"]),
+        (
+            HEADER + ",payload",
+            [GOOD[0] + ",-1"],
+            ["E-POSES-011", "line 2, column payload", "-1", "not negative"],
+        ),
+        (HEADER + ",sigma", [GOOD[0] + ",0"], ["E-POSES-011", "line 2, column sigma", "positive"]),
+        (
+            "pose,q1,q2,length",
+            ["1,0,0,1", "2,0.1,0.1,-1"],
+            ["E-POSES-011", "line 3, column length", "positive"],
+        ),
+        (
+            "pose,q1,q2,length",
+            ["1,0,0,900", "2,0.1,0.1,800"],
+            ["E-POSES-007", "line 2, column length", "millimetres"],
+        ),
         (
             HEADER + ",qw,qx,qy,qz",
             [GOOD[0] + ",1,0,0,0", GOOD[1] + ",1,1,0,0"],
-            ["line 3, column qw", "1.414"],
+            ["E-POSES-014", "line 3, column qw", "1.414"],
         ),
-        (HEADER, [], ["line 1", "no rows"]),
+        (HEADER, [], ["E-TABLE-019", "line 1"]),
     ],
 )
-def test_sentences(
-    tmp_path: Path, robot: Any, fault: Callable[..., str], header: str, lines: list[str], words: list[str]
-) -> None:
-    message = fault(read_poses, file(tmp_path / "poses.csv", lines, header), robot)
-    assert message.startswith(str(tmp_path / "poses.csv"))
-    for word in words:
-        assert word in message, message
+def test_sentences(tmp_path: Path, robot: Any, header: str, lines: list[str], refusal: list[str]) -> None:
+    with refused(*refusal) as caught:
+        read_poses(file(tmp_path / "poses.csv", lines, header), robot)
+    assert str(caught.value).startswith(str(tmp_path / "poses.csv"))
 
 
-def test_robot_that_declares_too_little(
-    tmp_path: Path, make_robot: Callable[..., Any], fault: Callable[..., str]
-) -> None:
+def test_robot_that_declares_too_little(tmp_path: Path, make_robot: Callable[..., Any]) -> None:
     path = file(tmp_path / "poses.csv", [line + ",2" for line in GOOD], HEADER + ",payload")
-    assert "declares none" in fault(read_poses, path, make_robot(payload=None))
-    assert "declares no point" in fault(read_poses, file(path, GOOD), make_robot(points={}))
+    with refused("E-POSES-009"):
+        read_poses(path, make_robot(payload=None))
+    with refused("E-POSES-008"):
+        read_poses(file(path, GOOD), make_robot(points={}))
 
 
-def test_motion_is_asked_for_only_where_it_is_needed(
-    tmp_path: Path, robot: Any, fault: Callable[..., str]
-) -> None:
+def test_motion_is_asked_for_only_where_it_is_needed(tmp_path: Path, robot: Any) -> None:
     path = file(tmp_path / "poses.csv", GOOD[:1])
     assert len(read_poses(path, robot, require_motion=False)) == 1
     path = file(tmp_path / "held.csv", ["1,0.1,0.2,0.3,0,0.4", "2,0.1,0.9,0.5,0,0.4"])
     assert len(read_poses(path, robot, require_motion=False)) == 2
-    assert "one pose" in fault(read_poses, [file(tmp_path / "a.csv", GOOD[:1])], robot)
+    with refused("E-POSES-003"):
+        read_poses([file(tmp_path / "a.csv", GOOD[:1])], robot)
 
 
 def test_several_files_are_numbered_on(tmp_path: Path, robot: Any) -> None:
@@ -212,24 +232,22 @@ def test_signals(tmp_path: Path, make_robot: Callable[..., Any]) -> None:
     assert standard.q[0].tolist() == [0.1, 0.2]
 
 
-def test_units_are_checked_after_the_mapping(
-    tmp_path: Path, make_robot: Callable[..., Any], fault: Callable[..., str]
-) -> None:
+def test_units_are_checked_after_the_mapping(tmp_path: Path, make_robot: Callable[..., Any]) -> None:
     robot = make_robot("  q: {columns: [a, b]}")
     path = file(tmp_path / "poses.csv", ["1,1,2,0.1,0.2,0.3", "2,1,90,0.1,0.2,0.3"], "pose,a,b,x,y,z")
-    assert "line 3, column b" in fault(read_poses, path, robot)
+    with refused("E-TABLE-001", "line 3, column b"):
+        read_poses(path, robot)
 
 
 def test_prismatic_joint_in_millimetres(
-    tmp_path: Path, make_robot: Callable[..., Any], make_joint: Callable[..., Any], fault: Callable[..., str]
+    tmp_path: Path, make_robot: Callable[..., Any], make_joint: Callable[..., Any]
 ) -> None:
     robot = make_robot(
         joints=(make_joint("axis", -0.5, 0.5, "prismatic"), make_joint("elbow", -3.0, 3.0, "revolute"))
     )
     path = file(tmp_path / "poses.csv", ["1,300,0.1,0.1,0.2,0.3", "2,400,0.2,0.1,0.2,0.3"])
-    message = fault(read_poses, path, robot)
-    assert "line 2, column q1" in message
-    assert "millimetres" in message
+    with refused("E-TABLE-001", "line 2, column q1", "millimetres"):
+        read_poses(path, robot)
 
 
 def test_tracker_far_away_and_several_stations(tmp_path: Path, robot: Any) -> None:
@@ -269,9 +287,10 @@ def test_subset_and_concatenate() -> None:
         make_poses(6, q=np.zeros(3))
 
 
-def test_not_finite_is_not_written(tmp_path: Path, fault: Callable[..., str]) -> None:
+def test_not_finite_is_not_written(tmp_path: Path) -> None:
     poses = make_poses(3, position=np.full((3, 3), np.nan))
-    assert "xyz of row 1 is not finite" in fault(write_poses, tmp_path / "poses.csv", poses)
+    with refused("E-POSES-016", "xyz", "1"):
+        write_poses(tmp_path / "poses.csv", poses)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -292,22 +311,21 @@ def test_a_pool_needs_no_measurements(tmp_path: Path, robot: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("header", "lines", "words"),
+    ("header", "lines", "refusal"),
     [
-        ("pose,q1", GOOD, ["line 1", "robot has 2 joints"]),
-        ("q1,q2", GOOD, ["line 1", "'pose'"]),
-        ("pose,q1,q2,colour", GOOD, ["line 1", "'colour' is not known"]),
-        ("pose,q1,q2", ["1,0,0", "7,0.1,-3.2"], ["line 3, column q2: pose 7", "-3.2 rad", "limits of elbow (-3 to 3"]),
-        ("pose,q1,q2", ["1,0,0", "1,0.1,0.2"], ["line 3, column q1", "own number"]),
-        ("pose,q1,q2", ["1,0,0", "2,10,-90"], ["line 3, column q1", "degrees"]),
-        ("pose,q1,q2,payload", ["1,0,0,2", "2,0,1,3"], ["line 3, column payload", "3 kg follow 2 kg"]),
-        ("pose,q1,q2,payload", ["1,0,0,-2"], ["line 2, column payload", "not negative"]),
+        ("pose,q1", GOOD, ["E-TABLE-007", "line 1", "2"]),
+        ("q1,q2", GOOD, ["E-TABLE-006", "line 1", "pose"]),
+        ("pose,q1,q2,colour", GOOD, ["E-TABLE-004", "line 1", "colour"]),
+        ("pose,q1,q2", ["1,0,0", "7,0.1,-3.2"], ["E-TABLE-002", "line 3, column q2", "pose 7", "-3.2", "elbow", "-3 to 3"]),
+        ("pose,q1,q2", ["1,0,0", "1,0.1,0.2"], ["E-POSES-006", "line 3, column q1"]),
+        ("pose,q1,q2", ["1,0,0", "2,10,-90"], ["E-TABLE-001", "line 3, column q1", "degrees"]),
+        ("pose,q1,q2,payload", ["1,0,0,2", "2,0,1,3"], ["E-POSES-015", "line 3, column payload", "3", "2"]),
+        ("pose,q1,q2,payload", ["1,0,0,-2"], ["E-POSES-011", "line 2, column payload", "not negative"]),
     ],
 )  # fmt: skip
 def test_pools_that_do_not_fit(
-    tmp_path: Path, robot: Any, fault: Callable[..., str], header: str, lines: list[str], words: list[str]
+    tmp_path: Path, robot: Any, header: str, lines: list[str], refusal: list[str]
 ) -> None:
-    message = fault(read_pose_pool, file(tmp_path / "pool.csv", lines, header), robot)
-    assert message.startswith(str(tmp_path / "pool.csv"))
-    for word in words:
-        assert word in message, message
+    with refused(*refusal) as caught:
+        read_pose_pool(file(tmp_path / "pool.csv", lines, header), robot)
+    assert str(caught.value).startswith(str(tmp_path / "pool.csv"))
