@@ -30,3 +30,10 @@ def assert_named(sentence: str, *names: str) -> None:
         before = " after the names before it" if start else ""
         assert found is not None, f"'{name}' does not stand{before} in: {sentence}"
         start = found.end()
+
+
+def assert_refusal(said: str, code: str, *names: str) -> None:
+    """The last line on standard error is the error of this code, with these names and numbers, in this order."""
+    line = said.rstrip("\n").rpartition("\n")[2]
+    assert line.startswith("flexcal: ") and line.endswith(f" [{code}]"), said
+    assert_named(line.removesuffix(f" [{code}]"), *names)
