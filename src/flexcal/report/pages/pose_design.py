@@ -64,7 +64,7 @@ def pose_page(study: PoseStudy) -> Page:
     ]
     return Page(
         title=f"{study.model.name}: poses to measure",
-        subtitle=f"Plan {Path(results['plan']).name}, "
+        subtitle=(f"Plan {Path(results['plan']).name}, " if results["plan"] else "")
         + ("chosen from given poses" if results["seed"] is None else f"seed {results['seed']}"),
         verdict=verdict,
         sections=[_numbers(results), *sections] if chosen else sections,
