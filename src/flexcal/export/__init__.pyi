@@ -4,18 +4,16 @@ from .mjcf_file import export_mjcf
 from .mujoco_spec import mjcf_spec
 from .offset_fit import undetermined_offsets
 from .offset_table import render_offsets
-from .representation_error import ExportErrors, UnrepresentedTerm, measure_export_error
+from .representation_error import measure_export_error
 from .urdf import export_urdf
 from .written_file import ExportedFile, RenderedModel, write_rendered
 
 __all__ = [
     "FORMATS",
     "Convention",
-    "ExportErrors",
     "ExportedFile",
     "PlainFormat",
     "RenderedModel",
-    "UnrepresentedTerm",
     "export_mjcf",
     "export_urdf",
     "measure_export_error",

@@ -1,15 +1,9 @@
 from .arm_poses import ArmPoses, arms_at
-from .best_fit_registration import (
-    Placement,
-    best_placement,
-    can_register,
-    can_register_with_points,
-    rigid_placement,
-)
+from .best_fit_registration import best_placement, can_register, can_register_with_points, rigid_placement
 from .error_scale_test import ErrorScale, error_scale, prediction_document
 from .errors_by_model import CALIBRATED, DECLARED, NOMINAL, OWN, RIGID, MeasuredPoints, errors_before
 from .refitted_placement import Refit, RefittedVerification, verify_refitted
-from .uncalibrated_robot import UncalibratedErrors, UncalibratedRobot, uncalibrated_model
+from .uncalibrated_robot import UncalibratedErrors, uncalibrated_model
 from .unseen_poses import (
     ErrorCovariance,
     PredictionErrors,
@@ -27,12 +21,10 @@ __all__ = [
     "ErrorCovariance",
     "ErrorScale",
     "MeasuredPoints",
-    "Placement",
     "PredictionErrors",
     "Refit",
     "RefittedVerification",
     "UncalibratedErrors",
-    "UncalibratedRobot",
     "arms_at",
     "best_placement",
     "can_register",

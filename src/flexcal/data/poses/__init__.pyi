@@ -1,5 +1,5 @@
 from .candidate_pool import PosePool
-from .checks import check_metres, check_motion, check_same_pose
+from .checks import check_metres, check_same_pose
 from .columns import check_positive, unit_quaternions, whole_numbers
 from .measured_tables import read_pose_pool, read_poses, write_poses
 from .pose_set import DEFAULT_SIGMA, PoseSet, concatenate
@@ -13,7 +13,6 @@ __all__ = [
     "PoseSet",
     "ToolTargets",
     "check_metres",
-    "check_motion",
     "check_positive",
     "check_same_pose",
     "concatenate",

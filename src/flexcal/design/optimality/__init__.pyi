@@ -1,5 +1,5 @@
 from .condition_criteria import ConditionNumberCriterion, SmoothMinimumEigenvalue, condition_number
-from .criteria import Criterion, DOptimal, Observability, SpectralCriterion, TraceOptimal, observability
+from .criteria import Criterion, DOptimal, SpectralCriterion, TraceOptimal, observability
 from .exchange_algorithm import exchange
 from .lower_bound import trace_lower_bound
 from .rank_updates import Selection, greedy
@@ -9,7 +9,6 @@ __all__ = [
     "ConditionNumberCriterion",
     "Criterion",
     "DOptimal",
-    "Observability",
     "Selection",
     "SmoothMinimumEigenvalue",
     "SpectralCriterion",

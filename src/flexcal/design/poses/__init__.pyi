@@ -1,13 +1,7 @@
 from .accuracy_curve import PoseCurve, pose_curve
 from .candidates import random_candidates
 from .feasibility import PoseCandidates, pose_candidates
-from .geometry_sensitivity import (
-    BaseSensitivity,
-    GeometricTolerances,
-    base_sensitivity,
-    geometry_jacobian,
-    pose_sensitivity,
-)
+from .geometry_sensitivity import GeometricTolerances, base_sensitivity, geometry_jacobian, pose_sensitivity
 from .gravity_preload import preloaded
 from .ordering import MeasurementOrder, measurement_order
 from .selection import CriterionName, PoseDesign, choose_poses, fewest_poses, random_poses, select_poses
@@ -15,7 +9,6 @@ from .sequential_selection import NextPoses, select_next_poses
 from .working_volume import WorkingVolume, working_box, working_points
 
 __all__ = [
-    "BaseSensitivity",
     "CriterionName",
     "GeometricTolerances",
     "MeasurementOrder",

@@ -5,7 +5,7 @@ from .optimisation import TrajectoryDesign, optimise_trajectories
 from .regressor_columns import BaseRegressor
 from .required_limits import COULOMB, VISCOUS, require_stated_limits, with_assumed_friction
 from .rest_to_rest import TimedMotion, timed_motion
-from .sequences import SequenceName, Stage, sequence
+from .sequences import SequenceName, sequence
 
 __all__ = [
     "COULOMB",
@@ -14,7 +14,6 @@ __all__ = [
     "BaseRegressor",
     "Kind",
     "SequenceName",
-    "Stage",
     "TimedMotion",
     "TrajectoryCriterion",
     "TrajectoryDesign",

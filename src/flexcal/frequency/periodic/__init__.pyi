@@ -10,21 +10,19 @@ from .multisine import (
     leave_out_detection_lines,
     multisine_spectra,
     odd_lines,
-    optimise_crest,
     orthogonal_matrix,
     reference_trajectory,
     samples_per_period,
     synthesise,
 )
 from .response import FrequencyResponse, frequency_response, frequency_responses
-from .symmetry import Reciprocity, reciprocity
+from .symmetry import reciprocity
 
 __all__ = [
     "ORDER",
     "Average",
     "FrequencyResponse",
     "LocalWindows",
-    "Reciprocity",
     "crest_factor",
     "excitation_torque",
     "frequency_response",
@@ -37,7 +35,6 @@ __all__ = [
     "multisine_spectra",
     "noise_lines",
     "odd_lines",
-    "optimise_crest",
     "orthogonal_matrix",
     "pool_noise",
     "projected",

@@ -1,10 +1,9 @@
 from .comparison import compare_folders
 from .customer import customer_report
-from .report import REPORT, report_folder, two_stage_study
+from .report import report_folder, two_stage_study
 from .result import Identification, ReportedResult, Result, summary_row
 
 __all__ = [
-    "REPORT",
     "Identification",
     "ReportedResult",
     "Result",
