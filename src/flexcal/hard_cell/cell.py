@@ -28,9 +28,9 @@ class HardCell:
         self.threads = threads or os.cpu_count() or 1
 
     @classmethod
-    def drawn(cls, robot: Path, seed: int = 0) -> HardCell:
+    def drawn(cls, robot_file: Path, seed: int = 0) -> HardCell:
         """The cell of a robot.yaml, its true robot drawn from `seed`; raises `FlexcalError` for a robot that it cannot be."""
-        described = read_description(robot)
+        described = read_description(robot_file)
         return cls(draw_robot(described, np.random.default_rng([seed, 0])), described, seed)
 
     def record(self, plan: MultisinePlan | TrajectoryPlan) -> Iterator[Recording]:

@@ -73,22 +73,22 @@ class ArmDescription:
         return tuple(self.links[k].joint for k in self.joints)
 
 
-def read_description(robot: Path) -> ArmDescription:
+def read_description(robot_file: Path) -> ArmDescription:
     """The arm of a robot.yaml as its files declare it.
 
     Raises `FlexcalError` for a robot that the hard cell cannot be: with sliding or locked joints, with branches, without a point.
     """
-    config = read_yaml(robot, RobotConfig)
-    links = _read_links(robot.parent / config.robot)
+    config = read_yaml(robot_file, RobotConfig)
+    links = _read_links(robot_file.parent / config.robot)
     turning = [link for link in links if link.axis is not None]
     names, n = [link.joint for link in turning], len(turning)
     if config.locked:
         raise FlexcalError(
             "E-CELL-005",
-            f"{robot}: the hard cell has no locked joints; run the demonstration with the virtual cell.",
+            f"{robot_file}: the hard cell has no locked joints; run the demonstration with the virtual cell.",
         )
     if not config.points:
-        raise FlexcalError("E-CELL-006", f"{robot} declares no point to measure; add `points:`.")
+        raise FlexcalError("E-CELL-006", f"{robot_file} declares no point to measure; add `points:`.")
     springs, dampers = np.full((n, 3), np.inf), np.zeros((n, 3))
     bearing = np.array([_upright(link.axis) for link in turning])
     for elastic in config.elastic:
@@ -108,7 +108,7 @@ def read_description(robot: Path) -> ArmDescription:
         return np.full(n, otherwise) if values is None else np.array(values, dtype=float)
 
     return ArmDescription(
-        name=robot.parent.name,
+        name=robot_file.parent.name,
         links=links,
         springs=springs,
         dampers=dampers,

@@ -71,16 +71,16 @@ class ExportedRobot:
         }
 
 
-def export_robot(robot: Path, out: Path, format: str, *, estimates: Path | None = None) -> ExportedRobot:
+def export_robot(robot_file: Path, out: Path, format: str, *, estimates: Path | None = None) -> ExportedRobot:
     """Write the robot with its estimates in a plain format; `estimates` is a file or folder in place of that beside robot.yaml.
 
     Raises `FlexcalError`, as every export here, as reading and the format's rendering do, and where `out` is one of the robot's own files.
     """
-    return _export(robot, out, estimates, lambda robot_: render(format, robot_.model, robot_.nominal))
+    return _export(robot_file, out, estimates, lambda robot_: render(format, robot_.model, robot_.nominal))
 
 
 def export_dh(
-    robot: Path,
+    robot_file: Path,
     out: Path,
     convention: Convention,
     *,
@@ -100,11 +100,11 @@ def export_dh(
             unseen=robot_.unseen,
         )
 
-    return _export(robot, out, estimates, rendered)
+    return _export(robot_file, out, estimates, rendered)
 
 
 def export_offsets(
-    robot: Path,
+    robot_file: Path,
     out: Path,
     *,
     point: str | None = None,
@@ -122,16 +122,17 @@ def export_offsets(
             undetermined=robot_.undetermined,
         )
 
-    return _export(robot, out, estimates, rendered)
+    return _export(robot_file, out, estimates, rendered)
 
 
-def _export(robot: Path, out: Path, estimates: Path | None, rendered: Render) -> ExportedRobot:
-    nominal = RobotModel.from_yaml(robot, estimates=False)
+def _export(robot_file: Path, out: Path, estimates: Path | None, rendered: Render) -> ExportedRobot:
+    nominal = RobotModel.from_yaml(robot_file, estimates=False)
     path = stored_estimates(nominal, estimates)
-    for own, what in ((nominal.urdf, "nominal URDF"), (robot, "robot.yaml"), (path, "estimates file")):
+    for own, what in ((nominal.urdf, "nominal URDF"), (robot_file, "robot.yaml"), (path, "estimates file")):
         if out.exists() and own.exists() and out.samefile(own):
             raise InputError(
-                "E-RUN-021", f"{out} is the {what} of {robot}, which is never changed; give another --out."
+                "E-RUN-021",
+                f"{out} is the {what} of {robot_file}, which is never changed; give another --out.",
             )
     if estimates is not None and not path.exists():
         raise InputError(

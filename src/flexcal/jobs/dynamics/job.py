@@ -17,7 +17,7 @@ from flexcal.progress import Progress, silent
 
 
 def identify_robot_dynamics(
-    robot: Path,
+    robot_file: Path,
     logs: Sequence[Path],
     *,
     hold_out: float = 0.0,
@@ -37,7 +37,7 @@ def identify_robot_dynamics(
     folder. A learned residual goes beside the estimates as learned_residual.npz where cross-validation finds it worth anything. Raises
     `FlexcalError` as `identify_dynamics` does, and where the place of a file is taken; nothing is written then.
     """
-    bare = RobotModel.from_yaml(robot, estimates=False)
+    bare = RobotModel.from_yaml(robot_file, estimates=False)
     source = bare.path.parent / bare.config.estimates
     blocks = read_estimates(source, without="dynamics") if source.exists() else {}
     target = estimates_target(source, out, "dynamics")
@@ -62,10 +62,10 @@ def identify_robot_dynamics(
         "flexible": flexible,
     }
     used = source if blocks else None
-    origin = provenance([robot, bare.urdf, *logs], options, used, tuple(blocks))
+    origin = provenance([robot_file, bare.urdf, *logs], options, used, tuple(blocks))
     everything = origin  # hashing goes through the whole logs
     if validate:
-        everything = provenance([robot, bare.urdf, *logs, *validate], options, used, tuple(blocks))
+        everything = provenance([robot_file, bare.urdf, *logs, *validate], options, used, tuple(blocks))
     result = replace(
         identified,
         estimate=replace(identified.estimate, provenance=origin),

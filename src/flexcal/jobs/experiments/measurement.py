@@ -52,7 +52,7 @@ class Measurement:
 
 
 def measure(
-    robot: Path,
+    robot_file: Path,
     plan_file: Path,
     cell: str,
     out: Path,
@@ -69,7 +69,7 @@ def measure(
     file `truth`, and left in `out`/truth.yaml. Raises `FlexcalError` where files do not fit, and where `out`
     holds the measurements of another plan.
     """
-    model = RobotModel.from_yaml(robot, estimates=False)
+    model = RobotModel.from_yaml(robot_file, estimates=False)
     plan = read_plan_for_robot(plan_file, model)
     if cell != VIRTUAL and Path(cell).resolve() == out.resolve():
         raise InputError("E-RUN-039", f"{out} is the folder measured before; give another --out.")

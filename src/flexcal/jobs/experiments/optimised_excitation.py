@@ -87,15 +87,15 @@ def plan_without_poses(
     return leave_out_detection_lines(plan) if detection_lines else plan
 
 
-def declared_sensors(robot: Path) -> Path | None:
+def declared_sensors(robot_file: Path) -> Path | None:
     """cell.yaml beside robot.yaml, where there is one."""
-    file = robot.parent / "cell.yaml"
+    file = robot_file.parent / "cell.yaml"
     return file if file.is_file() else None
 
 
-def response_sensors(robot: Path) -> ResponseSensors:
+def response_sensors(robot_file: Path) -> ResponseSensors:
     """The sensors that cell.yaml beside robot.yaml declares, common ones where there is none."""
-    file = declared_sensors(robot)
+    file = declared_sensors(robot_file)
     if file is None:
         return COMMON_SENSORS
     sensors = read_yaml(file, CellConfig).sensors

@@ -115,7 +115,7 @@ class ImportedFile:
 
 
 def import_file(
-    robot: Path,
+    robot_file: Path,
     file: Path,
     *,
     mapped: Sequence[str] = (),
@@ -131,7 +131,7 @@ def import_file(
     `unchecked`, where the nominal robot cannot go with the points. Raises `InputError` where the file cannot be read, joint positions are
     not recognised, or a value is missing or cannot be, and for a `sigma` that is not positive or has no place.
     """
-    model = RobotModel.from_yaml(robot, estimates=False)
+    model = RobotModel.from_yaml(robot_file, estimates=False)
     foreign = read_foreign(file, model.joint_names, sheet=sheet, topic=topic)
     guess = guess_columns(foreign, model)
     if mapped:

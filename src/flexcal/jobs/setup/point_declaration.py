@@ -17,13 +17,13 @@ _DIGITS = 6
 """m: micrometres."""
 
 
-def write_point_position(robot: Path, name: str, xyz: np.ndarray) -> None:
+def write_point_position(robot_file: Path, name: str, xyz: np.ndarray) -> None:
     """Put `xyz` (3,) m in place of the `xyz` of the point `name` under `points:`; comments and everything else stay as they are.
 
     Raises `InputError`, and changes nothing, where the file says it in a way that cannot be replaced.
     """
-    text = current_path(robot).read_text(encoding="utf-8")
-    before = read_yaml_file(robot).structure(RobotConfig)
+    text = current_path(robot_file).read_text(encoding="utf-8")
+    before = read_yaml_file(robot_file).structure(RobotConfig)
     place = tuple(round(float(value), _DIGITS) for value in xyz)
     told = ", ".join(f"{value:.{_DIGITS}f}" for value in place)
     block = re.search(r"^points:.*?(?=^\S|\Z)", _blanked(text), flags=re.MULTILINE | re.DOTALL)
@@ -35,13 +35,13 @@ def write_point_position(robot: Path, name: str, xyz: np.ndarray) -> None:
     if match is not None:
         changed = f"{text[: match.start(1)]}[{told}]{text[match.end(1) :]}"
         expected = replace(before, points=before.points | {name: replace(before.points[name], xyz=place)})
-        write_text(robot, changed)
-        if _structured(robot) == expected:
+        write_text(robot_file, changed)
+        if _structured(robot_file) == expected:
             return
-        write_text(robot, text)
+        write_text(robot_file, text)
     raise InputError(
         "E-RUN-090",
-        f"the xyz of the point '{name}' in {robot} could not be replaced; write xyz: [{told}] there by hand.",
+        f"the xyz of the point '{name}' in {robot_file} could not be replaced; write xyz: [{told}] there by hand.",
     )
 
 
@@ -50,8 +50,8 @@ def _blanked(text: str) -> str:
     return re.sub(r"(?:(?<=\s)|^)#[^\n]*", lambda match: " " * len(match[0]), text, flags=re.MULTILINE)
 
 
-def _structured(robot: Path) -> RobotConfig | None:
+def _structured(robot_file: Path) -> RobotConfig | None:
     try:
-        return read_yaml_file(robot).structure(RobotConfig)
+        return read_yaml_file(robot_file).structure(RobotConfig)
     except InputError:
         return None

@@ -22,23 +22,23 @@ def signals_text(signals: Mapping[str, Mapping[str, Any]]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def add_signals(robot: Path, signals: Mapping[str, Mapping[str, Any]]) -> None:
+def add_signals(robot_file: Path, signals: Mapping[str, Mapping[str, Any]]) -> None:
     """Add the block at the end of robot.yaml, every byte before it kept.
 
     Raises `InputError` where there is one already that says something else, and gives the lines to put there by hand.
     """
-    declared = read_yaml_file(robot).data.get("signals")
+    declared = read_yaml_file(robot_file).data.get("signals")
     block = signals_text(signals)
     if declared is not None:
         if all(declared.get(quantity) == dict(entry) for quantity, entry in signals.items()):
             return
         raise InputError(
-            "E-RUN-092", f"{robot} has `signals:` already, which is not changed; replace it by: {block}"
+            "E-RUN-092", f"{robot_file} has `signals:` already, which is not changed; replace it by: {block}"
         )
-    text = current_path(robot).read_text(encoding="utf-8")
-    write_text(robot, f"{text}{'' if text.endswith(chr(10)) else chr(10)}\n{block}")
+    text = current_path(robot_file).read_text(encoding="utf-8")
+    write_text(robot_file, f"{text}{'' if text.endswith(chr(10)) else chr(10)}\n{block}")
     try:
-        RobotModel.from_yaml(robot, estimates=False)
+        RobotModel.from_yaml(robot_file, estimates=False)
     except BaseException:
-        write_text(robot, text)
+        write_text(robot_file, text)
         raise

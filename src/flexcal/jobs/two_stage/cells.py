@@ -28,9 +28,9 @@ class KnownCell(Cell, Protocol):
 
 
 def open_cell(
-    kind: CellName, robot: Path, nominal: RobotModel, *, truth: Path | None, hidden: Path, seed: int
+    kind: CellName, robot_file: Path, nominal: RobotModel, *, truth: Path | None, hidden: Path, seed: int
 ) -> KnownCell:
-    """A cell with the robot of `robot` in it, whose true values of the model's parameters are left in the file `hidden`.
+    """A cell with the robot of `robot_file` in it, whose true values of the model's parameters are left in the file `hidden`.
 
     They are drawn from `seed`, or those of the file `truth`; of a hard robot only those that have a counterpart in the model. Raises
     `FlexcalError` where the cell cannot hold the robot, and for a `truth` of a hard one.
@@ -41,10 +41,10 @@ def open_cell(
                 "E-RUN-093",
                 "a hard cell's robot has no truth in the form of estimates.yaml; leave out --truth or --cell hard.",
             )
-        cell = HardCell.drawn(robot, seed)
+        cell = HardCell.drawn(robot_file, seed)
         write_truth(hidden, counterparts(cell.robot))
         return cell
-    config = read_yaml(robot.parent / "cell.yaml", CellConfig)
+    config = read_yaml(robot_file.parent / "cell.yaml", CellConfig)
     cell, values = VirtualCell.drawn(nominal, config, seed, truth)
     write_truth(hidden, values)
     return cell

@@ -88,7 +88,7 @@ class Stopwatch:
 
 
 def run_two_stage(
-    robot: Path,
+    robot_file: Path,
     out: Path,
     *,
     seed: int = 0,
@@ -102,7 +102,7 @@ def run_two_stage(
 ) -> TwoStageRun:
     """Run the two-stage calibration on a simulated robot and leave every intermediate file, results.json and report.html in `out`.
 
-    `robot` is a robot.yaml with frequency_poses.csv and, for the virtual cell, cell.yaml beside it. The hidden truth is drawn from
+    `robot_file` is a robot.yaml with frequency_poses.csv and, for the virtual cell, cell.yaml beside it. The hidden truth is drawn from
     `seed`, or taken from the file `truth`; it is written to `out`/truth.yaml and read back only after everything has been identified and
     stored. `inertias_known` gives the identification the true link inertias, to see what CAD costs. The plans `designed` and `quick` are
     chosen for the robot as stage 0 left it; `quick` takes half the time, and 25 calibration poses instead of 40. The robot of the hard
@@ -112,10 +112,10 @@ def run_two_stage(
     Raises `FlexcalError` for files that do not fit.
     """
     watch = Stopwatch()
-    nominal = RobotModel.from_yaml(robot, estimates=False)
+    nominal = RobotModel.from_yaml(robot_file, estimates=False)
     out.mkdir(parents=True, exist_ok=True)
     hidden = out / "truth.yaml"
-    robot_in_cell = open_cell(cell, robot, nominal, truth=truth, hidden=hidden, seed=seed)
+    robot_in_cell = open_cell(cell, robot_file, nominal, truth=truth, hidden=hidden, seed=seed)
     dynamics = None
     if inertias_known:
         believed = nominal.with_values(_inertias(read_truth(hidden)))
@@ -125,11 +125,11 @@ def run_two_stage(
         believed = nominal.with_estimate(dynamics)
 
     if plan == "default" or plan == "paper":
-        frequency = frequency_plan(nominal, robot.parent / "frequency_poses.csv", plan, seed)
+        frequency = frequency_plan(nominal, robot_file.parent / "frequency_poses.csv", plan, seed)
     else:
         with watch.stage("frequency"):
             flat = plan_without_poses(believed, plan, seed=seed)
-            frequency = optimise_excitation(believed, flat, sensors=response_sensors(robot)).planned.plan
+            frequency = optimise_excitation(believed, flat, sensors=response_sensors(robot_file)).planned.plan
     write_plan(out / "frequency_plan.yaml", frequency)
     with watch.stage("frequency"):
         responses = tuple(
@@ -143,7 +143,7 @@ def run_two_stage(
 
         def stage_one(robot: RobotModel, stage: str) -> SpringFit:
             return fit_springs(
-                robot,
+                robot_file,
                 responses,
                 inertias_known=inertias_known,
                 plan=frequency,
@@ -181,7 +181,7 @@ def run_two_stage(
     options = {"plan": plan, "seed": seed, "inertias_known": inertias_known}
     options |= {"bearings": elastic.bearings} if elastic.has_bearings else {}
     geometry = replace(calibration.estimate, measurements=measurement_digests(measured))
-    stored = _store(out, (robot, nominal.urdf), files, options, stiffness.estimate, geometry)
+    stored = _store(out, (robot_file, nominal.urdf), files, options, stiffness.estimate, geometry)
     calibration = replace(calibration, estimate=stored)
     exported = export_urdf(calibration.model, out / "calibrated.urdf")
     with watch.stage("verification"):
