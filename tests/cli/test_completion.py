@@ -7,6 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from refusals import assert_refusal
 
 from flexcal.cli.arguments.verb_options import options_of
 from flexcal.cli.arguments.verb_table import VERBS
@@ -71,20 +72,21 @@ def test_every_option_is_that_of_the_help(run, verb) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "refusal"),
     [
-        (["calibrate"], "'flexcal calibrate' needs ROBOT"),
-        (["calibrate", "r.yaml", "p.csv", "--los", "cauchy"], "has no option --los; did you mean '--loss'?"),
-        (["calibrate", "r.yaml", "p.csv", "--loss", "cauch"], "invalid choice 'cauch'"),
-        (["design", "poses", "r.yaml", "--count", "many"], "'many' is no whole number"),
-        (["design", "poses", "r.yaml", "--count"], "missing value for argument '--count'"),
-        (["calibrate", "r.yaml", "p.csv", "--secant-scale", "x"], "'x' is no number"),
-        (["export", "urdf", "robot.yaml"], "needs --out FILE"),
-        (["report", "a", "b"], "does not take b"),
-        (["completion", "tcsh"], "'bash', 'zsh', 'fish'"),
+        (["calibrate"], ["E-CLI-002", "calibrate", "ROBOT"]),
+        (["calibrate", "r.yaml", "p.csv", "--los", "cauchy"], ["E-CLI-001", "--los; did you mean '--loss'"]),
+        (["calibrate", "r.yaml", "p.csv", "--loss", "cauch"], ["E-CLI-004", "invalid choice 'cauch'"]),
+        (["design", "poses", "r.yaml", "--count", "many"], ["E-CLI-004", "'many' is no whole number"]),
+        (["design", "poses", "r.yaml", "--count"], ["E-CLI-004", "missing value for argument '--count'"]),
+        (["calibrate", "r.yaml", "p.csv", "--secant-scale", "x"], ["E-CLI-004", "'x' is no number"]),
+        (["export", "urdf", "robot.yaml"], ["E-CLI-002", "--out FILE"]),
+        (["report", "a", "b"], ["E-CLI-003", "b"]),
+        (["completion", "tcsh"], ["E-CLI-004", "'bash', 'zsh', 'fish'"]),
     ],
 )
-def test_arguments_that_do_not_parse_get_one_sentence(run, arguments: list[str], words: str) -> None:
+def test_arguments_that_do_not_parse_get_one_sentence(run, arguments: list[str], refusal: list[str]) -> None:
     outcome = run(*arguments)
     assert outcome.status == 2 and outcome.out == "" and outcome.err.startswith("flexcal: ")
-    assert words in outcome.err and outcome.err.count("\n") == 1 and "─" not in outcome.err
+    assert outcome.err.count("\n") == 1 and "─" not in outcome.err
+    assert_refusal(outcome.err, *refusal)

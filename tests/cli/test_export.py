@@ -6,6 +6,7 @@ import csv
 from pathlib import Path
 
 import pytest
+from refusals import assert_refusal
 from test_bad_input import refused_run
 
 from flexcal.model.robot import RobotModel
@@ -80,7 +81,7 @@ def test_tables_are_tables(run, tx90l_folder: Path) -> None:
 @pytest.mark.parametrize("own", ["robot.yaml", "tx90l.urdf", "frequency_poses.csv"])
 def test_a_robots_own_file_is_no_place_for_an_export(run, tx90l_folder: Path, name: str, own: str) -> None:
     arguments = ("export", name, tx90l_folder / "robot.yaml", "--out", tx90l_folder / own)
-    assert "never changed" in refused_run(run, tx90l_folder, *arguments)
+    assert_refusal(refused_run(run, tx90l_folder, *arguments), "E-CLI-013")
 
 
 def test_what_flexcal_wrote_is_protected_while_it_is_the_robot(run, tx90l_folder: Path) -> None:
@@ -90,7 +91,7 @@ def test_what_flexcal_wrote_is_protected_while_it_is_the_robot(run, tx90l_folder
         (tx90l_folder / "robot.yaml").read_text().replace("tx90l.urdf", "new.urdf").replace("smr:", "seen:")
     )
     sentence = refused_run(run, tx90l_folder, "export", "urdf", robot, "--out", tx90l_folder / "new.urdf")
-    assert "is the nominal URDF" in sentence
+    assert_refusal(sentence, "E-RUN-021", "nominal URDF")
 
 
 @pytest.mark.parametrize("name", ["dh", "mdh", "offsets", "kinematics"])
@@ -99,18 +100,20 @@ def test_a_chain_needs_a_point(run, tx90l_folder: Path, name: str) -> None:
     lines = robot.read_text().splitlines(keepends=True)
     robot.write_text("".join(line for line in lines if not line.startswith(("points:", "  smr:"))))
     sentence = refused_run(run, tx90l_folder, "export", name, robot, "--out", tx90l_folder / "new")
-    assert "declares none; add one under `points:`" in sentence
+    assert_refusal(sentence, "E-EXPORT-001")
 
 
 def test_other_input_that_cannot_be_used(run, tx90l_folder: Path, examples: Path) -> None:
     robot, out = tx90l_folder / "robot.yaml", tx90l_folder / "new"
     sentence = refused_run(run, tx90l_folder, "export", "dh", robot, "--point", "tool", "--out", out)
-    assert "no point 'tool'" in sentence and "smr" in sentence
+    assert_refusal(sentence, "E-ROBOT-041", "tool", "smr")
     missing = refused_run(run, tx90l_folder, "export", "mjcf", robot, "--estimates", "nowhere", "--out", out)
-    assert "nowhere does not exist" in missing
+    assert_refusal(missing, "E-RUN-022", "nowhere")
     massless = refused_run(
         run, tx90l_folder, "export", "mjcf", examples / "tx40" / "robot.yaml", "--out", out
     )
-    assert "MuJoCo cannot build" in massless and "tx40.urdf" in massless
-    assert "is a folder" in refused_run(run, tx90l_folder, "export", "sdf", robot, "--out", tx90l_folder)
-    assert "no 'export step'" in refused_run(run, tx90l_folder, "export", "step", robot, "--out", out)
+    assert_refusal(massless, "E-EXPORT-002", "tx40.urdf")
+    assert_refusal(refused_run(run, tx90l_folder, "export", "sdf", robot, "--out", tx90l_folder), "E-CLI-010")
+    assert_refusal(
+        refused_run(run, tx90l_folder, "export", "step", robot, "--out", out), "E-CLI-041", "export", "step"
+    )

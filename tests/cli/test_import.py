@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cli_files import read_csv, snapshot, write_csv
+from refusals import assert_refusal
 
 from flexcal.data.poses import read_poses
 from flexcal.data.recordings import read_recording, read_recording_blocks
@@ -30,7 +31,9 @@ def test_a_wrong_sign_is_found_and_mapped(run, ur5_folder: Path, foreign: Path) 
     before = snapshot(ur5_folder)
     refused = run("import", robot, foreign, "--out", out)
     assert refused.status == 2 and snapshot(ur5_folder) == before
-    assert "elbow_joint seems to have the opposite sign: --map 'q3=-axis 3[deg]'" in refused.err
+    assert_refusal(
+        refused.err, "E-CLI-035", "elbow_joint seems to have the opposite sign: --map 'q3=-axis 3[deg]'"
+    )
     assert run("import", robot, foreign, "--out", out, "--map", "q3=-axis 3[deg]").status == 0
     model = RobotModel.from_yaml(robot, estimates=False)
     poses, published = read_poses(out, model), read_poses(ur5_folder / "grid.csv", model)
@@ -84,20 +87,20 @@ def without_last_cell(text: str, row: int) -> str:
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "refusal"),
     [
-        (lambda text: text.replace("axis 5", "speed 5"), ["q1 … q6 were not recognised", "there are 5 of them, but 6 joints", "--map"]),
-        (lambda text: without_last_cell(text, 3), ["other.csv line 4, column tracker z", "no number"]),
-        (lambda text: text.splitlines()[0], ["other.csv"]),
+        (lambda text: text.replace("axis 5", "speed 5"), ["E-RUN-084", "q1 … q6", "there are 5 of them, but 6 joints"]),
+        (lambda text: without_last_cell(text, 3), ["E-RUN-085", "other.csv line 4, column tracker z", "no number"]),
+        (lambda text: text.splitlines()[0], ["E-IMPORT-053", "other.csv"]),
     ],
 )  # fmt: skip
 def test_faults_are_named_with_their_place(
-    run, ur5_folder: Path, foreign: Path, change, words: list[str]
+    run, ur5_folder: Path, foreign: Path, change, refusal: list[str]
 ) -> None:
     foreign.write_text(change(foreign.read_text()))
     outcome = run("import", ur5_folder / "robot.yaml", foreign)
     assert outcome.status == 2 and outcome.err.count("\n") == 1
-    assert all(word in outcome.err for word in words), outcome.err
+    assert_refusal(outcome.err, *refusal)
 
 
 def test_points_that_are_left_out_are_named(run, ur5_folder: Path, foreign: Path) -> None:
@@ -117,29 +120,32 @@ def test_the_instruments_noise_is_stated_where_the_file_does_not(run, ur5_folder
     poses = read_poses(out, RobotModel.from_yaml(robot, estimates=False))
     assert poses.sigma_given
     np.testing.assert_allclose(poses.sigma, 3e-5)
-    for file, sigma, words in (
-        (out, "0.03", "contains sigma"),
-        (grid, "0", "must be positive"),
-        (grid, "nan", "must be positive"),
-        (plan, "0.03", "has none"),
+    for file, sigma, refusal in (
+        (out, "0.03", ["E-RUN-088", "poses.csv"]),
+        (grid, "0", ["E-RUN-086", "0"]),
+        (grid, "nan", ["E-RUN-086", "nan"]),
+        (plan, "0.03", ["E-RUN-087", "plan.csv"]),
     ):
         refused = run("import", robot, file, "--sigma", sigma)
-        assert refused.status == 2 and words in refused.err and refused.err.count("\n") == 1
+        assert refused.status == 2 and refused.err.count("\n") == 1
+        assert_refusal(refused.err, *refusal)
 
 
 def test_one_wild_value_is_named_with_its_line(run, ur5_folder: Path) -> None:
     header, rows = read_csv(ur5_folder / "grid.csv")
-    for column, words in (("x", "line 5, column x"), ("q2", "line 5, column q2")):
+    for column, code in (("x", "E-POSES-007"), ("q2", "E-TABLE-001")):
         wild = rows[::25].copy()
         wild[3, header.index(column)] = 1e6
         outcome = run("import", ur5_folder / "robot.yaml", write_csv(ur5_folder / "wild.csv", header, wild))
-        assert outcome.status == 2 and words in outcome.err
+        assert outcome.status == 2
+        assert_refusal(outcome.err, code, f"line 5, column {column}")
 
 
 def test_a_folder_is_no_file_to_write(run, ur5_folder: Path) -> None:
     before = snapshot(ur5_folder)
     outcome = run("import", ur5_folder / "robot.yaml", ur5_folder / "grid.csv", "--out", ur5_folder)
-    assert outcome.status == 2 and "is a folder" in outcome.err and snapshot(ur5_folder) == before
+    assert outcome.status == 2 and snapshot(ur5_folder) == before
+    assert_refusal(outcome.err, "E-CLI-010")
 
 
 def test_timestamps_of_poses(run, ur5_folder: Path) -> None:
@@ -186,7 +192,9 @@ def test_a_log_with_timestamps_is_read_by_the_signals_that_import_writes(run, ur
     assert len(blocks) > 1
     np.testing.assert_allclose(np.concatenate([b.q for b in blocks]), recording.q, atol=1e-6)
     path.write_text(path.read_text().replace(str(moment[7]), "later"))
-    assert "line 9, column stamp: 'later' is no time" in run("identify", "dynamics", robot, path).err
+    assert_refusal(
+        run("identify", "dynamics", robot, path).err, "E-TABLE-040", "line 9, column stamp", "later"
+    )
 
 
 def test_a_time_that_is_none_is_placed(run, ur5_folder: Path, foreign: Path) -> None:
@@ -196,8 +204,9 @@ def test_a_time_that_is_none_is_placed(run, ur5_folder: Path, foreign: Path) -> 
     foreign.write_text("\n".join(f"{stamp},{line}" for stamp, line in zip(stamps, lines, strict=True)))
     sign = "q3=-axis 3[deg]"
     refused = run("import", ur5_folder / "robot.yaml", foreign, "--map", sign)
-    assert refused.status == 2 and "other.csv line 8, column when: there is no time" in refused.err
-    assert "--map t=none" in refused.err
+    assert refused.status == 2
+    assert_refusal(refused.err, "E-RUN-085", "other.csv line 8, column when: there is no time")
+    assert_refusal(refused.err, "E-RUN-085", "--map t=none")
     assert run("import", ur5_folder / "robot.yaml", foreign, "--map", sign, "t=none").status == 0
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from cli_files import snapshot
 from newcomer_robot import JOINTS, urdf_text
+from refusals import assert_refusal
 
 from flexcal.model.robot import RobotModel
 
@@ -72,17 +73,17 @@ def test_never_writes_over_a_file(run, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "sentence"),
+    ("name", "content", "refusal"),
     [
-        ("arm.urdf", "solid arm\n", "arm.urdf: this is no XML, so no URDF; name the robot's URDF."),
-        ("arm.urdf", "<mujoco/>", "the root element is <mujoco>, not <robot>"),
-        ("robot.yaml", "mine\n", "robot.yaml: this is no XML, so no URDF"),
-        ("missing.urdf", None, "missing.urdf: there is no such file; name the robot's URDF."),
-        (".", None, "is a folder; name the robot's URDF in it."),
+        ("arm.urdf", "solid arm\n", ["E-URDF-030", "arm.urdf"]),
+        ("arm.urdf", "<mujoco/>", ["E-URDF-001", "mujoco"]),
+        ("robot.yaml", "mine\n", ["E-URDF-030", "robot.yaml"]),
+        ("missing.urdf", None, ["E-URDF-035", "missing.urdf"]),
+        (".", None, ["E-URDF-034"]),
     ],
 )
 def test_a_wrong_urdf_beside_a_robot_yaml(
-    run, tmp_path: Path, name: str, content: str | None, sentence: str
+    run, tmp_path: Path, name: str, content: str | None, refusal: list[str]
 ) -> None:
     """The sentence is about the file that was named, whatever else is there."""
     (tmp_path / "robot.yaml").write_text("mine\n")
@@ -90,7 +91,8 @@ def test_a_wrong_urdf_beside_a_robot_yaml(
         (tmp_path / name).write_text(content)
     before = snapshot(tmp_path)
     outcome = run("init", tmp_path / name, "--out", tmp_path)
-    assert outcome.status == 2 and sentence in outcome.err and "there already" not in outcome.err
+    assert outcome.status == 2 and "there already" not in outcome.err
+    assert_refusal(outcome.err, *refusal)
     assert snapshot(tmp_path) == before
 
 
@@ -98,14 +100,16 @@ def test_a_urdf_that_cannot_be_loaded_leaves_no_folder(run, tmp_path: Path) -> N
     """A joint and a link of one name show only when robot.yaml is read back."""
     urdf = robot(tmp_path, chain("left", 6).replace("left_joint_2", "left_4"))
     outcome = run("init", urdf, "--out", tmp_path / "deep" / "cell")
-    assert outcome.status == 2 and "left_4" in outcome.err and list(tmp_path.iterdir()) == [urdf]
+    assert outcome.status == 2 and list(tmp_path.iterdir()) == [urdf]
+    assert_refusal(outcome.err, "E-URDF-023", "left_4")
 
 
 def test_two_arms_ask_for_the_tip(run, tmp_path: Path) -> None:
     urdf = robot(tmp_path, chain("left", 6), chain("right", 7))
     asked = run("init", urdf, "--out", tmp_path)
-    assert asked.status == 2 and "--tip" in asked.err
-    assert "left_6 (6 joints)" in asked.err and "right_7 (7 joints)" in asked.err
+    assert asked.status == 2
+    assert_refusal(asked.err, "E-URDF-041")
+    assert_refusal(asked.err, "E-URDF-041", "left_6 (6 joints)", "right_7 (7 joints)")
     document = run("init", urdf, "--out", tmp_path, "--tip", "right_7", "--json").document
     assert document["joints"] == [f"right_joint_{k}" for k in range(1, 8)]
     assert (
@@ -131,29 +135,31 @@ def test_joints_without_limits(run, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "name", "words"),
+    ("content", "name", "refusal"),
     [
-        ("", "a.urdf", ["a.urdf"]),
-        ("<robot name='x'>", "a.urdf", ["not well-formed"]),
-        ("<robot name='x'/>", "a.urdf.xacro", ["xacro", "a.urdf"]),
-        ("<robot name='x' xmlns:xacro='u'><xacro:macro name='m'/></robot>", "a.urdf", ["xacro"]),
-        ("<robot name='x'><link name='a'/></robot>", "a.urdf", ["no movable joint"]),
-        (MIMICKING, "a.urdf", ["shoulder", "mimics"]),
+        ("", "a.urdf", ["E-URDF-030", "a.urdf"]),
+        ("<robot name='x'>", "a.urdf", ["E-URDF-031"]),
+        ("<robot name='x'/>", "a.urdf.xacro", ["E-URDF-033", "a.urdf", "xacro"]),
+        ("<robot name='x' xmlns:xacro='u'><xacro:macro name='m'/></robot>", "a.urdf", ["E-URDF-002", "xacro"]),
+        ("<robot name='x'><link name='a'/></robot>", "a.urdf", ["E-URDF-036"]),
+        (MIMICKING, "a.urdf", ["E-URDF-039", "shoulder"]),
     ],
 )  # fmt: skip
 def test_bad_files_are_refused_in_a_sentence(
-    run, tmp_path: Path, content: str, name: str, words: list[str]
+    run, tmp_path: Path, content: str, name: str, refusal: list[str]
 ) -> None:
     (tmp_path / name).write_text(content)
     before = snapshot(tmp_path)
     outcome = run("init", tmp_path / name, "--out", tmp_path / "new")
     assert outcome.status == 2 and outcome.out == "" and outcome.err.count("\n") == 1
-    assert all(word in outcome.err for word in words) and snapshot(tmp_path) == before
+    assert_refusal(outcome.err, *refusal)
+    assert snapshot(tmp_path) == before
 
 
 def test_unknown_tip_is_suggested(run, tmp_path: Path) -> None:
     outcome = run("init", robot(tmp_path, chain("left", 6)), "--out", tmp_path, "--tip", "left_66")
-    assert outcome.status == 2 and "did you mean 'left_6'" in outcome.err
+    assert outcome.status == 2
+    assert_refusal(outcome.err, "E-URDF-037", "left_6")
 
 
 def test_units_of_joints_that_slide(run, tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from cli_files import snapshot
-from refusals import refused
+from refusals import assert_refusal, refused
 from test_bad_input import refused_run
 
 from flexcal.cli.folders.ledger import LEDGER
@@ -24,7 +24,7 @@ def sha256(path: Path) -> str:
 def test_a_users_file_is_no_place_for_a_plan(run, tx90l_folder: Path, name: str) -> None:
     (tx90l_folder / "notes.txt").write_text("mine")
     arguments = ("design", "frequency", tx90l_folder / "robot.yaml", "--out", tx90l_folder / name)
-    assert "never changed" in refused_run(run, tx90l_folder, *arguments)
+    assert_refusal(refused_run(run, tx90l_folder, *arguments), "E-CLI-013")
 
 
 def test_a_users_measurements_are_not_replaced(run, tx90l_folder: Path, tmp_path: Path) -> None:
@@ -34,26 +34,28 @@ def test_a_users_measurements_are_not_replaced(run, tx90l_folder: Path, tmp_path
     out.mkdir()
     (out / "poses.csv").write_text("pose,q1\n1,0\n")
     measure = ("measure", plan, "--robot", robot, "--cell", "virtual", "--out")
-    assert "mine/poses.csv" in refused_run(run, tmp_path, *measure, out)
+    assert_refusal(refused_run(run, tmp_path, *measure, out), "E-CLI-013", "mine/poses.csv")
     assert run(*measure, tmp_path / "new").status == 0
     first = snapshot(tmp_path / "new")
     assert run(*measure, tmp_path / "new").status == 0
     assert snapshot(tmp_path / "new") == first
     with (tmp_path / "new" / "poses.csv").open("a") as stream:
         stream.write("\n")
-    assert "has been changed" in refused_run(run, tmp_path, *measure, tmp_path / "new")
+    assert_refusal(refused_run(run, tmp_path, *measure, tmp_path / "new"), "E-CLI-013")
 
 
 def test_demo_does_not_touch_a_robots_estimates(run, tx90l_folder: Path) -> None:
     (tx90l_folder / "estimates.yaml").write_text("calibration: {values: {}}\n")
-    assert "estimates.yaml" in refused_run(run, tx90l_folder, "demo", "--out", tx90l_folder)
+    assert_refusal(
+        refused_run(run, tx90l_folder, "demo", "--out", tx90l_folder), "E-CLI-013", "estimates.yaml"
+    )
 
 
 @pytest.mark.parametrize("place", ["file", "file/below", "/proc/none/such"])
 def test_a_place_that_is_no_folder(run, tmp_path: Path, place: str) -> None:
     (tmp_path / "file").write_text("mine")
     sentence = refused_run(run, tmp_path, "demo", "--out", tmp_path / place)
-    assert place in sentence and "cannot be written to" in sentence
+    assert_refusal(sentence, "E-CLI-011", place)
 
 
 def test_folders_that_are_missing_are_made(tmp_path: Path) -> None:
@@ -101,12 +103,14 @@ def test_results_of_two_verbs_do_not_share_a_folder(run, ur5_folder: Path) -> No
     robot, out, poses = ur5_folder / "robot.yaml", ur5_folder / "out", ur5_folder / "random.csv"
     assert run("calibrate", robot, poses, "--terms", "kinematic", "--out", out).status == 0
     sentence = refused_run(run, ur5_folder, "verify", robot, poses, "--estimates", out, "--out", out)
-    assert "written by 'flexcal calibrate'" in sentence and "a folder of its own with --out" in sentence
+    assert_refusal(sentence, "E-CLI-014", "calibrate", "a folder")
     # the page alone may be made anew from the numbers, and the same verb may be run again
     assert run("report", out).status == 0
     assert run("calibrate", robot, poses, "--terms", "kinematic", "--out", out).status == 0
-    assert "calibrate" in refused_run(
-        run, ur5_folder, "verify", robot, poses, "--estimates", out, "--out", out
+    assert_refusal(
+        refused_run(run, ur5_folder, "verify", robot, poses, "--estimates", out, "--out", out),
+        "E-CLI-014",
+        "calibrate",
     )
     digests = {}
     for line in (out / LEDGER).read_text().splitlines():
@@ -149,8 +153,8 @@ def test_another_programs_covariances_are_seen_before_the_work(run, tx90l_folder
     arguments = [
         tx90l_folder / word if word.startswith(("robot", "none")) else word for word in words.split()
     ]
-    assert "out/estimates.npz was not written by flexcal" in refused_run(
-        run, tx90l_folder, *arguments, "--out", out
+    assert_refusal(
+        refused_run(run, tx90l_folder, *arguments, "--out", out), "E-FILE-010", "out/estimates.npz"
     )
 
 
@@ -159,4 +163,4 @@ def test_another_programs_file_is_no_learned_residual(run, tx90l_folder: Path) -
     (tx90l_folder / "learned_residual.npz").write_bytes(b"mine")
     robot, log = tx90l_folder / "robot.yaml", tx90l_folder / "none.csv"
     sentence = refused_run(run, tx90l_folder, "identify", "dynamics", robot, log, "--learn-residual")
-    assert "learned_residual.npz was not written by flexcal" in sentence
+    assert_refusal(sentence, "E-FILE-010", "learned_residual.npz")

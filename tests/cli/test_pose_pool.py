@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cli_files import read_csv, write_csv
+from refusals import assert_refusal
 from test_bad_input import refused_run
 
 from flexcal.data.plans import PosePlan, read_plan_of
@@ -115,29 +116,33 @@ def test_a_pose_outside_the_limits_is_refused(run, tx90l_folder: Path) -> None:
         tx90l_folder / "plan.yaml",
     )
     sentence = refused_run(run, tx90l_folder, *arguments)
-    assert "taught.csv line 5, column q2: pose 3" in sentence and "limits of joint_2" in sentence
+    assert_refusal(sentence, "E-TABLE-002", "taught.csv line 5, column q2", "pose 3", "joint_2")
 
 
 def test_random_and_given_poses_exclude_each_other(run, ur5_folder: Path) -> None:
     arguments = ("design", "poses", ur5_folder / "robot.yaml", "--random", "--from", ur5_folder / "grid.csv")
-    assert "--from" in refused_run(run, ur5_folder, *arguments, "--out", ur5_folder / "plan.yaml")
+    assert_refusal(refused_run(run, ur5_folder, *arguments, "--out", ur5_folder / "plan.yaml"), "E-CLI-023")
 
 
 FREQUENCY = [
     (
         "default,2,0,60.1,",
         "default,2,0,145,",
-        ["line 3, column q2_deg: pose 2", "limits of joint_2", "0.0611 rad"],
+        ["E-TABLE-002", "line 3, column q2_deg: pose 2", "0.0611 rad", "limits of joint_2"],
     ),
-    ("default,2,0,60.1,", "default,2,0,188,", ["line 3, column q2_deg: pose 2", "limits of joint_2"]),
-    ("default,2,0,60.1,", "default,2,0,60.1x,", ["line 3, column q2_deg", "not a number"]),
-    ("q6_deg", "q6", ["line 1", "q6_deg"]),
+    (
+        "default,2,0,60.1,",
+        "default,2,0,188,",
+        ["E-TABLE-002", "line 3, column q2_deg: pose 2", "limits of joint_2"],
+    ),
+    ("default,2,0,60.1,", "default,2,0,60.1x,", ["E-TABLE-036", "3", "q2_deg", "not a number"]),
+    ("q6_deg", "q6", ["E-RUN-041", "line 1", "q6_deg"]),
 ]
 
 
-@pytest.mark.parametrize(("right", "wrong", "words"), FREQUENCY)
+@pytest.mark.parametrize(("right", "wrong", "refusal"), FREQUENCY)
 def test_frequency_poses_that_do_not_fit(
-    run, tx90l_folder: Path, right: str, wrong: str, words: list[str]
+    run, tx90l_folder: Path, right: str, wrong: str, refusal: list[str]
 ) -> None:
     file = tx90l_folder / "frequency_poses.csv"
     text = file.read_text()
@@ -145,8 +150,8 @@ def test_frequency_poses_that_do_not_fit(
     file.write_text(text.replace(right, wrong))
     arguments = ("design", "frequency", tx90l_folder / "robot.yaml", "--out", tx90l_folder / "plan.yaml")
     sentence = refused_run(run, tx90l_folder, *arguments)
-    for word in ("frequency_poses.csv", *words):
-        assert word in sentence
+    code, *names = refusal
+    assert_refusal(sentence, code, "frequency_poses.csv", *names)
 
 
 def test_only_excited_joints_need_room(run, tx90l_folder: Path) -> None:

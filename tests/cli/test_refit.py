@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import assert_refusal
 from stranger_arm import SIX, StrangerArm, rigid, turn
 
 
@@ -80,7 +81,8 @@ def test_a_moved_tracker_is_said_and_refitted(run, robot: Path, arm: StrangerArm
     assert "--refit station verifies the geometry alone, and costs 2 poses" in done.out
     assert "Trusted: no" in done.out
     mapped = run("map", robot, "--verification", file, "--count", "50", "--out", tmp_path / "map.html")
-    assert mapped.status == 2 and "after a refit of the station" in mapped.err
+    assert mapped.status == 2
+    assert_refusal(mapped.err, "E-RUN-010", "after a refit of the station")
     plain = run("verify", robot, file, "--json").document
     assert plain["verification"]["measured"]["mean_mm"] > 100 and plain["refit"] is None
     assert plain["refit_proposed"]["what"] == ["station"]
@@ -121,7 +123,8 @@ def test_nothing_is_proposed_where_nothing_moved(run, robot: Path, arm: Stranger
 def test_too_few_poses_to_refit(run, robot: Path, arm: StrangerArm, tmp_path: Path) -> None:
     file = fresh(arm, tmp_path / "few.csv", 3, tracker=moved())
     done = run("verify", robot, file, "--refit", "station", "point")
-    assert done.status == 2 and "too few to refit the instrument and the measured point" in done.err
+    assert done.status == 2
+    assert_refusal(done.err, "E-CAL-019", "the instrument and the measured point")
 
 
 def test_an_uncalibrated_point_is_never_silent(run, tmp_path: Path, arm: StrangerArm) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from refusals import assert_refusal
 from test_bad_input import refused_run
 
 
@@ -55,15 +56,15 @@ def test_verification_leaves_its_report(run, calibrated: Path) -> None:
 
 
 def test_folders_without_anything_to_report(run, ur5_folder: Path, tmp_path: Path) -> None:
-    assert "no results.json" in refused_run(run, tmp_path, "report", ur5_folder)
-    assert "no results.json" in refused_run(run, tmp_path, "report", tmp_path / "none")
+    assert_refusal(refused_run(run, tmp_path, "report", ur5_folder), "E-REPORT-008", "results.json")
+    assert_refusal(refused_run(run, tmp_path, "report", tmp_path / "none"), "E-REPORT-008", "results.json")
     (tmp_path / "measured").mkdir()
     (tmp_path / "measured" / "results.json").write_text('{"kind": "poses", "poses": 3}\n')
-    assert "not of this version" in refused_run(run, tmp_path, "report", tmp_path / "measured")
+    assert_refusal(refused_run(run, tmp_path, "report", tmp_path / "measured"), "E-RUN-080")
     (tmp_path / "measured" / "results.json").write_text('{"kind": "measurement", "schema": 1, "poses": 3}\n')
-    assert "no calibration" in refused_run(run, tmp_path, "report", tmp_path / "measured")
+    assert_refusal(refused_run(run, tmp_path, "report", tmp_path / "measured"), "E-REPORT-009")
     (tmp_path / "measured" / "results.json").write_text("{")
-    assert "cannot be read" in refused_run(run, tmp_path, "report", tmp_path / "measured")
+    assert_refusal(refused_run(run, tmp_path, "report", tmp_path / "measured"), "E-FILE-001")
 
 
 def test_two_calibrations_are_compared(run, calibrated: Path, tmp_path: Path) -> None:
@@ -76,16 +77,22 @@ def test_two_calibrations_are_compared(run, calibrated: Path, tmp_path: Path) ->
     document = run("report", calibrated, "--compare", folder / "again", "--json").document
     assert document["runs"] == ["out", "again"] and document["difference_mm"]["mean"] == 0
     assert document["parameters"]["calibration"]["changed"] == [] and document["shared"] == ["random.csv"]
-    assert "same folder" in refused_run(run, tmp_path, "report", calibrated, "--compare", calibrated)
-    assert "no results.json" in refused_run(run, tmp_path, "report", calibrated, "--compare", folder / "none")
+    assert_refusal(refused_run(run, tmp_path, "report", calibrated, "--compare", calibrated), "E-REPORT-001")
+    assert_refusal(
+        refused_run(run, tmp_path, "report", calibrated, "--compare", folder / "none"),
+        "E-REPORT-005",
+        "results.json",
+    )
     old = folder / "old"
     old.mkdir()
     (old / "results.json").write_text('{"kind": "verification", "schema": 1, "rms_mm": {}, "provenance": {}}')
     header, *_ = rows = (calibrated / "points.csv").read_text("utf-8").splitlines()
     (old / "points.csv").write_text("\n".join(rows) + "\n", "utf-8")
-    assert "lacks 'robot'" in refused_run(run, tmp_path, "report", calibrated, "--compare", old)
+    assert_refusal(
+        refused_run(run, tmp_path, "report", calibrated, "--compare", old), "E-REPORT-010", "robot"
+    )
     (old / "points.csv").write_text(f"{header}\n", "utf-8")
-    assert "lacks columns or rows" in refused_run(run, tmp_path, "report", old)
+    assert_refusal(refused_run(run, tmp_path, "report", old), "E-RUN-081")
     check = (
         "verify",
         folder / "robot.yaml",
@@ -96,8 +103,8 @@ def test_two_calibrations_are_compared(run, calibrated: Path, tmp_path: Path) ->
         folder / "check",
     )
     assert run(*check).status == 0
-    assert "two of the same kind" in refused_run(
-        run, tmp_path, "report", calibrated, "--compare", folder / "check"
+    assert_refusal(
+        refused_run(run, tmp_path, "report", calibrated, "--compare", folder / "check"), "E-REPORT-002"
     )
 
 
