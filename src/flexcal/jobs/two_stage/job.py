@@ -143,7 +143,7 @@ def run_two_stage(
 
         def stage_one(robot: RobotModel, stage: str) -> SpringFit:
             return fit_springs(
-                robot_file,
+                robot,
                 responses,
                 inertias_known=inertias_known,
                 plan=frequency,
