@@ -13,6 +13,7 @@ import numpy as np
 from flexcal.dynamics.diagnostics import EssentialParameters, ExternalShare, GravityRatio, TorquePrediction
 from flexcal.dynamics.estimators import EstimatorName
 from flexcal.dynamics.friction import FrictionSelection
+from flexcal.dynamics.inverse_model import Observation
 from flexcal.dynamics.regression import RegressionData
 from flexcal.dynamics.residual import LEARNED
 from flexcal.dynamics.signals import Motion
@@ -102,6 +103,7 @@ class DynamicsIdentification(Identification):
                 "E-RUN-098",
                 f"{self.model.name} was identified with flexible drives, whose motors move otherwise than the arm; identify it without.",
             )
+        assert isinstance(observation, Observation)
         motion = Motion(
             np.arange(len(q), dtype=float), *motion_batch(self.model, q, dq, ddq), np.zeros_like(q)
         )
