@@ -150,6 +150,16 @@ def test_a_tool_that_never_turns_does_not_tell_its_offset(tmp_path: Path, run: C
     found = case.calibrated(q, xyz, 2e-5)
     assert [item.name for item in found.undetermined] == [f"tool.length_{key}" for key in "xyz"]
     assert all("the tool turned by 0.0° only" in item.cause for item in found.undetermined)
+    estimate = found.estimate
+    numbers = [estimate.parameters.index(item.name) for item in found.undetermined]
+    sizes = [item.size for item in found.undetermined]
+    np.testing.assert_allclose(np.sqrt(np.diag(estimate.covariance)[numbers]), sizes)
+    assert not np.array(estimate.identifiable)[numbers].any()
+    np.testing.assert_allclose(estimate.covariance, estimate.covariance.T, rtol=1e-9)
+    scale = np.sqrt(np.diag(estimate.covariance))
+    some = scale > 0
+    correlation = estimate.covariance[np.ix_(some, some)] / np.outer(scale[some], scale[some])
+    assert np.linalg.eigvalsh(correlation)[0] > -1e-9
     for key in "xyz":
         quantity = found.estimate.quantity(f"tool.length_{key}")
         assert quantity["estimate"] == 0 and quantity["std"] is None and not quantity["identifiable"]

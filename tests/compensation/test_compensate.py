@@ -131,7 +131,12 @@ def test_commands_are_those_of_a_solver_by_differences(
 def test_jacobian_against_differences(real: RobotModel, random_targets: Callable[[int], ToolTargets]) -> None:
     targets = random_targets(8)
     assert targets.q is not None
-    robot = real.with_values({"joint_5.gravity_compliance": 0.0})
+    waves = {
+        "joint_2.transmission_1_sin": 3e-4,
+        "joint_2.transmission_2_cos": -2e-4,
+        "joint_4.transmission_1_cos": 1e-4,
+    }
+    robot = real.with_values({"joint_5.gravity_compliance": 0.0} | waves)
     at = tool_at_rest(robot, targets.q, targets.payload, targets.target, jacobians=True)
     jacobian, step = at.command_jacobian(), 1e-6
     for j in range(6):

@@ -19,6 +19,15 @@ def tied(seed=0):
     return jacobian
 
 
+def test_gap_is_that_of_the_last_kept_and_the_first_dropped():
+    """Columns of equal length, of which the third is nearly the first: 3e-13 of its length are its own."""
+    jacobian = np.eye(4)[:, :3]
+    jacobian[:, 2] = jacobian[:, 0] + 3e-13 * np.eye(4)[2]
+    found = analyse(jacobian, NAMES[:3], prefer=NAMES[:2])
+    assert found.rank == 2
+    assert found.gap == pytest.approx(-np.log10(3e-13), rel=1e-3)
+
+
 def test_rank_gap_and_regrouping():
     found = analyse(tied(), NAMES, prefer=("a", "b", "d"))
     assert found.rank == 3
