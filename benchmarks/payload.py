@@ -26,9 +26,9 @@ from flexcal.design.poses import random_poses
 from flexcal.design.scene import MeasuringSetup
 from flexcal.estimation import Estimate
 from flexcal.files.formats import read_yaml
-from flexcal.jobs.dynamics import identify_robot_inertials
 from flexcal.jobs.experiments import TrajectoryRequest, measure
 from flexcal.jobs.experiments.measurement import VIRTUAL
+from flexcal.jobs.inertials import identify_robot_inertials
 from flexcal.jobs.payload import identify_robot_payload
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.robot import RobotModel

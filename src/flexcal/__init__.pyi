@@ -21,7 +21,6 @@ from .dynamics.estimators import (
     Estimator,
     PowerModel,
 )
-from .dynamics.inertials import identify_with_prior, trajectory_error
 from .dynamics.residual import read_learned_residual
 from .errors import FlexcalError, InputError
 from .estimation import Estimate
@@ -47,6 +46,8 @@ from .jobs.experiments import (
     exciting_plan,
     frequency_plan,
 )
+from .jobs.gains import GainsIdentification, identify_gains
+from .jobs.inertials import InertialsIdentification, identify_inertials
 from .jobs.inputs import CalibratedRobot
 from .jobs.payload import PayloadIdentification, identify_payload
 from .jobs.stiffness import StiffnessIdentification, identify_stiffness
@@ -82,6 +83,8 @@ __all__ = [
     "FlexcalError",
     "FrequencyRequest",
     "FrequencyResponse",
+    "GainsIdentification",
+    "InertialsIdentification",
     "InputError",
     "MeasuringSetup",
     "MultisinePlan",
@@ -116,9 +119,10 @@ __all__ = [
     "frequency_responses",
     "gravity_torque",
     "identify_dynamics",
+    "identify_gains",
+    "identify_inertials",
     "identify_payload",
     "identify_stiffness",
-    "identify_with_prior",
     "predict",
     "prediction_errors",
     "random_poses",
@@ -131,6 +135,5 @@ __all__ = [
     "repeatability",
     "rigid_motion",
     "tool_at_rest",
-    "trajectory_error",
     "verify",
 ]

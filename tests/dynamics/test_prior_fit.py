@@ -12,7 +12,7 @@ from refusals import refused
 
 from flexcal.data.plans import FourierPaths, TrajectoryPlan
 from flexcal.data.recordings import Recording
-from flexcal.dynamics.inertials import identify_with_prior, trajectory_error
+from flexcal.dynamics.inertials import fit_inertials, relative_torque_error, trajectory_torques
 from flexcal.estimation import Estimate
 from flexcal.jobs.experiments import exciting_plan
 from flexcal.model.robot import RobotModel
@@ -98,7 +98,7 @@ def test_without_noise_the_torques_of_the_robot_come_back(tx90l: RobotModel, sin
         geometry=replace(truth.geometry, errors=tx90l.geometry.errors),
         springs=replace(truth.springs, stiffness=tx90l.springs.stiffness),
     )
-    found = tx90l.with_estimate(identify_with_prior(tx90l, single, synthetic(truth, single, STILL)))
+    found = tx90l.with_estimate(fit_inertials(tx90l, single, synthetic(truth, single, STILL)))
     q, dq, ddq = rng.uniform(-1, 1, (3, 50, 6)) * np.array([2.0, 2.0, 5.0])[:, None, None]
 
     def torque(robot: RobotModel) -> np.ndarray:
@@ -120,7 +120,7 @@ def test_what_torques_miss(tx90l: RobotModel, single: TrajectoryPlan) -> None:
     """Nothing with the true robot; with rotors that are a tenth too large, a tenth of what they need: the lines up to 5 Hz hold it all."""
     truth = drawn(tx90l, np.random.default_rng(8))
     recordings = list(synthetic(truth, single, STILL))
-    assert trajectory_error(truth, single, recordings) < 1e-6
+    assert relative_torque_error(trajectory_torques(truth, single, recordings)) < 1e-6
     heavier = replace(truth, drives=replace(truth.drives, rotor_inertia=1.1 * truth.drives.rotor_inertia))
     size = single.samples_per_period
     acceleration = single.motion(0, np.arange(size) / single.rate_hz)[2]
@@ -128,7 +128,9 @@ def test_what_torques_miss(tx90l: RobotModel, single: TrajectoryPlan) -> None:
     spectrum[1:] *= np.sqrt(2.0)
     missed = np.linalg.norm(0.1 * truth.drives.rotor_inertia * acceleration) / np.sqrt(size)
     expected = missed / np.linalg.norm(spectrum)
-    assert trajectory_error(heavier, single, recordings) == pytest.approx(expected, rel=1e-6)
+    assert relative_torque_error(trajectory_torques(heavier, single, recordings)) == pytest.approx(
+        expected, rel=1e-6
+    )
 
 
 def test_exact_links_leave_rotors_and_friction(tx90l: RobotModel, single: TrajectoryPlan) -> None:
@@ -137,7 +139,7 @@ def test_exact_links_leave_rotors_and_friction(tx90l: RobotModel, single: Trajec
     robot = replace(tx90l, config=replace(tx90l.config, prior=exact))
     truth = replace(robot, drives=replace(robot.drives, rotor_inertia=1.04 * robot.drives.rotor_inertia))
     rng = np.random.default_rng(6)
-    estimate = identify_with_prior(robot, single, synthetic(truth, single, coloured(single, rng)))
+    estimate = fit_inertials(robot, single, synthetic(truth, single, coloured(single, rng)))
     assert not any(name.startswith("link") for name in estimate.parameters.names)
     for name in tx90l.joint_names:
         key = f"{name}.rotor_inertia"
@@ -165,7 +167,7 @@ def coverage(model: RobotModel, plan: TrajectoryPlan, seeds: range) -> tuple[flo
     for seed in seeds:
         rng = np.random.default_rng([2024, seed])
         truth = drawn(model, rng)
-        estimate = identify_with_prior(model, plan, synthetic(truth, plan, coloured(plan, rng)))
+        estimate = fit_inertials(model, plan, synthetic(truth, plan, coloured(plan, rng)))
         one, both = errors(estimate, truth)
         normalised.append(one)
         together.append(both)
@@ -181,7 +183,7 @@ def test_the_virtual_cell_is_understood(tx90l: RobotModel) -> None:
     values = draw_truth(tx90l, CellConfig().spread, np.random.default_rng(4))
     truth = tx90l.with_values(values)
     cell = VirtualCell(truth, seed=4, controller_model=tx90l)
-    estimate = identify_with_prior(tx90l, plan, cell.record(plan))
+    estimate = fit_inertials(tx90l, plan, cell.record(plan))
     one, together = errors(estimate, truth)
     assert np.mean(np.abs(one) < 1.96) > 0.88
     assert 0.5 < together < 1.6
@@ -193,17 +195,17 @@ def test_the_virtual_cell_is_understood(tx90l: RobotModel) -> None:
 def test_what_does_not_fit_is_said(tx90l: RobotModel, plan: TrajectoryPlan) -> None:
     short = Recording(time_step=1 / 400, q=np.zeros((50, 6)), torque=np.zeros((50, 6)))
     with refused("E-DYN-039", "50", "0.0025", "6000"):
-        identify_with_prior(tx90l, plan, [short])
+        fit_inertials(tx90l, plan, [short])
     with refused("E-DYN-015"):
-        identify_with_prior(tx90l, plan, [])
+        fit_inertials(tx90l, plan, [])
     still = Recording(time_step=1 / 400, q=np.zeros((6000, 6)), torque=np.zeros((6000, 6)))
     with refused("E-DYN-040", "1"):
-        identify_with_prior(tx90l, plan, [still])
+        fit_inertials(tx90l, plan, [still])
     full = next(synthetic(tx90l, plan, STILL))
     with refused("E-DYN-040", "2"):
-        identify_with_prior(tx90l, plan, [full, full])
+        fit_inertials(tx90l, plan, [full, full])
     with refused("E-DYN-016", "joint_1"):
-        identify_with_prior(tx90l, plan, [replace(full, torque=0.0 * full.torque)])
+        fit_inertials(tx90l, plan, [replace(full, torque=0.0 * full.torque)])
     lacking = replace(tx90l, drives=replace(tx90l.drives, rotor_inertia=np.full(6, np.nan)))
     with refused("E-DYN-017", "joint_1"):
-        identify_with_prior(lacking, plan, [full])
+        fit_inertials(lacking, plan, [full])

@@ -42,14 +42,14 @@ class IdentifyGains:
     def run(self) -> None:
         """Fit, and print the gains."""
         from flexcal.cli.tables.results import drive_gain_table
-        from flexcal.jobs.dynamics import identify_gains
+        from flexcal.jobs.gains import identify_robot_gains
         from flexcal.jobs.logs import preprocessing_remarks
 
         require_robot_and_files(self.robot, self.logs, "LOGS")
         require_at_least(1, jobs=self.jobs)
         console = Console(self.json)
         with console.progress() as progress:
-            gains = identify_gains(
+            gains = identify_robot_gains(
                 self.robot, self.logs, out=self.out, command=command_line(), jobs=self.jobs, progress=progress
             )
         document = gains.document()

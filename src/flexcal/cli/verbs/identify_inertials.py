@@ -32,7 +32,7 @@ class IdentifyInertials:
     def run(self) -> None:
         """Fit, and print the parameters and the error of the torques."""
         from flexcal.cli.tables.results import quantity_table
-        from flexcal.jobs.dynamics import identify_robot_inertials
+        from flexcal.jobs.inertials import identify_robot_inertials
 
         require_robot(self.robot, self.folder)
         console = Console(self.json)

@@ -1,7 +1,9 @@
-from .bayesian_fit import identify_with_prior
-from .torque_error import trajectory_error
+from .bayesian_fit import fit_inertials
+from .torque_error import TrajectoryTorques, relative_torque_error, trajectory_torques
 
 __all__ = [
-    "identify_with_prior",
-    "trajectory_error",
+    "TrajectoryTorques",
+    "fit_inertials",
+    "relative_torque_error",
+    "trajectory_torques",
 ]

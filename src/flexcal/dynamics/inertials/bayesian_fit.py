@@ -61,7 +61,7 @@ CURVATURE_PASSES = 2
 """How often the second-order terms are evaluated with the last covariance."""
 
 
-def identify_with_prior(model: RobotModel, plan: TrajectoryPlan, recordings: Iterable[Recording]) -> Estimate:
+def fit_inertials(model: RobotModel, plan: TrajectoryPlan, recordings: Iterable[Recording]) -> Estimate:
     """Posterior of mass, centre of mass, rotor inertia and friction of a robot from a plan's recordings.
 
     The rows are Fourier coefficients of the motor torques of one mean period (Swevers 1997). The prior is that of robot.yaml; beside the

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,17 +16,39 @@ from flexcal.model.robot import RobotModel
 from flexcal.model.vibration import periodic_torque
 
 
-def trajectory_error(model: RobotModel, plan: TrajectoryPlan, recordings: Iterable[Recording]) -> float:
-    """Relative torque error of `model` on recorded trajectories, up to 5 Hz as in `identify_with_prior`.
+@dataclass(frozen=True, eq=False)
+class TrajectoryTorques:
+    """`measured` and `predicted` torques of a trajectory: rows (2 K + 1, n), N m, of the Fourier series of its mean period up to 5 Hz."""
+
+    measured: np.ndarray
+    predicted: np.ndarray
+
+    @property
+    def residual(self) -> np.ndarray:
+        """Measured minus predicted (2 K + 1, n), N m."""
+        return self.measured - self.predicted
+
+
+def trajectory_torques(
+    model: RobotModel, plan: TrajectoryPlan, recordings: Iterable[Recording]
+) -> tuple[TrajectoryTorques, ...]:
+    """Torques of recorded trajectories, and those that `model` predicts.
 
     Friction that robot.yaml does not know counts as none. Raises `FlexcalError` where a recording does not fit the plan.
     """
-    measured, missed = 0.0, 0.0
+    torques = []
     for number, recording in enumerate(recordings):
         motion = PeriodicMotion.of(recording, plan, number, CUTOFF_HZ)
-        seen = real_rows(motion.torque)
-        left = seen - _torque(model, motion, plan.payload)
-        measured, missed = measured + np.sum(seen**2), missed + np.sum(left**2)
+        torques.append(TrajectoryTorques(real_rows(motion.torque), _torque(model, motion, plan.payload)))
+    return tuple(torques)
+
+
+def relative_torque_error(torques: Iterable[TrajectoryTorques]) -> float:
+    """Norm of the residuals over that of the measured torques."""
+    measured, missed = 0.0, 0.0
+    for trajectory in torques:
+        measured = measured + np.sum(trajectory.measured**2)
+        missed = missed + np.sum(trajectory.residual**2)
     return float(np.sqrt(missed / measured))
 
 

@@ -1,4 +1,4 @@
-"""Identification of base parameters, link inertials and drive gains from joint logs."""
+"""Identification of base parameters and friction from joint logs."""
 
 import lazy_loader
 

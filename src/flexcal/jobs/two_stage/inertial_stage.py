@@ -9,8 +9,8 @@ from flexcal.data.experiments import Cell
 from flexcal.data.plans import write_plan
 from flexcal.estimation import Estimate
 from flexcal.files.formats import provenance, write_estimates
-from flexcal.jobs.dynamics import identify_inertials_from_recordings
 from flexcal.jobs.experiments import exciting_plan
+from flexcal.jobs.inertials import identify_inertials
 from flexcal.jobs.result_files import ESTIMATES
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress
@@ -24,7 +24,7 @@ def run_stage_zero(cell: Cell, nominal: RobotModel, out: Path, *, seed: int, pro
     plan = exciting_plan(nominal, seed=seed)
     file = out / "trajectory_plan.yaml"
     write_plan(file, plan)
-    estimate = identify_inertials_from_recordings(nominal, plan, cell.record(plan), progress)[1]
+    estimate = identify_inertials(nominal, plan, cell.record(plan), progress=progress).estimate
     origin = provenance([nominal.path, nominal.urdf, file], {"seed": seed})
     estimate = replace(estimate, provenance=origin)
     write_estimates(out / ESTIMATES, "dynamics", estimate)
