@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from flexcal.estimation.objective import Objective
+from flexcal.progress import Progress, silent
 
 _FIRST_DAMPING = 1e-3
 _LARGEST_DAMPING = 1e14
@@ -42,7 +42,7 @@ def minimise(
     *,
     max_iterations: int,
     tolerance: float,
-    progress: Callable[[int, float], None] | None = None,
+    progress: Progress = silent,
 ) -> Optimum:
     """Minimise over the coordinates marked in `free` (p,), from `x` (p,).
 
@@ -63,8 +63,7 @@ def minimise(
     damping, growth, best_offset = _FIRST_DAMPING, 2.0, np.inf
     status, message, iteration, polishing = "iteration limit", "", 0, False
     while True:
-        if progress is not None:
-            progress(iteration, cost)
+        progress("fitting", iteration / max_iterations)
         weights = objective.weights(residual)
         factor, target, norm = objective.triangular(x, residual, jacobian, weights)
         scale = np.maximum(scale, np.linalg.norm(factor, axis=0))

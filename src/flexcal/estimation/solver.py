@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -16,6 +16,7 @@ from flexcal.estimation.objective import Objective
 from flexcal.estimation.parameter import Parameters
 from flexcal.estimation.problem import Problem
 from flexcal.estimation.uncertainty import is_log_identified, sandwich, uncertainty
+from flexcal.progress import Progress, silent
 
 _SAME_OPTIMUM = 1e-3
 
@@ -30,7 +31,7 @@ def solve(
     tolerance: float = 1e-9,
     rank_tolerance: float = RANK_TOLERANCE,
     prefer: Sequence[str] = (),
-    progress: Callable[[int, float], None] | None = None,
+    progress: Progress = silent,
 ) -> Estimate:
     """Minimise a problem, and determine rank and covariance at the optimum.
 
@@ -39,7 +40,7 @@ def solve(
     (relative `rank_tolerance`, see `analyse` and its `prefer`), the dropped parameters go back to their values in
     `problem.parameters` and the kept ones are fitted again. `covariance`: "posterior" trusts whitening and prior,
     "sandwich" lets the scatter of the groups speak. `loss` is robust on group norms; groups whose weight ends below 0.2 are
-    listed as outliers. `progress(iteration, cost)` is called at every iteration.
+    listed as outliers. `progress` is called at every iteration, with its share of `max_iterations`.
 
     Raises FlexcalError for shapes that do not fit, a model that cannot be evaluated at any start, or no rows at all. A fit
     that does not converge is returned with its status and a message that says what to do.

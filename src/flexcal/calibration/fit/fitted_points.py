@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -36,6 +35,7 @@ from flexcal.calibration.measurement import (
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import RANK_TOLERANCE, Estimate, Identifiability, Loss, Parameter, Parameters
 from flexcal.model.robot import SCATTER, RobotModel, unit_of
+from flexcal.progress import Progress
 
 _FLANK_PASSES = 4
 _FIRST_SCATTER = 1e-4
@@ -64,7 +64,7 @@ class PointFit:
     prior: ElasticPrior
     elastic: bool
     marginalised: bool
-    progress: Callable[[int, float], None] | None
+    progress: Progress
 
     @classmethod
     def of(
@@ -76,7 +76,7 @@ class PointFit:
         elastic: bool,
         *,
         marginalised: bool,
-        progress: Callable[[int, float], None] | None,
+        progress: Progress,
     ) -> PointFit:
         """Without the term `transmission` where there are fewer than 20 different poses, which do not tell its variance.
 

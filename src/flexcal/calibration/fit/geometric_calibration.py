@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -18,6 +18,7 @@ from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate, Identifiability, Loss, Squares, loss_named
 from flexcal.model.robot import RobotModel
+from flexcal.progress import Progress, silent
 from flexcal.units import MILLIMETRE
 
 _PASSES = 8
@@ -99,7 +100,7 @@ def fit_geometry(
     elasticity: Literal["reestimated", "marginalised"] = "reestimated",
     secant_scale: float = 0.0,
     loss: Loss | LossName = "auto",
-    progress: Callable[[int, float], None] | None = None,
+    progress: Progress = silent,
 ) -> GeometricFit:
     """Fit the geometry of `model` to measured points, Levenberg-Marquardt on the vector error (28) with the Jacobian (29).
 

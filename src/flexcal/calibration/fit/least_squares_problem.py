@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -14,6 +14,7 @@ from flexcal.calibration.measurement import PredictedMeasurements, predict_measu
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Estimate, Loss, Parameters, Problem, solve
 from flexcal.model.robot import RobotModel
+from flexcal.progress import Progress
 
 PlainLoss = Literal["squares", "huber", "cauchy"]
 LossName = Literal["auto", "squares", "huber", "cauchy"]
@@ -50,9 +51,7 @@ class GeometryProblem:
         """Whitened Jacobian of all coordinates (3 N, p) by some parameters, natural units."""
         return whitened(self.whitening, at.jacobian(names))
 
-    def reestimated(
-        self, *, loss: Loss | PlainLoss, progress: Callable[[int, float], None] | None
-    ) -> Estimate:
+    def reestimated(self, *, loss: Loss | PlainLoss, progress: Progress) -> Estimate:
         """Levenberg-Marquardt (29) on geometry, stiffness and inertia together; the latter keep their prior."""
         parameters = self.kept + self.prior.parameters
 

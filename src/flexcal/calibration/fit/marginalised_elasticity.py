@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from flexcal.calibration.fit.least_squares_problem import GeometryProblem
 from flexcal.estimation import Estimate, Parameters, Problem, is_log_identified, solve
+from flexcal.progress import Progress
 
 _RELINEARISATIONS = 10
 _SETTLED = 1e-4
 """Step of the marginalised parameters, in standard deviations of their prior, below which they count as found."""
 
 
-def marginalised(fit: GeometryProblem, *, progress: Callable[[int, float], None] | None) -> Estimate:
+def marginalised(fit: GeometryProblem, *, progress: Progress) -> Estimate:
     """Fit the geometry alone, then read stiffness and inertia θ off the residual r: what `fit.reestimated` finds, by another way.
 
     With S = R + J Σ Jᵀ the posterior is θ₀ + Σ Jᵀ S⁻¹ r, and geometry x and θ have the joint covariance of one Gaussian update. J is

@@ -85,7 +85,7 @@ class IdentifiedResponses:
 
 
 def identify_response(
-    robot: Path,
+    robot_file: Path,
     folder: Path,
     out: Path,
     *,
@@ -99,7 +99,7 @@ def identify_response(
     the responses: the fit of stage 1 needs its reference motion. results.json and report.html go there too.
     Raises `FlexcalError` where a log is missing, has gaps or does not fit the plan.
     """
-    model = RobotModel.from_yaml(robot, estimates=False)
+    model = RobotModel.from_yaml(robot_file, estimates=False)
     cell = FolderCell(folder, model)
     plan = cell.plan
     if not isinstance(plan, MultisinePlan):
@@ -120,7 +120,7 @@ def identify_response(
         response.save(file)
     write_plan(out / PLAN, plan)
     logs = [existing_file(folder, label.name) for label in labels(plan)]
-    origin = provenance([robot, model.urdf, folder / PLAN, *logs], {"method": method})
+    origin = provenance([robot_file, model.urdf, folder / PLAN, *logs], {"method": method})
     result = IdentifiedResponses(
         responses, files, model.name, RunRecord(origin, command), tuple(model.sensors)
     )
