@@ -11,13 +11,13 @@ import numpy as np
 
 from flexcal.estimation import Estimate
 from flexcal.jobs.gains.split_halves import SplitHalfGains
-from flexcal.jobs.pages import Result, summary_row
+from flexcal.jobs.pages import ReportedResult, summary_row
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, header, quantities
 from flexcal.report.checks import Trust, gain_checks
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class GainsIdentification(Result):
+class GainsIdentification(ReportedResult):
     """Result of `identify_gains`: factors of the drive gains that robot.yaml declares. No block of estimates.yaml has them.
 
     Attributes

@@ -13,7 +13,7 @@ from .document import (
     springs_block,
     write_results,
 )
-from .estimates import ESTIMATES, estimates_target, store_block
+from .estimates import ESTIMATES, estimates_target
 from .fitted_responses import read_fitted_responses, write_fitted_responses
 from .points import read_arm, read_loads, read_points, write_arm, write_loads, write_points
 from .response_arrays import read_response_arrays, write_response_arrays
@@ -43,7 +43,6 @@ __all__ = [
     "read_results",
     "read_verification",
     "springs_block",
-    "store_block",
     "write_arm",
     "write_fitted_responses",
     "write_loads",

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 
-from flexcal.estimation import Estimate
-from flexcal.files.formats import Block, require_place, write_estimates
+from flexcal.files.formats import Block, require_place
 
 ESTIMATES = "estimates.yaml"
 
@@ -19,13 +17,3 @@ def estimates_target(source: Path, out: Path | None, block: Block) -> Path:
     target = source if out is None else out / ESTIMATES
     require_place(target, block)
     return target
-
-
-def store_block(
-    source: Path, target: Path, others: Mapping[Block, Estimate], block: Block, estimate: Estimate
-) -> None:
-    """Write `estimate` as `block` of the file `target`; where that is not the robot's own `source`, the `others` it began from too."""
-    if target != source:
-        for name, other in others.items():
-            write_estimates(target, name, other)
-    write_estimates(target, block, estimate)
