@@ -8,10 +8,16 @@ from pathlib import Path
 
 
 class FlexcalError(Exception):
-    """An error that the user can correct: `str` is one sentence that says what is wrong, where, and what to do.
+    """An error that the user can correct: its text is one sentence that says what is wrong, where, and what to do.
 
-    `code` names the sentence, as in `E-URDF-017`, whatever file, joint or number stands in it. Every error has its own, the documentation
-    lists them, and none is used again for another. An error that is raised in place of another, to say where, keeps the code of that.
+    Parameters
+    ----------
+    code : str
+        Code of the sentence, as in `E-URDF-017`, whatever file, joint or number stands in it. Every error has its own, the
+        documentation lists them, and none is used again for another. An error that is raised in place of another, to say
+        where, keeps the code of that.
+    sentence : str
+        What is wrong, where, and what to do.
     """
 
     code: str
@@ -26,7 +32,13 @@ class FlexcalError(Exception):
 
 
 class InputError(FlexcalError):
-    """A file or argument that cannot be used as it is; the message names the file, and line, column or joint where there is one."""
+    """A file or argument that cannot be used as it is; the message names the file, and line, column or joint where there is one.
+
+    Parameters
+    ----------
+    code, sentence : str
+        As those of `FlexcalError`.
+    """
 
 
 def unreadable(path: Path, problem: Exception, remedy: str = "check the name and the folder") -> InputError:

@@ -34,16 +34,42 @@ class Dropped:
 class Estimate:
     """Estimated parameters with their joint uncertainty.
 
-    `parameters` carry the estimates as values; `covariance` (p, p) is in estimation coordinates, with zero rows and columns
-    for `dropped` parameters: given their fixed values, predictions inside the model's reach have exactly this uncertainty.
-    `identifiable` is False for dropped parameters, and for parameters on a log scale with a standard deviation above 0.255
-    (not known to a factor of two). `cost` is the minimised objective, prior included. `chi2` is the data's
-    whitened residual sum of squares, prior rows excluded and with robust weights where a robust loss is used;
-    `degrees_of_freedom` its expectation, the (weighted) number of rows less the effective number of parameters, rounded.
-    `outliers` are labels of groups, or row numbers where the problem has no groups. `covariance_freedom` are the degrees of freedom of a
-    covariance that the scatter of few batches gave; without it the noise level's stand for them. `misfit` says where a fit to frequency
-    responses does not explain them. `ranges` are those of the conditions, by name, that the data cover: the estimate says little outside
-    them. `measurements` are digests of those that a calibration was fitted to.
+    Attributes
+    ----------
+    parameters : Parameters
+        Names, units and estimated values.
+    covariance : ndarray
+        Covariance (p, p) in estimation coordinates, with zero rows and columns for `dropped` parameters: given their fixed values,
+        predictions inside the model's reach have exactly this uncertainty.
+    rank : int
+        Number of parameters that the data determine.
+    dropped : tuple of Dropped
+        Parameters that the data do not determine, held at fixed values.
+    identifiable : tuple of bool
+        False for dropped parameters, and for parameters on a log scale with a standard deviation above 0.255 (not known to a factor
+        of two).
+    cost : float
+        Minimised objective, prior included.
+    chi2 : float
+        Whitened residual sum of squares of the data, without prior rows and with robust weights where a robust loss is used.
+    degrees_of_freedom : int
+        Expectation of `chi2`: the (weighted) number of rows less the effective number of parameters, rounded.
+    status, message : str
+        Whether and why the minimisation ended.
+    iterations : int
+        Number of iterations.
+    outliers : tuple of int
+        Labels of groups, or row numbers where the problem has no groups.
+    covariance_freedom : float or None
+        Degrees of freedom of a covariance that was estimated from few batches; without it, those of the noise level count.
+    misfit : Misfit or None
+        Where a fit does not explain frequency responses.
+    provenance : mapping of str
+        Digests of the files that the estimate was made from.
+    ranges : mapping of tuple
+        Ranges of the conditions, by name, that the data cover: the estimate says little outside them.
+    measurements : tuple of str
+        Digests of the measurements that a calibration was fitted to.
     """
 
     parameters: Parameters
@@ -87,7 +113,18 @@ class Estimate:
         return self.status == "converged"
 
     def std(self, name: str) -> float | None:
-        """Standard deviation in natural units, to first order; None when not identifiable."""
+        """Standard deviation of a parameter in natural units, to first order.
+
+        Parameters
+        ----------
+        name : str
+            Name of the parameter.
+
+        Returns
+        -------
+        float or None
+            None when not identifiable.
+        """
         number = self.parameters.index(name)
         if not self.identifiable[number]:
             return None
@@ -95,9 +132,19 @@ class Estimate:
         return float(slope * math.sqrt(self.covariance[number, number]))
 
     def interval(self, name: str) -> tuple[float, float] | None:
-        """95 % interval (low, high) in natural units, symmetric in the estimation coordinate; None when not identifiable.
+        """95 % confidence interval of a parameter in natural units, symmetric in the estimation coordinate.
 
         Quantile of Student's t below 100 degrees of freedom, where the noise level or the covariance is hardly better known, else normal.
+
+        Parameters
+        ----------
+        name : str
+            Name of the parameter.
+
+        Returns
+        -------
+        tuple of float or None
+            Lower and upper limit; None when not identifiable.
         """
         number = self.parameters.index(name)
         if not self.identifiable[number]:
@@ -108,7 +155,20 @@ class Estimate:
         return item.natural(centre - half), item.natural(centre + half)
 
     def quantity(self, name: str, truth: float | None = None) -> dict[str, float | bool | None]:
-        """The quantity as every results file has it; std, low and high are None when not identifiable."""
+        """Value, standard deviation and interval of a parameter as every results file has it.
+
+        Parameters
+        ----------
+        name : str
+            Name of the parameter.
+        truth : float, optional
+            True value, where it is known.
+
+        Returns
+        -------
+        dict
+            `std`, `low` and `high` are None when not identifiable.
+        """
         interval = self.interval(name)
         return {
             "estimate": float(self.parameters[name].value),
@@ -120,14 +180,35 @@ class Estimate:
         }
 
     def marginal(self, names: Iterable[str]) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates (k,) and covariance (k, k) of the named parameters, both in estimation coordinates."""
+        """Marginal distribution of some parameters, in estimation coordinates.
+
+        Parameters
+        ----------
+        names : iterable of str
+            Names of k parameters.
+
+        Returns
+        -------
+        coordinates : ndarray
+            Estimates (k,).
+        covariance : ndarray
+            Covariance (k, k).
+        """
         numbers = [self.parameters.index(name) for name in names]
         return self.parameters.coordinates()[numbers], self.covariance[np.ix_(numbers, numbers)]
 
     def regrouped(self, truth: Mapping[str, float]) -> dict[str, float]:
-        """What this estimate should have found for `truth` (natural units): dropped parameters mapped into the kept ones.
+        """Expected estimate for given true values: dropped parameters are mapped into the kept ones.
 
-        Names that `truth` lacks are taken at the estimate. Dropped parameters come back at the value they were held at.
+        Parameters
+        ----------
+        truth : mapping of float
+            True values, natural units; names that it lacks are taken at the estimate.
+
+        Returns
+        -------
+        dict of float
+            Values by name; dropped parameters at the value they were held at.
         """
         start = self.parameters.coordinates()
         known = {name: value for name, value in truth.items() if name in self.parameters}

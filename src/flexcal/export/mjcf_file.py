@@ -31,7 +31,34 @@ _AT_REST = 1e-12
 
 
 def export_mjcf(model: RobotModel, path: str | Path) -> ExportedFile:
-    """Write the robot as MJCF with elastic joints and measure what it lost; see `render_mjcf`."""
+    """Write a robot as MJCF with elastic joints, and measure the error due to the terms that the format lacks; see `render_mjcf`.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, calibrated or not.
+    path : str or Path
+        File to write.
+
+    Returns
+    -------
+    ExportedFile
+        The `path`, the error `loss`, and `remarks`; as `str` one paragraph.
+
+    Raises
+    ------
+    FlexcalError
+        Where MuJoCo cannot build the robot, as with links that have no mass, and where the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from flexcal import RobotModel, export_mjcf
+    >>> model = RobotModel.from_yaml("examples/ur5_tracker/robot.yaml", estimates=False)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     export_mjcf(model, f"{folder}/ur5.xml").lost
+    ()
+    """
     return write_rendered(model, path, render_mjcf(model))
 
 

@@ -17,7 +17,34 @@ from flexcal.model.robot import RobotModel
 
 
 def export_urdf(model: RobotModel, path: str | Path) -> ExportedFile:
-    """Write the URDF of `model` and measure what it lost; see `render_urdf`. Raises `FlexcalError` where it cannot be written, too."""
+    """Write the URDF of a robot and measure the error due to the terms that the format lacks; see `render_urdf`.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, calibrated or not.
+    path : str or Path
+        File to write.
+
+    Returns
+    -------
+    ExportedFile
+        The `path`, the error `loss`, and `remarks`; as `str` one paragraph.
+
+    Raises
+    ------
+    FlexcalError
+        Where a point's name is already a link's, and where the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from flexcal import RobotModel, export_urdf
+    >>> model = RobotModel.from_yaml("examples/ur5_tracker/robot.yaml", estimates=False)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     export_urdf(model, f"{folder}/ur5.urdf").lost
+    ()
+    """
     return write_rendered(model, path, render_urdf(model))
 
 

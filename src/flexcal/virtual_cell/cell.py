@@ -23,10 +23,28 @@ _TRACKER = 2**32  # keeps the tracker's random numbers apart from those of the r
 
 
 class VirtualCell:
-    """A MuJoCo robot with the values of `truth`, its controller and its instruments.
+    """Simulated robot cell: a MuJoCo robot with known true parameters, its controller and its instruments.
 
-    `controller_model` is the robot that the controller's feed-forward believes in (default: the truth, so that nothing droops). Every
-    output is a function of `seed`, the plan and its seed, whatever the number of `threads` (default: one per core).
+    Parameters
+    ----------
+    truth : RobotModel
+        Robot with the true values.
+    config : CellConfig, optional
+        Sensors, friction, controller and mismatch.
+    seed : int
+        Seed of the noise. Every output is a function of it, the plan and its seed, whatever the number of `threads`.
+    controller_model : RobotModel, optional
+        Robot of the controller's feed-forward; by default the true one, so that the arm does not droop.
+    threads : int, optional
+        Number of threads; by default one per core.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from flexcal import PosePlan, RobotModel, VirtualCell
+    >>> cell = VirtualCell(RobotModel.from_yaml("examples/tx90l/robot.yaml", estimates=False))
+    >>> cell.measure(PosePlan(q=np.array([[0, -0.5, 1.6, 0, 0.6, 0]]))).position.shape
+    (1, 3)
     """
 
     def __init__(
@@ -48,20 +66,55 @@ class VirtualCell:
     def drawn(
         cls, nominal: RobotModel, config: CellConfig, seed: int, truth: Path | None = None
     ) -> tuple[VirtualCell, dict[str, float]]:
-        """A cell whose robot differs from the `nominal` one, in which the controller believes; and the true values by name.
+        """Virtual cell whose robot differs from a nominal one, with which the controller computes.
 
-        They are drawn from `seed`, or those of the file `truth`; raises `InputError` as `read_truth_of` does.
+        Parameters
+        ----------
+        nominal : RobotModel
+            Nominal robot.
+        config : CellConfig
+            Settings of the cell, with the standard deviations of the true parameters.
+        seed : int
+            Seed of the true parameters and of the noise.
+        truth : Path, optional
+            File of true parameters, in place of random ones.
+
+        Returns
+        -------
+        cell : VirtualCell
+            The cell.
+        values : dict of float
+            True values by name, SI units.
+
+        Raises
+        ------
+        InputError
+            As `read_truth_of` does.
         """
         rng = np.random.default_rng([seed, 0])
         values = draw_truth(nominal, config.spread, rng) if truth is None else read_truth_of(truth, nominal)
         return cls(nominal.with_values(values), config, seed, controller_model=nominal), values
 
     def record(self, plan: MultisinePlan | TrajectoryPlan) -> Iterator[Recording]:
-        """Run a frequency experiment: recordings by pose, realisation, orthogonal experiment, sign (+1, then −1); or trajectories.
+        """Run the experiments of a plan.
 
-        `q` (N, n) are encoder readings and `torque` (N, n) the torque held until the next sample, with sensor noise; joints that are
-        not excited are braked at the pose and read a torque of zero. Raises `FlexcalError` for a joint count that does not fit,
-        an excited drive without rotor inertia, a step that does not resolve the robot, or a loop that diverges.
+        Parameters
+        ----------
+        plan : MultisinePlan or TrajectoryPlan
+            Frequency experiments or trajectories.
+
+        Returns
+        -------
+        iterator of Recording
+            By pose, realisation, orthogonal experiment and sign (+1, then −1); or by trajectory. `q` (N, n) are encoder readings and
+            `torque` (N, n) the torque held until the next sample, with sensor noise; in a frequency experiment, joints that are not
+            excited are braked at the pose and read a torque of zero.
+
+        Raises
+        ------
+        FlexcalError
+            For a joint count that does not fit, an excited drive without rotor inertia, a time step that does not resolve the robot, or
+            a loop that diverges.
         """
         self._check_width(plan.joint_count)
         self._check_rotors(plan)
@@ -70,17 +123,36 @@ class VirtualCell:
         return recordings(self.truth, self.controller_model, self.config, plan, self.seed, self.threads)
 
     def measure(self, plan: PosePlan) -> PoseSet:
-        """Go to every pose and measure the first declared point with the tracker of the first station.
+        """Measure the first declared point in every pose with the tracker at the first station.
 
-        `q` are encoder readings, `torque` is gravity's plus Coulomb friction of random sign and size within its band plus noise,
-        `sigma` the tracker's standard deviation an axis.
+        Parameters
+        ----------
+        plan : PosePlan
+            The poses.
+
+        Returns
+        -------
+        PoseSet
+            `q` are encoder readings, `torque` is that of gravity plus Coulomb friction of random sign and size within its band plus
+            noise, `sigma` the tracker's standard deviation per axis.
         """
         self._check_width(plan.joint_count)
         rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(plan.seed, _TRACKER)))
         return measured_poses(self.truth, self.config, plan, rng)
 
     def noise_free(self, plan: PosePlan) -> np.ndarray:
-        """True positions (N, 3) m of the point at every pose in the instrument's frame, for verification only."""
+        """True positions of the first declared point, for verification only.
+
+        Parameters
+        ----------
+        plan : PosePlan
+            The poses.
+
+        Returns
+        -------
+        ndarray
+            Positions (N, 3), m, in the instrument's frame.
+        """
         self._check_width(plan.joint_count)
         return in_instrument(self.truth, true_poses(self.truth, self.config, plan).point)
 

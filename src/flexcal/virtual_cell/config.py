@@ -142,7 +142,21 @@ class MismatchConfig:
 
 @dataclass(frozen=True)
 class CellConfig:
-    """The virtual cell: controller, sensors, friction, spread of the hidden truth, mismatch."""
+    """Settings of a virtual cell.
+
+    Parameters
+    ----------
+    controller : LoopConfig
+        Steps and filter of the position controller.
+    sensors : SensorConfig
+        Resolution and noise of encoders, torques, tracker and sensors on the arm.
+    friction : FrictionConfig
+        Friction of the drives, relative to what robot.yaml declares.
+    spread : SpreadConfig
+        Standard deviations of the true parameters about the nominal robot.
+    mismatch : MismatchConfig
+        Effects of the true robot that the identified model lacks; all off by default.
+    """
 
     controller: LoopConfig = LoopConfig()
     sensors: SensorConfig = SensorConfig()

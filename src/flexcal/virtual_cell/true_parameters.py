@@ -20,11 +20,35 @@ _NOT_NEGATIVE = (".damping", ".backlash", ".viscous", ".coulomb")
 
 
 def draw_truth(model: RobotModel, spread: SpreadConfig, rng: np.random.Generator) -> dict[str, float]:
-    """Named true values (SI units) of a robot around the nominal `model`.
+    """Draw the true parameters of a robot around those of a nominal one.
 
-    Drawn are link masses, centres of mass, rotor inertias, all geometric errors with tool and first station, half gaps of the joints
-    that declare backlash, stiffness and damping of every spring; `model.with_values` gives the true robot, whose link inertias
-    follow the masses. Friction stays as declared.
+    Drawn are link masses, centres of mass, rotor inertias, all geometric errors with tool and first station, half gaps of the
+    joints that declare backlash, stiffness and damping of every spring. Link inertias follow the masses; friction stays as
+    declared.
+
+    Parameters
+    ----------
+    model : RobotModel
+        Nominal robot.
+    spread : SpreadConfig
+        Standard deviations of the parameters.
+    rng : numpy.random.Generator
+        Source of the random numbers.
+
+    Returns
+    -------
+    dict of float
+        True values by name, SI units; `model.with_values` gives the true robot.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from flexcal import CellConfig, RobotModel, draw_truth
+    >>> model = RobotModel.from_yaml("examples/tx90l/robot.yaml", estimates=False)
+    >>> values = draw_truth(model, CellConfig().spread, np.random.default_rng(0))
+    >>> truth = model.with_values(values)
+    >>> bool(truth.value("link_3.mass") == values["link_3.mass"])
+    True
     """
     return dict(_draws(model, spread, rng))
 

@@ -102,24 +102,56 @@ def fit_geometry(
     loss: Loss | LossName = "auto",
     progress: Progress = silent,
 ) -> GeometricFit:
-    """Fit the geometry of `model` to measured points, Levenberg-Marquardt on the vector error (28) with the Jacobian (29).
+    """Fit the geometry of a robot to measured points by the Levenberg-Marquardt method (vector error (28), Jacobian (29)).
 
-    Rank and dropped parameters come from the kinematic Jacobian at zero deflection. What the model's posterior holds of stiffness and
-    inertia (stage 1) is their prior, so give the model without an earlier calibration on the same poses. It enters by re-estimating those
-    parameters, or, marginalised, through the residual covariance R + J Σ Jᵀ; both give the same estimate. `secant_scale` lets each
-    drive's stiffness under gravity differ from the tangent one. Without `elastic` the arm is fitted as rigid.
+    `calibrate` calls it with the terms that it selects. Rank and dropped parameters come from the kinematic Jacobian at zero
+    deflection. Points are weighted by the sum of three variances, those of instrument, robot and model error, which restricted
+    maximum likelihood estimates from the points; a stated sigma is that of the instrument alone.
 
-    The term `transmission`, transmission errors of all revolute joints as waves in the joint position, is a random effect: all waves are
-    normal with one variance, which falls with the square of their order and is estimated with those of the scatter (best linear unbiased
-    prediction). Few poses leave them near zero and uncertain. `transmission_1`… are free waves of one order.
+    Parameters
+    ----------
+    model : RobotModel
+        Robot without an earlier calibration on the same poses. What its posterior holds of stiffness and inertia (stage 1) is
+        their prior.
+    poses : PoseSet
+        Joint positions (N, n) in rad or m and measured points (N, 3) in m.
+    terms : sequence of str
+        Names of the error terms. `transmission`, transmission errors of all revolute joints as waves in the joint position, is
+        a random effect: all waves are normal with one variance, which falls with the square of their order and is estimated
+        with those of the scatter (best linear unbiased prediction). Few poses leave them near zero and uncertain.
+        `transmission_1`… are free waves of one order.
+    elastic : bool
+        Whether the arm deflects; without, it is fitted as rigid.
+    elasticity : {"reestimated", "marginalised"}
+        How the uncertainty of stiffness and inertia enters: by estimating those parameters again, or through the residual
+        covariance R + J Σ Jᵀ; both give the same estimate.
+    secant_scale : float
+        Relative standard deviation of the ratio of each drive's secant stiffness under gravity to its tangent stiffness.
+    loss : {"auto", "squares", "huber", "cauchy"} or Loss
+        Loss function; "cauchy" finds outliers, "auto" takes it where squares leave some.
+    progress : callable, optional
+        Called with the number of the iteration and the objective.
 
-    Points are weighted by the sum of three variances, those of instrument, robot and model error, which restricted maximum
-    likelihood finds from the points; a stated sigma is that of the instrument alone. `loss` "cauchy" finds outliers; "auto" takes it
-    where squares leave some.
+    Returns
+    -------
+    GeometricFit
+        `model`, `estimate`, `residuals` (N, 3), m, `errors` and `summary()`.
 
-    Raises `FlexcalError` for measured lengths and orientations, fewer rows than identifiable parameters, poses that are all equal,
-    joints that do not move, a backlash seen from one flank only, stations that robot.yaml does not know, and a robust loss with
-    marginalised elasticity.
+    Raises
+    ------
+    FlexcalError
+        For measured lengths and orientations, fewer rows than identifiable parameters, poses that are all equal, joints that
+        do not move, a backlash seen from one flank only, stations that robot.yaml does not know, and a robust loss with
+        marginalised elasticity.
+
+    Examples
+    --------
+    >>> from flexcal import RobotModel, fit_geometry, read_poses
+    >>> model = RobotModel.from_yaml("examples/ur5_tracker/robot.yaml", estimates=False)
+    >>> poses = read_poses("examples/ur5_tracker/grid.csv", model).subset(slice(None, None, 13))
+    >>> fit = fit_geometry(model, poses, terms=("kinematic",))
+    >>> print(f"{fit.errors.mean * 1e3:.1f} mm")
+    0.1 mm
     """
     robust = loss != "auto" and not isinstance(loss_named(loss), Squares)
     if elasticity == "marginalised" and robust:

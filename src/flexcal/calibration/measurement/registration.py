@@ -38,9 +38,37 @@ def register(model: RobotModel, poses: PoseSet, predicted: np.ndarray) -> RobotM
 
 
 def rigid_motion(source: np.ndarray, target: np.ndarray, name: str = "") -> tuple[np.ndarray, np.ndarray]:
-    """Rotation (3, 3) and translation (3,) that map `source` (N, 3) onto `target` (N, 3) in least squares (Kabsch 1976).
+    """Rigid motion that maps points onto others with the least sum of squared distances (Kabsch 1976).
 
-    Raises `FlexcalError` where the points do not span a plane.
+    Parameters
+    ----------
+    source, target : ndarray
+        Corresponding points (N, 3), m.
+    name : str
+        What the points are, for the message of the error.
+
+    Returns
+    -------
+    rotation : ndarray
+        Rotation matrix (3, 3).
+    translation : ndarray
+        Translation (3,), m: ``target ≈ source @ rotation.T + translation``.
+
+    Raises
+    ------
+    FlexcalError
+        Where the points do not span a plane.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from flexcal import rigid_motion
+    >>> source = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    >>> rotation, translation = rigid_motion(source, source + [1, 2, 3])
+    >>> np.allclose(rotation, np.eye(3))
+    True
+    >>> translation.round(6)
+    array([1., 2., 3.])
     """
     if len(source) < 3:
         raise FlexcalError(

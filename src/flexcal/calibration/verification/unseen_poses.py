@@ -104,10 +104,40 @@ class ErrorCovariance:
 def prediction_errors(
     model: RobotModel, poses: PoseSet, *, elastic: bool = True, noise_free: bool = False
 ) -> PredictionErrors:
-    """Compare a calibrated robot with points; `poses` should be none of those it was fitted to.
+    """Errors of a calibrated robot at measured points, with their predicted size.
 
-    The instrument must stand where it stood during calibration: `model` holds its place. `noise_free` points are those of the true robot,
-    without instrument and repeatability. Raises `FlexcalError` for measured lengths and orientations, and as `predict_measurements` does.
+    The instrument must stand where it stood during calibration: `model` holds its place.
+
+    Parameters
+    ----------
+    model : RobotModel
+        Calibrated robot.
+    poses : PoseSet
+        Measured points, none of which the robot was fitted to.
+    elastic : bool
+        Whether the arm deflects.
+    noise_free : bool
+        Whether the points are those of the true robot, without noise of instrument and repeatability.
+
+    Returns
+    -------
+    PredictionErrors
+        `errors` (N, 3), m, measured minus predicted; `all`, their statistics; `expected_rms` (N,), m, as predicted.
+
+    Raises
+    ------
+    FlexcalError
+        For measured lengths and orientations, and as `predict_measurements` does.
+
+    Examples
+    --------
+    >>> from flexcal import RobotModel, fit_geometry, prediction_errors, read_poses
+    >>> model = RobotModel.from_yaml("examples/ur5_tracker/robot.yaml", estimates=False)
+    >>> poses = read_poses("examples/ur5_tracker/grid.csv", model)
+    >>> fit = fit_geometry(model, poses.subset(slice(None, None, 13)), terms=("kinematic",))
+    >>> unseen = poses.subset(slice(3, None, 13))
+    >>> print(f"{prediction_errors(fit.model, unseen).all.mean * 1e3:.1f} mm")
+    0.1 mm
     """
     return prediction_errors_with_covariance(model, poses, elastic=elastic, noise_free=noise_free)[0]
 

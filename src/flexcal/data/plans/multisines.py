@@ -16,21 +16,49 @@ from flexcal.errors import FlexcalError
 class MultisinePlan:
     """Orthogonal multisine experiments in P poses of an n-joint robot, n_u of its axes excited on L lines.
 
-    poses: (P, n) commanded joint positions, rad.
-    joints: indices of the excited axes (in files: numbers from 1, as in the columns q1…qn).
-    payload: kg at the declared payload's centre of mass; None takes what robot.yaml declares.
-    lines, detection_lines: (L,) and (K,) excited and left-out multiples of `base_frequency_hz`.
-    amplitude: (n_u, L) cosine amplitudes, N m.
-    periods, settle_periods: recorded periods per experiment, and how many of them are dropped at the start.
-    realisations: independent draws of the phases; every one takes n_u experiments, twice that with `signs`.
-    signs: whether each experiment is repeated with the excitation reversed under the same reference motion.
-    reference_amplitude, reference_frequency_hz: the slow motion under the excitation, rad and Hz.
-    kp, kd: (n,) gains of the position controller referred to the joint, N m/rad and N m s/rad; rate_hz its rate.
-    torque: what the logged torque is over a sample; `tau` in files.
-    crest: whether the phases are random, or start there and are shifted for small peaks.
-    seed: of the random phases.
+    Parameters
+    ----------
+    name : str
+        Name of the plan.
+    poses : ndarray
+        Commanded joint positions (P, n), rad.
+    joints : tuple of int
+        Indices of the excited axes (in files: numbers from 1, as in the columns q1…qn).
+    base_frequency_hz : float
+        Base frequency, Hz.
+    lines : ndarray
+        Excited multiples (L,) of `base_frequency_hz`.
+    amplitude : ndarray
+        Cosine amplitudes (n_u, L), N m.
+    periods, settle_periods : int
+        Recorded periods per experiment, and how many of them are dropped at the start.
+    realisations : int
+        Independent draws of the phases; each takes n_u experiments, twice that with `signs`.
+    signs : bool
+        Whether each experiment is repeated with the excitation reversed under the same reference motion.
+    reference_amplitude, reference_frequency_hz : float
+        Slow motion under the excitation, rad and Hz.
+    kp, kd : ndarray
+        Gains (n,) of the position controller referred to the joint, N m/rad and N m s/rad.
+    rate_hz : float
+        Rate of the controller, Hz.
+    torque : {"held", "instantaneous", "mean"}
+        What the logged torque is over a sample; `tau` in files.
+    seed : int
+        Seed of the random phases.
+    kind : {"multisine"}
+        Kind of the plan, in files.
+    payload : float, optional
+        Mass, kg, at the declared payload's centre of mass; by default as declared in robot.yaml.
+    detection_lines : ndarray
+        Left-out multiples (K,) of `base_frequency_hz`.
+    crest : {"random", "optimised"}
+        Random phases, or ones that are shifted from there for small peaks.
 
-    Raises `FlexcalError` where shapes or values do not fit together.
+    Raises
+    ------
+    FlexcalError
+        Where shapes or values do not fit together.
     """
 
     kind: Literal["multisine"] = field(default="multisine", kw_only=True)

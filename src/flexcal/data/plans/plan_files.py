@@ -23,7 +23,34 @@ _KINDS: dict[str, type[MultisinePlan] | type[TrajectoryPlan] | type[PosePlan]] =
 
 
 def read_plan(path: str | Path) -> Plan:
-    """Read a plan; raises `InputError` with file and line for everything that does not fit."""
+    r"""Read a plan of poses, trajectories or frequency experiments.
+
+    Parameters
+    ----------
+    path : str or Path
+        YAML file whose `kind` is `poses`, `trajectory` or `multisine`; plans of poses also as CSV.
+
+    Returns
+    -------
+    PosePlan or TrajectoryPlan or MultisinePlan
+        The plan, of the class that `kind` names.
+
+    Raises
+    ------
+    InputError
+        With file and line, for everything that does not fit.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from flexcal import read_plan
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "plan.yaml"
+    ...     _ = file.write_text("kind: poses\nq: [[0, -0.5], [0.3, 0.2], [1.2, 0]]\n")
+    ...     read_plan(file).q.shape
+    (3, 2)
+    """
     if Path(path).suffix == ".csv":
         return read_pose_table(Path(path))
     file = read_yaml_file(path)

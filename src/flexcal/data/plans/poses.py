@@ -15,13 +15,25 @@ from flexcal.errors import FlexcalError
 class PosePlan:
     """N poses to stand still in and measure.
 
-    q: (N, n) commanded joint positions, rad.
-    pose: (N,) their numbers; the same one again is another visit. None counts from 1.
-    payload: (N,) kg at the declared payload's centre of mass (a single number counts for all); None takes what
-        robot.yaml declares.
-    seed: of the measurement, where something is drawn.
+    Parameters
+    ----------
+    q : ndarray
+        Commanded joint positions (N, n), rad.
+    payload : ndarray, optional
+        Mass (N,), kg, at the declared payload's centre of mass (a single number counts for all); by default as declared in robot.yaml.
+    seed : int
+        Seed of the measurement, where something is drawn.
+    name : str
+        Name of the plan.
+    pose : ndarray, optional
+        Numbers (N,) of the poses; the same one again is another visit. By default counted from 1.
+    kind : {"poses"}
+        Kind of the plan, in files.
 
-    Raises `FlexcalError` where shapes or values do not fit together.
+    Raises
+    ------
+    FlexcalError
+        Where shapes or values do not fit together.
     """
 
     kind: Literal["poses"] = field(default="poses", kw_only=True)

@@ -17,15 +17,33 @@ from flexcal.errors import FlexcalError
 class TrajectoryPlan:
     """E periodic trajectories of an n-joint robot.
 
-    paths: what the joints follow over one period, again and again.
-    payload: kg at the declared payload's centre of mass; None takes what robot.yaml declares.
-    periods, settle_periods: recorded periods of each trajectory, and how many of them are dropped at the start.
-    kp, kd: (n,) gains of the position controller referred to the joint, N m/rad and N m s/rad; None where robot.yaml declares none.
-    rate_hz: of that controller, and of the log.
-    torque: what the logged torque is over a sample; `tau` in files.
-    seed: of the design.
+    Parameters
+    ----------
+    name : str
+        Name of the plan.
+    paths : FourierPaths or SplinePaths
+        What the joints follow over one period, again and again.
+    base_frequency_hz : float
+        Base frequency, Hz.
+    periods, settle_periods : int
+        Recorded periods of each trajectory, and how many of them are dropped at the start.
+    rate_hz : float
+        Rate of the position controller and of the log, Hz.
+    torque : {"held", "instantaneous", "mean"}
+        What the logged torque is over a sample; `tau` in files.
+    seed : int
+        Seed of the design.
+    kind : {"trajectory"}
+        Kind of the plan, in files.
+    payload : float, optional
+        Mass, kg, at the declared payload's centre of mass; by default as declared in robot.yaml.
+    kp, kd : ndarray, optional
+        Gains (n,) of the position controller referred to the joint, N m/rad and N m s/rad; None where robot.yaml declares none.
 
-    Raises `FlexcalError` where shapes or values do not fit together.
+    Raises
+    ------
+    FlexcalError
+        Where shapes or values do not fit together.
     """
 
     kind: Literal["trajectory"] = field(default="trajectory", kw_only=True)
@@ -65,7 +83,20 @@ class TrajectoryPlan:
         return self.periods / self.base_frequency_hz
 
     def motion(self, number: int, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Position, velocity and acceleration (N, n) of trajectory `number` at times (N,), in rad and s."""
+        """Motion of one trajectory.
+
+        Parameters
+        ----------
+        number : int
+            Index of the trajectory.
+        time : ndarray
+            Times (N,), s.
+
+        Returns
+        -------
+        position, velocity, acceleration : ndarray
+            Each (N, n), rad and s.
+        """
         basis = self.paths.basis(time, 1 / self.base_frequency_hz)
         position, velocity, acceleration = basis @ self.paths.coefficients[number]
         return position, velocity, acceleration

@@ -44,13 +44,36 @@ def read_poses(
 ) -> PoseSet:
     """Read measured poses from one file or several, joined in order (see `concatenate`).
 
-    Without a `target` column the point is the first under `points:`; without `station` the instrument stands at the
-    robot's first station; without `sigma` it is 0.1 mm and `sigma_given` is False.
+    Parameters
+    ----------
+    paths : str or Path, or sequence of these
+        CSV or Parquet tables with the columns q1…qn (rad or m) and x, y, z (m). Without a column `target` the point is
+        the first under `points:`; without `station` the instrument stands at the robot's first station; without `sigma` it is
+        0.1 mm and `sigma_given` is False.
+    model : RobotModel
+        Robot whose joints, points and stations the columns name.
+    require_motion : bool
+        Whether poses that are all equal, and joints that never move, are refused: nothing can be calibrated from them.
 
-    Raises `InputError` with file, line and column for a missing, unknown or partial column, a value that is missing or
-    no number, angles that cannot be in rad, points that cannot be in m, an unknown target, a negative sigma or
-    payload, a quaternion that is not of unit norm, and joint positions that differ within one pose. With
-    `require_motion` also where all poses are equal or a joint never moves, from which nothing can be calibrated.
+    Returns
+    -------
+    PoseSet
+        One row per pose and target, in measuring order.
+
+    Raises
+    ------
+    InputError
+        With file, line and column, for a missing, unknown or partial column, a value that is missing or no number, angles
+        that cannot be in rad, points that cannot be in m, an unknown target, a negative sigma or payload, a quaternion that
+        is not of unit norm, and joint positions that differ within one pose.
+
+    Examples
+    --------
+    >>> from flexcal import RobotModel, read_poses
+    >>> model = RobotModel.from_yaml("examples/ur5_tracker/robot.yaml")
+    >>> poses = read_poses("examples/ur5_tracker/random.csv", model)
+    >>> poses.q.shape, poses.position.shape
+    ((20, 6), (20, 3))
     """
     listed = [paths] if isinstance(paths, str | Path) else list(paths)
     poses = concatenate([_read(Path(path), model) for path in listed])

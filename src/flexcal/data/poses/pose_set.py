@@ -18,19 +18,37 @@ DEFAULT_SIGMA = 1e-4
 class PoseSet:
     """N measured points of an n-joint robot, one row per pose and target, in measuring order.
 
-    q: (N, n) motor positions referred to the joint, rad (m where prismatic).
-    position: (N, 3) the measured point in the instrument's frame, m; NaN where only `length` is measured.
-    sigma: (N, 3) 1σ of the measurement per coordinate, m; `sigma_given` False says that it is a default.
-    torque: (N, n) motor torques referred to the joint, N m, where measured.
-    payload: (N,) kg at the declared payload's centre of mass; None: as declared in robot.yaml.
-    target: (N,) names of the points, station: (N,) names of the instrument's places.
-    temperature: (N,) where measured.
-    pose: (N,) numbers of the poses; rows of one pose share it.
-    quaternion_wxyz: (N, 4) measured orientation, unit norm, where measured.
-    length: (N,) m, of a draw-wire.
-    time: (N,) s, when each was measured, where known.
+    Parameters
+    ----------
+    q : ndarray
+        Motor positions (N, n) referred to the joint, rad (m where prismatic).
+    position : ndarray
+        Measured points (N, 3) in the instrument's frame, m; NaN where only `length` is measured.
+    sigma : ndarray
+        Standard deviations (N, 3) of the measured coordinates, m.
+    torque : ndarray or None
+        Motor torques (N, n) referred to the joint, N m, where measured.
+    payload : ndarray or None
+        Mass (N,), kg, at the declared payload's centre of mass; None for as declared in robot.yaml.
+    target, station : ndarray
+        Names (N,) of the points and of the instrument's places.
+    temperature : ndarray or None
+        Temperature (N,), where measured.
+    pose : ndarray
+        Numbers (N,) of the poses; rows of one pose share it.
+    quaternion_wxyz : ndarray, optional
+        Measured orientations (N, 4), unit norm.
+    length : ndarray, optional
+        Lengths (N,) of a draw-wire, m.
+    time : ndarray, optional
+        Times (N,) of the measurements, s.
+    sigma_given : bool
+        False where `sigma` is a default.
 
-    Raises `FlexcalError` where shapes do not fit.
+    Raises
+    ------
+    FlexcalError
+        Where shapes do not fit.
     """
 
     q: np.ndarray
@@ -87,7 +105,18 @@ class PoseSet:
         return tuple(dict.fromkeys(self.target.tolist()))
 
     def subset(self, rows: np.ndarray | Sequence[int] | slice) -> PoseSet:
-        """The rows with these indices, or where this mask is true, in their order."""
+        """Some of the points, in their order.
+
+        Parameters
+        ----------
+        rows : ndarray, sequence of int or slice
+            Indices, or a mask (N,).
+
+        Returns
+        -------
+        PoseSet
+            The points of these rows.
+        """
         index = rows if isinstance(rows, slice) else np.asarray(rows)
         if isinstance(index, np.ndarray) and index.size == 0:
             index = np.zeros(0, dtype=int)

@@ -32,11 +32,41 @@ if TYPE_CHECKING:
 
 
 def read_targets(path: str | Path, model: RobotModel) -> ToolTargets:
-    """Read tool targets: `pose`, with q1…qn, or x, y, z and optionally qw, qx, qy, qz, or both.
+    r"""Read targets of the tool.
 
-    Optional are `target`, `station` and `payload`. Raises `InputError` with file, line and column for a missing, unknown or partial
-    column, a value that is missing or no number, angles that cannot be in rad, points that cannot be in m, an unknown target or station, a
-    pose number that stands twice, a negative payload and a quaternion that is not of unit norm.
+    Parameters
+    ----------
+    path : str or Path
+        Table with `pose` and joint positions q1…qn (rad or m), or points x, y, z (m) and optionally qw, qx, qy, qz, or both;
+        `target`, `station` and `payload` (kg) are optional.
+    model : RobotModel
+        Robot whose joints, points and stations the columns name.
+
+    Returns
+    -------
+    ToolTargets
+        One target a row.
+
+    Raises
+    ------
+    InputError
+        With file, line and column, for a missing, unknown or partial column, a value that is missing or no number, angles
+        that cannot be in rad, points that cannot be in m, an unknown target or station, a pose number that stands twice, a
+        negative payload and a quaternion that is not of unit norm.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from flexcal import RobotModel, read_targets
+    >>> model = RobotModel.from_yaml("examples/ur5_tracker/robot.yaml")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "targets.csv"
+    ...     _ = file.write_text("pose,x,y,z\n1,0.4,0.1,0.3\n2,0.4,-0.1,0.3\n")
+    ...     targets = read_targets(file, model)
+    >>> targets.position
+    array([[ 0.4,  0.1,  0.3],
+           [ 0.4, -0.1,  0.3]])
     """
     file = open_table(path)
     texts = tuple(name for name in ("target", "station") if name in file.columns)

@@ -14,12 +14,27 @@ from flexcal.errors import FlexcalError
 class ToolTargets:
     """N targets for the tool of an n-joint robot, one per row.
 
-    pose: (N,) their numbers, each once; target: (N,) names of the points that are to be there.
-    q: (N, n) nominal commands, rad or m. Without `position` they say what is wanted: the pose that the nominal robot takes there.
-    position: (N, 3) m, rotation: (N, 3, 3) of the point's frame; in the robot's base frame, or that of the instrument at `station` (N,).
-    payload: (N,) kg at the declared payload's centre of mass; None: as declared in robot.yaml.
+    Parameters
+    ----------
+    pose : ndarray
+        Numbers (N,) of the targets, each once.
+    target : ndarray
+        Names (N,) of the points that are to be there.
+    q : ndarray, optional
+        Nominal commands (N, n), rad or m. Without `position` the target is where the nominal robot's point is with these.
+    position : ndarray, optional
+        Positions (N, 3), m, in the robot's base frame, or in that of the instrument at `station`.
+    rotation : ndarray, optional
+        Rotation matrices (N, 3, 3) of the point's frame, in the same frame.
+    station : ndarray, optional
+        Names (N,) of the instrument's places.
+    payload : ndarray, optional
+        Mass (N,), kg, at the declared payload's centre of mass; by default as declared in robot.yaml.
 
-    Raises `FlexcalError` where shapes do not fit or nothing says where the tool is to go.
+    Raises
+    ------
+    FlexcalError
+        Where shapes do not fit, and where there is neither `q` nor `position`.
     """
 
     pose: np.ndarray
@@ -60,7 +75,18 @@ class ToolTargets:
         return len(self.pose)
 
     def subset(self, rows: np.ndarray | slice) -> ToolTargets:
-        """The rows with these indices, or where this mask is true, in their order."""
+        """Some of the targets, in their order.
+
+        Parameters
+        ----------
+        rows : ndarray or slice
+            Indices, or a mask (N,).
+
+        Returns
+        -------
+        ToolTargets
+            The targets of these rows.
+        """
         changed: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
         changed |= {name: values[rows] for name, values in changed.items() if values is not None}
         return ToolTargets(**changed)

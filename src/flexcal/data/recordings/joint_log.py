@@ -37,19 +37,45 @@ class RecordingLabel:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """N samples of n joints at t = start + k · time_step (s).
+    """Joint log: N samples of n joints at t = start + k · time_step.
 
-    q: (N, n) motor positions referred to the joint, rad (m where prismatic).
-    torque: (N, n) motor torques referred to the joint, N m (N).
-    arm: (N, n) positions on the arm side of elastic joints, where measured.
-    tilt_x, tilt_y: (N, n) tilts of their bearings about x and y, rad, where measured, beside `arm`.
-    velocity, acceleration, arm_velocity, external_torque: (N, n) where the log has them (`dq`, `ddq`, `dqa`,
-        `tau_ext`); force, moment: (N, 3), N and N m, as the force sensor reads them; temperature: (N,); payload: (N,), kg, the
-        same throughout.
-    sensors, sensed: names of the S sensors on the arm that recorded too, and their readings (N, S) in m/s², m/s or m.
-    time_base, file: how the time stamps were and the file itself, where the recording comes from one.
+    Parameters
+    ----------
+    time_step : float
+        Time between samples, s.
+    q : ndarray
+        Motor positions (N, n) referred to the joint, rad (m where prismatic).
+    torque : ndarray
+        Motor torques (N, n) referred to the joint, N m (N).
+    arm : ndarray, optional
+        Positions (N, n) on the arm side of elastic joints.
+    start : float
+        Time of the first sample, s.
+    label : RecordingLabel, optional
+        Place of the recording in a frequency experiment.
+    tilt_x, tilt_y : ndarray, optional
+        Tilts (N, n) of the bearings about x and y, rad, beside `arm`.
+    velocity, acceleration, arm_velocity, external_torque : ndarray, optional
+        Columns `dq`, `ddq`, `dqa` and `tau_ext` (N, n), where the log has them.
+    force, moment : ndarray, optional
+        Readings (N, 3) of the force sensor, N and N m.
+    temperature : ndarray, optional
+        Temperature (N,).
+    payload : ndarray, optional
+        Mass (N,), kg, the same throughout.
+    time_base : TimeBase, optional
+        How the time stamps of the file were.
+    file : Path, optional
+        File that the recording was read from.
+    sensors : tuple of str
+        Names of the S sensors on the arm that recorded too.
+    sensed : ndarray, optional
+        Their readings (N, S), m/s², m/s or m.
 
-    Raises `FlexcalError` where shapes do not fit or the time step is not positive.
+    Raises
+    ------
+    FlexcalError
+        Where shapes do not fit or the time step is not positive.
     """
 
     time_step: float

@@ -53,11 +53,40 @@ _OPTIONAL = ("qa", "qax", "qay", "dq", "ddq", "dqa", "tau_ext", "force", "moment
 def read_recording(
     path: str | Path, model: RobotModel, label: RecordingLabel | None = None, *, fill: float = 0.0
 ) -> Recording:
-    """Read one joint log; where its time stamps jitter, values are interpolated onto a uniform base.
+    """Read one joint log; where its time stamps jitter, values are interpolated onto a uniform time base.
 
-    Raises `InputError` with file, line and column for a missing, unknown or partial column, a value that is missing or no number, time that
-    runs backwards by more than 50 ms or stands still, a gap (a step of more than 2.5 time steps and more than `fill`, s), a rate outside
-    1 Hz to 20 kHz, and angles that cannot be in rad. `recording.time_base` says how the time stamps were.
+    Parameters
+    ----------
+    path : str or Path
+        The log.
+    model : RobotModel
+        Robot whose joints the log has; `signals:` of its robot.yaml says what the columns are, where they are not the usual ones.
+    label : RecordingLabel, optional
+        Pose, realisation, orthogonal experiment and sign, in a frequency experiment.
+    fill : float
+        Longest gap, s, that is interpolated; steps of up to 2.5 time steps always are.
+
+    Returns
+    -------
+    Recording
+        Joint positions and torques in SI units; its `time_base` says how the time stamps were.
+
+    Raises
+    ------
+    InputError
+        With file, line and column, for a missing, unknown or partial column, a value that is missing or no number, time that
+        runs backwards by more than 50 ms or stands still, a gap (a step of more than 2.5 time steps and more than `fill`), a
+        rate outside 1 Hz to 20 kHz, and angles that cannot be in rad.
+
+    Examples
+    --------
+    >>> from flexcal import RobotModel, read_recording
+    >>> model = RobotModel.from_yaml("examples/tx40/robot.yaml")
+    >>> log = read_recording("examples/tx40/exciting.parquet", model)
+    >>> log.q.shape
+    (45000, 6)
+    >>> print(f"{log.duration:.0f} s at {1 / log.time_step:.0f} Hz")
+    9 s at 5000 Hz
     """
     file = open_table(path)
     signals = assign(file, model, _REQUIRED, (*_OPTIONAL, *_sensor_columns(model)))

@@ -216,9 +216,38 @@ def random_poses(
     *,
     checker: CollisionChecker | None = None,
 ) -> PosePlan:
-    """Verification poses: uniform over the joint ranges, free of collision, visible, on whatever flank they happen to be.
+    """Random poses for verification: uniform over the joint ranges, free of collision and visible, on either flank of the backlash.
 
-    Raises `FlexcalError` where too few random poses pass the checks.
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    count : int
+        Number of poses.
+    rng : numpy.random.Generator
+        Source of the random numbers.
+    setup : MeasuringSetup
+        Target point, instrument and payload.
+    checker : CollisionChecker, optional
+        Collision checker of this robot, where there is one already.
+
+    Returns
+    -------
+    PosePlan
+        The poses, in the order in which they were drawn.
+
+    Raises
+    ------
+    FlexcalError
+        Where too few random poses pass the checks.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from flexcal import RobotModel, random_poses
+    >>> model = RobotModel.from_yaml("examples/tx90l/robot.yaml", estimates=False)
+    >>> random_poses(model, 5, np.random.default_rng(0)).q.shape
+    (5, 6)
     """
     checker = CollisionChecker(model) if checker is None else checker
     return _plan(random_candidates(checker, count, rng, setup), setup, rng)

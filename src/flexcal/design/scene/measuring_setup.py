@@ -23,10 +23,20 @@ class TrackerNoise:
 
 @dataclass(frozen=True)
 class MeasuringSetup:
-    """How poses are measured: the target `point` and the instrument's `station` by name (None: the first declared ones).
+    """How poses are measured: target point, instrument and payload.
 
-    `payload` in kg at the declared payload's centre of mass (None: the declared one), `noise` of the instrument, `acceptance` of the
-    reflector (None: turned by hand, it is seen from everywhere).
+    Parameters
+    ----------
+    point : str, optional
+        Name of the target point; by default the first declared one.
+    station : str, optional
+        Name of the instrument's place; by default the first declared one.
+    payload : float, optional
+        Mass, kg, at the declared payload's centre of mass; by default as declared.
+    noise : TrackerNoise
+        Noise of the instrument.
+    acceptance : AcceptanceConfig, optional
+        Acceptance of the reflector; without, it is turned by hand and seen from everywhere.
     """
 
     point: str | None = None
@@ -37,7 +47,20 @@ class MeasuringSetup:
 
     @classmethod
     def declared(cls, model: RobotModel, payload: float | None = None) -> MeasuringSetup:
-        """The first point as robot.yaml declares it, with the acceptance of its reflector."""
+        """Measuring setup with the first point as robot.yaml declares it, and the acceptance of its reflector.
+
+        Parameters
+        ----------
+        model : RobotModel
+            The robot.
+        payload : float, optional
+            Mass, kg; by default as declared.
+
+        Returns
+        -------
+        MeasuringSetup
+            The setup.
+        """
         point = next(iter(model.config.points), None)
         return cls(
             payload=payload, acceptance=None if point is None else model.config.points[point].acceptance

@@ -15,7 +15,15 @@ if TYPE_CHECKING:
 
 
 class Estimator(Protocol):
-    """What `identify_dynamics` takes as estimator: a `name` for files and messages, a `summary` for the help page, and `fit`."""
+    """Interface of the estimators that `identify_dynamics` takes.
+
+    Attributes
+    ----------
+    name : str
+        Name in files, messages and on the command line.
+    summary : str
+        One line for the help page.
+    """
 
     name: ClassVar[EstimatorName]
     summary: ClassVar[str]
@@ -45,7 +53,15 @@ class Estimator(Protocol):
 
 @dataclass(frozen=True)
 class OLS:
-    """Ordinary least squares: all equations weigh the same."""
+    """Ordinary least squares: all equations weigh the same.
+
+    Examples
+    --------
+    >>> from flexcal import OLS, RobotModel, identify_dynamics
+    >>> model = RobotModel.from_yaml("examples/tx40/robot.yaml")
+    >>> identify_dynamics(model, ["examples/tx40/exciting.parquet"], estimator=OLS(), friction="classic")
+    <DynamicsIdentification of staubli_tx40: 61 of 61 base parameters by ols, relative torque error ... % in the fit>
+    """
 
     name: ClassVar[EstimatorName] = "ols"
     summary: ClassVar[str] = "ordinary least squares"
@@ -59,7 +75,10 @@ class OLS:
 
 @dataclass(frozen=True)
 class WLS:
-    """Weighted least squares: every joint by the variance of its residuals, which may be correlated in time."""
+    """Weighted least squares: each joint and log is weighted by the variance of its residuals, which may be correlated in time.
+
+    The default of `identify_dynamics`.
+    """
 
     name: ClassVar[EstimatorName] = "wls"
     summary: ClassVar[str] = "weighted least squares, every joint and log by its own noise"
@@ -73,8 +92,10 @@ class WLS:
 
 @dataclass(frozen=True)
 class SDP:
-    """Weighted least squares under the constraint that every link is physically consistent, by semidefinite programming (Sousa and
-    Cortesão 2014)."""
+    """Weighted least squares with physically consistent links, by semidefinite programming (Sousa and Cortesão 2014).
+
+    The inertials can be used in a simulation and in a URDF.
+    """
 
     name: ClassVar[EstimatorName] = "sdp"
     summary: ClassVar[str] = "as wls, with physically consistent inertials"
@@ -102,7 +123,7 @@ class IRLS:
 
 @dataclass(frozen=True)
 class TLS:
-    """Total least squares: the noise of positions in the regressor is estimated and taken into account (Van Huffel and Vandewalle 1991)."""
+    """Total least squares: takes account of the noise of positions in the regressor (Van Huffel and Vandewalle 1991)."""
 
     name: ClassVar[EstimatorName] = "tls"
     summary: ClassVar[str] = "total least squares, with the noise of the positions"
@@ -117,7 +138,10 @@ class TLS:
 
 @dataclass(frozen=True)
 class IV:
-    """Instrumental variables from the simulated closed loop (Janot, Vandanjon and Gautier 2014)."""
+    """Instrumental variables from the simulated closed loop (Janot, Vandanjon and Gautier 2014).
+
+    Without the bias of noisy velocities; needs `controller:` in robot.yaml.
+    """
 
     name: ClassVar[EstimatorName] = "iv"
     summary: ClassVar[str] = (
@@ -133,7 +157,10 @@ class IV:
 
 @dataclass(frozen=True)
 class DIDIM:
-    """Direct and inverse dynamic identification model: from torques alone, by simulation (Gautier, Janot and Vandanjon 2013)."""
+    """Direct and inverse dynamic identification model: from torques alone, by simulation (Gautier, Janot and Vandanjon 2013).
+
+    Needs `controller:` in robot.yaml.
+    """
 
     name: ClassVar[EstimatorName] = "didim"
     summary: ClassVar[str] = (
@@ -149,7 +176,7 @@ class DIDIM:
 
 @dataclass(frozen=True)
 class EnergyModel:
-    """Least squares of the energy balance of the whole robot: without accelerations (Gautier and Khalil 1988)."""
+    """Least squares of the energy balance of the whole robot; needs no accelerations (Gautier and Khalil 1988)."""
 
     name: ClassVar[EstimatorName] = "energy"
     summary: ClassVar[str] = "energy of all joints, one equation per row"
@@ -163,7 +190,7 @@ class EnergyModel:
 
 @dataclass(frozen=True)
 class PowerModel:
-    """Least squares of the power balance of the whole robot, one equation a sample (Gautier 1997)."""
+    """Least squares of the power balance of the whole robot, one equation per sample (Gautier 1997)."""
 
     name: ClassVar[EstimatorName] = "power"
     summary: ClassVar[str] = "power of all joints, one equation per row"
@@ -177,7 +204,10 @@ class PowerModel:
 
 @dataclass(frozen=True)
 class ML:
-    """Maximum likelihood for periodic excitation, in the frequency domain (Swevers, Ganseman, Tükel, De Schutter and Van Brussel 1997)."""
+    """Maximum likelihood in the frequency domain for periodic excitation.
+
+    The noise comes from four or more periods of one motion (Swevers, Ganseman, Tükel, De Schutter and Van Brussel 1997).
+    """
 
     name: ClassVar[EstimatorName] = "ml"
     summary: ClassVar[str] = "maximum likelihood, with noise from four or more periods of one motion"
@@ -191,7 +221,7 @@ class ML:
 
 @dataclass(frozen=True)
 class EKF:
-    """Extended Kalman filter and smoother: states and parameters together (Gautier and Poignet 2001)."""
+    """Extended Kalman filter and smoother that estimates states and parameters together (Gautier and Poignet 2001)."""
 
     name: ClassVar[EstimatorName] = "ekf"
     summary: ClassVar[str] = "extended Kalman filter"

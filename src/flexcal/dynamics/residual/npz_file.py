@@ -57,9 +57,39 @@ def write_learned_residual(path: Path, learned: LearnedResidual, estimates: Path
 
 
 def read_learned_residual(path: str | Path, estimates: str | Path) -> LearnedResidual:
-    """Read the file that `identify dynamics --learn-residual` writes; needs no scikit-learn.
+    """Read the learned residual torques that `identify dynamics --learn-residual` writes; needs no scikit-learn.
 
-    Raises `InputError` where the file cannot be read, and where it was learned with other dynamics than those of the file `estimates`.
+    Parameters
+    ----------
+    path : str or Path
+        The file learned_residual.npz.
+    estimates : str or Path
+        The estimates.yaml of the dynamics that it was learned with.
+
+    Returns
+    -------
+    LearnedResidual
+        Its `torque` predicts mean and standard deviation of the residual torques.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be read, and where it was learned with other dynamics than those of `estimates`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from dataclasses import replace
+    >>> from flexcal import RobotModel, identify_dynamics, read_learned_residual, read_recording
+    >>> model = RobotModel.from_yaml("examples/tx40/robot.yaml")
+    >>> log = read_recording("examples/tx40/exciting.parquet", model)
+    >>> log = replace(log, q=log.q[:14000], torque=log.torque[:14000])
+    >>> dynamics = identify_dynamics(model, [log], friction="classic", learn_residual=True)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     dynamics.write(folder)
+    ...     learned = read_learned_residual(f"{folder}/learned_residual.npz", f"{folder}/estimates.yaml")
+    >>> learned.shares.shape
+    (6, 6)
     """
     path, again = Path(path), "run 'flexcal identify dynamics --learn-residual' again"
     file = NpzFile(path, again)

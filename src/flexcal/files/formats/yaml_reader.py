@@ -50,11 +50,32 @@ class YamlFile:
 
 
 def read_yaml(path: str | Path, cls: type[T]) -> T:
-    """Read a YAML file into `cls`, usually a frozen dataclass.
+    """Read a YAML file into a class, usually a frozen dataclass.
 
-    Raises `InputError` with one sentence that names the file and the line, for a file that cannot be read,
-    text that is not YAML, a key that is unknown, missing or given twice, and a value of the wrong type. A
-    `FlexcalError` or `ValueError` of a dataclass's `__post_init__` is placed at the line of its mapping.
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    cls : type
+        Class whose annotations say what the keys and their types are.
+
+    Returns
+    -------
+    object
+        An instance of `cls`.
+
+    Raises
+    ------
+    InputError
+        One sentence that names the file and the line, for a file that cannot be read, text that is not YAML, a key that is
+        unknown, missing or given twice, and a value of the wrong type. A `FlexcalError` or `ValueError` of a dataclass's
+        `__post_init__` is placed at the line of its mapping.
+
+    Examples
+    --------
+    >>> from flexcal import CellConfig, read_yaml
+    >>> read_yaml("examples/tx90l/cell.yaml", CellConfig).sensors.torque_noise
+    1.0
     """
     return read_yaml_file(path).structure(cls)
 

@@ -45,18 +45,43 @@ _SENSED = {
 
 @dataclass(frozen=True, eq=False)
 class FrequencyResponse:
-    """Measured G from motor torque (N m) to motor acceleration (rad/s²) of the excited axes: L lines, n axes.
+    """Measured frequency response G from motor torques (N m) to motor accelerations (rad/s²) of the excited axes: L lines, n axes.
 
-    frequencies_hz (L,); response (L, n, n) complex, rows are accelerations, hold corrected;
-    covariance (L, n², n²) complex Hermitian, of vec (column-major) of `response`: noise and stochastic nonlinear
-    distortion, the total of one realisation over R; noise_covariance the same for the noise alone;
-    degrees_of_freedom behind `covariance`; realisations (R, L, n, n), those of eq. (20); joints: names of the axes;
-    q_mean (all joints,) rad, the mean motor position to linearise at; payload kg or None; pose: its number in the
-    plan; sample_time s; average: how the realisations were averaged; odd_distortion (n,) of each axis, relative to its
-    excited acceleration, where the plan left lines out to see it.
-
-    sensors: names of the S sensors on the arm that recorded too; sensor_response (L, S, n), from motor torque to their readings
-    (m/s², m/s or m per N m); joint_covariance (L, (n + S) n, (n + S) n) of vec of all rows, axes first. None without sensors.
+    Attributes
+    ----------
+    frequencies_hz : ndarray
+        Frequencies (L,), Hz.
+    response : ndarray
+        G (L, n, n), complex; rows are accelerations; corrected for the hold.
+    covariance : ndarray
+        Covariance (L, n², n²), complex Hermitian, of vec (column-major) of `response`: noise and stochastic nonlinear distortion,
+        the total of one realisation over R.
+    noise_covariance : ndarray
+        The same for the noise alone.
+    degrees_of_freedom : float
+        Degrees of freedom of `covariance`.
+    realisations : ndarray
+        Responses (R, L, n, n) of the realisations, those of eq. (20).
+    joints : tuple of str
+        Names of the axes.
+    q_mean : ndarray
+        Mean motor positions of all joints, rad, to linearise at.
+    payload : float or None
+        Mass, kg.
+    pose : int
+        Number of the pose in the plan.
+    sample_time : float
+        Sample time, s.
+    average : str
+        How the realisations were averaged.
+    odd_distortion : ndarray or None
+        Odd distortion (n,) of each axis, relative to its excited acceleration, where the plan left lines out to see it.
+    sensors : tuple of str
+        Names of the S sensors on the arm that recorded too.
+    sensor_response : ndarray or None
+        Response (L, S, n) from motor torques to their readings, m/s², m/s or m per N m; None without sensors.
+    joint_covariance : ndarray or None
+        Covariance (L, (n + S) n, (n + S) n) of vec of all rows, axes first; None without sensors.
     """
 
     frequencies_hz: np.ndarray
@@ -99,7 +124,18 @@ class FrequencyResponse:
         return _elements(self.stacked_covariance, self.response.shape[-1])
 
     def at_lines(self, rows: slice) -> "FrequencyResponse":
-        """The response at some of its lines."""
+        """Frequency response at some of the lines.
+
+        Parameters
+        ----------
+        rows : slice
+            Indices of the lines.
+
+        Returns
+        -------
+        FrequencyResponse
+            The response at these lines.
+        """
         own = (
             "frequencies_hz",
             "response",
@@ -141,7 +177,13 @@ class FrequencyResponse:
         return self.covariance / (vec[:, :, None] * vec[:, None, :].conj())
 
     def save(self, path: str | Path) -> None:
-        """Write everything into one .npz file, atomically."""
+        """Write everything into one .npz file, atomically.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write.
+        """
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         values["joints"] = np.array(self.joints)
         values["payload"] = np.nan if self.payload is None else self.payload
@@ -153,7 +195,23 @@ class FrequencyResponse:
 
     @classmethod
     def load(cls, path: str | Path) -> "FrequencyResponse":
-        """Read what `save` wrote; `InputError` where the file is missing or something else."""
+        """Read what `save` wrote.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        FrequencyResponse
+            The response.
+
+        Raises
+        ------
+        InputError
+            Where the file is missing or something else.
+        """
         if not current_path(path).exists():
             raise InputError(
                 "E-FRF-031", f"{path} does not exist; run 'flexcal identify response' to make it."
@@ -208,15 +266,52 @@ def frequency_response(
     joint_names: Sequence[str] | None = None,
     pooled_lines: int = POOLED_LINES,
 ) -> FrequencyResponse:
-    """The frequency response of one pose of a multisine experiment, from its recordings in any order.
+    """Frequency response of one pose of a multisine experiment, from its recordings in any order.
 
-    The recordings are streamed, those of other poses passed over: of each only the spectra at the lines are kept. Settle
-    periods are dropped, periods averaged, the two signs subtracted, (plus - minus)/2, and then
-    Ĝ^[r] = (-ω² Q) Γ⁻¹ for each realisation (20), with the torque spectrum corrected for the hold.
-    `pooled_lines` neighbouring lines share one covariance, more in the proportion of outputs to axes where sensors on the
-    arm recorded too. `joint_names`: of the excited axes. Raises `FlexcalError` where a recording is missing, double, too
-    short or does not fit the plan, where there are fewer than two realisations (then see `local_polynomial_responses`),
-    or the excitation does not reach every axis.
+    The recordings are streamed: of each only the spectra at the lines are kept. Settle periods are dropped, periods averaged, the
+    two signs subtracted, (plus - minus)/2, and then Ĝ^[r] = (-ω² Q) Γ⁻¹ for each realisation (20), with the torque spectrum
+    corrected for the hold.
+
+    Parameters
+    ----------
+    plan : MultisinePlan
+        Plan of the experiment.
+    pose : int
+        Index of the pose in the plan.
+    recordings : iterable of Recording
+        Labelled recordings; those of other poses are passed over.
+    average : {"arithmetic", "logarithmic", "harmonic", "h1", "joint_input_output", "errors_in_variables"}
+        How the realisations are averaged.
+    joint_names : sequence of str, optional
+        Names of the excited axes.
+    pooled_lines : int
+        Number of neighbouring lines that share one covariance; more in the proportion of outputs to axes where sensors on the arm
+        recorded too.
+
+    Returns
+    -------
+    FrequencyResponse
+        From motor torques to motor accelerations, `response` (L, n, n) with its `covariance`.
+
+    Raises
+    ------
+    FlexcalError
+        Where a recording is missing, double, too short or does not fit the plan, where there are fewer than two realisations (then
+        see `local_polynomial_responses`), or the excitation does not reach every axis.
+
+    Examples
+    --------
+    Joint 2 of the virtual cell alone is excited:
+
+    >>> from dataclasses import replace
+    >>> from flexcal import RobotModel, VirtualCell, frequency_plan, frequency_response
+    >>> model = RobotModel.from_yaml("examples/tx90l/robot.yaml", estimates=False)
+    >>> plan = frequency_plan(model, "examples/tx90l/frequency_poses.csv", "default", seed=0)
+    >>> plan = replace(plan, joints=(1,), amplitude=plan.amplitude[1:2], poses=plan.poses[:1])
+    >>> plan = replace(plan, realisations=3, signs=False, periods=2, settle_periods=1)
+    >>> measured = frequency_response(plan, 0, VirtualCell(model).record(plan))
+    >>> measured.response.shape
+    (154, 1, 1)
     """
     (records,) = by_pose(plan, recordings, keep_periods, [pose])
     return response_of(records, average, joint_names=joint_names, pooled_lines=pooled_lines)
@@ -230,7 +325,38 @@ def frequency_responses(
     joint_names: Sequence[str] | None = None,
     pooled_lines: int = POOLED_LINES,
 ) -> Iterator[FrequencyResponse]:
-    """`frequency_response` for every pose of the plan in one pass over its recordings; each is yielded when complete."""
+    """Frequency response of every pose of a multisine experiment, in one pass over its recordings.
+
+    Parameters
+    ----------
+    plan : MultisinePlan
+        Plan of the experiment.
+    recordings : iterable of Recording
+        Labelled recordings, in any order.
+    average, joint_names, pooled_lines
+        As `frequency_response` takes them.
+
+    Returns
+    -------
+    iterator of FrequencyResponse
+        Each is yielded when the recordings of its pose are complete.
+
+    Raises
+    ------
+    FlexcalError
+        As `frequency_response` does.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> from flexcal import RobotModel, VirtualCell, frequency_plan, frequency_responses
+    >>> model = RobotModel.from_yaml("examples/tx90l/robot.yaml", estimates=False)
+    >>> plan = frequency_plan(model, "examples/tx90l/frequency_poses.csv", "default", seed=0)
+    >>> plan = replace(plan, joints=(1,), amplitude=plan.amplitude[1:2], poses=plan.poses[:2])
+    >>> plan = replace(plan, realisations=3, signs=False, periods=2, settle_periods=1)
+    >>> [measured.pose for measured in frequency_responses(plan, VirtualCell(model).record(plan))]
+    [0, 1]
+    """
     for records in by_pose(plan, recordings, keep_periods):
         yield response_of(records, average, joint_names=joint_names, pooled_lines=pooled_lines)
 

@@ -53,11 +53,40 @@ _SOURCE_POSES = 200
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AccuracyMap(Result):
-    """Result of `accuracy_map`: the map as it is to be believed, its worst rows, where its errors come from, and what poses outside say.
+    """Result of `accuracy_map`: predicted error of the tool over the working volume, and where it comes from.
 
-    `scale` is what verification poses say of the map, `before` of the uncalibrated robot; `unmeasured` what there is to say of a point that
-    the calibration did not measure. `box` (2, 3) m, None for given poses or anywhere; `sources` over all poses, `worst_sources` at each of
-    the `worst` rows. `record` says what this comes from. `sample` says which of very many verification points were taken.
+    Attributes
+    ----------
+    model : RobotModel
+        The calibrated robot.
+    reach : Propagation
+        Poses of the map, and how parameters act on the tool there.
+    predicted : PredictedAccuracy
+        Predicted errors: `position` (N, 3), `mean` and `p95` (N,), m.
+    box : ndarray or None
+        Working volume, smallest and largest x, y, z (2, 3), m; None for given poses or anywhere.
+    worst : ndarray
+        Rows of the largest errors.
+    sources : dict of float
+        Shares of the sources of error, over all poses.
+    worst_sources : dict of ndarray
+        The same at each of the `worst` rows.
+    scale : ErrorScale or None
+        What verification poses say of the map.
+    before : UncalibratedErrors or None
+        Errors of the uncalibrated robot at the verification poses.
+    verification : PredictionErrors or None
+        Errors of the calibrated robot at the verification poses.
+    unmeasured : tuple of str
+        Remarks on a point that the calibration did not measure.
+    fitted : tuple of str
+        Files or points among the verification that the calibration was made from.
+    outside : str
+        Which verification poses lie outside the joint ranges of the calibration.
+    sample : StratifiedSample or None
+        Which of very many verification points were taken.
+    record : RunRecord
+        What the result comes from.
     """
 
     reach: Propagation
@@ -90,7 +119,18 @@ class AccuracyMap(Result):
         return "\n".join([self.headline, f"sources: {shares}", *self.remarks, self.trust.sentence])
 
     def report(self, path: str | Path) -> Path:
-        """Write the map as one HTML page; returns its path."""
+        """Write the map as one HTML page.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
         path = Path(path)
         study = MapStudy(self.model, self.predicted, self.box, self.document(), self.scale, self.verification)
         write_page(path, map_page(study))
@@ -197,7 +237,7 @@ def accuracy_map(
     seed : int
         Seed of the random poses.
     progress : Progress
-        Told of the stages and their shares.
+        Called with the stage and the share of it that is done.
 
     Returns
     -------
@@ -208,6 +248,16 @@ def accuracy_map(
     ------
     FlexcalError
         Where the robot does not reach the box, and where the verification poses were measured from another place than the calibration's.
+
+    Examples
+    --------
+    >>> from flexcal import RobotModel, accuracy_map, calibrate, read_poses
+    >>> model = RobotModel.from_yaml("examples/ur5_tracker/robot.yaml", estimates=False)
+    >>> poses = read_poses("examples/ur5_tracker/grid.csv", model).subset(slice(None, None, 13))
+    >>> robot = calibrate(model, poses, terms=["kinematic"]).robot
+    >>> map = accuracy_map(robot, count=50)
+    >>> map.predicted.p95.shape
+    (50,)
     """
     model = robot.model
     stations = [s for s in model.stations.names if is_station_identified(model, s)]

@@ -73,7 +73,7 @@ def calibrate(
     elasticity : {"reestimated", "marginalised"}
         How the uncertainty of stiffness and inertia enters; both give the same estimate to first order.
     progress : Progress
-        Told of the stages and their shares.
+        Called with the stage and the share of it that is done.
 
     Returns
     -------
@@ -89,11 +89,14 @@ def calibrate(
 
     Examples
     --------
+    Kinematic terms only, from some of the measured poses; without `terms`, cross-validation selects them.
+
     >>> from flexcal import RobotModel, calibrate, read_poses
-    >>> model = RobotModel.from_yaml("examples/ur5_tracker/robot.yaml")
-    >>> calibration = calibrate(model, read_poses("examples/ur5_tracker/grid.csv", model))
-    >>> print(f"{calibration.errors.mean * 1e3:.2f} mm")
-    0.08 mm
+    >>> model = RobotModel.from_yaml("examples/ur5_tracker/robot.yaml", estimates=False)
+    >>> poses = read_poses("examples/ur5_tracker/grid.csv", model).subset(slice(None, None, 13))
+    >>> calibration = calibrate(model, poses, terms=["kinematic"])
+    >>> print(f"{calibration.errors.mean * 1e3:.1f} mm at {len(poses)} poses")
+    0.1 mm at 77 poses
     """
     _require_uncalibrated(model)
     require_points(poses)

@@ -60,13 +60,38 @@ from flexcal.units import MILLIMETRE
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(Identification):
-    """Result of `calibrate`: the calibrated robot, its errors before and after, and what the points say of it.
+    """Result of `calibrate`: the calibrated robot, its errors before and after, and what the points tell about it.
 
-    `nominal` is the robot before; `before` are its errors; `rigid` is the fit without elasticity and further terms, `selected` the one
-    that `estimate` is of; `selection`, and `validated`, the errors of `selected` at poses left out, are None where the terms were
-    given. `bearings` says which bearing axes the points prefer; `stiffness` is what stage 1 left in the estimates, where they were
-    read from a file. Of more points than a fit takes, `sample` says which were fitted, and `everywhere` are the errors of `selected`
-    at all of them. `estimates` is the file that the estimate was stored in, `command` the command line, where there was one.
+    Attributes
+    ----------
+    model : RobotModel
+        The calibrated robot.
+    estimate : Estimate
+        Geometric parameters, with stiffness and inertia as prior and points together determine them.
+    nominal : RobotModel
+        The robot before.
+    before : UncalibratedErrors
+        Errors of the robot before.
+    rigid : GeometricFit
+        Fit without elasticity and further terms.
+    selection : TermSelection or None
+        Cross-validation of the terms; None where they were given.
+    selected : GeometricFit
+        The fit that `estimate` is of.
+    bearings : BearingAxes or None
+        Which bearing axes the points prefer.
+    stiffness : Estimate or None
+        What stage 1 left in the estimates, where they were read from a file.
+    validated : CrossValidation or None
+        Errors of `selected` at poses left out; None where the terms were given.
+    sample : StratifiedSample or None
+        Which points were fitted, where there are more than a fit takes.
+    everywhere : ErrorStatistics or None
+        Errors of `selected` at all points, where a sample was fitted.
+    estimates : Path or None
+        File that the estimate was stored in.
+    command : str
+        The command line, where there was one.
     """
 
     block: ClassVar[Block] = "calibration"

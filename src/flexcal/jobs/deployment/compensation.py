@@ -28,11 +28,24 @@ _FAR = 0.25
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Compensation(Result):
-    """Result of `compensate`: motor commands for tool `targets`.
+    """Result of `compensate`: motor commands for targets of the tool.
 
-    `commands` has the command of every target, or the reason why it has none. `start` (n,): where inverse kinematics started, None with
-    joint positions. `nominal` is the uncalibrated robot with the `measured` points where they were found. `table` is the file that the
-    targets were read from, if any.
+    Attributes
+    ----------
+    model : RobotModel
+        The calibrated robot.
+    targets : ToolTargets
+        Where the tool is to be.
+    commands : MotorCommands
+        Command of every target, or the reason why it has none.
+    start : ndarray or None
+        Joint positions (n,) where inverse kinematics started; None where the targets have joint positions.
+    nominal : RobotModel
+        The uncalibrated robot with the `measured` points at their calibrated positions.
+    measured : tuple of str
+        Points that the calibration measured.
+    table : TableFile or None
+        File that the targets were read from.
     """
 
     targets: ToolTargets
@@ -140,7 +153,7 @@ def compensate(
         Joint positions (n,), rad or m, where inverse kinematics starts for targets without their own; by default a posture far from
         singular.
     progress : Progress
-        Told of the stages and their shares.
+        Called with the stage and the share of it that is done.
 
     Returns
     -------
@@ -151,6 +164,20 @@ def compensate(
     ------
     FlexcalError
         Where no target can be reached, for points that are in another frame than said, and for a station that was not calibrated.
+
+    Examples
+    --------
+    The commands that bring the tool to where the nominal robot would have it at `q`:
+
+    >>> import numpy as np
+    >>> from flexcal import RobotModel, ToolTargets, calibrate, compensate, read_poses
+    >>> model = RobotModel.from_yaml("examples/ur5_tracker/robot.yaml", estimates=False)
+    >>> poses = read_poses("examples/ur5_tracker/grid.csv", model).subset(slice(None, None, 13))
+    >>> robot = calibrate(model, poses, terms=["kinematic"]).robot
+    >>> q = np.array([[0.3, -1.2, 1.5, 0.0, 1.6, 0.0]])
+    >>> targets = ToolTargets(pose=np.array([1]), target=np.array(["smr"]), q=q)
+    >>> compensate(robot, targets).commands.reached
+    array([ True])
     """
     model, nominal = robot.probable, robot.with_points
     if frame is not None:

@@ -25,8 +25,16 @@ _BLOCK = 20_000
 class Prediction(Result):
     """Result of `predict`: where the real tool is.
 
-    `tool` has its positions and orientations in the base frame; `beside` (N, 3) m is how far these are from where the nominal robot has
-    them. `unambiguous` (N,): the flank of every backlash is certain there.
+    Attributes
+    ----------
+    model : RobotModel
+        The calibrated robot.
+    tool : ToolTargets
+        Positions and orientations of the tool in the base frame.
+    beside : ndarray
+        Distance (N, 3), m, of these positions from those of the nominal robot.
+    unambiguous : ndarray
+        Whether (N,) the flank of every backlash is certain.
     """
 
     tool: ToolTargets
@@ -63,7 +71,7 @@ def predict(robot: CalibratedRobot, commands: ToolTargets, *, progress: Progress
         Commanded joint positions `q` (N, n), rad or m, the names of the points (N,) that are looked at, and payloads (N,), kg, where
         they are not as declared.
     progress : Progress
-        Told of the stages and their shares.
+        Called with the stage and the share of it that is done.
 
     Returns
     -------
@@ -77,9 +85,15 @@ def predict(robot: CalibratedRobot, commands: ToolTargets, *, progress: Progress
 
     Examples
     --------
-    >>> from flexcal import CalibratedRobot, predict, read_targets
-    >>> robot = CalibratedRobot.from_yaml("robot.yaml")  # doctest: +SKIP
-    >>> predict(robot, read_targets("commands.csv", robot.model)).tool.position  # doctest: +SKIP
+    >>> import numpy as np
+    >>> from flexcal import RobotModel, ToolTargets, calibrate, predict, read_poses
+    >>> model = RobotModel.from_yaml("examples/ur5_tracker/robot.yaml", estimates=False)
+    >>> poses = read_poses("examples/ur5_tracker/grid.csv", model).subset(slice(None, None, 13))
+    >>> robot = calibrate(model, poses, terms=["kinematic"]).robot
+    >>> q = np.array([[0.3, -1.2, 1.5, 0.0, 1.6, 0.0]])
+    >>> commands = ToolTargets(pose=np.array([1]), target=np.array(["smr"]), q=q)
+    >>> predict(robot, commands).tool.position.round(2)
+    array([[0.55, 0.28, 0.24]])
     """
     if commands.q is None:
         raise FlexcalError("E-RUN-097", "the commands hold no joint positions q; give those of the motors.")

@@ -76,7 +76,7 @@ def identify_dynamics(
     jobs : int
         Number of logs read in parallel, each in its own process.
     progress : Progress
-        Told of the stages and their shares.
+        Called with the stage and the share of it that is done.
 
     Returns
     -------
@@ -89,6 +89,16 @@ def identify_dynamics(
     FlexcalError
         Where the logs do not fit the robot, for a log with a payload, one that is given twice, torques unlike the links' weight; with
         `learn_residual` for a `flexible` robot or without scikit-learn.
+
+    Examples
+    --------
+    >>> from flexcal import RobotModel, identify_dynamics
+    >>> model = RobotModel.from_yaml("examples/tx40/robot.yaml")
+    >>> dynamics = identify_dynamics(model, ["examples/tx40/exciting.parquet"], friction="classic")
+    >>> dynamics.estimate.rank
+    61
+    >>> dynamics.residuals[0].shape[1]
+    6
     """
     if learn_residual:
         _require_rigid_and_learnable(flexible)

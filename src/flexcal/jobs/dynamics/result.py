@@ -41,14 +41,52 @@ from flexcal.report.pages import dynamics_checks
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DynamicsIdentification(Identification):
-    """Result of `identify_dynamics`: the estimate, how well it predicts the torques it was made from and those it never saw.
+    """Result of `identify_dynamics`: the estimate, and how well it predicts torques inside and outside the fit.
 
-    The last share `hold_out` of the time of every log was kept out of the fit, or the logs `validated` were. `motors` are the joints
-    whose motors have equations of their own; `signals` are as `preprocessing_document` has them. `weight_faults` are torques unlike the
-    links' weight that were accepted, `weight_shares` the identified weight of the links over that of the URDF, empty where it was
-    accepted. `external` tells how much of the measured external torques the motors' show, None without a force sensor. `learned` is what
-    was learned beside the estimate, None where nobody asked for it; `predictions` are those of all logs. `estimates` is the file that it
-    was stored in, None where it was not; `record` says what it comes from.
+    Attributes
+    ----------
+    model : RobotModel
+        The robot with the estimate.
+    estimate : Estimate
+        Base parameters of inertia, and friction, SI units.
+    estimator : str
+        Name of the estimator.
+    structural_rank : int
+        Number of parameters that any motion can determine.
+    train : RegressionData
+        Equations of the fit.
+    held_out : RegressionData or None
+        Equations kept out of the fit.
+    hold_out : float
+        Share of the time at the end of every log that was kept out of the fit.
+    validated : tuple of Path
+        Logs that were kept out of the fit.
+    essential : EssentialParameters
+        Parameters that the torques need, by their significance.
+    friction : FrictionSelection
+        Choice of the friction terms.
+    motors : tuple of str
+        Joints whose motors have equations of their own.
+    treatment : Preprocessing
+        Filters and decimation of the logs.
+    signals : mapping
+        The same as results.json has it (`preprocessing_document`).
+    weight_faults : tuple of str
+        Torques unlike the links' weight that were accepted.
+    weight_shares : mapping of GravityRatio
+        Identified weight of the links over that of the URDF; empty where it was accepted.
+    external : ExternalShare or None
+        How much of the measured external torques appears in the motors' torques; None without a force sensor.
+    learned : LearnedDynamics or None
+        Learned residual torques, where they were asked for.
+    predictions : tuple of TorquePrediction
+        Measured and predicted torques of all logs.
+    seconds : float
+        Time that the estimator took.
+    estimates : Path or None
+        File that the estimate was stored in.
+    record : RunRecord
+        What the result comes from.
     """
 
     block: ClassVar[Block] = "dynamics"

@@ -86,10 +86,26 @@ DEFAULT_REQUEST = FrequencyRequest()
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DesignedFrequency(Result):
-    """Result of `design_frequency`: a plan and what it will tell; the `choice` of its poses and their `curve` where they were chosen.
+    """Result of `design_frequency`: a plan of frequency experiments and its predicted precision.
 
-    `flat` is the same with equal amplitudes. `curve` holds numbers of poses and the largest standard deviation of a stiffness with as many,
-    chosen and at random, (3, K). `file` is that of the plan, where it was written; `record` says what it comes from.
+    Attributes
+    ----------
+    model : RobotModel
+        The robot that the plan is for.
+    planned : PlannedResponses
+        The plan with its predicted standard deviations.
+    flat : PlannedResponses
+        The same with equal amplitudes.
+    choice : FrequencyPoseSelection or None
+        Choice of the poses, where they were chosen.
+    curve : ndarray or None
+        Numbers of poses, and the largest standard deviation of a stiffness with as many, chosen and at random, (3, K).
+    placements : tuple of Placement
+        What holding the payload elsewhere would change.
+    file : Path or None
+        File of the plan, where it was written.
+    record : RunRecord
+        What the result comes from.
     """
 
     planned: PlannedResponses
@@ -114,7 +130,18 @@ class DesignedFrequency(Result):
         )
 
     def report(self, path: str | Path) -> Path:
-        """Write the plan's figures as one HTML page; returns its path."""
+        """Write the plan's figures as one HTML page.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
         path = Path(path)
         study = FrequencyDesignStudy(self.model, self.planned, self.flat, self.curve, self.document())
         write_page(path, frequency_page(study))
@@ -187,7 +214,7 @@ def design_frequency(
     sensors : ResponseSensors
         Resolution of the encoders and noise of the torques.
     progress : Progress
-        Told of the stages and their shares.
+        Called with the stage and the share of it that is done.
 
     Returns
     -------
@@ -199,6 +226,18 @@ def design_frequency(
     FlexcalError
         Where the robot declares no elastic joint or no controller, poses are missing or cannot be excited, too few can be found, or the
         desired standard deviation is out of reach.
+
+    Examples
+    --------
+    Equal amplitudes in one pose; by default poses are chosen and amplitudes shaped.
+
+    >>> import numpy as np
+    >>> from flexcal import FrequencyRequest, RobotModel, design_frequency
+    >>> model = RobotModel.from_yaml("examples/tx90l/robot.yaml", estimates=False)
+    >>> poses = np.array([[0.0, -0.5, -1.6, 0.65, -1.7, 0.0]])
+    >>> design = design_frequency(model, FrequencyRequest(kind="default", poses=poses))
+    >>> design.plan.joints
+    (0, 1, 2)
     """
     _require_all(model, request)
     kind, poses, choice = request.kind, request.poses, None

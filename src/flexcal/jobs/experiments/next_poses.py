@@ -31,10 +31,30 @@ from flexcal.units import MILLIMETRE
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DesignedNextPoses(Result):
-    """Result of `design_next_poses`: the next poses, best first, up to where to stop; `plan` is None where nothing is left to measure.
+    """Result of `design_next_poses`: the next poses to measure, best first, and when to stop.
 
-    `pool` are the given poses they were chosen from, if any; else `seed` drew the random ones. `file` is that of the plan, where it was
-    written.
+    Attributes
+    ----------
+    model : RobotModel
+        The robot that the plan is for.
+    plan : PosePlan or None
+        The next poses up to where to stop; None where nothing is left to measure.
+    poses : NextPoses
+        The next poses with the tool error predicted after each.
+    stop : int or None
+        Number of poses after which to stop; None where those asked for do not suffice.
+    desired_error : float or None
+        Predicted tool error, m, at which no more poses are taken.
+    seed : int
+        Seed of the random poses, where none were given.
+    working : WorkingVolume or None
+        Where the tool error counts; None for anywhere.
+    pool : PosePool or None
+        Given poses that these were chosen from.
+    file : Path or None
+        File of the plan, where it was written.
+    record : RunRecord
+        What the result comes from.
     """
 
     plan: PosePlan | None
@@ -59,7 +79,23 @@ class DesignedNextPoses(Result):
         return self.headline
 
     def report(self, path: str | Path) -> Path:
-        """Write the plan's figures as one HTML page; returns its path. Raises `FlexcalError` where nothing is left to measure."""
+        """Write the plan's figures as one HTML page.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        FlexcalError
+            Where nothing is left to measure.
+        """
         if self.plan is None:
             raise FlexcalError("E-RUN-096", "no more poses are needed, so there is no plan to show.")
         return write_plan_page(Path(path), self.model, self.plan, self.document(), self.working)
@@ -107,7 +143,7 @@ def design_next_poses(
         How many poses at most, by which criterion (c, A or D), from which candidates; they end where the predicted tool error is the
         desired one, or without that where more poses only average noise.
     progress : Progress
-        Told of the stages and their shares.
+        Called with the stage and the share of it that is done.
 
     Returns
     -------
@@ -118,6 +154,15 @@ def design_next_poses(
     ------
     FlexcalError
         For another criterion, too few candidates, and poses measured with another target or from another station.
+
+    Examples
+    --------
+    >>> from flexcal import PoseRequest, RobotModel, design_next_poses, read_poses
+    >>> model = RobotModel.from_yaml("examples/ur5_tracker/robot.yaml", estimates=False)
+    >>> measured = read_poses("examples/ur5_tracker/grid.csv", model).subset(slice(None, None, 53))
+    >>> design = design_next_poses(model, measured, PoseRequest(count=4, candidates=60))
+    >>> design.plan.q.shape
+    (4, 6)
     """
     rng = np.random.default_rng([request.seed, 7])
     return _designed(CandidatePoses.of(model, request, rng, progress), measured, request, rng)

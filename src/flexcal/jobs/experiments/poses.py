@@ -64,10 +64,30 @@ class RandomPoses:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DesignedPoses(Result):
-    """Result of `design_poses`: a plan of calibration poses, why these, the way through them, and where the robot will work.
+    """Result of `design_poses`: a plan of calibration poses, with the reasons for the choice and the order of measuring.
 
-    `working` is None for anywhere. `pool` are the given poses they were chosen from, if any; else `seed` drew the random ones. `file` is
-    that of the plan, where it was written; `record` says what it comes from.
+    Attributes
+    ----------
+    model : RobotModel
+        The robot that the plan is for.
+    plan : PosePlan
+        The poses in measuring order.
+    design : PoseDesign
+        The choice and its predicted uncertainty.
+    curve : PoseCurve
+        Predicted tool error by number of poses.
+    way : MeasurementOrder
+        The way through the poses.
+    seed : int
+        Seed of the random poses, where none were given.
+    working : WorkingVolume or None
+        Where the tool error counts; None for anywhere.
+    pool : PosePool or None
+        Given poses that these were chosen from.
+    file : Path or None
+        File of the plan, where it was written.
+    record : RunRecord
+        What the result comes from.
     """
 
     plan: PosePlan
@@ -97,7 +117,18 @@ class DesignedPoses(Result):
         )
 
     def report(self, path: str | Path) -> Path:
-        """Write the plan's figures as one HTML page; returns its path."""
+        """Write the plan's figures as one HTML page.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
         return write_plan_page(Path(path), self.model, self.plan, self.document(), self.working)
 
     def document(self) -> dict[str, Any]:
@@ -176,7 +207,7 @@ def design_poses(
     request : PoseRequest
         How many poses, by which criterion, from which candidates, for which working volume.
     progress : Progress
-        Told of the stages and their shares.
+        Called with the stage and the share of it that is done.
 
     Returns
     -------
@@ -193,8 +224,8 @@ def design_poses(
     --------
     >>> from flexcal import PoseRequest, RobotModel, design_poses
     >>> model = RobotModel.from_yaml("examples/ur5_tracker/robot.yaml", estimates=False)
-    >>> len(design_poses(model, PoseRequest(count=20, candidates=200)).plan)
-    20
+    >>> len(design_poses(model, PoseRequest(count=12, candidates=60)).plan)
+    12
     """
     rng = np.random.default_rng([request.seed, 2])
     return _designed(CandidatePoses.of(model, request, rng, progress), request, rng, progress)

@@ -27,11 +27,38 @@ def reference_amplitude(kind: str) -> float:
 
 
 def frequency_plan(
-    model: RobotModel, poses_file: Path, kind: Literal["default", "paper"], seed: int
+    model: RobotModel, poses_file: str | Path, kind: Literal["default", "paper"], seed: int
 ) -> MultisinePlan:
-    """`standard_plan` in the poses of that plan in a file.
+    """Standard plan of frequency experiments in the poses that a file gives (Neubauer et al. 2015, section 4.1.3); see `standard_plan`.
 
-    Raises `InputError` where the file lacks the plan's poses, robot.yaml a controller, or a pose the room that the motion about it needs.
+    Parameters
+    ----------
+    model : RobotModel
+        Robot with elastic joints and a controller.
+    poses_file : str or Path
+        Table with the columns plan, pose, q1_deg … qn_deg.
+    kind : {"default", "paper"}
+        Which rows of the table are taken, and their payload and reference motion: as declared and 1.5°, or none and 3°.
+    seed : int
+        Seed of the random phases.
+
+    Returns
+    -------
+    MultisinePlan
+        Odd lines from 3 to 80 Hz on 0.25 Hz, with flat amplitudes.
+
+    Raises
+    ------
+    InputError
+        Where the file lacks the plan's poses, robot.yaml a controller, or a pose the room that the motion about it needs.
+
+    Examples
+    --------
+    >>> from flexcal import RobotModel, frequency_plan
+    >>> model = RobotModel.from_yaml("examples/tx90l/robot.yaml", estimates=False)
+    >>> plan = frequency_plan(model, "examples/tx90l/frequency_poses.csv", "default", seed=0)
+    >>> plan.poses.shape, plan.frequencies_hz.shape
+    ((6, 6), (154,))
     """
     room = excitation_margin(model, reference_amplitude(kind))
     return standard_plan(model, read_frequency_poses(poses_file, kind, model, room), kind, seed)
@@ -55,7 +82,7 @@ def standard_plan(
 
 
 def read_frequency_poses(
-    path: Path, kind: str, model: RobotModel, room: np.ndarray | float = 0.0
+    path: str | Path, kind: str, model: RobotModel, room: np.ndarray | float = 0.0
 ) -> np.ndarray:
     """Poses (P, n) in rad of one plan from a table with columns plan, pose, q1_deg … qn_deg.
 

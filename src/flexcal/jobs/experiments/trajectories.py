@@ -144,10 +144,24 @@ DEFAULT_REQUEST = TrajectoryRequest()
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DesignedTrajectories(Result):
-    """Result of `optimise_trajectories`: the designs of all searches, best first.
+    """Result of `design_trajectories`: the designs of all searches, best first.
 
-    `timed` are the trajectories of the best as timed joint positions, `rate_hz` a second. `assumed_friction` names the joints of which
-    robot.yaml gives no friction. `file` is that of the plan, where it was written; `record` says what it comes from.
+    Attributes
+    ----------
+    model : RobotModel
+        The robot that the plan is for.
+    designs : list of TrajectoryDesign
+        Designs of all searches, best first.
+    timed : tuple of TimedMotion
+        Trajectories of the best design as timed joint positions.
+    rate_hz : float
+        Joint positions per second in `timed`.
+    assumed_friction : tuple of str
+        Joints whose friction robot.yaml does not give.
+    file : Path or None
+        File of the plan, where it was written.
+    record : RunRecord
+        What the result comes from.
     """
 
     designs: list[TrajectoryDesign]
@@ -173,7 +187,18 @@ class DesignedTrajectories(Result):
         return "\n".join([self.headline, *self.remarks])
 
     def report(self, path: str | Path) -> Path:
-        """Write the trajectories' figures as one HTML page; returns its path."""
+        """Write the trajectories' figures as one HTML page.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
         path = Path(path)
         write_page(path, trajectory_page(self.design, self.document()))
         return path
@@ -285,7 +310,7 @@ def design_trajectories(
     rate_hz : float, optional
         Timed joint positions a second; by default 100, more where a motion is fast.
     progress : Progress
-        Told of the stages and their shares.
+        Called with the stage and the share of it that is done.
 
     Returns
     -------
@@ -296,6 +321,16 @@ def design_trajectories(
     ------
     FlexcalError
         Where limits are missing, a start has another number of joints, or no motion within the limits is found.
+
+    Examples
+    --------
+    One step of one search, for a quick plan that is not yet a good one:
+
+    >>> from flexcal import RobotModel, TrajectoryRequest, design_trajectories
+    >>> model = RobotModel.from_yaml("examples/tx90l/robot.yaml", estimates=False)
+    >>> request = TrajectoryRequest(count=1, criterion="posterior", duration=5.0, harmonics=2, searches=1, steps=1)
+    >>> len(design_trajectories(model, request).plan)
+    1
     """
     require_stated_limits(model)
     known, assumed = with_assumed_friction(model)
@@ -337,6 +372,34 @@ def plan_trajectories(
 
 
 def exciting_plan(nominal: RobotModel, *, count: int = 3, seed: int) -> TrajectoryPlan:
-    """Trajectories of stage 0 of the demonstration: without payload, of one search, by the criterion posterior."""
+    """Exciting trajectories of stage 0 of the demonstration: without payload, of one search, by the criterion posterior.
+
+    Parameters
+    ----------
+    nominal : RobotModel
+        Nominal robot with limits of position, velocity and torque.
+    count : int
+        Number of trajectories.
+    seed : int
+        Seed of the start of the search.
+
+    Returns
+    -------
+    TrajectoryPlan
+        Trajectories within all limits and without collision.
+
+    Raises
+    ------
+    FlexcalError
+        As `design_trajectories` does.
+
+    Examples
+    --------
+    >>> from flexcal import RobotModel, exciting_plan
+    >>> model = RobotModel.from_yaml("examples/tx90l/robot.yaml", estimates=False)
+    >>> plan = exciting_plan(model, count=1, seed=0)
+    >>> print(f"{len(plan)} trajectory of {plan.duration:.0f} s")
+    1 trajectory of 15 s
+    """
     request = TrajectoryRequest(count=count, criterion="posterior", searches=1, seed=seed)
     return request.optimise(nominal)[0].plan

@@ -21,9 +21,27 @@ TARGETS_BETWEEN = ", "
 
 @dataclass(frozen=True, eq=False)
 class CalibratedRobot:
-    """A calibrated robot beside the nominal one: `model` is `nominal` with the `blocks` of its estimates.
+    """A calibrated robot together with its nominal one.
 
-    `stored` is the file that these were read from, None where they were not.
+    Attributes
+    ----------
+    nominal : RobotModel
+        The robot as declared.
+    model : RobotModel
+        `nominal` with the `blocks` of its estimates.
+    blocks : mapping of Estimate
+        Estimates by block.
+    stored : Path or None
+        The file that these were read from.
+
+    Examples
+    --------
+    >>> from flexcal import RobotModel, calibrate, read_poses
+    >>> model = RobotModel.from_yaml("examples/ur5_tracker/robot.yaml", estimates=False)
+    >>> poses = read_poses("examples/ur5_tracker/grid.csv", model).subset(slice(None, None, 13))
+    >>> robot = calibrate(model, poses, terms=["kinematic"]).robot
+    >>> robot.measured
+    ('smr',)
     """
 
     nominal: RobotModel
@@ -33,9 +51,26 @@ class CalibratedRobot:
 
     @classmethod
     def from_yaml(cls, path: str | Path, estimates: str | Path | None = None) -> CalibratedRobot:
-        """Read robot.yaml and its estimates: a file, or a folder with an estimates.yaml, in place of that beside robot.yaml.
+        """Read a robot and its estimates.
 
-        Raises `FlexcalError` as reading does, and `InputError` where there is no calibration.
+        Parameters
+        ----------
+        path : str or Path
+            The file robot.yaml.
+        estimates : str or Path, optional
+            File, or folder with an estimates.yaml, in place of the estimates.yaml beside robot.yaml.
+
+        Returns
+        -------
+        CalibratedRobot
+            The robot with these estimates.
+
+        Raises
+        ------
+        FlexcalError
+            As reading does.
+        InputError
+            Where there is no calibration.
         """
         nominal = RobotModel.from_yaml(path, estimates=False)
         stored = stored_estimates(nominal, None if estimates is None else Path(estimates))

@@ -53,7 +53,13 @@ class ReportedResult(Result):
         """Leave the arrays of the result in a folder, beside results.json."""
 
     def write(self, folder: str | Path) -> None:
-        """Leave results.json, report.html and the arrays that it shows in a folder, which is created where it is missing."""
+        """Write results.json, report.html and the arrays that it shows to a folder.
+
+        Parameters
+        ----------
+        folder : str or Path
+            The folder, which is created where it is missing.
+        """
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         write_results(folder, self.document())
@@ -61,7 +67,18 @@ class ReportedResult(Result):
         report_folder(folder)
 
     def report(self, path: str | Path) -> Path:
-        """Write the result as one HTML page; returns its path."""
+        """Write the result as one HTML page.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
         path = Path(path)
         with TemporaryDirectory() as folder:
             self.write(folder)

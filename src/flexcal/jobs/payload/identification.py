@@ -88,6 +88,22 @@ def identify_payload(
         Where neither `dynamics` nor `free` are given, a log does not fit the robot, states that it was recorded without the payload (or
         with it, of those that are free), is given twice or was used for `dynamics` already; and where the 95 % interval of the mass
         contains zero.
+
+    Examples
+    --------
+    The virtual cell moves without and with 6 kg:
+
+    >>> from dataclasses import replace
+    >>> from flexcal import RobotModel, TrajectoryRequest, VirtualCell, design_trajectories, identify_payload
+    >>> model = RobotModel.from_yaml("examples/tx90l/robot.yaml", estimates=False).without_springs()
+    >>> settings = replace(model.config.dynamics, cutoff_hz=20.0, friction="classic")
+    >>> model = replace(model, config=replace(model.config, dynamics=settings))
+    >>> request = TrajectoryRequest(count=1, criterion="posterior", searches=1, steps=1)
+    >>> plan = replace(design_trajectories(model, request).plan, periods=1, settle_periods=0, rate_hz=1000.0)
+    >>> cell = VirtualCell(model)
+    >>> free, loaded = (list(cell.record(replace(plan, payload=mass))) for mass in (0.0, 6.0))
+    >>> print(f"{identify_payload(model, loaded, free=free).estimate.values['payload.mass']:.1f} kg")
+    6.0 kg
     """
     if dynamics is None and not free:
         raise FlexcalError(

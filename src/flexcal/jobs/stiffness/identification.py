@@ -65,6 +65,24 @@ def identify_stiffness(
     ------
     FlexcalError
         Where the responses do not fit the robot.
+
+    Examples
+    --------
+    One pose and few lines of the virtual cell, from one start:
+
+    >>> from dataclasses import replace
+    >>> from flexcal import RobotModel, VirtualCell, frequency_plan, frequency_responses, identify_stiffness
+    >>> from flexcal.elasticity.identification import MultiStart
+    >>> model = RobotModel.from_yaml("examples/tx90l/robot.yaml", estimates=False)
+    >>> plan = frequency_plan(model, "examples/tx90l/frequency_poses.csv", "default", seed=0)
+    >>> plan = replace(plan, poses=plan.poses[:1], lines=plan.lines[::6], amplitude=plan.amplitude[:, ::6])
+    >>> plan = replace(plan, realisations=3, periods=2, settle_periods=1)
+    >>> responses = list(frequency_responses(plan, VirtualCell(model).record(plan), pooled_lines=26))
+    >>> search = MultiStart(starts=1, agreement=1)
+    >>> result = identify_stiffness(model, responses, plan=plan, inertias_known=True, search=search)
+    >>> low, high = result.estimate.interval("joint_2.drive.stiffness")
+    >>> bool(low < model.value("joint_2.drive.stiffness") < high)
+    True
     """
     fit = fit_springs(
         model,

@@ -51,14 +51,58 @@ _FIRST_MOMENTS = {"mc_x": 0, "mc_y": 1, "mc_z": 2}
 
 @dataclass(frozen=True, eq=False)
 class RobotModel:
-    """An immutable robot: structure from the URDF, settings of robot.yaml, and parameters in groups of arrays (n joints, SI units).
+    """Immutable robot of n joints: structure of the URDF, settings of robot.yaml, and parameters in groups of arrays, SI units.
 
     Every number that can be identified has a name (docs/file-formats.md): `values` reads them all, `with_values` makes a changed robot.
-    Setting a link's or the payload's mass scales its inertia about the centre of mass with it; setting a link's `com_x`… or first moment
-    `mc_x`… (mass times centre of mass, after the mass) moves that inertia rigidly.
+    Setting a link's or the payload's mass scales its inertia about the centre of mass with it; setting a link's `com_x`… or first
+    moment `mc_x`… (mass times centre of mass, after the mass) moves that inertia rigidly.
 
-    `geometry` holds deviations from the URDF and compliances, `springs` those of the elastic joints, `drives` motors, transmissions and
-    friction, `links` masses and inertia, `stations` the instrument's places; `tree` is the kernels' view of joints and bearing frames.
+    Attributes
+    ----------
+    config : RobotConfig
+        Settings of robot.yaml.
+    path, urdf : Path
+        The files robot.yaml and URDF.
+    name : str
+        Name of the robot in the URDF.
+    joints : tuple of Joint
+        The movable joints, nominal.
+    points : mapping of Point
+        Target points by name.
+    tree : Tree
+        The kernels' view of joints and bearing frames.
+    geometry : Geometry
+        Deviations from the URDF, and compliances.
+    springs : Springs
+        Springs and dampers of the elastic joints.
+    drives : Drives
+        Motors, transmissions and friction.
+    links : Links
+        Masses and inertia.
+    stations : Stations
+        Places of the instrument.
+    scatter : Scatter
+        Standard deviations of instrument, robot and model error.
+    payload : Payload or None
+        The declared payload.
+    force_sensor : ForceSensor or None
+        The declared force sensor.
+    posterior : Posterior
+        Joint covariance of the parameters that were estimated.
+    sensors : mapping of ArmSensor
+        Sensors on the arm by name.
+
+    Examples
+    --------
+    >>> from flexcal import RobotModel
+    >>> model = RobotModel.from_yaml("examples/tx90l/robot.yaml", estimates=False)
+    >>> model.n
+    6
+    >>> model.value("joint_1.drive.stiffness")
+    143700.0
+    >>> stiffer = model.with_values({"joint_1.drive.stiffness": 150e3})
+    >>> round(stiffer.value("joint_1.drive.stiffness"))
+    150000
     """
 
     config: RobotConfig
@@ -83,9 +127,26 @@ class RobotModel:
     def from_yaml(
         cls, path: str | Path, *, estimates: bool = True, without: Block | None = None
     ) -> RobotModel:
-        """Read robot.yaml, its URDF and, where present and wanted, the estimates beside it, all blocks or all but one.
+        """Read robot.yaml, its URDF and, where present, the estimates beside it.
 
-        Raises `InputError` with file and line.
+        Parameters
+        ----------
+        path : str or Path
+            The file robot.yaml.
+        estimates : bool
+            Whether the estimates beside it are read.
+        without : str, optional
+            Block of the estimates that is left out, such as "calibration".
+
+        Returns
+        -------
+        RobotModel
+            The robot.
+
+        Raises
+        ------
+        InputError
+            With file and line.
         """
         from flexcal.model.robot.loading import read_robot
         from flexcal.model.robot.stored_estimates import apply_estimates
@@ -109,15 +170,41 @@ class RobotModel:
         )
 
     def with_bearings(self, bearings: Bearings) -> RobotModel:
-        """The robot whose bearings are known to tilt before or after the joint's rotation, its parameters and posterior as they are."""
+        """Robot with bearings that tilt before or after the joint's rotation; parameters and posterior stay.
+
+        Parameters
+        ----------
+        bearings : {"before", "after"}
+            Where the bearings tilt.
+
+        Returns
+        -------
+        RobotModel
+            The changed robot.
+        """
         config = replace(self.config, bearings=bearings)
         tree = kinematic_tree(self.joints, self.springs.bearing_frames, bearings)
         return replace(self, config=config, tree=tree)
 
     def with_drive_springs(self, springs: Mapping[int, tuple[float, float]]) -> RobotModel:
-        """The robot with a drive spring, (stiffness in N m/rad, damping in N m s/rad), at each of some rigid joints, by index.
+        """Robot with drive springs at some of the rigid joints.
 
-        In a frequency experiment the motors of these joints are braked. Raises `FlexcalError` for a prismatic joint.
+        In a frequency experiment the motors of these joints are braked.
+
+        Parameters
+        ----------
+        springs : mapping
+            Stiffness, N m/rad, and damping, N m s/rad, by index of the joint.
+
+        Returns
+        -------
+        RobotModel
+            The changed robot.
+
+        Raises
+        ------
+        FlexcalError
+            For a prismatic joint.
         """
         frames = dict(self.springs.bearing_frames)
         stiffness, damping = self.springs.stiffness.copy(), self.springs.damping.copy()
@@ -144,7 +231,18 @@ class RobotModel:
         return replace(self, springs=replace(self.springs, bearing_frames={}))
 
     def with_estimated_springs(self, values: Mapping[str, float]) -> RobotModel:
-        """The robot with a drive spring at every rigid joint whose `<joint>.drive.stiffness` is among `values`."""
+        """Robot with a drive spring at every rigid joint whose `<joint>.drive.stiffness` was estimated.
+
+        Parameters
+        ----------
+        values : mapping of float
+            Estimated values by name.
+
+        Returns
+        -------
+        RobotModel
+            The changed robot.
+        """
         springs = {}
         for i, name in enumerate(self.joint_names):
             stiffness = values.get(f"{name}.drive.stiffness")
@@ -153,7 +251,18 @@ class RobotModel:
         return self.with_drive_springs(springs) if springs else self
 
     def with_brakes(self, excited: tuple[str, ...]) -> RobotModel:
-        """The robot in a frequency experiment that excites the named joints: the motors of all other elastic joints are braked."""
+        """Robot in a frequency experiment: the motors of all elastic joints that are not excited are braked.
+
+        Parameters
+        ----------
+        excited : tuple of str
+            Names of the excited joints.
+
+        Returns
+        -------
+        RobotModel
+            The changed robot.
+        """
         braked = frozenset(e.index for e in self.elastic if e.name not in excited)
         return replace(self, springs=replace(self.springs, braked=braked))
 
@@ -239,7 +348,23 @@ class RobotModel:
         return sum(lengths) + max(far, default=0.0)
 
     def joint_index(self, name: str) -> int:
-        """Index of a joint by its URDF name; raises `FlexcalError` that lists the names."""
+        """Index of a joint.
+
+        Parameters
+        ----------
+        name : str
+            URDF name of the joint.
+
+        Returns
+        -------
+        int
+            Index from 0.
+
+        Raises
+        ------
+        FlexcalError
+            For an unknown name; lists the names.
+        """
         if name not in self.joint_names:
             raise FlexcalError(
                 "E-ROBOT-039",
@@ -248,11 +373,38 @@ class RobotModel:
         return self.joint_names.index(name)
 
     def path_to(self, joint: int) -> tuple[int, ...]:
-        """Indices of the joints from the base to a joint, this one included; none for -1, the base."""
+        """Indices of the joints from the base to a joint.
+
+        Parameters
+        ----------
+        joint : int
+            Index of the last joint; -1 is the base.
+
+        Returns
+        -------
+        tuple of int
+            Indices, `joint` included; none for the base.
+        """
         return path_to(self.joints, joint)
 
     def point(self, name: str | None = None) -> Point:
-        """A target by name, the first declared one without; raises `FlexcalError` that lists the names."""
+        """A target point.
+
+        Parameters
+        ----------
+        name : str, optional
+            Name of the point; by default the first declared one.
+
+        Returns
+        -------
+        Point
+            The point.
+
+        Raises
+        ------
+        FlexcalError
+            For an unknown name; lists the names.
+        """
         if not self.points:
             raise FlexcalError(
                 "E-ROBOT-040",
@@ -267,7 +419,23 @@ class RobotModel:
         return self.points[key]
 
     def station_index(self, name: str) -> int:
-        """Index of one of the instrument's places; raises `FlexcalError` that lists the names."""
+        """Index of one of the instrument's places.
+
+        Parameters
+        ----------
+        name : str
+            Name of the station.
+
+        Returns
+        -------
+        int
+            Index from 0.
+
+        Raises
+        ------
+        FlexcalError
+            For an unknown name; lists the names.
+        """
         if name not in self.stations.names:
             raise FlexcalError(
                 "E-ROBOT-042",
@@ -304,13 +472,45 @@ class RobotModel:
         return MappingProxyType(table)
 
     def value(self, name: str) -> float:
-        """One named value, SI; raises `FlexcalError` that suggests close names."""
+        """Value of a named parameter.
+
+        Parameters
+        ----------
+        name : str
+            Name of the parameter, such as `link_3.mass`.
+
+        Returns
+        -------
+        float
+            Value, SI units.
+
+        Raises
+        ------
+        FlexcalError
+            For an unknown name; suggests close ones.
+        """
         if name not in self.values:
             raise self._unknown(name)
         return self.values[name]
 
     def with_values(self, values: Mapping[str, float]) -> RobotModel:
-        """A robot with some named values changed; raises `FlexcalError` for an unknown name."""
+        """Robot with other values of some named parameters.
+
+        Parameters
+        ----------
+        values : mapping of float
+            New values by name, SI units.
+
+        Returns
+        -------
+        RobotModel
+            The changed robot.
+
+        Raises
+        ------
+        FlexcalError
+            For an unknown name.
+        """
         changes: dict[Group, dict[str, np.ndarray]] = {}
 
         def own(group: Group, array: str) -> np.ndarray:
@@ -366,9 +566,19 @@ class RobotModel:
         return first_moment / mass if mass != 0 else 0.0
 
     def with_estimate(self, estimate: Estimate) -> RobotModel:
-        """A robot with the values of an estimate that are the robot's own, carrying their joint covariance.
+        """Robot with the values of an estimate that are the robot's own, and with their joint covariance.
 
         A rigid joint whose drive stiffness was estimated gets that spring.
+
+        Parameters
+        ----------
+        estimate : Estimate
+            Estimated parameters.
+
+        Returns
+        -------
+        RobotModel
+            The changed robot.
         """
 
         widened = self.with_estimated_springs(estimate.values)

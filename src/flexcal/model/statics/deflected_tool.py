@@ -69,10 +69,45 @@ def tool_at_rest(
     elastic: bool = True,
     jacobians: bool = False,
 ) -> ToolAtRest:
-    """The points `target` (N,), by name, of a robot whose motors stand at `q` (N, n), rad or m.
+    """Pose of measured points on the robot at rest, deflected by gravity and payload.
 
-    `payload` (N,) as `carried_mass` takes it; `flank` (N, n) fixes the side of the backlash, without it the drive torque at rest decides;
-    without `elastic` the arm is rigid. Raises `FlexcalError` for an unknown point and as `static_equilibrium` does.
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, calibrated or not.
+    q : ndarray
+        Motor positions (N, n) referred to the joints, rad or m.
+    payload : ndarray, optional
+        Payload (N,), kg, at the declared payload's centre of mass, as `carried_mass` takes it; by default as declared.
+    target : ndarray
+        Names (N,) of the points.
+    flank : ndarray, optional
+        Side of every backlash (N, n), ±1; by default the drive torque at rest decides.
+    elastic : bool
+        Whether the arm deflects; without, it is rigid.
+    jacobians : bool
+        Whether derivatives are computed too.
+
+    Returns
+    -------
+    ToolAtRest
+        `kinematics.position` (N, 3), m, and `kinematics.rotation` (N, 3, 3) in the base frame, and the equilibrium `rest`.
+
+    Raises
+    ------
+    FlexcalError
+        For an unknown point, and as `static_equilibrium` does.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from flexcal import RobotModel, tool_at_rest
+    >>> model = RobotModel.from_yaml("examples/tx90l/robot.yaml", estimates=False)
+    >>> q = np.array([[0, -0.5, 1.6, 0, 0.6, 0]])
+    >>> deflected = tool_at_rest(model, q, None, np.array(["smr"]))
+    >>> rigid = tool_at_rest(model, q, None, np.array(["smr"]), elastic=False)
+    >>> (deflected.kinematics.position - rigid.kinematics.position).shape
+    (1, 3)
     """
     masses = carried_mass(model, payload, len(q))
     rest = static_equilibrium(model, q, masses, flank=flank, elastic=elastic, sensitivities=jacobians)

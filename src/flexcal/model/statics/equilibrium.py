@@ -113,9 +113,31 @@ def _solve(
 
 
 def gravity_torque(model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None) -> np.ndarray:
-    """Torque (samples, n), N m, that the drives must hold against gravity on the undeflected robot; `payload` (samples,) in kg.
+    """Torque that the drives must hold against gravity, on the undeflected robot.
 
-    Found by putting a spring of unbounded stiffness in every joint; prismatic joints read 0.
+    Computed with a spring of unbounded stiffness in every joint.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    q : ndarray
+        Motor positions (N, n) referred to the joints, rad or m.
+    payload : ndarray or float, optional
+        Payload (N,), kg, at the declared payload's centre of mass; by default as declared.
+
+    Returns
+    -------
+    ndarray
+        Torques (N, n), N m; zero for prismatic joints.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from flexcal import RobotModel, gravity_torque
+    >>> model = RobotModel.from_yaml("examples/tx90l/robot.yaml", estimates=False)
+    >>> gravity_torque(model, np.array([[0, -0.5, 1.6, 0, 0.6, 0]])).shape
+    (1, 6)
     """
     _, deflection, _, _ = _held_rigidly(model, q, payload, _twists(model), sensitivities=False)
     return -_RIGID * deflection[:, :, 2]
