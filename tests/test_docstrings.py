@@ -3,9 +3,7 @@
 import doctest
 import inspect
 import re
-from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -56,11 +54,11 @@ def test_a_class_describes_its_fields(name: str) -> None:
     found = sections(docstring(name))
     assert not {"Parameters", "Attributes"} <= found.keys()
     names = described(found.get("Parameters", found.get("Attributes", "")))
-    if is_dataclass(cls):
-        assert names == [field.name for field in fields(cls) if field.name != "kind" or field.init]
+    parameters = list(inspect.signature(cls).parameters)
+    if name == "Estimator":
+        assert names == ["name", "summary"]
     else:
-        parameters: Any = inspect.signature(cls).parameters
-        assert set(names) >= parameters.keys() - {"args", "kwargs"}
+        assert names == parameters
 
 
 @pytest.mark.parametrize("name", CLASSES)
@@ -75,7 +73,9 @@ def test_a_method_says_what_it_takes(name: str) -> None:
         if text.startswith("As `"):  # the interface's docstring, which the class refers to
             continue
         assert described(sections(text).get("Parameters", "")) == parameters, f"{name}.{key}"
-        assert not parameters or "Returns" in sections(text) or "None" in str(function.__annotations__["return"]), key
+        assert (
+            not parameters or "Returns" in sections(text) or "None" in str(function.__annotations__["return"])
+        ), key
 
 
 INTERNAL = {"write_arrays", "volume", "optimise"}

@@ -129,8 +129,8 @@ def fit_geometry(
         Relative standard deviation of the ratio of each drive's secant stiffness under gravity to its tangent stiffness.
     loss : {"auto", "squares", "huber", "cauchy"} or Loss
         Loss function; "cauchy" finds outliers, "auto" takes it where squares leave some.
-    progress : callable, optional
-        Called with the number of the iteration and the objective.
+    progress : Progress
+        Called with the stage and the share of it that is done.
 
     Returns
     -------

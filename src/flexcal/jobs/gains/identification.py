@@ -59,6 +59,26 @@ def identify_gains(
     FlexcalError
         Where the logs do not fit the robot, a log is given twice or does not say whether the payload was held, or a matrix of `signals:`
         mixes the torques of several columns.
+
+    Examples
+    --------
+    The virtual cell, whose gains are right, moves with and without its payload:
+
+    >>> from dataclasses import replace
+    >>> import numpy as np
+    >>> from flexcal import RobotModel, TrajectoryRequest, VirtualCell, design_trajectories, identify_gains
+    >>> model = RobotModel.from_yaml("examples/tx90l/robot.yaml", estimates=False).without_springs()
+    >>> settings = replace(model.config.dynamics, cutoff_hz=20.0, friction="classic")
+    >>> model = replace(model, config=replace(model.config, dynamics=settings))
+    >>> request = TrajectoryRequest(count=1, criterion="posterior", searches=1, steps=1)
+    >>> plan = replace(design_trajectories(model, request).plan, periods=1, settle_periods=0, rate_hz=1000.0)
+    >>> logs = []
+    >>> for mass in (0.0, 6.0):
+    ...     for log in VirtualCell(model).record(replace(plan, payload=mass)):
+    ...         logs.append(replace(log, payload=np.full(len(log), mass)))
+    >>> gains = identify_gains(model, logs)
+    >>> bool(abs(gains.gains[1] - 1) < 0.05)
+    True
     """
     robot = model_for_logs(model, logs)
     declared = _declared(robot)

@@ -53,6 +53,16 @@ def identify_inertials(
     ------
     FlexcalError
         Where a recording does not fit the plan or has a fault, a torque is zero throughout, or the torques are not of this robot.
+
+    Examples
+    --------
+    >>> from flexcal import RobotModel, VirtualCell, exciting_plan, identify_inertials
+    >>> model = RobotModel.from_yaml("examples/tx90l/robot.yaml", estimates=False)
+    >>> plan = exciting_plan(model, count=1, seed=0)
+    >>> inertials = identify_inertials(model, plan, VirtualCell(model).record(plan))
+    >>> low, high = inertials.estimate.interval("link_3.mass")
+    >>> bool(low < model.value("link_3.mass") < high)
+    True
     """
     progress("dynamics", 0.0)
     recorded = []
