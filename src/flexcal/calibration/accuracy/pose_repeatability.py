@@ -23,7 +23,7 @@ _NOISE = np.sqrt(8 / np.pi) + 3 * np.sqrt(3 - 8 / np.pi)
 
 @dataclass(frozen=True, eq=False)
 class PoseRepeatability:
-    """One commanded pose: the `rows` (K,) of its visits in measuring order, and what ISO 9283:1998 makes of them.
+    """One commanded pose: the `rows` (K,) of its visits in measuring order, and their statistics of ISO 9283:1998.
 
     `deviations` (K, 3) m from the barycentre; `repeatability` RP = l̄ + 3 S_l (7.2.2), m; `rotation` (3,) rad, 3 S about x, y, z of the
     instrument's frame, None where no orientation was measured; `direction_variation` vAP (7.2.3), m, the largest distance between the

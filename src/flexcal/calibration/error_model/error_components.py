@@ -110,7 +110,7 @@ def whitened(whitening: np.ndarray, rows: np.ndarray) -> np.ndarray:
 
 
 def known_scatter(model: RobotModel, *, stated: bool) -> ErrorComponents | None:
-    """What a calibration found of the errors of a robot's points; without a calibration the instrument alone where its sigma is `stated`.
+    """Calibrated error components of a robot; without a calibration the instrument alone, where its sigma is `stated`.
 
     A sigma that the calibration did not have is not added: the robot's part there holds the instrument's. None where nothing is known.
     """

@@ -28,7 +28,7 @@ class ElasticPrior:
 
     @classmethod
     def of(cls, model: RobotModel, poses: PoseSet, *, secant_scale: float = 0.0) -> ElasticPrior:
-        """What the model's posterior holds of these parameters, and the declared priors of the others.
+        """Prior of the parameters: the model's posterior where it has them, else the declared priors.
 
         `secant_scale` is the relative 1σ by which a drive's stiffness under gravity may differ from the tangent one of a frequency
         response: it widens the drive stiffnesses by one scale each.

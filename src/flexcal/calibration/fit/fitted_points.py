@@ -53,7 +53,7 @@ _FREE_STIFFNESS = 0.3
 
 @dataclass(frozen=True, eq=False)
 class PointFit:
-    """What a fit is made from: the registered robot `start`, its `geometric` parameters, their rank on the `poses`, the elastic `prior`."""
+    """Input of a fit: the registered robot `start`, its `geometric` parameters, their rank on the `poses`, the elastic `prior`."""
 
     start: RobotModel
     poses: PoseSet

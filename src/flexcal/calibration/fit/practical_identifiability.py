@@ -56,7 +56,7 @@ def undetermined(
 
 
 def _cause(start: RobotModel, poses: PoseSet, name: str, partners: tuple[tuple[str, float], ...]) -> str:
-    """One clause for a user: what about the poses hides a parameter."""
+    """Clause for the user: the property of the poses that hides a parameter."""
     owner = name.rpartition(".")[0]
     if owner == "tool" or owner.startswith("point."):
         turned = _turning(start, poses, owner)

@@ -1,4 +1,4 @@
-"""Rows that stand for a measurement of more points than a fit with variance components can take."""
+"""Stratified sample of a measurement with more points than a fit with variance components can take."""
 
 from __future__ import annotations
 

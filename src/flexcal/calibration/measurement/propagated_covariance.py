@@ -88,7 +88,7 @@ class Propagation:
         )
 
     def _scatter(self, by_geometry: np.ndarray) -> list[np.ndarray]:
-        """Columns (N, 3, k) m of what is no parameter's: repeatability and model error."""
+        """Columns (N, 3, k) m of the errors beside the parameters: repeatability and model error."""
         model, columns = self.model, []
         angular = model.value("scatter.angular")
         if angular > 0:

@@ -41,7 +41,7 @@ class CandidateTerms:
 
 
 def candidates(model: RobotModel, poses: PoseSet) -> CandidateTerms:
-    """What gravity, the declared springs and the joints that move leave to be considered on some poses."""
+    """Terms that can be considered on some poses, by gravity, the declared springs and the joints that move."""
     joints = moving_joints(model, poses)
     masses = carried_mass(model, poses.payload, len(poses))
     torque = gravity_torque(model, poses.q, masses)

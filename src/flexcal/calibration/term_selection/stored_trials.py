@@ -26,7 +26,7 @@ def considered_document(row: TermComparison) -> dict[str, Any]:
 
 
 def considered_terms(results: Mapping[str, Any]) -> tuple[TermComparison, ...]:
-    """What the selection of terms considered, as results.json has it; empty where the terms were given, or the poses too few."""
+    """Terms that the selection considered, as results.json has them; empty where the terms were given, or the poses too few."""
     return tuple(_considered(row) for row in results["term_selection"])
 
 

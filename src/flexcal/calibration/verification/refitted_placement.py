@@ -66,7 +66,7 @@ def verify_refitted(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) ->
         )
 
     def left_out(values: np.ndarray) -> np.ndarray:
-        """What leaving each pose out makes of errors (3 N, k)."""
+        """Leave-one-out errors (3 N, k) from errors of the fit."""
         rest = values - basis @ (basis.T @ values)
         return np.linalg.solve(own, rest.reshape(len(poses), 3, -1))
 

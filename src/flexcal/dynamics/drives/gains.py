@@ -79,7 +79,7 @@ def drive_gains(data: RegressionData, payloads: Sequence[float]) -> Estimate:
 
 
 def gain_name(joint: str) -> str:
-    """Of the parameter that says what the torques of a joint must be multiplied by."""
+    """Name of the parameter that is the factor of a joint's torques."""
     return f"{joint}.drive_gain"
 
 

@@ -82,7 +82,7 @@ class EnergyModel(ScalarEquations):
 
 @dataclass(frozen=True, eq=False)
 class _Account:
-    """What an experiment has put in until its sample at `end` (s), by parameter and by the motors.
+    """Energy supplied until the sample at `end` (s), by parameter and by the motors.
 
     `power` and `work` (p + 1,) are those at the end; `energy` (p + 1, H) is stored energy and work together at the last samples' `time`.
     """

@@ -39,7 +39,7 @@ def linear_fit(data: RegressionData, noise: Sequence[float]) -> Estimate:
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """What a linear estimator estimates: the `kept` columns (k,), of a system that leaves the `hidden` base parameters open."""
+    """Unknowns of a linear estimator: the `kept` columns (k,), of a system that leaves the `hidden` base parameters open."""
 
     data: RegressionData
     kept: list[int]

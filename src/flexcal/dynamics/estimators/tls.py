@@ -58,6 +58,6 @@ def total_least_squares(data: RegressionData, errors: RegressionData) -> Estimat
 
 
 def _torque_share(own: Subsystem, wrong: Subsystem, sigma: float, parameters: np.ndarray) -> float:
-    """What of the variance of a subsystem's residual is not ΔW χ."""
+    """Share of the variance of a subsystem's residual that is not due to ΔW χ."""
     moved = float(np.linalg.norm(wrong.triangle.matrix @ parameters[wrong.column_indices])) / sigma
     return max(1.0 - moved**2 / own.triangle.rows, _LEAST_TORQUE_NOISE)

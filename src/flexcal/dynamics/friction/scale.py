@@ -14,7 +14,7 @@ from flexcal.dynamics.regression import ExperimentSystem
 
 @dataclass(frozen=True, eq=False)
 class ExcitationScale:
-    """What shapes of terms are measured by.
+    """Scales of a motion by which the shapes of friction terms are measured.
 
     `speed` and `stroke` (n,) are those of the motor axes: the root mean square of ṡ, and its square over that of s̈; `duration` (s) is
     that of the longest recording; `inertials` (10 n,) are the links'. An axis that does not move counts as if both were 1.

@@ -37,7 +37,7 @@ class Candidate:
             yield replace(column, name=self.column(column.name))
 
     def column(self, name: str) -> str:
-        """What the column `name` of the term is called here."""
+        """Name of the term's column `name` among those of several shapes."""
         return f"{name} {self.shape}"
 
 

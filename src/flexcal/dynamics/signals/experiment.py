@@ -1,4 +1,4 @@
-"""What a regression takes of a recording: filtered motions and torques over a window of time."""
+"""Filtered motions and torques of a recording over a window of time, as a regression takes them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Experiment(Protocol):
 
     @property
     def name(self) -> str:
-        """What messages call it."""
+        """Name in messages."""
         ...
 
     @property

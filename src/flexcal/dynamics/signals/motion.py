@@ -49,7 +49,7 @@ class Motion:
 
     @property
     def name(self) -> str:
-        """What messages call it."""
+        """Name in messages."""
         return "the motion"
 
     @property

@@ -69,8 +69,8 @@ def identify_masses(fit: ModalFit, response: LocalResponse, masses: int | None =
             f"{low:.3g} to {high:.3g} Hz shows {len(alternating)}; excite a wider band, or give --masses {allowed}"
         )
     strongest = sorted(alternating, key=lambda pair: pair[0] / pair[1])
-    wanted = range(1, allowed + 1) if masses is None else (masses,)
-    fits = tuple(fit_chain(fit, count, sorted(strongest[: count - 1])) for count in wanted)
+    chain_sizes = range(1, allowed + 1) if masses is None else (masses,)
+    fits = tuple(fit_chain(fit, count, sorted(strongest[: count - 1])) for count in chain_sizes)
     chosen = min(fits, key=lambda one: one.criterion)
     if masses is None and not alternating and _modes(fit):
         return AxisMasses(

@@ -205,28 +205,28 @@ def certify_robot(
     assert calibrated.stored is not None
     model = calibrated.probable
     progress("reading", 0.0)
-    wanted = read_targets(targets, model)
+    desired = read_targets(targets, model)
     base, as_declared = (
-        desired_pose(model, nominal, wanted).position
+        desired_pose(model, nominal, desired).position
         for nominal in (calibrated.with_points, calibrated.nominal)
     )
     sets = {file: verification_poses(calibrated, [file]) for file in (before, after)}
-    rows = {file: _rows(file, poses, targets, wanted) for file, poses in sets.items()}
+    rows = {file: _rows(file, poses, targets, desired) for file, poses in sets.items()}
     progress("reading", 1.0)
     progress("comparing", 0.0)
-    if wanted.q is not None:
-        off = {file: np.abs(poses.q - wanted.q[rows[file]]).max(axis=1) for file, poses in sets.items()}
+    if desired.q is not None:
+        off = {file: np.abs(poses.q - desired.q[rows[file]]).max(axis=1) for file, poses in sets.items()}
         if np.median(off[before]) > np.median(off[after]):
             raise InputError(
                 "E-RUN-003",
                 f"{before} was measured farther from the nominal commands in {targets} than {after}; are --before and --after swapped?",
             )
-    common = np.intersect1d(wanted.pose[rows[before]], wanted.pose[rows[after]])
-    every = np.union1d(wanted.pose[rows[before]], wanted.pose[rows[after]])
+    common = np.intersect1d(desired.pose[rows[before]], desired.pose[rows[after]])
+    every = np.union1d(desired.pose[rows[before]], desired.pose[rows[after]])
     visited = {}
     for file in (before, after):
         poses = sets.pop(file)
-        kept = np.isin(wanted.pose[rows[file]], common)
+        kept = np.isin(desired.pose[rows[file]], common)
         points = base[rows[file][kept]]
         visited[file] = (poses if kept.all() else poses.subset(kept), points)
         del poses
@@ -240,7 +240,7 @@ def certify_robot(
     known, covariance = prediction_errors_with_covariance(model, visited[after][0].subset(judged))
     there = _visited(visited[after][0], _placed(model, *visited[after]))
     start = visited[before][0]
-    declared = as_declared[rows[before][np.isin(wanted.pose[rows[before]], common)]]
+    declared = as_declared[rows[before][np.isin(desired.pose[rows[before]], common)]]
     placed = uncalibrated_model(calibrated.nominal, start).declared
     result = RobotCertificate(
         calibrated,
@@ -267,26 +267,26 @@ def certify_robot(
     return result
 
 
-def _rows(file: Path, poses: PoseSet, targets: Path, wanted: ToolTargets) -> np.ndarray:
+def _rows(file: Path, poses: PoseSet, targets: Path, desired: ToolTargets) -> np.ndarray:
     """The row of the targets (N,) that every measured row belongs to."""
-    order = np.argsort(wanted.pose)
-    place = np.searchsorted(wanted.pose, poses.pose, sorter=order).clip(max=len(order) - 1)
+    order = np.argsort(desired.pose)
+    place = np.searchsorted(desired.pose, poses.pose, sorter=order).clip(max=len(order) - 1)
     rows = order[place]
-    strange = np.flatnonzero(wanted.pose[rows] != poses.pose)
+    strange = np.flatnonzero(desired.pose[rows] != poses.pose)
     if len(strange):
         raise InputError(
             "E-RUN-005",
             f"{file}: pose {poses.pose[strange[0]]} is no target of {targets}; keep the targets' numbers when measuring.",
         )
-    other = np.flatnonzero(wanted.target[rows] != poses.target)
+    other = np.flatnonzero(desired.target[rows] != poses.target)
     if len(other):
         k = other[0]
         raise InputError(
             "E-RUN-006",
-            f"{file}: pose {poses.pose[k]} was measured at '{poses.target[k]}', but its target is one of '{wanted.target[rows[k]]}'.",
+            f"{file}: pose {poses.pose[k]} was measured at '{poses.target[k]}', but its target is one of '{desired.target[rows[k]]}'.",
         )
-    if wanted.q is not None:
-        apart = np.abs(poses.q - wanted.q[rows])
+    if desired.q is not None:
+        apart = np.abs(poses.q - desired.q[rows])
         if apart.max() > _FAR:
             k, joint = (int(i) for i in np.argwhere(apart > _FAR)[0])
             raise InputError(

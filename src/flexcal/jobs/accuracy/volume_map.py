@@ -203,7 +203,7 @@ class AccuracyMap(Result):
 
 
 def error_scale_factor(scale: ErrorScale | None) -> float:
-    """What the map is multiplied by: the factor where errors are larger than chance allows; never less than one."""
+    """Factor of the map, where errors are larger than chance allows; never less than one."""
     return scale.factor if scale is not None and scale.low > 1 else 1.0
 
 
@@ -348,7 +348,7 @@ def map_accuracy(
 
 @dataclass(frozen=True, eq=False)
 class _Check:
-    """What verification poses say: their errors, those before, how large they are against their prediction, and what was fitted."""
+    """Check by verification poses: their errors, those before, their ratio to the prediction, and what was fitted."""
 
     errors: PredictionErrors
     before: UncalibratedErrors

@@ -160,7 +160,7 @@ class Calibration(Identification):
 
     @cached_property
     def found_points(self) -> dict[str, dict[str, Any]]:
-        """The measured points: their frames, and where they are in it, m, as declared and as found, with the 1σ distance of the latter."""
+        """Measured points: frame, and position in it, m, as declared and as calibrated, with the 1σ distance of the latter."""
         fit = self.selected
         targets = fit.poses.targets
         robot = probable_robot(fit.model, targets)

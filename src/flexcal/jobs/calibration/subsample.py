@@ -1,4 +1,4 @@
-"""What there is to say of a measurement of which a part stands for all."""
+"""Remarks on a calibration of which a sample of the points was fitted."""
 
 from __future__ import annotations
 

@@ -98,7 +98,7 @@ class Compensation(Result):
 
     @property
     def lost_points(self) -> dict[str, float]:
-        """1σ (m) of the measured points whose place on the tool the calibration did not find."""
+        """1σ (m) of the measured points whose position on the tool the calibration does not determine."""
         every = {name: point_uncertainty(self.model, name) for name in self.measured}
         return {name: std for name, std in every.items() if std > KNOWN_POINT_STD}
 

@@ -48,7 +48,7 @@ Render = Callable[[Exportable], RenderedModel]
 
 @dataclass(frozen=True)
 class ExportedRobot:
-    """What was written; `calibrated` is False where there is no calibration: where the joints are is as in the nominal robot."""
+    """Exported file; `calibrated` is False where there is no calibration: the joints are then those of the nominal robot."""
 
     export: ExportedFile
     calibrated: bool

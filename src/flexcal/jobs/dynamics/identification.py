@@ -109,20 +109,20 @@ def identify_dynamics(
         require_distinct_files(files, others)
         springs = require_flexible_drives(model, [*files, *others], estimator.name) if flexible else ()
         bearings = require_flexible_bearings(model, [*files, *others]) if flexible else ()
-        treatment = choose_preprocessing(model, files, flexible=flexible)
+        preprocessing = choose_preprocessing(model, files, flexible=flexible)
         divided = HoldOutLogs.read(
             files,
             others,
             hold_out,
             model,
-            treatment,
+            preprocessing,
             folder,
             accept_weight=accept_weight,
             jobs=jobs,
             progress=progress,
         )
         declared = (model.config.dynamics if friction is None else DynamicsConfig(friction=friction)).friction
-        selection = select_friction(model, declared, divided.equations, treatment.decimation)
+        selection = select_friction(model, declared, divided.equations, preprocessing.decimation)
         sensor = model.config.force_sensor
         shifted = sensor is not None and sensor.offset == "estimated"
         terms = (*selection.terms, SensorOffset()) if shifted else selection.terms
@@ -159,8 +159,8 @@ def identify_dynamics(
             essential=essential,
             friction=selection,
             motors=observation.motors,
-            treatment=treatment,
-            signals=preprocessing_document(treatment, divided.logs),
+            preprocessing=preprocessing,
+            signals=preprocessing_document(preprocessing, divided.logs),
             weight_faults=tuple(weight_faults(divided.logs, model)),
             weight_shares={} if accept_weight else weight_shares(train, estimate),
             external=external,

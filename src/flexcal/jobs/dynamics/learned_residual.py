@@ -26,7 +26,7 @@ from flexcal.progress import Progress
 
 @dataclass(frozen=True, eq=False)
 class LearnedDynamics:
-    """What was learned, and the torques missed with and without it: in left-out blocks of the fit, in all of the fit, and held out."""
+    """Learned residual torques, and torque errors with and without them: in left-out blocks, in all of the fit, and held out."""
 
     learned: LearnedResidual
     blocks: CrossValidatedErrors

@@ -67,7 +67,7 @@ class DynamicsIdentification(Identification):
         Choice of the friction terms.
     motors : tuple of str
         Joints whose motors have equations of their own.
-    treatment : Preprocessing
+    preprocessing : Preprocessing
         Filters and decimation of the logs.
     signals : mapping
         The same as results.json has it (`preprocessing_document`).
@@ -99,7 +99,7 @@ class DynamicsIdentification(Identification):
     essential: EssentialParameters
     friction: FrictionSelection
     motors: tuple[str, ...]
-    treatment: Preprocessing
+    preprocessing: Preprocessing
     signals: Mapping[str, Any]
     weight_faults: tuple[str, ...]
     weight_shares: Mapping[str, GravityRatio]
@@ -150,7 +150,7 @@ class DynamicsIdentification(Identification):
         return np.stack([parameters[index] @ values for values, index in columns], axis=1)
 
     def summary(self) -> str:
-        """What the fit says, for people: errors of the torques, base parameters, remarks, verdict."""
+        """Summary of the fit in text: errors of the torques, base parameters, remarks, verdict."""
         document = self.document()
         rows = [
             summary_row(row["name"], row["estimate"], row["std"], row["unit"])
@@ -178,7 +178,7 @@ class DynamicsIdentification(Identification):
 
     @property
     def bodiless(self) -> tuple[str, ...]:
-        """The links whose inertials no body can have: right for torques, useless for springs and for a URDF."""
+        """Links whose identified inertials are not physically consistent: right for torques, useless for springs and for a URDF."""
         links = (joint.link for joint in self.train.observation.model.joints)
         return tuple(link for link in links if not is_physically_consistent(self.estimate.values, link))
 

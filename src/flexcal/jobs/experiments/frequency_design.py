@@ -118,7 +118,7 @@ class DesignedFrequency(Result):
 
     @property
     def headline(self) -> str:
-        """Size of the plan, and the stiffness that it tells least well."""
+        """Size of the plan, and the stiffness with the largest predicted standard deviation."""
         name, largest = largest_stiffness_std(self.planned.sensitivity)
         plan = self.plan
         return f"{len(plan.poses)} poses, {len(plan.lines)} lines, largest standard deviation {100 * largest:.2f} % ({name})"
@@ -203,7 +203,7 @@ def design_frequency(
     sensors: ResponseSensors = COMMON_SENSORS,
     progress: Progress = silent,
 ) -> DesignedFrequency:
-    """Plan the frequency experiments of a robot, and predict how well they tell its springs.
+    """Plan the frequency experiments of a robot, and predict how precisely they determine its springs.
 
     Parameters
     ----------

@@ -39,7 +39,7 @@ SCHEDULES = {"designed": Schedule(0.2, 3, 1, 4), "quick": Schedule(0.3125, 3, 1,
 
 @dataclass(frozen=True, eq=False)
 class OptimisedExcitation:
-    """What was planned, the same with equal amplitudes, and the choice of poses behind both."""
+    """Planned experiments, the same with equal amplitudes, and the choice of poses behind both."""
 
     planned: PlannedResponses
     flat: PlannedResponses

@@ -47,7 +47,7 @@ _NEXT_SEED = 7919
 
 @dataclass(frozen=True)
 class TrajectoryRequest:
-    """Which exciting trajectories `optimise_trajectories` plans.
+    """Which exciting trajectories `design_trajectories` plans.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class TrajectoryRequest:
     def optimise(self, nominal: RobotModel, progress: Progress = silent) -> list[TrajectoryDesign]:
         """The designs of all searches, best first.
 
-        Raises `FlexcalError` as `optimise_trajectories` does, and for a start of another number of joints.
+        Raises `FlexcalError` as `design_trajectories` does, and for a start of another number of joints.
         """
         if self.start and len(self.start) != nominal.n:
             raise InputError(
@@ -227,7 +227,7 @@ class DesignedTrajectories(Result):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """One sentence each, on what the plan leans on."""
+        """One sentence each, on the plan's assumptions."""
         remarks = []
         if self.assumed_friction:
             remarks.append(
@@ -351,10 +351,10 @@ def plan_trajectories(
     command: str = "",
     progress: Progress = silent,
 ) -> DesignedTrajectories:
-    """`optimise_trajectories` for the nominal robot of a robot.yaml, after the recorded plan of the file `after`.
+    """`design_trajectories` for the nominal robot of a robot.yaml, after the recorded plan of the file `after`.
 
     The plan goes to the file `out`; beside it a page of pictures, and the motions as timed positions. Raises `FlexcalError` as
-    `optimise_trajectories` does.
+    `design_trajectories` does.
     """
     nominal = RobotModel.from_yaml(robot_file, estimates=False)
     require_stated_limits(nominal)

@@ -85,14 +85,14 @@ def identify_gains(
     with scratch_folder() as folder:
         files = log_files(logs, folder, "log")
         require_distinct_files(files)
-        treatment = choose_preprocessing(robot, files)
+        preprocessing = choose_preprocessing(robot, files)
         observation = Observation(robot, CLASSIC)
-        read = read_logs(files, robot, treatment, folder, jobs=jobs)
+        read = read_logs(files, robot, preprocessing, folder, jobs=jobs)
         payloads = payload_masses(read, robot)
         require_no_wrenches(read)
         parts = [LogSegment(log, Window()) for log in read]
         systems = assemble_log_systems(
-            parts, observation, treatment, batches=batches_each(len(files)), jobs=jobs, progress=progress
+            parts, observation, preprocessing, batches=batches_each(len(files)), jobs=jobs, progress=progress
         )
     base = BaseParameters.of(observation)
     return GainsIdentification(
@@ -101,7 +101,7 @@ def identify_gains(
         halves=half_gains(observation, base, systems, payloads),
         declared=declared,
         payloads=tuple(payloads),
-        signals=preprocessing_document(treatment, read),
+        signals=preprocessing_document(preprocessing, read),
     )
 
 

@@ -1,4 +1,4 @@
-"""What jobs read: the robot with its stored estimates, plans, frequency responses, and checks of such files."""
+"""Input of jobs: the robot with its stored estimates, plans, frequency responses, and checks of such files."""
 
 import lazy_loader
 

@@ -38,7 +38,7 @@ class HoldOutLogs:
     borders: tuple[float, ...]
     fitted: tuple[LogSegment, ...]
     unseen: tuple[LogSegment, ...]
-    treatment: Preprocessing
+    preprocessing: Preprocessing
     jobs: int
     progress: Progress
 
@@ -49,7 +49,7 @@ class HoldOutLogs:
         validate: Sequence[Path],
         hold_out: float,
         model: RobotModel,
-        treatment: Preprocessing,
+        preprocessing: Preprocessing,
         scratch: Path,
         *,
         accept_weight: bool = False,
@@ -61,12 +61,14 @@ class HoldOutLogs:
         Filtered logs are files of the folder `scratch`. Raises `InputError` and `FlexcalError` for a log that lies, has a payload, or
         has the torques of motors without a map, unless they are to be accepted (`accept_weight`).
         """
-        seen, others = (read_logs(paths, model, treatment, scratch, jobs=jobs) for paths in (fit, validate))
+        seen, others = (
+            read_logs(paths, model, preprocessing, scratch, jobs=jobs) for paths in (fit, validate)
+        )
         require_unloaded([*seen, *others], model)
         if not accept_weight:
             require_joint_torques([*seen, *others], model)
         require_wrenches([*seen, *others], model)
-        windows = [split_hold_out(log, treatment, hold_out) for log in seen]
+        windows = [split_hold_out(log, preprocessing, hold_out) for log in seen]
         late = [LogSegment(log, w) for log, (_, w) in zip(seen, windows, strict=True) if w is not None]
         borders = [math.inf if w is None else w.start for _, w in windows]
         return cls(
@@ -74,37 +76,39 @@ class HoldOutLogs:
             (*borders, *(-math.inf for _ in others)),
             tuple(LogSegment(log, early) for log, (early, _) in zip(seen, windows, strict=True)),
             (*late, *(LogSegment(log, Window()) for log in others)),
-            treatment,
+            preprocessing,
             jobs,
             progress,
         )
 
     def equations(self, observation: Observation) -> list[ExperimentSystem]:
-        """Of what is fitted."""
+        """Equations of the fitted part."""
         return self._systems(self.fitted, observation, batches_each(len(self.fitted)))
 
     def unseen_equations(self, observation: Observation) -> list[ExperimentSystem]:
-        """Of what is not."""
+        """Equations of the held-out part."""
         return self._systems(self.unseen, observation, 1)
 
     def rows(self, observation: Observation, base: BaseParameters) -> RecordedRows:
-        """Of what is fitted, log after log in this process; every pass over them is told anew."""
+        """Rows of the fitted part, log after log in this process; every pass over them reports its progress."""
         return self._rows(self.fitted, observation, base)
 
     def unseen_rows(self, observation: Observation, base: BaseParameters) -> RecordedRows | None:
-        """Of what is not, if there is any."""
+        """Rows of the held-out part, if there is any."""
         return self._rows(self.unseen, observation, base) if self.unseen else None
 
     def predictions(self, observation: Observation, estimate: Estimate) -> list[TorquePrediction]:
         """Of all logs, for the report."""
         predicted = [(observation, estimate.parameters.coordinates())] * len(self.logs)
-        return predict_log_torques(self.logs, self.borders, predicted, self.treatment, progress=self.progress)
+        return predict_log_torques(
+            self.logs, self.borders, predicted, self.preprocessing, progress=self.progress
+        )
 
     def _systems(
         self, parts: Sequence[LogSegment], observation: Observation, batches: int
     ) -> list[ExperimentSystem]:
         return assemble_log_systems(
-            parts, observation, self.treatment, batches=batches, jobs=self.jobs, progress=self.progress
+            parts, observation, self.preprocessing, batches=batches, jobs=self.jobs, progress=self.progress
         )
 
     def _rows(
@@ -112,5 +116,7 @@ class HoldOutLogs:
     ) -> RecordedRows:
         logs = [part.log for part in with_progress(parts, "estimating", self.progress)]
         windows = [part.window for part in parts]
-        treatment = self.treatment
-        return RecordedRows(observation, base, logs, windows, treatment.decimation, treatment.mask_standstill)
+        preprocessing = self.preprocessing
+        return RecordedRows(
+            observation, base, logs, windows, preprocessing.decimation, preprocessing.mask_standstill
+        )

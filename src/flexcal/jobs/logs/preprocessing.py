@@ -60,17 +60,17 @@ def choose_preprocessing(
                 f"{log}: the positions show no motion above their noise; record a motion that excites all joints.",
             )
     rate = min(motion.rate_hz for motion in bandwidths)
-    wanted = rows_hz = min(_PASSED * max(motion.frequency_hz for motion in bandwidths), _HIGHEST * rate)
+    cutoff_hz = rows_hz = min(_PASSED * max(motion.frequency_hz for motion in bandwidths), _HIGHEST * rate)
     choice = None
     if flexible:
-        wanted = max(wanted, _REVERSALS * rate)
+        cutoff_hz = max(cutoff_hz, _REVERSALS * rate)
     elif declared.cutoff_hz is None:
-        choice = _chosen(model, logs, wanted, loaded)
+        choice = _chosen(model, logs, cutoff_hz, loaded)
         if choice is not None:
-            wanted, rows_hz = choice.cutoff_hz, min(rows_hz, _ROWS * choice.cutoff_hz)
+            cutoff_hz, rows_hz = choice.cutoff_hz, min(rows_hz, _ROWS * choice.cutoff_hz)
     proposed = tuple(key for key in ("cutoff_hz", "decimation") if getattr(declared, key) is None)
     return Preprocessing(
-        float(f"{wanted:.2g}") if declared.cutoff_hz is None else declared.cutoff_hz,
+        float(f"{cutoff_hz:.2g}") if declared.cutoff_hz is None else declared.cutoff_hz,
         Decimation.near(rate / rows_hz) if declared.decimation is None else Decimation(declared.decimation),
         declared.mask_standstill,
         proposed,
@@ -90,17 +90,17 @@ def _chosen(
     return choose_cutoff(model, list(loads.values()), proposed_hz)
 
 
-def preprocessing_document(treatment: Preprocessing, logs: Sequence[JointLog]) -> dict[str, Any]:
+def preprocessing_document(preprocessing: Preprocessing, logs: Sequence[JointLog]) -> dict[str, Any]:
     """The entry `signals` of results.json: filters, and what was done with the time stamps of each log where they are not uniform."""
     return {
-        "cutoff_hz": treatment.cutoff_hz,
-        "decimation": treatment.decimation.factor,
-        "proposed": list(treatment.proposed),
+        "cutoff_hz": preprocessing.cutoff_hz,
+        "decimation": preprocessing.decimation.factor,
+        "proposed": list(preprocessing.proposed),
         "cross_validation": None
-        if treatment.choice is None
+        if preprocessing.choice is None
         else {
-            "error_percent": 100 * treatment.choice.error,
-            "error_of_spectrum_percent": 100 * treatment.choice.proposed_error,
+            "error_percent": 100 * preprocessing.choice.error,
+            "error_of_spectrum_percent": 100 * preprocessing.choice.proposed_error,
         },
         "time_stamps": {str(log.path): log.time_stamps for log in logs if log.time_stamps},
     }

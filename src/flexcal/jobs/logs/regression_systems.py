@@ -24,26 +24,26 @@ _LEAST = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class LogSegment:
-    """What of a log lies in a window of time."""
+    """Part of a log in a window of time."""
 
     log: JointLog
     window: Window
 
 
 def read_logs(
-    paths: Sequence[Path], model: RobotModel, treatment: Preprocessing, scratch: Path, *, jobs: int
+    paths: Sequence[Path], model: RobotModel, preprocessing: Preprocessing, scratch: Path, *, jobs: int
 ) -> list[JointLog]:
     """The logs, filtered into files of the folder `scratch`, so many at once as there are `jobs` (processes).
 
     Raises `InputError` and `FlexcalError` as `JointLog.read` does.
     """
     if jobs == 1:
-        return [JointLog.read(path, model, treatment.cutoff_hz, scratch) for path in paths]
+        return [JointLog.read(path, model, preprocessing.cutoff_hz, scratch) for path in paths]
     from joblib import Parallel, delayed
 
     start_workers(jobs)
     read: Any = Parallel(n_jobs=jobs)(
-        delayed(WorkerTask(JointLog.read))(path, model, treatment.cutoff_hz, scratch) for path in paths
+        delayed(WorkerTask(JointLog.read))(path, model, preprocessing.cutoff_hz, scratch) for path in paths
     )
     return read
 
@@ -51,7 +51,7 @@ def read_logs(
 def assemble_log_systems(
     parts: Sequence[LogSegment],
     observation: Observation,
-    treatment: Preprocessing,
+    preprocessing: Preprocessing,
     *,
     batches: int,
     jobs: int,
@@ -64,7 +64,7 @@ def assemble_log_systems(
     if jobs == 1:
         progress("reading", 0.0)
         assembled = [
-            _log_system(part, observation, treatment, batches)
+            _log_system(part, observation, preprocessing, batches)
             for part in with_progress(parts, "reading", progress)
         ]
         progress("reading", 1.0)
@@ -72,7 +72,7 @@ def assemble_log_systems(
     from joblib import Parallel, delayed
 
     systems = Parallel(n_jobs=jobs, return_as="generator")(
-        delayed(WorkerTask(_log_system))(part, observation, treatment, batches) for part in parts
+        delayed(WorkerTask(_log_system))(part, observation, preprocessing, batches) for part in parts
     )
     progress("reading", 0.0)
     assembled = []
@@ -82,12 +82,14 @@ def assemble_log_systems(
     return assembled
 
 
-def split_hold_out(log: JointLog, treatment: Preprocessing, hold_out: float) -> tuple[Window, Window | None]:
+def split_hold_out(
+    log: JointLog, preprocessing: Preprocessing, hold_out: float
+) -> tuple[Window, Window | None]:
     """What of a log is fitted, and its last share `hold_out` of time, if there is one; the filters reach from neither into the other."""
     if hold_out == 0:
         return Window(), None
     border = log.last(hold_out)
-    reach = treatment.decimation.support * log.time_step
+    reach = preprocessing.decimation.support * log.time_step
     return Window(end=float(np.nextafter(border - reach, -math.inf))), Window(start=border)
 
 
@@ -106,13 +108,13 @@ def with_progress(parts: Sequence[LogSegment], stage: str, progress: Progress) -
 
 
 def _log_system(
-    part: LogSegment, observation: Observation, treatment: Preprocessing, batches: int
+    part: LogSegment, observation: Observation, preprocessing: Preprocessing, batches: int
 ) -> ExperimentSystem:
     return experiment_system(
         observation,
         part.log,
-        treatment.decimation,
+        preprocessing.decimation,
         part.window,
-        mask_standstill=treatment.mask_standstill,
+        mask_standstill=preprocessing.mask_standstill,
         batches=batches,
     )

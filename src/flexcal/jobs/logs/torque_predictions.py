@@ -22,7 +22,7 @@ def predict_log_torques(
     logs: Sequence[JointLog],
     held_out_from: Sequence[float],
     predicted: Sequence[tuple[Observation, np.ndarray]],
-    treatment: Preprocessing,
+    preprocessing: Preprocessing,
     *,
     progress: Progress,
 ) -> list[TorquePrediction]:
@@ -32,7 +32,7 @@ def predict_log_torques(
     progress("report", 0.0)
     for log, border, (observation, parameters) in zip(logs, held_out_from, predicted, strict=True):
         prediction = predict_torques(
-            observation, parameters, log, treatment.decimation, held_out_from=border, points=points
+            observation, parameters, log, preprocessing.decimation, held_out_from=border, points=points
         )
         predictions.append(prediction)
         progress("report", len(predictions) / len(logs))

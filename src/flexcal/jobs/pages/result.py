@@ -1,4 +1,4 @@
-"""What the results of all verbs have in common."""
+"""Base classes of the results of all verbs."""
 
 from __future__ import annotations
 

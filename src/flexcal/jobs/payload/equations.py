@@ -25,7 +25,7 @@ class PayloadLogEquations:
     logs: Sequence[JointLog]
     observations: Sequence[Observation]
     equations: PayloadEquations
-    treatment: Preprocessing
+    preprocessing: Preprocessing
 
     @classmethod
     def of(
@@ -35,7 +35,7 @@ class PayloadLogEquations:
         loaded: Sequence[bool],
         dynamics: Estimate | None,
         sources: tuple[str, ...],
-        treatment: Preprocessing,
+        preprocessing: Preprocessing,
     ) -> PayloadLogEquations:
         """With springs that yield under the payload of the `model`; raises `FlexcalError` as `FlexibilityCorrection` and
         `experiment_system` do.
@@ -53,14 +53,14 @@ class PayloadLogEquations:
             systems += assemble_log_systems(
                 [LogSegment(log, Window())],
                 wide,
-                treatment,
+                preprocessing,
                 batches=batches_each(len(logs)),
                 jobs=1,
                 progress=silent,
             )
         assert model.payload is not None
         data = RegressionData.of(observations[-1], base, systems)
-        return cls(logs, observations, PayloadEquations(data, loaded, model.payload, prior), treatment)
+        return cls(logs, observations, PayloadEquations(data, loaded, model.payload, prior), preprocessing)
 
     def predictions(self, fit: PayloadFit) -> list[TorquePrediction]:
         """Torques of every log as the `fit` of these equations has them, beside the measured ones."""
@@ -69,5 +69,5 @@ class PayloadLogEquations:
             for observation, with_payload in zip(self.observations, self.equations.loaded, strict=True)
         ]
         return predict_log_torques(
-            self.logs, [np.inf] * len(self.logs), predicted, self.treatment, progress=silent
+            self.logs, [np.inf] * len(self.logs), predicted, self.preprocessing, progress=silent
         )

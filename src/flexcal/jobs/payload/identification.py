@@ -123,9 +123,9 @@ def identify_payload(
         require_distinct_files(files)
         _require_unused(files, dynamics)
         carrying = [True] * len(loaded) + [False] * len(unloaded)
-        treatment = choose_preprocessing(robot, files, flexible=bool(robot.elastic), loaded=carrying)
-        treatment = _slow(treatment, robot, files)
-        read = read_logs(files, robot, treatment, folder, jobs=jobs)
+        preprocessing = choose_preprocessing(robot, files, flexible=bool(robot.elastic), loaded=carrying)
+        preprocessing = _slow(preprocessing, robot, files)
+        read = read_logs(files, robot, preprocessing, folder, jobs=jobs)
         _require_payloads(read, carrying)
         require_no_wrenches(read)
         faults = tuple(weight_faults(read, robot))
@@ -133,11 +133,11 @@ def identify_payload(
             require_joint_torques(read, robot)
         for number in range(_ROUGH if robot.elastic else 0):
             progress("payload", number / (_ROUGH + 1))
-            rough = PayloadLogEquations.of(robot, read, carrying, dynamics, (), treatment)
+            rough = PayloadLogEquations.of(robot, read, carrying, dynamics, (), preprocessing)
             robot = robot.with_values(fit_payload(rough.equations).estimate.values)
         progress("payload", _ROUGH / (_ROUGH + 1))
         system = PayloadLogEquations.of(
-            robot, read, carrying, dynamics, uncertain_parameters(robot), treatment
+            robot, read, carrying, dynamics, uncertain_parameters(robot), preprocessing
         )
         fit = fit_payload(system.equations)
         if fit.error > _SENSELESS:
@@ -158,7 +158,7 @@ def identify_payload(
             predictions=predictions,
             loaded=_named(loaded, folder),
             free=_named(unloaded, folder),
-            signals=preprocessing_document(treatment, read),
+            signals=preprocessing_document(preprocessing, read),
             weight_faults=faults,
         )
 
@@ -188,16 +188,16 @@ def _has(model: RobotModel, estimate: Estimate) -> bool:
     return own <= set(model.posterior.parameters.names)
 
 
-def _slow(treatment: Preprocessing, model: RobotModel, logs: Sequence[Path]) -> Preprocessing:
+def _slow(preprocessing: Preprocessing, model: RobotModel, logs: Sequence[Path]) -> Preprocessing:
     """With rows no closer than springs allow."""
     if not model.elastic:
-        return treatment
+        return preprocessing
     rate = min(1.0 / next(log_blocks(log, model)).time_step for log in logs)
     slowest = Decimation.near(rate / _ROWS_HZ)
-    if treatment.decimation.factor >= slowest.factor:
-        return treatment
-    chosen = tuple(dict.fromkeys((*treatment.proposed, "decimation")))
-    return replace(treatment, decimation=slowest, proposed=chosen)
+    if preprocessing.decimation.factor >= slowest.factor:
+        return preprocessing
+    chosen = tuple(dict.fromkeys((*preprocessing.proposed, "decimation")))
+    return replace(preprocessing, decimation=slowest, proposed=chosen)
 
 
 def _require_unused(logs: Sequence[Path], dynamics: Estimate | None) -> None:

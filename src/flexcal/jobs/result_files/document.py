@@ -42,7 +42,7 @@ SCHEMA = 1
 
 
 def header(kind: Kind) -> dict[str, Any]:
-    """What every results.json begins with."""
+    """First entries of every results.json."""
     return {"kind": kind, "schema": SCHEMA}
 
 

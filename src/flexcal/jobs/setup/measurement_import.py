@@ -53,7 +53,7 @@ _LOG = ("t", *JOINT_QUANTITIES, "temperature", "payload")
 
 @dataclass(frozen=True, eq=False)
 class ImportedFile:
-    """What the columns of a file are taken to be, and the values that were or would be written.
+    """Interpretation of a file's columns, and the values that were or would be written.
 
     kind: poses were measured, a log of joints, or joint positions only, from which poses can be chosen. columns: in flexcal's names and
     SI units. misfit: how the nominal robot goes with the points, None where there are none or too few.

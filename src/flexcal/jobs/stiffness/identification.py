@@ -75,9 +75,9 @@ def identify_stiffness(
     >>> from flexcal.elasticity.identification import MultiStart
     >>> model = RobotModel.from_yaml("examples/tx90l/robot.yaml", estimates=False)
     >>> plan = frequency_plan(model, "examples/tx90l/frequency_poses.csv", "default", seed=0)
-    >>> plan = replace(plan, poses=plan.poses[:1], lines=plan.lines[::6], amplitude=plan.amplitude[:, ::6])
+    >>> plan = replace(plan, poses=plan.poses[:1], lines=plan.lines[::9], amplitude=plan.amplitude[:, ::9])
     >>> plan = replace(plan, realisations=3, periods=2, settle_periods=1)
-    >>> responses = list(frequency_responses(plan, VirtualCell(model).record(plan), pooled_lines=26))
+    >>> responses = list(frequency_responses(plan, VirtualCell(model).record(plan), pooled_lines=18))
     >>> search = MultiStart(starts=1, agreement=1)
     >>> result = identify_stiffness(model, responses, plan=plan, inertias_known=True, search=search)
     >>> low, high = result.estimate.interval("joint_2.drive.stiffness")

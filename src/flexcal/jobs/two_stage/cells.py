@@ -20,7 +20,7 @@ CellName = Literal["virtual", "hard"]
 
 
 class KnownCell(Cell, Protocol):
-    """A cell whose truth can be asked for at the end."""
+    """Cell whose true values are known and compared at the end."""
 
     def noise_free(self, plan: PosePlan) -> np.ndarray:
         """True positions (N, 3) m of the point at every pose in the instrument's frame, for verification only."""

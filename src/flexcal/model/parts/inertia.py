@@ -17,7 +17,7 @@ class Inertia:
 
 
 def parallel_axis(mass: float, com: np.ndarray) -> np.ndarray:
-    """What moving the reference from the centre of mass to the frame's origin adds to the inertia, (3, 3) kg m²."""
+    """Parallel-axis term of the inertia: its increase from the centre of mass to the frame's origin, (3, 3) kg m²."""
     return mass * ((com @ com) * np.eye(3) - np.outer(com, com))
 
 

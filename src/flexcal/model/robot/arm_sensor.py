@@ -11,7 +11,7 @@ from flexcal.model.robot.config import ArmSensorConfig
 
 @dataclass(frozen=True, eq=False)
 class ArmSensor:
-    """What sees one point of a link move in one direction: an accelerometer on it, or a vibrometer that stands still.
+    """Sensor of the motion of one point of a link in one direction: an accelerometer on it, or a fixed vibrometer.
 
     `xyz` (3,) m is the point in the frame of the link that moves with joint number `joint`. `direction` (3,), of unit length, is in the
     link's frame where the sensor `moves` with the link, else in the robot's base frame. `order` is the time derivative that is measured: 0

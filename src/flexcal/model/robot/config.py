@@ -235,7 +235,7 @@ class CableTorqueConfig:
 
 @dataclass(frozen=True)
 class DynamicsConfig:
-    """Signal treatment and friction of the identification of dynamics; an absent cut-off and decimation are proposed from the data.
+    """Preprocessing of signals, and friction, for the identification of dynamics; absent cut-off and decimation follow from the data.
 
     friction: "classic" (viscous, Coulomb, offset), a list of terms, or "auto": the classic ones and what cross-validation adds to them.
     torque: what a logged torque is over a sample, as in plans; `tau` in files.

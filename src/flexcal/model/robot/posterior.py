@@ -18,7 +18,7 @@ class Posterior:
     covariance: np.ndarray
 
     def determines(self, name: str) -> bool:
-        """Whether a parameter was estimated, and not held because the data could not tell it from others."""
+        """Whether a parameter was estimated, and not held fixed because the data do not separate it from others."""
         if name not in self.parameters:
             return False
         number = self.parameters.index(name)

@@ -1,4 +1,4 @@
-"""Joint torques of what acts on a robot beside its motors: a measured wrench, and springs and cables that robot.yaml knows."""
+"""Joint torques of external loads: a measured wrench, and springs and cables that robot.yaml declares."""
 
 from __future__ import annotations
 

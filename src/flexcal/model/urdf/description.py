@@ -31,7 +31,7 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Description:
-    """What flexcal takes from a URDF: movable joints, the inertia each carries (fixed and locked children merged), all frames.
+    """Content of a URDF: movable joints, the inertia of each (fixed and locked children merged), and all frames.
 
     Joints stand depth first, branches in the order of the file; Pinocchio sorts them by name.
     """

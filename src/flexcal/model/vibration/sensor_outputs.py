@@ -1,4 +1,4 @@
-"""What arm-side sensors measure of the linearised elastic robot."""
+"""Readings of arm-side sensors as outputs of the linearised elastic robot."""
 
 from __future__ import annotations
 
