@@ -68,7 +68,7 @@ class AccuracyMap(Result):
     worst : ndarray
         Rows of the largest errors.
     sources : dict of float
-        Shares of the sources of error, over all poses.
+        Share (0 to 1) of the error's variance by kind of parameter, over all poses; correlated kinds do not add up to one.
     worst_sources : dict of ndarray
         The same at each of the `worst` rows.
     scale : ErrorScale or None

@@ -82,7 +82,7 @@ class DynamicsIdentification(Identification):
     predictions : tuple of TorquePrediction
         Measured and predicted torques of all logs.
     seconds : float
-        Time that the estimator took.
+        Duration of the identification.
     estimates : Path or None
         File that the estimate was stored in.
     record : RunRecord
