@@ -29,7 +29,7 @@ def test_a_motion_of_another_day(tmp_path: Path, friction: str, most: float) -> 
     x = found.estimate.parameters.coordinates()
 
     model = RobotModel.from_yaml(tmp_path / "robot.yaml", estimates=False)
-    read = JointLog.read(tmp_path / "fresh.csv", model, found.treatment.cutoff_hz, tmp_path)
+    read = JointLog.read(tmp_path / "fresh.csv", model, found.preprocessing.cutoff_hz, tmp_path)
     motion = Motion.joined(read.blocks())
     columns = zip(observation.columns(motion), observation.column_indices, strict=True)
     time = fresh["t"].to_numpy()
