@@ -18,6 +18,7 @@ import polars as pl
 import pytest
 from cli_files import FLEXCAL, copied
 from refusals import assert_refusal
+from small_plan import small_plan
 from test_bad_input import refused_run
 
 from flexcal.cli.arguments.verb_table import find_verb
@@ -39,19 +40,7 @@ def recorded(examples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = copied(examples / "tx90l", tmp_path_factory.mktemp("cli") / "tx90l")
     assert main(["design", "frequency", str(folder / "robot.yaml"), "--out", str(folder / "whole.yaml")]) == 0
     whole = read_plan_of(folder / "whole.yaml", MultisinePlan)
-    lines = np.arange(3, 60, 4)
-    small = replace(
-        whole,
-        poses=whole.poses[:2],
-        base_frequency_hz=1.0,
-        lines=lines,
-        amplitude=np.repeat(whole.amplitude[:, :1], len(lines), axis=1),
-        periods=3,
-        settle_periods=1,
-        realisations=3,
-        reference_frequency_hz=1.5,
-        rate_hz=1000.0,
-    )
+    small = small_plan(whole)
     write_plan(folder / "small.yaml", small)
     arguments = [
         "measure",

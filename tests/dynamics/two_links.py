@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import recovery
 
 from flexcal.data.recordings import Decimation
@@ -88,3 +89,14 @@ def errors(estimate: Estimate, observation: Observation, truth: np.ndarray) -> n
     hidden = {entry.name for entry in estimate.dropped}
     rows = [(estimate.values[n] - v, estimate.std(n)) for n, v in expected.items() if n not in hidden]
     return np.array(rows, dtype=float).T
+
+
+def write_logs(arm: Observation, folder: Path) -> None:
+    """free.csv and loaded.csv: the motion without and with `HELD`, motor torques by `GAINS` with noise of 0.1 N m."""
+    rng = np.random.default_rng(1)
+    for name, held, seed in (("free", 0 * HELD, 7), ("loaded", HELD, 9)):
+        motion = swings(arm, held, seed)
+        torque = motion.torque * GAINS + 0.1 * rng.normal(size=motion.torque.shape)
+        columns = {"t": motion.time} | {f"q{i + 1}": motion.q[:, i] for i in range(2)}
+        columns |= {f"tau{i + 1}": torque[:, i] for i in range(2)}
+        pl.DataFrame(columns).write_csv(folder / f"{name}.csv")

@@ -4,10 +4,9 @@ import json
 from pathlib import Path
 
 import numpy as np
-import polars as pl
 import pytest
 from refusals import refused
-from two_links import GAINS, HELD, swings, two_links
+from two_links import two_links, write_logs
 
 from flexcal import (
     DynamicsIdentification,
@@ -29,14 +28,7 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """robot.yaml of two links, free.csv and loaded.csv, with torque noise; the payload is not declared."""
     home = tmp_path_factory.mktemp("arm")
     observation = Observation(two_links(home, ROBOT), CLASSIC)
-    rng = np.random.default_rng(1)
-    for name, held, seed in (("free", 0 * HELD, 7), ("loaded", HELD, 9)):
-        motion = swings(observation, held, seed)
-        torque = motion.torque * GAINS + 0.1 * rng.normal(size=motion.torque.shape)
-        columns = {"t": motion.time} | {f"q{i + 1}": motion.q[:, i] for i in range(2)}
-        pl.DataFrame(columns | {f"tau{i + 1}": torque[:, i] for i in range(2)}).write_csv(
-            home / f"{name}.csv"
-        )
+    write_logs(observation, home)
     return home
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from refusals import refused
+from small_plan import small_plan
 
 from flexcal import (
     CellConfig,
@@ -35,19 +36,7 @@ def nominal(examples: Path) -> RobotModel:
 def experiment(nominal: RobotModel, examples: Path) -> Experiment:
     """A plan of two poses of 15 lines, and the responses of a virtual robot by it."""
     whole = frequency_plan(nominal, examples / "tx90l" / "frequency_poses.csv", "default", 3)
-    lines = np.arange(3, 60, 4)
-    plan = replace(
-        whole,
-        poses=whole.poses[:2],
-        base_frequency_hz=1.0,
-        lines=lines,
-        amplitude=np.repeat(whole.amplitude[:, :1], len(lines), axis=1),
-        periods=3,
-        settle_periods=1,
-        realisations=3,
-        reference_frequency_hz=1.5,
-        rate_hz=1000.0,
-    )
+    plan = small_plan(whole)
     config = CellConfig()
     truth = draw_truth(nominal, config.spread, np.random.default_rng([3, 0]))
     cell = VirtualCell(nominal.with_values(truth), config, 3, controller_model=nominal)

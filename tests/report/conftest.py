@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-import polars as pl
 import pytest
-from two_links import GAINS, HELD, swings, two_links
+from two_links import two_links, write_logs
 from virtual_study import leave_run, simulate_run
 
 from flexcal.dynamics.inverse_model import CLASSIC, Observation
@@ -46,14 +44,7 @@ def payload_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """What two links leave that hold 4 kg in one recording, nothing in another, and 3 kg in robot.yaml."""
     home = tmp_path_factory.mktemp("arm")
     observation = Observation(two_links(home, ROBOT), CLASSIC)
-    rng = np.random.default_rng(1)
-    for name, held, seed in (("free", 0 * HELD, 7), ("loaded", HELD, 9)):
-        motion = swings(observation, held, seed)
-        torque = motion.torque * GAINS + 0.1 * rng.normal(size=motion.torque.shape)
-        columns = {"t": motion.time} | {f"q{i + 1}": motion.q[:, i] for i in range(2)}
-        pl.DataFrame(columns | {f"tau{i + 1}": torque[:, i] for i in range(2)}).write_csv(
-            home / f"{name}.csv"
-        )
+    write_logs(observation, home)
     robot = home / "robot.yaml"
     robot.write_text(robot.read_text() + DECLARED)
     out, command = home / "out", "flexcal identify payload r l"

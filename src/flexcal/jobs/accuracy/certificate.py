@@ -31,7 +31,7 @@ from flexcal.data.poses import PoseSet, ToolTargets, read_targets
 from flexcal.errors import InputError
 from flexcal.files.formats import sha256_of
 from flexcal.jobs.accuracy.verification import verification_poses
-from flexcal.jobs.calibration import already_fitted
+from flexcal.jobs.calibration import fitted_files, fitted_points
 from flexcal.jobs.inputs import CalibratedRobot, unmeasured_targets_remark
 from flexcal.model.parts import vector_rotation
 from flexcal.model.robot import RobotModel
@@ -257,7 +257,7 @@ def certify_robot(
             [robot_file, calibrated.nominal.urdf],
             {"estimates": calibrated.stored, "targets": targets, "before": before, "after": after},
         ),
-        already_fitted(calibrated, [after], visited[after][0]),
+        fitted_files(calibrated, [after]) or fitted_points(calibrated, visited[after][0]),
         command,
     )
     progress("comparing", 1.0)

@@ -33,7 +33,8 @@ from flexcal.errors import FlexcalError
 from flexcal.files.formats import provenance
 from flexcal.jobs.accuracy.registration_refit import proposed_refit, refit_document, refit_remarks
 from flexcal.jobs.calibration import (
-    already_fitted,
+    fitted_files,
+    fitted_points,
     ignored_columns_remarks,
     outside_ranges,
     subsample_document,
@@ -267,7 +268,7 @@ def verify(
         better=proposed_refit(model, poses, verified[0]) if anew is None else None,
         uncalibrated=() if "point" in refit else unmeasured,
         outside=outside_ranges(robot, measured.q),
-        fitted=already_fitted(robot, (), poses),
+        fitted=fitted_points(robot, poses),
         sample=sample,
         everywhere=None if sample is None else all_errors(standing, measured, progress),
     )
@@ -295,7 +296,7 @@ def verify_robot(
     progress("reading", 1.0)
     verification = verify(robot, poses, refit=refit, progress=progress)
     origin = provenance([robot_file, robot.nominal.urdf, *files], None, robot.stored, tuple(robot.blocks))
-    fitted = already_fitted(robot, files, verification.poses)
+    fitted = fitted_files(robot, files) or verification.fitted
     result = replace(verification, fitted=fitted, record=RunRecord(origin, command))
     if out is not None:
         result.write(out)

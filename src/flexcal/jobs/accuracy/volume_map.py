@@ -28,7 +28,7 @@ from flexcal.errors import FlexcalError, InputError
 from flexcal.files.formats import provenance
 from flexcal.jobs.accuracy.registration_refit import proposed_refit, refit_remarks
 from flexcal.jobs.accuracy.verification import verification_poses
-from flexcal.jobs.calibration import already_fitted, outside_ranges
+from flexcal.jobs.calibration import fitted_files, fitted_points, outside_ranges
 from flexcal.jobs.experiments import box_corners, working_file, working_volume
 from flexcal.jobs.inputs import (
     CalibratedRobot,
@@ -36,11 +36,11 @@ from flexcal.jobs.inputs import (
     require_distinct_files,
     unmeasured_targets_remark,
 )
-from flexcal.jobs.pages import Result
+from flexcal.jobs.pages import PlottedResult
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust, prediction_checks
-from flexcal.report.layout import write_page
+from flexcal.report.layout import Page
 from flexcal.report.pages import MapStudy, map_page
 from flexcal.units import MILLIMETRE
 
@@ -52,7 +52,7 @@ _SOURCE_POSES = 200
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class AccuracyMap(Result):
+class AccuracyMap(PlottedResult):
     """Result of `accuracy_map`: predicted error of the tool over the working volume, and where it comes from.
 
     Attributes
@@ -118,23 +118,9 @@ class AccuracyMap(Result):
         shares = ", ".join(f"{kind} {100 * share:.0f} %" for kind, share in self.sources.items())
         return "\n".join([self.headline, f"sources: {shares}", *self.remarks, self.trust.sentence])
 
-    def report(self, path: str | Path) -> Path:
-        """Write the map as one HTML page.
-
-        Parameters
-        ----------
-        path : str or Path
-            File to write.
-
-        Returns
-        -------
-        Path
-            The file.
-        """
-        path = Path(path)
+    def _page(self) -> Page:
         study = MapStudy(self.model, self.predicted, self.box, self.document(), self.scale, self.verification)
-        write_page(path, map_page(study))
-        return path
+        return map_page(study)
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -338,7 +324,7 @@ def map_accuracy(
         robot.stored,
         tuple(robot.blocks),
     )
-    fitted = already_fitted(robot, verification, poses) if poses is not None else ()
+    fitted = fitted_files(robot, verification) or accuracy.fitted
     result = replace(accuracy, fitted=fitted, record=RunRecord(origin, command))
     if out != page_beside(out):
         _write_table(out, result.predicted)
@@ -368,7 +354,7 @@ class _Check:
                 f"the verification poses cannot verify the map: {said}; give points measured as the calibration's.",
             )
         before = uncalibrated_model(robot.nominal, poses).errors(poses)
-        return cls(errors, before, error_scale(errors, covariance), already_fitted(robot, (), poses), sample)
+        return cls(errors, before, error_scale(errors, covariance), fitted_points(robot, poses), sample)
 
 
 def _worst(predicted: PredictedAccuracy) -> np.ndarray:

@@ -1,4 +1,4 @@
-from .fitted_measurements import already_fitted, measurement_digests
+from .fitted_measurements import fitted_files, fitted_points, measurement_digests
 from .ignored_columns import ignored_columns_remarks
 from .job import calibrate_robot
 from .joint_ranges import outside_ranges
@@ -8,9 +8,10 @@ from .subsample import subsample_document, verification_subsample_remark
 
 __all__ = [
     "Calibration",
-    "already_fitted",
     "calibrate",
     "calibrate_robot",
+    "fitted_files",
+    "fitted_points",
     "ignored_columns_remarks",
     "measurement_digests",
     "outside_ranges",

@@ -26,13 +26,14 @@ def _digests(poses: PoseSet) -> Iterator[str]:
     return (f"{zlib.crc32(row.tobytes()):08x}" for row in rows)
 
 
-def already_fitted(calibrated: CalibratedRobot, files: Sequence[Path], poses: PoseSet) -> tuple[str, ...]:
-    """Those of the `files`, or how many of the `poses` in them, that the calibration was fitted to, in words."""
-    estimate = calibrated.blocks["calibration"]
-    known = estimate.provenance.values()
-    named = tuple(file.name for file in files if sha256_of(file) in known)
-    if named:
-        return named
-    fitted = set(estimate.measurements)
+def fitted_files(calibrated: CalibratedRobot, files: Sequence[Path]) -> tuple[str, ...]:
+    """Names of those of the `files` that the calibration was made from."""
+    known = calibrated.blocks["calibration"].provenance.values()
+    return tuple(file.name for file in files if sha256_of(file) in known)
+
+
+def fitted_points(calibrated: CalibratedRobot, poses: PoseSet) -> tuple[str, ...]:
+    """How many of the `poses` the calibration was fitted to, in words; empty for none."""
+    fitted = set(calibrated.blocks["calibration"].measurements)
     again = sum(digest in fitted for digest in _digests(poses))
     return (f"{again} of these {len(poses)} points",) if again else ()

@@ -35,11 +35,11 @@ from flexcal.jobs.experiments.optimised_excitation import (
 )
 from flexcal.jobs.experiments.standard_plans import read_frequency_poses, reference_amplitude, standard_plan
 from flexcal.jobs.inputs import robot_provenance
-from flexcal.jobs.pages import Result
+from flexcal.jobs.pages import PlottedResult
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
-from flexcal.report.layout import write_page
+from flexcal.report.layout import Page
 from flexcal.report.pages import FrequencyDesignStudy, frequency_page
 
 
@@ -85,7 +85,7 @@ DEFAULT_REQUEST = FrequencyRequest()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DesignedFrequency(Result):
+class DesignedFrequency(PlottedResult):
     """Result of `design_frequency`: a plan of frequency experiments and its predicted precision.
 
     Attributes
@@ -129,23 +129,9 @@ class DesignedFrequency(Result):
             [self.headline, *(f"{name:<40} {std:.4f}" for name, std in self.planned.std().items())]
         )
 
-    def report(self, path: str | Path) -> Path:
-        """Write the plan's figures as one HTML page.
-
-        Parameters
-        ----------
-        path : str or Path
-            File to write.
-
-        Returns
-        -------
-        Path
-            The file.
-        """
-        path = Path(path)
+    def _page(self) -> Page:
         study = FrequencyDesignStudy(self.model, self.planned, self.flat, self.curve, self.document())
-        write_page(path, frequency_page(study))
-        return path
+        return frequency_page(study)
 
     @property
     def plan(self) -> MultisinePlan:
@@ -316,8 +302,7 @@ def _require_all(model: RobotModel, request: FrequencyRequest, file: Path | None
         columns = ", ".join(f"q{i}_deg" for i in range(1, model.n + 1))
         missing.append(
             f"has no {file or 'file'} for the poses of the plan '{request.kind}': write it with the columns plan, pose, {columns}, or let "
-            "--plan designed "
-            "choose the poses"
+            "--plan designed choose the poses"
         )
     if missing:
         raise InputError("E-RUN-038", f"{model.path} " + "; it ".join(missing) + ".")

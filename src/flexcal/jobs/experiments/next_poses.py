@@ -20,17 +20,18 @@ from flexcal.jobs.experiments.candidate_poses import (
     PoseRequest,
     PoseRequestFiles,
 )
-from flexcal.jobs.experiments.poses import flank_block, pool_block, working_block, write_plan_page
+from flexcal.jobs.experiments.poses import flank_block, plan_page, pool_block, working_block
 from flexcal.jobs.inputs import robot_provenance
-from flexcal.jobs.pages import Result
+from flexcal.jobs.pages import PlottedResult
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
+from flexcal.report.layout import Page
 from flexcal.units import MILLIMETRE
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DesignedNextPoses(Result):
+class DesignedNextPoses(PlottedResult):
     """Result of `design_next_poses`: the next poses to measure, best first, and when to stop.
 
     Attributes
@@ -78,27 +79,10 @@ class DesignedNextPoses(Result):
         """Predicted tool error now and after the next poses."""
         return self.headline
 
-    def report(self, path: str | Path) -> Path:
-        """Write the plan's figures as one HTML page.
-
-        Parameters
-        ----------
-        path : str or Path
-            File to write.
-
-        Returns
-        -------
-        Path
-            The file.
-
-        Raises
-        ------
-        FlexcalError
-            Where nothing is left to measure.
-        """
+    def _page(self) -> Page:
         if self.plan is None:
             raise FlexcalError("E-RUN-096", "no more poses are needed, so there is no plan to show.")
-        return write_plan_page(Path(path), self.model, self.plan, self.document(), self.working)
+        return plan_page(self.model, self.plan, self.document(), self.working)
 
     def document(self) -> dict[str, Any]:
         """The JSON document; `stop_after` counts the next poses, and is null where those asked for do not suffice."""

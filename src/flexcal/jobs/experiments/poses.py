@@ -31,11 +31,11 @@ from flexcal.jobs.experiments.candidate_poses import (
     PoseRequestFiles,
 )
 from flexcal.jobs.inputs import robot_provenance
-from flexcal.jobs.pages import Result
+from flexcal.jobs.pages import PlottedResult
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, identifiability_block
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
-from flexcal.report.layout import write_page
+from flexcal.report.layout import Page, write_page
 from flexcal.report.pages import PoseStudy, pose_page
 from flexcal.units import MILLIMETRE
 
@@ -63,7 +63,7 @@ class RandomPoses:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DesignedPoses(Result):
+class DesignedPoses(PlottedResult):
     """Result of `design_poses`: a plan of calibration poses, with the reasons for the choice and the order of measuring.
 
     Attributes
@@ -116,20 +116,8 @@ class DesignedPoses(Result):
             ]
         )
 
-    def report(self, path: str | Path) -> Path:
-        """Write the plan's figures as one HTML page.
-
-        Parameters
-        ----------
-        path : str or Path
-            File to write.
-
-        Returns
-        -------
-        Path
-            The file.
-        """
-        return write_plan_page(Path(path), self.model, self.plan, self.document(), self.working)
+    def _page(self) -> Page:
+        return plan_page(self.model, self.plan, self.document(), self.working)
 
     def document(self) -> dict[str, Any]:
         """The JSON document; `chosen` are the poses' numbers in the file they come from; those left out there stand beside, with why.
@@ -282,16 +270,15 @@ def plan_verification_poses(
     plan = replace(plan, name=VERIFICATION)
     result = RandomPoses(plan, out, seed, RunRecord(robot_provenance(model), command))
     write_plan(out, plan)
-    write_plan_page(page_beside(out), model, plan, result.document(), None)
+    write_page(page_beside(out), plan_page(model, plan, result.document(), None))
     return result
 
 
-def write_plan_page(
-    path: Path, model: RobotModel, plan: PosePlan, document: dict[str, Any], working: WorkingVolume | None
-) -> Path:
-    """Write the page of a plan of poses; returns its path."""
+def plan_page(
+    model: RobotModel, plan: PosePlan, document: dict[str, Any], working: WorkingVolume | None
+) -> Page:
+    """The page of a plan of poses."""
     study = PoseStudy(model, plan.q, document)
     if working is not None:
         study = replace(study, working=working.points, box=working.box)
-    write_page(path, pose_page(study))
-    return path
+    return pose_page(study)

@@ -28,11 +28,11 @@ from flexcal.design.trajectories import (
 )
 from flexcal.errors import InputError
 from flexcal.files.formats import provenance
-from flexcal.jobs.pages import Result
+from flexcal.jobs.pages import PlottedResult
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
-from flexcal.report.layout import write_page
+from flexcal.report.layout import Page
 from flexcal.report.pages import trajectory_page
 
 SEARCHES = 3
@@ -143,7 +143,7 @@ DEFAULT_REQUEST = TrajectoryRequest()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DesignedTrajectories(Result):
+class DesignedTrajectories(PlottedResult):
     """Result of `design_trajectories`: the designs of all searches, best first.
 
     Attributes
@@ -186,22 +186,8 @@ class DesignedTrajectories(Result):
         """Length, condition number and remarks."""
         return "\n".join([self.headline, *self.remarks])
 
-    def report(self, path: str | Path) -> Path:
-        """Write the trajectories' figures as one HTML page.
-
-        Parameters
-        ----------
-        path : str or Path
-            File to write.
-
-        Returns
-        -------
-        Path
-            The file.
-        """
-        path = Path(path)
-        write_page(path, trajectory_page(self.design, self.document()))
-        return path
+    def _page(self) -> Page:
+        return trajectory_page(self.design, self.document())
 
     @property
     def design(self) -> TrajectoryDesign:
@@ -357,7 +343,6 @@ def plan_trajectories(
     `design_trajectories` does.
     """
     nominal = RobotModel.from_yaml(robot_file, estimates=False)
-    require_stated_limits(nominal)
     if after is not None:
         request = replace(request, after=read_plan_of(after, TrajectoryPlan))
     origin = provenance([robot_file, nominal.urdf, *(() if after is None else (after,))])

@@ -16,6 +16,7 @@ from flexcal.files.transaction import write_text
 from flexcal.jobs.pages.report import REPORT, report_folder
 from flexcal.jobs.result_files import ESTIMATES, write_results
 from flexcal.model.robot import RobotModel
+from flexcal.report.layout import Page, write_page
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,6 +43,32 @@ class Result(ABC):
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(self.summary())}</pre>"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PlottedResult(Result):
+    """Result whose report is made from itself alone."""
+
+    @abstractmethod
+    def _page(self) -> Page:
+        """The report."""
+
+    def report(self, path: str | Path) -> Path:
+        """Write the result as one HTML page.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
+        path = Path(path)
+        write_page(path, self._page())
+        return path
 
 
 @dataclass(frozen=True, eq=False, repr=False)
