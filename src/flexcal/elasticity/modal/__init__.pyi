@@ -1,5 +1,5 @@
 from .axis_masses import AxisMasses, identify_masses, misfit
-from .fit import IdentifiedModes, identify_modes, refined_response_at
+from .fit import IdentifiedModes, identify_modes, refined_response
 from .resonance_intervals import Peak, Resonance, antiresonances, peaks, resonances
 
 __all__ = [
@@ -12,6 +12,6 @@ __all__ = [
     "identify_modes",
     "misfit",
     "peaks",
-    "refined_response_at",
+    "refined_response",
     "resonances",
 ]

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from flexcal.elasticity.modal.model import BACKGROUND, ModalModel, quadratics, response_basis
+from flexcal.elasticity.modal.noise_shape import noise_shape
 from flexcal.elasticity.modal.record_least_squares import (
     SMOOTH,
     BandData,
@@ -20,7 +21,7 @@ from flexcal.elasticity.modal.record_least_squares import (
     transient_basis,
     transients,
 )
-from flexcal.frequency.arbitrary import LocalResponse, RecordSpectra, local_response
+from flexcal.frequency.arbitrary import LocalResponse, RecordSpectra, local_response, local_window
 from flexcal.progress import Progress, silent
 
 MOST_MODES = 8
@@ -145,10 +146,10 @@ def identify_modes(
     Golub and Pereyra 1973).
     """
     most = MOST_MODES if modes is None else modes
-    response, fit = measured, None
+    response, sigma, fit = measured, _sigma(spectra, measured), None
     for turn in range(_ROUNDS):
         cleaned = _cleaned(spectra, response if fit is None else fit.model)
-        data = thinned(BandData(cleaned, _sigma(spectra, response)), _FOR_CHOICE)
+        data = thinned(BandData(cleaned, sigma), _FOR_CHOICE)
         before = 0 if fit is None else len(fit.model.natural)
         fit = _fitted(data, _FIRST if fit is None else _nonlinear(fit))
         while len(fit.model.natural) < most:
@@ -161,14 +162,14 @@ def identify_modes(
             fit = larger
             if modes is None and (fit.model.damping > HEAVILY_DAMPED).any():
                 break
-        response = refined_response(spectra, fit.model, _sigma(spectra, response))
+        response, sigma = _refined(spectra, fit.model, sigma)
         if len(fit.model.natural) == before:
             break
     assert fit is not None
-    data = thinned(BandData(_cleaned(spectra, fit.model), _sigma(spectra, response)), _FOR_FIT)
+    data = thinned(BandData(_cleaned(spectra, fit.model), sigma), _FOR_FIT)
     fit = _fitted(data, _nonlinear(fit))
     progress("modes", 1.0)
-    return IdentifiedModes(fit, refined_response(spectra, fit.model, _sigma(spectra, response)))
+    return IdentifiedModes(fit, _refined(spectra, fit.model, sigma)[0])
 
 
 def _cleaned(spectra: RecordSpectra, guess: LocalResponse | ModalModel) -> RecordSpectra:
@@ -187,24 +188,28 @@ def _cleaned(spectra: RecordSpectra, guess: LocalResponse | ModalModel) -> Recor
     return replace(spectra, inputs=spectra.instruments, outputs=spectra.outputs - rest)
 
 
-def refined_response(spectra: RecordSpectra, model: ModalModel, sigma: np.ndarray) -> LocalResponse:
+def refined_response(spectra: RecordSpectra, model: ModalModel, response: LocalResponse) -> LocalResponse:
     """The local response with a model and its transients as the first guess: only what they leave is smoothed over frequency.
 
-    `sigma` (K, n_y): standard deviations that weight the transients' fit.
+    `response`: its scatter weights the transients' fit; the records may be others than those it was measured from.
     """
+    return _refined(spectra, model, _sigma(spectra, response))[0]
+
+
+def _refined(
+    spectra: RecordSpectra, model: ModalModel, sigma: np.ndarray
+) -> tuple[LocalResponse, np.ndarray]:
+    """The refined response with weights by `sigma` (K, n_y), and the standard deviation (K, n_y) of the outputs about it."""
     guessed = model.response(spectra.frequencies_hz)
     rest = spectra.outputs - np.einsum("kyu,rku->rky", guessed, spectra.inputs)
     data = BandData(spectra, sigma)
     rest = rest - transients(data, transient_basis(data, model.slow, model.quadratics), rest)
-    local = local_response(replace(spectra, outputs=rest))
+    shape = noise_shape(rest, guessed, spectra.excited, local_window(spectra))
+    local = local_response(replace(spectra, outputs=rest), shape)
     response = local.response + model.response(local.frequencies_hz)
     diagonal = np.real(np.diagonal(local.scatter, axis1=1, axis2=2))
-    return replace(local, response=response, coherence=_coherence(spectra, local, response, diagonal))
-
-
-def refined_response_at(spectra: RecordSpectra, model: ModalModel, response: LocalResponse) -> LocalResponse:
-    """`refined_response` for other records of the same bins, with weights by the scatter of `response`."""
-    return refined_response(spectra, model, _sigma(spectra, response))
+    refined = replace(local, response=response, coherence=_coherence(spectra, local, response, diagonal))
+    return refined, _sigma(spectra, local, shape)
 
 
 def _coherence(
@@ -228,17 +233,15 @@ def _coherence(
     return power / np.maximum(power + scatter, np.finfo(float).tiny)
 
 
-def _sigma(spectra: RecordSpectra, response: LocalResponse) -> np.ndarray:
-    """Standard deviation (K, n_y) of the outputs at every bin, from the scatter at the lines."""
-    variance = np.real(np.diagonal(response.scatter, axis1=1, axis2=2))
+def _sigma(spectra: RecordSpectra, response: LocalResponse, shape: np.ndarray | None = None) -> np.ndarray:
+    """Standard deviation (K, n_y) of the outputs at every bin, from the scatter at the lines relative to a `shape` (K,)."""
+    every = np.ones(len(spectra.frequencies_hz)) if shape is None else shape
+    own = np.interp(response.frequencies_hz, spectra.frequencies_hz, every)
+    variance = np.real(np.diagonal(response.scatter, axis1=1, axis2=2)) / own[:, None] ** 2
     floor = 1e-20 * variance.max(0) + np.finfo(float).tiny
     logs = np.log(np.maximum(variance, floor))
-    return np.exp(
-        0.5
-        * np.stack(
-            [np.interp(spectra.frequencies_hz, response.frequencies_hz, column) for column in logs.T], -1
-        )
-    )
+    between = [np.interp(spectra.frequencies_hz, response.frequencies_hz, column) for column in logs.T]
+    return every[:, None] * np.exp(0.5 * np.stack(between, -1))
 
 
 def _nonlinear(fit: ModalFit) -> np.ndarray:

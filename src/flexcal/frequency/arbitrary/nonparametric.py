@@ -47,28 +47,31 @@ class LocalResponse:
         return np.sqrt(np.maximum(np.swapaxes(variance, 1, 2), 0.0))
 
 
-def local_response(spectra: RecordSpectra) -> LocalResponse:
+def local_response(spectra: RecordSpectra, noise: np.ndarray | None = None) -> LocalResponse:
     """G by the local polynomial method (Pintelon and Schoukens 2012, ch. 7), from records with transients.
 
     In a window of bins d about a line, all records share G: Y = (G_0 + G_1 d + G_2 d²) U + T_0 + T_1 d + T_2 d² + V, with a transient T of
-    each record and output. The regressors are the instruments. Raises `FlexcalError` where there are too few bins, or
+    each record and output. The regressors are the instruments. `noise` (K,): shape over frequency of the standard deviation of V, where it
+    is not flat in a window; the equations are divided by it. Raises `FlexcalError` where there are too few bins, or
     where the inputs cannot be told apart.
     """
-    bins = spectra.inputs.shape[1]
     lines = np.flatnonzero(spectra.excited)
-    window = _window(spectra, len(lines))
-    stride = max(1, -(-len(lines) // _MOST_LINES))
-    window = min(max(window, 2 * stride + 1), bins - 1 + bins % 2)
-    at = lines[::stride]
-    parts = [_windows(spectra, chunk, window) for chunk in _chunks(at)]
+    window = local_window(spectra)
+    at = lines[:: _stride(len(lines))]
+    weighted = spectra if noise is None else spectra.divided(noise)
+    parts = [_windows(weighted, chunk, window) for chunk in _chunks(at)]
     response, gain, scatter, power = (
         np.concatenate(part) for part in zip(*(p[:4] for p in parts), strict=True)
     )
+    relative = scatter
+    if noise is not None:
+        size = noise[at] ** 2
+        scatter, power = scatter * size[:, None, None], power * size[:, None]
     total = power + np.real(np.diagonal(scatter, axis1=1, axis2=2))
     return LocalResponse(
         frequencies_hz=spectra.frequencies_hz[at],
         response=response,
-        covariance=kronecker(gain, scatter),
+        covariance=kronecker(gain, relative),
         scatter=scatter,
         coherence=power / np.maximum(total, np.finfo(float).tiny),
         degrees_of_freedom=min(float(part[4]) for part in parts),
@@ -77,19 +80,27 @@ def local_response(spectra: RecordSpectra) -> LocalResponse:
     )
 
 
-def _window(spectra: RecordSpectra, lines: int) -> int:
-    """Bins in a window: enough for the degrees of freedom, an odd number."""
+def local_window(spectra: RecordSpectra) -> int:
+    """Bins in a window of the local polynomial method, an odd number: enough for the degrees of freedom.
+
+    Raises `FlexcalError` where there are too few bins.
+    """
     records, bins, n_u = spectra.inputs.shape
+    lines = int(spectra.excited.sum())
     share = lines / bins
     unknowns = (ORDER + 1) * n_u
     least = (ORDER + 1) * (n_u + 1) + 2  # a transient and equal inputs in all records must differ
     for window in range(least + 1 - least % 2, bins + 1, 2):
         if records * share * (window - (ORDER + 1)) - unknowns >= _FREEDOM and window * share >= 3:
-            return window
+            return min(max(window, 2 * _stride(lines) + 1), bins - 1 + bins % 2)
     raise FlexcalError(
         "E-FRF-005",
         f"a frequency response needs more excited lines than {lines} (records: {records}, inputs: {n_u}); record longer, or more often.",
     )
+
+
+def _stride(lines: int) -> int:
+    return max(1, -(-lines // _MOST_LINES))
 
 
 def _chunks(at: np.ndarray) -> Iterator[np.ndarray]:

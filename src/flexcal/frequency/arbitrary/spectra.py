@@ -50,6 +50,13 @@ class RecordSpectra:
             self, inputs=self.inputs[part], outputs=self.outputs[part], instruments=self.instruments[part]
         )
 
+    def divided(self, by: np.ndarray) -> RecordSpectra:
+        """All phasors over positive numbers `by` (K,) of their bins."""
+        over = by[:, None]
+        return replace(
+            self, inputs=self.inputs / over, outputs=self.outputs / over, instruments=self.instruments / over
+        )
+
     def between(self, low_hz: float, high_hz: float) -> RecordSpectra:
         """The bins of a band."""
         tolerance = 1e-6 * self.resolution_hz

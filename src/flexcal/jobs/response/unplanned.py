@@ -20,7 +20,7 @@ from flexcal.elasticity.modal import (
     identify_modes,
     misfit,
     peaks,
-    refined_response_at,
+    refined_response,
     resonances,
 )
 from flexcal.errors import FlexcalError, InputError
@@ -320,7 +320,7 @@ def _halves(spectra: RecordSpectra, identified: IdentifiedModes) -> HalfDifferen
         return None
     try:
         first, second = (
-            refined_response_at(spectra.of_records(part), identified.fit.model, identified.response)
+            refined_response(spectra.of_records(part), identified.fit.model, identified.response)
             for part in (slice(0, records // 2), slice(records // 2, None))
         )
     except FlexcalError:
