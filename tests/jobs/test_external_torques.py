@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import polars as pl
 import pytest
@@ -16,6 +17,8 @@ from pushed_robot import (
     SPRINGS,
     Pushed,
     pushed,
+    pushed_model,
+    pushed_torque,
     pushed_yaml,
 )
 from refusals import refused
@@ -23,6 +26,7 @@ from refusals import refused
 from flexcal.dynamics.estimators import ESTIMATORS, EstimatorName
 from flexcal.jobs.dynamics import identify_robot_dynamics
 from flexcal.model.robot import RobotModel
+from flexcal.model.torques import wrench_torque
 
 _NOISE = 0.005
 
@@ -45,6 +49,19 @@ def tared(robot: Path) -> Path:
 
 def error(document: dict) -> float:
     return document["error_percent"]["held_out"]
+
+
+def test_the_wrench_acts_where_the_sensor_is(tmp_path: Path) -> None:
+    """At any joint positions, on a flange that is turned and moved from the last joint, and as MuJoCo applies it."""
+    robot = RobotModel.from_yaml(pushed_yaml(tmp_path))
+    model = pushed_model()
+    data = mujoco.MjData(model)
+    rng = np.random.default_rng(0)
+    q, wrench = rng.uniform(-1.0, 1.0, (20, 4)), rng.normal(size=(20, 6))
+    for own, one, torque in zip(q, wrench, wrench_torque(robot, q, wrench), strict=True):
+        data.qpos[:] = own
+        mujoco.mj_forward(model, data)
+        np.testing.assert_allclose(torque, pushed_torque(model, data, one), atol=1e-12)
 
 
 def test_springs_and_cables_are_found(tmp_path: Path, motion: Pushed, other: Pushed) -> None:
