@@ -1,5 +1,6 @@
 """Identification of dynamics by the library: objects in, one object out, the same as from files."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,18 @@ def test_a_recording_in_memory_is_a_log(found: DynamicsIdentification, files: tu
     model = RobotModel.from_yaml(files[0])
     again = identify_dynamics(model, [read_recording(files[1], model)], hold_out=0.2)
     assert again.estimate.values == pytest.approx(found.estimate.values, rel=1e-6, abs=1e-9)
+
+
+def test_a_recording_in_memory_goes_by_a_name_in_the_document(files: tuple[Path, Path]) -> None:
+    model = RobotModel.from_yaml(files[0])
+    log = read_recording(files[1], model)
+    middle = len(log) // 2
+    parts = [
+        replace(log, q=log.q[rows], torque=log.torque[rows])
+        for rows in (slice(0, middle), slice(middle, None))
+    ]
+    dynamics = identify_dynamics(model, parts[:1], validate=parts[1:], friction="classic")
+    assert dynamics.document()["hold_out"]["logs"] == ["validation_1.parquet"]
 
 
 def test_residuals_and_model_are_those_of_the_estimate(found: DynamicsIdentification) -> None:

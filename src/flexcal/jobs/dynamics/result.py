@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from flexcal.dynamics.diagnostics import EssentialParameters, ExternalShare, GravityRatio, TorquePrediction
+from flexcal.dynamics.diagnostics import EssentialParameters, ExternalShare, GravityRatio
 from flexcal.dynamics.estimators import EstimatorName
 from flexcal.dynamics.friction import FrictionSelection
 from flexcal.dynamics.inverse_model import Observation
@@ -22,7 +22,7 @@ from flexcal.files.formats import Block
 from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
 from flexcal.jobs.dynamics.remarks import dynamics_notes, dynamics_remarks, selection_remark
 from flexcal.jobs.logs import Preprocessing
-from flexcal.jobs.pages import Identification, summary_row
+from flexcal.jobs.pages import TorqueIdentification, summary_row
 from flexcal.jobs.result_files import (
     ESTIMATES,
     NOT_RECORDED,
@@ -30,7 +30,6 @@ from flexcal.jobs.result_files import (
     dropped_parameters,
     header,
     quantities,
-    write_predictions,
 )
 from flexcal.model.parts import is_physically_consistent
 from flexcal.model.robot import torque_units
@@ -40,7 +39,7 @@ from flexcal.report.pages import dynamics_checks
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DynamicsIdentification(Identification):
+class DynamicsIdentification(TorqueIdentification):
     """Result of `identify_dynamics`: the estimate, and how well it predicts torques inside and outside the fit.
 
     Attributes
@@ -49,6 +48,8 @@ class DynamicsIdentification(Identification):
         The robot with the estimate.
     estimate : Estimate
         Base parameters of inertia, and friction, SI units.
+    predictions : tuple of TorquePrediction
+        Measured and predicted torques of all logs.
     estimator : str
         Name of the estimator.
     structural_rank : int
@@ -79,8 +80,6 @@ class DynamicsIdentification(Identification):
         How much of the measured external torques appears in the motors' torques; None without a force sensor.
     learned : LearnedDynamics or None
         Learned residual torques, where they were asked for.
-    predictions : tuple of TorquePrediction
-        Measured and predicted torques of all logs.
     seconds : float
         Duration of the identification.
     estimates : Path or None
@@ -105,15 +104,9 @@ class DynamicsIdentification(Identification):
     weight_shares: Mapping[str, GravityRatio]
     external: ExternalShare | None
     learned: LearnedDynamics | None
-    predictions: tuple[TorquePrediction, ...]
     seconds: float
     estimates: Path | None = None
     record: RunRecord = NOT_RECORDED
-
-    @property
-    def residuals(self) -> tuple[np.ndarray, ...]:
-        """Measured minus predicted torques (M, n), N m, of every log, at the times of its prediction."""
-        return tuple(prediction.measured - prediction.predicted for prediction in self.predictions)
 
     def torque(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
         """Torques of a motion by the identified inverse dynamics: inertia, gravity and friction.
@@ -172,7 +165,7 @@ class DynamicsIdentification(Identification):
 
     def write_arrays(self, folder: Path) -> None:
         """Leave predictions.npz in a folder, and learned_residual.npz where something was learned."""
-        write_predictions(folder, self.predictions)
+        super().write_arrays(folder)
         if self.learned is not None:
             self.learned.store(folder / ESTIMATES)
 

@@ -1,5 +1,5 @@
 from .checks import payload_masses, require_joint_torques, require_no_wrenches, weight_faults
-from .given_logs import JointLogs, log_files, model_for_logs
+from .given_logs import JointLogs, log_files, log_names, model_for_logs
 from .hold_out import HoldOutLogs
 from .preprocessing import Preprocessing, choose_preprocessing, preprocessing_document, preprocessing_remarks
 from .regression_systems import LogSegment, assemble_log_systems, read_logs
@@ -14,6 +14,7 @@ __all__ = [
     "assemble_log_systems",
     "choose_preprocessing",
     "log_files",
+    "log_names",
     "model_for_logs",
     "payload_masses",
     "predict_log_torques",

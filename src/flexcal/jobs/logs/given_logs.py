@@ -37,3 +37,8 @@ def log_files(logs: JointLogs, folder: Path, name: str) -> list[Path]:
         else:
             files.append(Path(log))
     return files
+
+
+def log_names(files: Sequence[Path], folder: Path) -> tuple[Path, ...]:
+    """What documents call the logs: files as they are, those in memory, written to `folder`, by their names alone."""
+    return tuple(Path(file.name) if file.parent == folder else file for file in files)

@@ -1,13 +1,14 @@
 from .comparison import compare_folders
 from .customer import customer_report
 from .report import report_folder, two_stage_study
-from .result import Identification, PlottedResult, ReportedResult, Result, summary_row
+from .result import Identification, PlottedResult, ReportedResult, Result, TorqueIdentification, summary_row
 
 __all__ = [
     "Identification",
     "PlottedResult",
     "ReportedResult",
     "Result",
+    "TorqueIdentification",
     "compare_folders",
     "customer_report",
     "report_folder",

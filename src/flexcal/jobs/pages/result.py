@@ -10,11 +10,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, ClassVar
 
+import numpy as np
+
+from flexcal.dynamics.diagnostics import TorquePrediction
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, write_estimates
 from flexcal.files.transaction import write_text
 from flexcal.jobs.pages.report import REPORT, report_folder
-from flexcal.jobs.result_files import ESTIMATES, write_results
+from flexcal.jobs.result_files import ESTIMATES, write_predictions, write_results
 from flexcal.model.robot import RobotModel
 from flexcal.report.layout import Page, write_page
 
@@ -134,6 +137,22 @@ class Identification(ReportedResult):
             for name, other in others.items():
                 write_estimates(out / ESTIMATES, name, other)
         self.write(out)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TorqueIdentification(Identification):
+    """Result of a verb that estimates parameters from torques: `predictions` has measured and predicted torques of every log."""
+
+    predictions: tuple[TorquePrediction, ...]
+
+    @property
+    def residuals(self) -> tuple[np.ndarray, ...]:
+        """Measured minus predicted torques (M, n), N m, of every log, at the times of its prediction."""
+        return tuple(prediction.measured - prediction.predicted for prediction in self.predictions)
+
+    def write_arrays(self, folder: Path) -> None:
+        """Leave predictions.npz in a folder."""
+        write_predictions(folder, self.predictions)
 
 
 def summary_row(name: str, value: float, std: float | None, unit: str) -> str:

@@ -20,6 +20,7 @@ from flexcal.jobs.logs import (
     Preprocessing,
     choose_preprocessing,
     log_files,
+    log_names,
     model_for_logs,
     preprocessing_document,
     read_logs,
@@ -156,8 +157,8 @@ def identify_payload(
             frame=frame,
             fit=fit,
             predictions=predictions,
-            loaded=_named(loaded, folder),
-            free=_named(unloaded, folder),
+            loaded=log_names(loaded, folder),
+            free=log_names(unloaded, folder),
             signals=preprocessing_document(preprocessing, read),
             weight_faults=faults,
         )
@@ -175,11 +176,6 @@ def attach_payload(model: RobotModel, frame: str) -> tuple[RobotModel, str]:
             f"--frame is '{frame}', but {model.path} declares the payload in '{declared.frame}'; leave --frame out, or correct robot.yaml.",
         )
     return model, declared.frame
-
-
-def _named(files: Sequence[Path], folder: Path) -> tuple[Path, ...]:
-    """The files, those in the temporary `folder` by their names alone."""
-    return tuple(Path(file.name) if file.parent == folder else file for file in files)
 
 
 def _has(model: RobotModel, estimate: Estimate) -> bool:

@@ -8,22 +8,19 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
-import numpy as np
-
-from flexcal.dynamics.diagnostics import TorquePrediction
 from flexcal.dynamics.payload import PayloadFit
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block
-from flexcal.jobs.pages import Identification, summary_row
+from flexcal.jobs.pages import TorqueIdentification, summary_row
 from flexcal.jobs.payload.remarks import declared_payload, other_payloads, payload_remarks
-from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, header, quantities, write_predictions
+from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, header, quantities
 from flexcal.model.robot import RobotModel, torque_units
 from flexcal.report.checks import Trust, payload_checks
 from flexcal.units import MILLIMETRE
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PayloadIdentification(Identification):
+class PayloadIdentification(TorqueIdentification):
     """Result of `identify_payload`: mass, centre of mass and inertia of what the robot held.
 
     Attributes
@@ -32,14 +29,14 @@ class PayloadIdentification(Identification):
         The robot with this payload.
     estimate : Estimate
         `payload.mass` (kg), `payload.com_x` … (m) and `payload.Ixx` … (kg m², about the centre of mass), in `frame`.
+    predictions : tuple of TorquePrediction
+        Measured and predicted torques of every log, first those with the payload.
     declared : RobotModel
         The robot as robot.yaml and URDF declare it, to compare with.
     frame : str
         URDF frame of the payload.
     fit : PayloadFit
         Errors of the torques, and the distance to the nearest physically consistent payload.
-    predictions : tuple of TorquePrediction
-        Measured and predicted torques of every log, first those with the payload.
     loaded, free : tuple of Path
         Logs with and without the payload.
     signals : mapping
@@ -58,7 +55,6 @@ class PayloadIdentification(Identification):
     declared: RobotModel
     frame: str
     fit: PayloadFit
-    predictions: tuple[TorquePrediction, ...]
     loaded: tuple[Path, ...]
     free: tuple[Path, ...]
     signals: Mapping[str, Any]
@@ -66,11 +62,6 @@ class PayloadIdentification(Identification):
     blocks: Mapping[Block, Estimate] = field(default_factory=dict)
     estimates: Path | None = None
     record: RunRecord = NOT_RECORDED
-
-    @property
-    def residuals(self) -> tuple[np.ndarray, ...]:
-        """Measured minus predicted torques (M, n), N m, of every log, at the times of its prediction."""
-        return tuple(prediction.measured - prediction.predicted for prediction in self.predictions)
 
     @property
     def headline(self) -> str:
@@ -98,10 +89,6 @@ class PayloadIdentification(Identification):
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
         return {**header("payload"), **self._numbers, "verdict": self.trust.document()}
-
-    def write_arrays(self, folder: Path) -> None:
-        """Leave predictions.npz in a folder."""
-        write_predictions(folder, self.predictions)
 
     @cached_property
     def _numbers(self) -> dict[str, Any]:
