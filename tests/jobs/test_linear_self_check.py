@@ -56,7 +56,7 @@ def test_nine_stiffnesses_and_the_delay(
     truth, plan, recordings = linear
     names = tx90l.joint_names[:3]
     responses = frequency_responses(plan, late(recordings, samples), joint_names=names)
-    responses = [response.at_lines(slice(None, None, 4)) for response in responses]
+    responses = [response.at_lines(slice(None, None, 12)) for response in responses]
     tight = replace(tx90l, config=replace(tx90l.config, geometry=GeometryConfig()))
     fit = fit_springs(
         tight, responses, inertias_known=True, tolerances=Tolerances.none(), rng=np.random.default_rng(0)
