@@ -15,7 +15,7 @@ _POSE = 6
 
 
 def desired_pose(model: RobotModel, nominal: RobotModel, targets: ToolTargets) -> ToolPoseTarget:
-    """Position and, where it counts, rotation of every target in the base frame.
+    """Desired position and, if it counts, rotation of every target in the base frame.
 
     Points and orientations are those of the file, else those that the `nominal` robot takes at the file's joint positions. A point alone
     leaves the orientation free, and so does an arm with fewer than six joints before the tool. Points in an instrument's frame are brought
@@ -41,7 +41,7 @@ def desired_pose(model: RobotModel, nominal: RobotModel, targets: ToolTargets) -
 
 
 def joints_before(model: RobotModel, target: str) -> int:
-    """How many joints move a point."""
+    """Number of joints that move a point."""
     return len(model.path_to(model.point(target).joint))
 
 

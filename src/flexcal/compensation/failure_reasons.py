@@ -11,11 +11,11 @@ from flexcal.model.robot import RobotModel
 from flexcal.units import MILLIMETRE
 
 _SHARE = 0.3
-"""Of the largest part in a motion, from which on a joint is named."""
+"""Share of the largest component of a motion from which a joint is named."""
 
 
 def given_past_limit(model: RobotModel, q: np.ndarray) -> np.ndarray:
-    """For joint positions (N, n) that a file gives, where one is past its limit; empty texts for the others (N,)."""
+    """Reasons for given joint positions (N, n) beyond a limit; empty texts for the others (N,)."""
     lower, upper = joint_limits(model)
     reasons = np.full(len(q), "", dtype=object)
     for k in np.flatnonzero(((q < lower) | (q > upper)).any(axis=1)):
@@ -24,7 +24,7 @@ def given_past_limit(model: RobotModel, q: np.ndarray) -> np.ndarray:
 
 
 def nominal_reasons(model: RobotModel, aim: ToolPoseTarget, nearest: np.ndarray) -> list[str]:
-    """What keeps the nominal robot from K aims: `nearest` (K, n) is as near as it comes within its limits."""
+    """Reasons why the nominal robot cannot reach K targets; `nearest` (K, n) is its nearest posture within its limits."""
     residual, _ = aim.nominal(model, nearest)
     return [
         f"out of reach: {_nearest(away)}" + (f", with {_named(model, stuck)} at the limit" if stuck else "")
@@ -35,7 +35,7 @@ def nominal_reasons(model: RobotModel, aim: ToolPoseTarget, nearest: np.ndarray)
 def real_reasons(
     model: RobotModel, aim: ToolPoseTarget, nominal: np.ndarray, commands: Commands
 ) -> list[str]:
-    """What keeps the real robot from K aims that the nominal one takes at `nominal` (K, n): `commands` that were not found.
+    """Reasons why the real robot cannot reach K targets that the nominal one reaches at `nominal` (K, n); `commands` did not converge.
 
     The two robots differ by millimetres, so it is a limit, or a singularity that asks for much motion to make up for little.
     """
@@ -84,7 +84,7 @@ def _large(model: RobotModel, correction: np.ndarray, tied: str) -> str:
 
 
 def _tied(model: RobotModel, weakest: np.ndarray) -> str:
-    """The joints that a motion which hardly moves the tool consists of."""
+    """Joints of a motion that hardly moves the tool."""
     part = np.abs(weakest)
     joints = np.flatnonzero(part > _SHARE * part.max()).tolist()
     if len(joints) == 1:
@@ -98,7 +98,7 @@ def _named(model: RobotModel, joints: list[int]) -> str:
 
 
 def _weakest_motion(model: RobotModel, aim: ToolPoseTarget, q: np.ndarray) -> np.ndarray:
-    """The joint motions (K, n) of unit length that move the nominal tool least, of those that can move it."""
+    """Joint motions (K, n) of unit length with the least effect on the nominal tool, among joints that can move it."""
     _, jacobian = aim.nominal(model, q)
     return np.linalg.svd(jacobian * aim.weight(model)[:, None], full_matrices=False)[2][:, -1]
 

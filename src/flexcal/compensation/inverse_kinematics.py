@@ -11,22 +11,22 @@ from flexcal.model.kinematics import damped_step, joint_limits
 from flexcal.model.robot import RobotModel
 
 Forward = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
-"""Numbers (k,) of rows of an aim and joint positions (k, n) to residuals (k, m) and their negative Jacobians (k, m, n)."""
+"""Function from row numbers (k,) and joint positions (k, n) to residuals (k, m) and their negative Jacobians (k, m, n)."""
 
 _ITERATIONS = 300
 _LONGEST_STEP = 0.3
 _SMALL_GAIN = 1e-2
 _PATIENCE = 8
-"""Steps of a small gain, one after the other, until a row is at its end: a singular posture takes some to get going."""
+"""Number of successive steps of small gain after which a row has converged: leaving a singular posture takes several."""
 _LEAST_DAMPING = 1e-7
 _FAR, NEAR = 1e-1, 1e-3
-"""Dampings relative to the reach: to start with where the aim may be anywhere, and where it is near."""
+"""Initial dampings relative to the reach, for a target anywhere and for a near one."""
 
 
 def inverse_kinematics(
     model: RobotModel, aim: ToolPoseTarget, start: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Joint positions (N, n) at which the undeflected robot takes every aim, or comes nearest to it; and whether it does (N,).
+    """Joint positions (N, n) at which the undeflected robot reaches, or comes nearest to, every target; and a mask (N,) of those reached.
 
     As `nearest_positions` finds them from `start` (N, n).
     """
@@ -39,7 +39,7 @@ def inverse_kinematics(
 def nearest_positions(
     model: RobotModel, aim: ToolPoseTarget, start: np.ndarray, first_damping: float, forward: Forward
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Joint positions (N, n) within the limits at which the residuals (N, m) of `forward` are least, and these residuals.
+    """Joint positions (N, n) within the limits that minimise the residuals (N, m) of `forward`, and these residuals.
 
     Levenberg-Marquardt from `start` (N, n): Δq = Jᵀ (J Jᵀ + λ²)⁻¹ r, of least joint change, at most 0.3 rad or m a step, and first with
     λ = `first_damping` · reach; a joint at a limit that the step would leave stands still. A row is at its end where steps keep gaining

@@ -1,4 +1,4 @@
-"""The command that brings the real tool to its aim: Newton's method on the calibrated robot, on the flank that gravity holds there."""
+"""Newton's method for the command that brings the real tool to its target, on the calibrated robot and the flank set by gravity."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from flexcal.model.robot import RobotModel
 from flexcal.model.statics import ToolAtRest, tool_at_rest
 
 LARGEST_CORRECTION = 0.2
-"""A command farther than this from the nominal one (rad or m, any joint) is that of another posture, not a correction."""
+"""Largest difference of a command from the nominal one (rad or m, any joint); beyond it the posture is another one."""
 _ITERATIONS = 12
 _SHARED = 4
-"""Steps that share the Jacobian of the nominal command; rows that need more get their own in each."""
+"""Number of steps that share the Jacobian of the nominal command; later steps have their own."""
 _DAMPING = 1e-7
-"""Relative to the reach: it keeps exactly singular rows solvable, and is far below what can be corrected."""
+"""Damping relative to the reach: keeps exactly singular rows solvable, and is far below what can be corrected."""
 
 
 @dataclass(frozen=True, eq=False)
 class Commands:
-    """Motor positions `q` (N, n) after the last step; `reached` (N,): with them the tool is at its aim, within all limits.
+    """Motor positions `q` (N, n) after the last step; `reached` (N,): the tool is at its target, within all limits.
 
     `before` and `after` (N, m): aim minus tool, as `ToolPoseTarget.residual` has it, at the nominal command and at `q`; `torque` (N, n) N
     m at rest.
@@ -36,7 +36,7 @@ class Commands:
     torque: np.ndarray
 
     def subset(self, rows: np.ndarray) -> Commands:
-        """The rows with these indices, or where this mask is true."""
+        """Rows with these indices or of this mask."""
         return Commands(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
 
 
@@ -62,7 +62,7 @@ def solve_commands(
 
 
 class _Search:
-    """Where the search stands for all rows; `rows` are the numbers of those still under way."""
+    """State of the search for all rows; `rows` are the numbers of the active ones."""
 
     def __init__(
         self, model: RobotModel, aim: ToolPoseTarget, nominal: np.ndarray, payload: np.ndarray | None
@@ -81,7 +81,7 @@ class _Search:
         self.after = self.before.copy()
 
     def advance(self, *, jacobians: bool) -> None:
-        """One step of all rows under way; those that are done, or lead too far, leave."""
+        """One step of all active rows; converged and diverging ones are removed."""
         self._step(self.rows)
         rows = self.rows = self.rows[~self._far(self.rows)]
         self._evaluate(rows, self.q[rows], jacobians=jacobians)
@@ -91,7 +91,7 @@ class _Search:
         self.rows = rows[goes_on]
 
     def try_damped(self) -> None:
-        """Rows that came to no end, once more by damped least squares within the limits; twice where the flank turns at the end."""
+        """Repeat rows without result by damped least squares within the limits; twice if the flank changes at the end."""
         rows = np.flatnonzero(~self.reached & ~self.aim.reached(self.after))
 
         def forward(own: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -117,7 +117,7 @@ class _Search:
         return tool_at_rest(self.model, q, payload, target, flank=flank, jacobians=jacobians)
 
     def _evaluate(self, rows: np.ndarray, q: np.ndarray, *, jacobians: bool) -> None:
-        """Residuals and torques of rows at `q` (k, n) on their flanks, and with `jacobians` these."""
+        """Residuals and torques of rows at `q` (k, n) on their flanks, and, with `jacobians`, their Jacobians."""
         at = self._at_rest(rows, q, self.flank[rows], jacobians=jacobians)
         self.torque[rows] = at.rest.torque
         self.after[rows] = self.aim.subset(rows).residual(at.kinematics)
@@ -129,7 +129,7 @@ class _Search:
         return correction.max(axis=1, initial=0.0) > LARGEST_CORRECTION
 
     def _turn_flanks(self, rows: np.ndarray) -> np.ndarray:
-        """Put arms that are at their aims onto the flanks that their torques there press them to, once; whose this changed (k,)."""
+        """Set the flanks of converged arms by the sign of their torques, once; mask (k,) of those that changed."""
         flank = np.sign(self.torque[rows]) * np.abs(self.flank[rows])
         turns = (flank != self.flank[rows]).any(axis=1) & ~self.turned[rows]
         self.flank[rows[turns]] = flank[turns]
@@ -138,7 +138,7 @@ class _Search:
         return turns
 
     def _hold_at_limits(self, rows: np.ndarray) -> np.ndarray:
-        """Mark arms within limits as found; hold the joint farthest beyond one there, where enough others are free; where (k,)."""
+        """Mark arms within limits as reached; hold the joint farthest beyond its limit if enough others are free; mask (k,) of those."""
         beyond = np.maximum(self.lower - self.q[rows], self.q[rows] - self.upper)
         outside = (beyond > 0).any(axis=1)
         self.reached[rows] = ~outside & self.aim.reached(self.after[rows])
@@ -153,7 +153,7 @@ class _Search:
         return spare
 
     def _step(self, rows: np.ndarray) -> None:
-        """Gauss-Newton from the origin, without the joints that are held there."""
+        """Gauss-Newton step from the origin, without the held joints."""
         jacobian = self.jacobian[rows]
         moved = self.q[rows] - self.origin[rows]
         wanted = (self.after[rows] + np.matmul(jacobian, moved[:, :, None])[:, :, 0]) * self.weight

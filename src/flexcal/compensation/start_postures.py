@@ -1,4 +1,4 @@
-"""Where inverse kinematics starts when a file names points but no joint positions."""
+"""Start postures of inverse kinematics for points without joint positions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _OTHER_STARTS = 32
 
 
 def best_posture(model: RobotModel, target: str | None = None) -> np.ndarray:
-    """The posture (n,) out of 256 spread over the joint ranges that is farthest from singularities and limits.
+    """Posture (n,) farthest from singularities and limits out of 256 spread over the joint ranges.
 
     That is: the smallest singular value of its Jacobian, rotations being weighted by the reach, times the share of its range that the
     nearest limit leaves a joint, is the largest. An arm that cannot turn its tool every way is judged by positions alone.
@@ -32,7 +32,7 @@ def best_posture(model: RobotModel, target: str | None = None) -> np.ndarray:
 def inverse_kinematics_from_postures(
     model: RobotModel, aim: ToolPoseTarget, start: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Inverse kinematics (N, n) from `start` (n,); whether it gets there (N,), and from another posture only (N,).
+    """Inverse kinematics (N, n) from `start` (n,); masks (N,) of targets reached, and of those reached only from another posture.
 
     Where it ends before its aim, 32 other postures are tried, the nearest to `start` first.
     """

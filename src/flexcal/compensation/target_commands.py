@@ -1,4 +1,4 @@
-"""Targets to motor commands."""
+"""Motor commands for tool targets."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from flexcal.model.statics import carried_mass, certain_flank
 from flexcal.progress import Progress, silent
 
 _BLOCK = 8192
-"""Rows that are solved together: what they need fits into a few tens of megabytes."""
+"""Number of rows solved together: their memory is a few tens of megabytes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class MotorCommands:
 
     @property
     def reached(self) -> np.ndarray:
-        """Whether there is a command (N,)."""
+        """Mask (N,) of targets with a command."""
         return self.reason == ""
 
 
@@ -51,7 +51,7 @@ def motor_commands(
     start: np.ndarray | None = None,
     progress: Progress = silent,
 ) -> MotorCommands:
-    """Commands with which the calibrated `model` puts its tool where `targets` say; `nominal` is the robot before calibration.
+    """Commands with which the calibrated `model` brings its tool to `targets`; `nominal` is the robot before calibration.
 
     The nominal inverse kinematics starts from the targets' own joint positions, else from `start` (n,), and Newton's method on `model` from
     there, so that the arm keeps its configuration. What the tool is to keep beside its position is in `desired_pose`. Raises `FlexcalError`

@@ -1,4 +1,4 @@
-"""What is wanted of the tool, and how far a pose is from it."""
+"""Target poses of the tool, and the residual of a pose."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from flexcal.model.robot import RobotModel
 from flexcal.model.statics import points_kinematics
 
 _NEAR = 1e-9
-"""A pose is reached where every coordinate of its point (m) and of its rotation (rad) is nearer than this."""
+"""Tolerance of every coordinate of the point (m) and of the rotation (rad) within which a pose is reached."""
 
 
 @dataclass(frozen=True, eq=False)
 class ToolPoseTarget:
-    """Where N points, by name, are to be in the base frame: `position` (N, 3) m and, where it counts, `rotation` (N, 3, 3).
+    """Desired poses of N points, by name, in the base frame: `position` (N, 3) m and, if it counts, `rotation` (N, 3, 3).
 
     Residuals and Jacobians have m rows: three for the position, and three more for the rotation.
     """
@@ -28,20 +28,22 @@ class ToolPoseTarget:
 
     @property
     def rows(self) -> int:
-        """m, 3 or 6."""
+        """Number of rows of the residual m, 3 or 6."""
         return 3 if self.rotation is None else 6
 
     def weight(self, model: RobotModel) -> np.ndarray:
-        """Factors (m,) that make lengths of all rows: a rotation counts as the motion of a point as far away as the robot reaches."""
+        """Factors (m,) that give all rows the unit of length: a rotation counts as the displacement at the distance of the robot's
+        reach.
+        """
         return np.repeat([1.0, model.reach], 3)[: self.rows]
 
     def subset(self, rows: np.ndarray | slice) -> ToolPoseTarget:
-        """The rows with these indices, or where this mask is true."""
+        """Rows with these indices or of this mask."""
         turn = None if self.rotation is None else self.rotation[rows]
         return ToolPoseTarget(self.target[rows], self.position[rows], turn)
 
     def residual(self, at: PointKinematics) -> np.ndarray:
-        """Target minus pose (N, m): m, then the rotation vector in base axes from the one to the other, rad."""
+        """Target minus pose (N, m): position, m, then the rotation vector in base axes from pose to target, rad."""
         away = self.position - at.position
         if self.rotation is None:
             return away
@@ -49,7 +51,7 @@ class ToolPoseTarget:
         return np.hstack([away, rotation_vector(turn)])
 
     def reached(self, residual: np.ndarray) -> np.ndarray:
-        """Whether residuals (N, m) are as good as zero (N,)."""
+        """Mask (N,) of residuals (N, m) within the tolerance."""
         return np.abs(residual).max(axis=1) < _NEAR
 
     def nominal(self, model: RobotModel, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,1 +1,1 @@
-"""Whole jobs of the command line, one package a family of verbs; the only package that reads the file of true parameters."""
+"""Complete workflows of the command line, one package per family of verbs; the only package that reads the file of true parameters."""

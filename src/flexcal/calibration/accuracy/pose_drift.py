@@ -11,9 +11,9 @@ from flexcal.calibration.accuracy.pose_repeatability import PoseRepeatability, r
 from flexcal.data.poses import PoseSet
 
 VISITS_PER_SET = 10
-"""Visits to a pose, one cycle after the other, from which its accuracy and repeatability at a time are taken."""
+"""Number of successive visits to a pose that give its accuracy and repeatability at a time."""
 _CHANCE = 0.0027
-"""How often a pose that stays is said to wander: three standard deviations of a Gaussian."""
+"""Significance level of a drift: three standard deviations of a Gaussian."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,17 +32,17 @@ class PoseDrift:
 
     @property
     def certain(self) -> bool:
-        """Whether chance hardly explains the way."""
+        """Whether the displacement is statistically significant."""
         return self.chance < _CHANCE
 
     @property
     def distance(self) -> float:
-        """From the barycentre of the first set to that of the last, m."""
+        """Distance from the barycentre of the first set to that of the last, m."""
         return float(np.linalg.norm(self.way[-1]))
 
     @property
     def repeatability_drift(self) -> float:
-        """dRP, m: by how much RP of the last set differs from that of the first."""
+        """Drift dRP, m: change of RP from the first set to the last."""
         return float(abs(self.repeatability[-1] - self.repeatability[0]))
 
     def accuracy(self, errors: np.ndarray) -> np.ndarray:
@@ -50,13 +50,13 @@ class PoseDrift:
         return np.array([np.linalg.norm(errors[rows].mean(axis=0)) for rows in self.sets])
 
     def accuracy_drift(self, errors: np.ndarray) -> float:
-        """dAP, m: by how much AP of the last set differs from that of the first."""
+        """Drift dAP, m: change of AP from the first set to the last."""
         accuracy = self.accuracy(errors)
         return float(abs(accuracy[-1] - accuracy[0]))
 
 
 def pose_drifts(poses: PoseSet, visited: Sequence[PoseRepeatability]) -> list[PoseDrift]:
-    """Of every pose that was visited twice `VISITS_PER_SET` times or more; none without times that go on from row to row."""
+    """Drift of every pose that was visited at least twice `VISITS_PER_SET` times; none without times that increase from row to row."""
     time = poses.time
     if time is None or (np.diff(time) < 0).any():
         return []

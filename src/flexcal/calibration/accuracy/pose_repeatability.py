@@ -12,13 +12,13 @@ from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 
 SAME_COMMAND = 1e-4
-"""rad or m: rows whose joint positions differ by no more than this are visits to one commanded pose."""
+"""Difference of joint positions, rad or m, up to which rows are visits to one commanded pose."""
 _CELL = 10 * SAME_COMMAND
-"""Of the look-up of a command; no less than the tolerance."""
+"""Cell size of the look-up of a command; no less than the tolerance."""
 CYCLES = 30
-"""Visits to each pose that the standard asks for."""
+"""Number of visits to each pose required by the standard."""
 _NOISE = np.sqrt(8 / np.pi) + 3 * np.sqrt(3 - 8 / np.pi)
-"""RP of many visits with nothing but an instrument's noise of 1σ an axis, in σ: l̄ and S_l are those of a χ distribution."""
+"""RP of many visits due to instrument noise alone, in units of its 1σ per axis: l̄ and S_l are those of a χ distribution."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +102,7 @@ def noise_repeatability(sigma: np.ndarray) -> float:
 
 
 def _numbers(poses: PoseSet) -> np.ndarray:
-    """The commanded pose (N,) of every row, counted from 0 in the order in which they first appear.
+    """Number (N,) of every row's commanded pose, in the order of first appearance.
 
     A row belongs to the first pose before it that it is like; those are looked up in cells of their first and last joints, so that the time
     is linear in the rows.
@@ -157,7 +157,7 @@ def _rotation_spread(quaternion_wxyz: np.ndarray) -> np.ndarray:
 
 
 def _direction_variation(points: np.ndarray, rows: np.ndarray, number: np.ndarray) -> float | None:
-    """Directions of approach are distinguished by the commanded pose that was measured before."""
+    """Multidirectional variation; directions of approach are distinguished by the commanded pose measured before."""
     before = np.where(rows > 0, number[np.maximum(rows - 1, 0)], -1)
     labels, own, counts = np.unique(before, return_inverse=True, return_counts=True)
     sums = np.array([np.bincount(own, coordinate) for coordinate in points.T]).T

@@ -20,7 +20,7 @@ SOURCES = (*PARAMETERS, REPEATABILITY, MODEL_ERROR)
 
 
 def source_of(name: str) -> str:
-    """The kind of a parameter that moves a point, one of `PARAMETERS`."""
+    """Kind of a parameter that moves a point, one of `PARAMETERS`."""
     owner, _, key = name.rpartition(".")
     if owner.startswith("station."):
         return "instrument's place"
@@ -34,7 +34,7 @@ def source_of(name: str) -> str:
 
 
 def error_sources(reach: Propagation, q: np.ndarray) -> dict[str, np.ndarray]:
-    """By how much of itself the variance of the tool's error at poses `q` (N, n) would fall if one kind of parameter were known exactly.
+    """Fraction by which the variance of the tool's error at poses `q` (N, n) falls if one kind of parameter is known exactly.
 
     (N,) between 0 and 1 for each of the `SOURCES` that were estimated; the variance of the others given these is Gaussian conditioning.
     Where kinds are correlated the shares do not add up to one.

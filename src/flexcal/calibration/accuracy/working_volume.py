@@ -16,7 +16,7 @@ from flexcal.model.kinematics import joint_ranges, point_kinematics
 from flexcal.progress import Progress, silent
 
 _BATCH = 256
-"""Poses at once: their derivatives stay in the processor's cache, and in memory that need not be asked for again every time."""
+"""Poses processed together: their derivatives stay in the processor's cache and in reused memory."""
 _DRAWN = 100_000
 _FEWEST = 1e-4
 """Share of all random poses below which a box counts as out of reach."""
@@ -24,7 +24,8 @@ _FEWEST = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class PredictedAccuracy:
-    """At each pose `q` (N, n), rad or m: the point's `position` (N, 3), base frame, `mean` and 95 % quantile `p95` (N,) of its error, m.
+    """Predicted error at each pose `q` (N, n), rad or m: `position` (N, 3) of the point, base frame, `mean` and 95 % quantile `p95` (N,)
+    of its error, m.
 
     The error is the distance between where the calibrated model has the point and where an instrument at the station finds it, from the
     uncertainty of the parameters alone.
@@ -36,7 +37,7 @@ class PredictedAccuracy:
     p95: np.ndarray
 
     def scaled(self, factor: float) -> PredictedAccuracy:
-        """With every error `factor` times as large."""
+        """Prediction with every error multiplied by `factor`."""
         return PredictedAccuracy(self.q, self.position, factor * self.mean, factor * self.p95)
 
 

@@ -16,10 +16,10 @@ from flexcal.model.parts import Bearings
 from flexcal.model.robot import RobotModel
 
 _CERTAIN = 3.0
-"""Vuong's statistic from which the preference is no chance."""
+"""Vuong's statistic from which a preference is significant."""
 
 _RELEVANT = 0.95
-"""Ratio of root mean square distances above which the better of the fits is no better for a user."""
+"""Ratio of root mean square distances above which the better fit has no practical advantage."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class BearingAxes:
 
     @classmethod
     def compare(cls, declared: Bearings | None, before: GeometricFit, after: GeometricFit) -> BearingAxes:
-        """Two fits to the same poses; points that either takes for outliers do not count."""
+        """Comparison of two fits to the same poses, without the outliers of either."""
         outliers = {*before.estimate.outliers, *after.estimate.outliers}
         inside = np.setdiff1d(np.arange(len(before.poses)), list(outliers))
         first, second = (f.residuals[inside].ravel() for f in (before, after))

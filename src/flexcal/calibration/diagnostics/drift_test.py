@@ -10,12 +10,12 @@ from flexcal.calibration.fit import GeometricFit
 from flexcal.units import MILLIMETRE
 
 _CHANCE = 0.0027
-"""How often an arm that stays is said to drift: three standard deviations of a Gaussian."""
+"""Significance level of a drift: three standard deviations of a Gaussian."""
 
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """Way (3,) m that the points went in the first station's frame while they were measured, at an even pace; `covariance` (3, 3).
+    """Drift (3,) m of the points in the first station's frame during the measurement, at constant rate; `covariance` (3, 3).
 
     `freedom` are the degrees of freedom of the scatter in that covariance.
     """
@@ -26,12 +26,12 @@ class Drift:
 
     @property
     def distance(self) -> float:
-        """How far they went (m)."""
+        """Length of the drift, m."""
         return float(np.linalg.norm(self.travel))
 
     @property
     def probability(self) -> float:
-        """How often points that stay show as long a way, p of the F test."""
+        """p-value of the F test for no drift."""
         from scipy.special import fdtrc
 
         size = len(self.travel)
@@ -40,11 +40,11 @@ class Drift:
 
     @property
     def certain(self) -> bool:
-        """Whether chance explains it in less than 0.27 % of all sessions without a drift."""
+        """Whether the drift is significant: p below 0.27 %."""
         return self.probability < _CHANCE
 
     def document(self) -> dict[str, float | bool]:
-        """For JSON documents."""
+        """Block of a JSON document."""
         return {
             "distance_mm": self.distance / MILLIMETRE,
             "p": self.probability,
@@ -53,7 +53,7 @@ class Drift:
 
     @classmethod
     def of(cls, fit: GeometricFit) -> Drift:
-        """From the residuals of a fit, by Rao's score test: what a drift of three coordinates more would estimate, to first order.
+        """Score test (Rao) on the residuals of a fit: first-order estimate of a drift with three further coordinates.
 
         The covariance of the errors is that of the fit without what stretches of the measuring order share, scaled by the chi-square
         that is left. Rows are in measuring order; outliers do not count.

@@ -9,21 +9,21 @@ import numpy as np
 from flexcal.calibration.fit import GeometricFit, manufacturing_tolerances
 
 FAR = 50.0
-"""Tolerances by which no geometric parameter should be off: 15 mm, 25 mrad."""
+"""Largest plausible deviation of a geometric parameter, in tolerances: 15 mm, 25 mrad."""
 
 FAR_POINT = 0.05
-"""m: a reflector's place on the tool, which is often guessed, should not be farther off than this."""
+"""Largest plausible deviation, m, of a reflector's place on the tool, which is often guessed."""
 
 FAR_FROM_PRIOR = 5.0
-"""Standard deviations of its prior by which no stiffness, mass or centre of mass should be off."""
+"""Largest plausible deviation of a stiffness, mass or centre of mass, in standard deviations of its prior."""
 
 SCATTERED = 0.01
-"""Errors after the fit over the extent of the points (root mean square both) from which data and robot hardly belong together."""
+"""Ratio of errors after the fit to the extent of the points (root mean square both) from which data and robot do not belong together."""
 
 
 @dataclass(frozen=True)
 class ImplausibleShift:
-    """A parameter that ended at `value`, `times` its tolerance (or the standard deviation of its prior) from its start."""
+    """Parameter that changed to `value`, by `times` its tolerance (or the standard deviation of its prior)."""
 
     name: str
     start: float
@@ -62,11 +62,11 @@ def implausible_shifts(calibration: GeometricFit) -> tuple[ImplausibleShift, ...
 
 
 def _limits(kept: list[str], size: np.ndarray) -> np.ndarray:
-    """How many tolerances each geometric parameter may be off."""
+    """Largest plausible change of each geometric parameter, in tolerances."""
     points = [name.startswith(("tool.length", "point.")) for name in kept]
     return np.where(points, FAR_POINT / size[: len(kept)], FAR)
 
 
 def _has_size(name: str) -> bool:
-    """Whether robot.yaml or the URDF say how large a parameter may be: not of the place of the instrument, nor of a compliance."""
+    """Whether robot.yaml or the URDF give a parameter's size: not for the place of the instrument, nor for a compliance."""
     return not name.startswith("station.") and ".gravity_compliance" not in name

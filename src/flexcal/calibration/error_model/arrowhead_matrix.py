@@ -1,4 +1,4 @@
-"""Symmetric matrices of many short diagonal blocks that a few columns border."""
+"""Symmetric block-diagonal matrices bordered by a few columns (block arrowhead matrices)."""
 
 from __future__ import annotations
 
@@ -11,37 +11,41 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Arrowhead:
-    """M = [[B, F], [Fᵀ, D]]: `border` F (b, d), `corner` D (d, d), and the diagonal `blocks` of B in their order, (k, m, m) of one size."""
+    """Arrowhead matrix M = [[B, F], [Fᵀ, D]]: `border` F (b, d), `corner` D (d, d), and the diagonal `blocks` of B in their order, (k,
+    m, m) of one size.
+    """
 
     blocks: tuple[np.ndarray, ...]
     border: np.ndarray
     corner: np.ndarray
 
     def scaled(self, outer: float, inner: np.ndarray, used: np.ndarray) -> Arrowhead:
-        """S M S of the columns `used` (d',) of the corner, with the factors `outer` of the first b rows and `inner` (d',) of these."""
+        """Scaled matrix S M S restricted to the columns `used` (d',) of the corner; S has `outer` for the first b rows and `inner` (d',)
+        for these.
+        """
         blocks = tuple(outer**2 * values for values in self.blocks)
         corner = self.corner[np.ix_(used, used)] * inner * inner[:, None]
         return Arrowhead(blocks, self.border[:, used] * (outer * inner), corner)
 
     def rows(self, outer: float, inner: np.ndarray, used: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """S M (b + d', k) of some `columns` (k,) of the corner, S as in `scaled`."""
+        """Rows S M (b + d', k) of some `columns` (k,) of the corner, S as in `scaled`."""
         return np.concatenate(
             [outer * self.border[:, columns], inner[:, None] * self.corner[np.ix_(used, columns)]]
         )
 
     def plus_identity(self, inner: np.ndarray) -> Arrowhead:
-        """M with 1 added to the diagonal of B and, where `inner` (d,) says so, of D."""
+        """Matrix M with 1 added to the diagonal of B and, where `inner` (d,) is set, of D."""
         blocks = tuple(values + np.eye(values.shape[1]) for values in self.blocks)
         return Arrowhead(blocks, self.border, self.corner + np.diag(inner.astype(float)))
 
     def times(self, vector: np.ndarray) -> np.ndarray:
-        """M v (b + d,)."""
+        """Product M v (b + d,)."""
         first, last = vector[: len(self.border)], vector[len(self.border) :]
         upper = self.border @ last + _by_blocks(self.blocks, first[:, None])[:, 0]
         return np.concatenate([upper, self.border.T @ first + self.corner @ last])
 
     def factored(self) -> ArrowheadFactor:
-        """Its Cholesky factor, with B eliminated first; raises `LinAlgError` where M is not positive definite."""
+        """Cholesky factor, with B eliminated first; raises `LinAlgError` if M is not positive definite."""
         inverses = tuple(np.linalg.inv(np.linalg.cholesky(values)) for values in self.blocks)
         border = _by_blocks(inverses, self.border)
         return ArrowheadFactor(inverses, border, np.linalg.cholesky(self.corner - border.T @ border))
@@ -49,7 +53,9 @@ class Arrowhead:
 
 @dataclass(frozen=True, eq=False)
 class ArrowheadFactor:
-    """L with L Lᵀ = M: `inverses` of the blocks' factors L_B, `border` L_B⁻¹ F (b, d), and `corner` L_S of S = D - Fᵀ B⁻¹ F (d, d)."""
+    """Cholesky factor L with L Lᵀ = M: `inverses` of the blocks' factors L_B, `border` L_B⁻¹ F (b, d), and `corner` L_S of S = D - Fᵀ
+    B⁻¹ F (d, d).
+    """
 
     inverses: tuple[np.ndarray, ...]
     border: np.ndarray
@@ -57,12 +63,12 @@ class ArrowheadFactor:
 
     @property
     def log_determinant(self) -> float:
-        """ln det M."""
+        """Logarithm of the determinant, ln det M."""
         diagonals = [1 / np.diagonal(values, axis1=1, axis2=2).ravel() for values in self.inverses]
         return 2 * float(np.log(np.concatenate([*diagonals, np.diag(self.corner)])).sum())
 
     def half(self, columns: np.ndarray) -> np.ndarray:
-        """L⁻¹ C of columns (b + d, k)."""
+        """Forward substitution L⁻¹ C of columns (b + d, k)."""
         from scipy.linalg import solve_triangular
 
         count = len(self.border)
@@ -71,7 +77,7 @@ class ArrowheadFactor:
         return np.concatenate([upper, lower])
 
     def other_half(self, columns: np.ndarray) -> np.ndarray:
-        """L⁻ᵀ C of columns (b + d, k)."""
+        """Back substitution L⁻ᵀ C of columns (b + d, k)."""
         from scipy.linalg import solve_triangular
 
         count = len(self.border)
@@ -79,7 +85,7 @@ class ArrowheadFactor:
         return np.concatenate([_by_blocks(self._turned, columns[:count] - self.border @ lower), lower])
 
     def trace(self, other: Arrowhead) -> float:
-        """tr M⁻¹ A of an `other` matrix A with blocks of the same sizes."""
+        """Trace of M⁻¹ A for an `other` matrix A with blocks of the same sizes."""
         whole = float(np.sum(self._corner_inverse * other.corner))
         for inverse, values in zip(self.inverses, other.blocks, strict=True):
             whole += float(np.sum((inverse @ values) * inverse))
@@ -87,7 +93,7 @@ class ArrowheadFactor:
         return whole + float(np.sum(self._spread * across))
 
     def squares(self, other: Arrowhead) -> float:
-        """‖L⁻¹ A‖² of the first b columns of an `other` matrix A with blocks of the same sizes."""
+        """Squared norm ‖L⁻¹ A‖² of the first b columns of an `other` matrix A with blocks of the same sizes."""
         whole, first = 0.0, 0
         lower = other.border.T.copy()
         for inverse, values in zip(self.inverses, other.blocks, strict=True):
@@ -104,24 +110,24 @@ class ArrowheadFactor:
 
     @cached_property
     def _corner_inverse(self) -> np.ndarray:
-        """S⁻¹ (d, d)."""
+        """Inverse S⁻¹ (d, d) of the Schur complement."""
         from scipy.linalg import cho_solve
 
         return cho_solve((self.corner, True), np.eye(len(self.corner)))
 
     @cached_property
     def _eliminated(self) -> np.ndarray:
-        """B⁻¹ F (b, d)."""
+        """Product B⁻¹ F (b, d)."""
         return _by_blocks(self._turned, self.border)
 
     @cached_property
     def _spread(self) -> np.ndarray:
-        """B⁻¹ F S⁻¹ (b, d)."""
+        """Product B⁻¹ F S⁻¹ (b, d)."""
         return self._eliminated @ self._corner_inverse
 
 
 def _by_blocks(blocks: Sequence[np.ndarray], columns: np.ndarray) -> np.ndarray:
-    """Block-diagonal matrix times columns (b, k)."""
+    """Product of a block-diagonal matrix with columns (b, k)."""
     result, first = np.empty(columns.shape), 0
     for values in blocks:
         last = first + values.shape[0] * values.shape[1]

@@ -1,4 +1,4 @@
-"""Sums over the visits of every command that was visited again."""
+"""Sums over the visits of every repeatedly visited command."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class CommandSums:
-    """K commands visited again, of which only those that some visit has together (its targets') have scalar products.
+    """Sums of K repeatedly visited commands; only commands that share a visit (its targets') have scalar products.
 
     `once` (G, 3 T) is 1 at the points of the other commands, whose error is each visit's own. `sums` (K, G T) adds rows of a command;
     `cells` (K c, G T T) pairs of rows of a visit, of a command and one of c cells, the `count`; `groups` (k s s, G T T) pairs of rows of
@@ -31,7 +31,7 @@ class CommandSums:
 
     @classmethod
     def of(cls, points: ErrorGroups, cell: np.ndarray, cells: int) -> CommandSums:
-        """Of `points` that have commands; `cell` (G, T, kinds) are the cells of their visits, -1 where there is no point."""
+        """Sums of `points` with commands; `cell` (G, T, kinds) are the cells of their visits, -1 where there is no point."""
         assert points.command is not None
         visits = points.visits
         again = np.bincount(points.command) > 1
@@ -71,12 +71,12 @@ class CommandSums:
         return tuple(products)
 
     def spread(self, values: np.ndarray) -> np.ndarray:
-        """Errors (G T, 3) of all points from those (3 K,) of the commands."""
+        """Errors (G T, 3) of all points from the errors (3 K,) of the commands."""
         return self.sums.T @ values.reshape(-1, 3)
 
 
 def _tied(command: np.ndarray, count: int) -> np.ndarray:
-    """Number (count,) of the group of every command, `command` (G, T) being those of the visits, or -1."""
+    """Group number (count,) of every command; `command` (G, T) are those of the visits, or -1."""
     from scipy.sparse.csgraph import connected_components
 
     if not count:

@@ -1,4 +1,4 @@
-"""Covariance of the errors of measured points beside the fitted parameters: instrument, robot and model error."""
+"""Covariance of the errors of measured points besides the fitted parameters: instrument, robot and model error."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from flexcal.calibration.measurement import PredictedMeasurements
 from flexcal.model.robot import RobotModel
 
 _SMALLEST = 1e-6
-"""Standard deviation (m) that no instrument on an arm goes below: it stands beside priors where simulated points have no noise."""
+"""Lower bound (m) of the standard deviation of an instrument, for simulated points without noise."""
 _SMALLEST_TURN = 1e-7
-"""Angle (rad) beside which a change of an error of the joints is judged."""
+"""Angle (rad) relative to which a change of a joint error is judged."""
 
 
 @dataclass(frozen=True)
 class ErrorComponents:
-    """Standard deviations of the error components of measured points, each a coordinate (1σ).
+    """Standard deviations (1σ, per coordinate) of the error components of measured points.
 
     `share`: the instrument's noise over the stated sigma, 0 where none is stated (the robot's then contains it); `robot` m, independent
     from measurement to measurement, `pose` m and `angular` rad at every revolute joint, common to the points of one visit to a pose:
@@ -38,11 +38,11 @@ class ErrorComponents:
 
     @property
     def model(self) -> float:
-        """Standard deviation of the model error of a coordinate, m."""
+        """Standard deviation of the model error per coordinate, m."""
         return float(np.sqrt(self.workspace**2 + self.order**2 + self.command**2))
 
     def settled(self, before: ErrorComponents, tolerance: float) -> bool:
-        """Whether every component is where it was, to a share `tolerance` of the whole."""
+        """Whether every component has converged to a share `tolerance` of the whole."""
         own, other = (np.array([s.robot, s.pose, s.workspace, s.order, s.command]) for s in (self, before))
         same = np.abs(own - other).max() <= tolerance * (np.linalg.norm(own) + _SMALLEST)
         angles = ((self.angular, before.angular), (self.transmission, before.transmission))
@@ -58,7 +58,7 @@ class ErrorComponents:
         return diagonal[:, :, None] * np.eye(3) + self.angular**2 * turns @ np.swapaxes(turns, 1, 2)
 
     def jointly(self, sigma: np.ndarray, turns: np.ndarray, cells: ErrorGroups) -> np.ndarray:
-        """The same (G, 3 T, 3 T), m², of all measurements of a visit to a pose together, which are independent of other visits'.
+        """Joint covariance (G, 3 T, 3 T), m², of all measurements of a visit to a pose, independent of other visits.
 
         The diagonal is 1 where a visit lacks a point.
         """
@@ -68,17 +68,17 @@ class ErrorComponents:
         return single + common @ np.swapaxes(common, 1, 2)
 
     def common(self, turns: np.ndarray) -> np.ndarray:
-        """Columns (N, 3, 3 + r) m of the repeatability that the points of a visit share, each times a standard normal number."""
+        """Columns (N, 3, 3 + r) m of the repeatability shared by the points of a visit, each times a standard normal variable."""
         moved = np.broadcast_to(self.pose * np.eye(3), (len(turns), 3, 3))
         return np.concatenate([moved, self.angular * turns], axis=2)
 
     def whitening(self, sigma: np.ndarray, turns: np.ndarray) -> np.ndarray:
-        """W (N, 3, 3) 1/m with WᵀW the inverse of the sum of all variances of single measurements."""
+        """Whitening matrix W (N, 3, 3) 1/m with WᵀW the inverse of the total variance of single measurements."""
         whole = self.independent(sigma, turns) + self.model**2 * np.eye(3)
         return np.linalg.inv(np.linalg.cholesky(whole))
 
     def weights(self, sigma: np.ndarray, turns: np.ndarray) -> np.ndarray:
-        """The same (N, 3, 3) with the repeatability of the joints spread evenly over points and directions.
+        """Whitening matrix (N, 3, 3) with the repeatability of the joints averaged over points and directions.
 
         What is taken for it may be an error of the model, and weights that follow it would fit the points of short levers only.
         """
@@ -86,7 +86,7 @@ class ErrorComponents:
         return even.whitening(sigma, turns)
 
     def evenly(self, turns: np.ndarray) -> float:
-        """Standard deviation of a coordinate, m, from the robot's repeatability, root mean square over the points."""
+        """Standard deviation of a coordinate, m, due to the robot's repeatability, root mean square over the points."""
         turned = float(np.mean((turns**2).sum(axis=2))) if turns.size else 0.0
         return float(np.sqrt(self.robot**2 + self.pose**2 + self.angular**2 * turned))
 
@@ -103,14 +103,14 @@ class ErrorComponents:
 
 
 def whitened(whitening: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """W (N, 3, 3) times `rows` (N, 3) or (N, 3, m), stacked: (3 N,) or (3 N, m)."""
+    """Product of W (N, 3, 3) with `rows` (N, 3) or (N, 3, m), stacked: (3 N,) or (3 N, m)."""
     if rows.ndim == 2:
         return np.matmul(whitening, rows[:, :, None]).ravel()
     return np.matmul(whitening, rows).reshape(3 * len(rows), rows.shape[2])
 
 
 def known_scatter(model: RobotModel, *, stated: bool) -> ErrorComponents | None:
-    """Calibrated error components of a robot; without a calibration the instrument alone, where its sigma is `stated`.
+    """Calibrated error components of a robot; without a calibration the instrument alone, with its sigma if `stated`.
 
     A sigma that the calibration did not have is not added: the robot's part there holds the instrument's. None where nothing is known.
     """
@@ -124,6 +124,6 @@ def known_scatter(model: RobotModel, *, stated: bool) -> ErrorComponents | None:
 
 
 def joint_rotation_jacobian(at: PredictedMeasurements) -> np.ndarray:
-    """How every revolute joint, turned by one radian, moves the points: (N, 3, r), m/rad, in the instrument's frame."""
+    """Derivative (N, 3, r), m/rad, of the points with respect to a rotation of every revolute joint, in the instrument's frame."""
     joints = [joint for joint in at.model.joints if joint.kind == "revolute"]
     return at.jacobian([f"{joint.name}.offset" for joint in joints])

@@ -22,7 +22,7 @@ class ErrorStatistics:
 
     @classmethod
     def of(cls, errors: np.ndarray) -> ErrorStatistics:
-        """From error vectors (N, 3), m."""
+        """Statistics of error vectors (N, 3), m."""
         distance = np.linalg.norm(errors, axis=1)
         if not len(distance):
             return cls(0, np.nan, np.nan, np.nan)
@@ -32,12 +32,12 @@ class ErrorStatistics:
 
     @classmethod
     def of_millimetres(cls, block: Mapping[str, Any]) -> ErrorStatistics:
-        """From a block of results.json, as `in_millimetres` makes it."""
+        """Statistics read from a block of results.json, as `in_millimetres` makes it."""
         values = (block[key] for key in ("mean_mm", "p90_mm", "max_mm"))
         return cls(block["poses"], *(np.nan if v is None else v * MILLIMETRE for v in values))
 
     def in_millimetres(self) -> dict[str, float | int | None]:
-        """The block of results.json: poses, mean_mm, p90_mm, max_mm; null without poses."""
+        """Block of results.json: poses, mean_mm, p90_mm, max_mm; null without poses."""
         values = {"mean_mm": self.mean, "p90_mm": self.p90, "max_mm": self.max}
         return {"poses": self.poses} | {
             key: v / MILLIMETRE if self.poses else None for key, v in values.items()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 _SAME = 0.01
-"""rad or m: joints that differ by less make the same pose."""
+"""Difference of joint positions, rad or m, below which poses are the same."""
 
 
 def repeated_pose_numbers(q: np.ndarray) -> np.ndarray:
@@ -19,7 +19,7 @@ def repeated_pose_numbers(q: np.ndarray) -> np.ndarray:
 
 
 def are_different(q: np.ndarray, count: int) -> bool:
-    """Whether there are at least `count` different poses, as `repeated_pose_numbers` tells them, among joint positions (N, n)."""
+    """Whether joint positions (N, n) include at least `count` different poses, as counted by `repeated_pose_numbers`."""
     for _ in range(count):
         if not len(q):
             return False
@@ -33,7 +33,7 @@ def order_folds(samples: int, folds: int) -> np.ndarray:
 
 
 def workspace_folds(points: np.ndarray, folds: int) -> np.ndarray:
-    """Fold number (N,) of cells of nearly equal count: `points` (N, 3) are halved across their longest direction, again and again."""
+    """Fold number (N,) of workspace cells of nearly equal count: `points` (N, 3) are recursively halved across their longest direction."""
     result = np.zeros(len(points), dtype=int)
     cells = [np.arange(len(points))]
     while len(cells) < folds:

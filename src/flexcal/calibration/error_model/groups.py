@@ -11,18 +11,18 @@ from flexcal.calibration.error_model.folds import order_folds, workspace_folds
 from flexcal.data.poses import PoseSet
 
 COMMAND = "command"
-"""The model error common to all visits of a command."""
+"""Name of the model error common to all visits of a command."""
 _CELL_VISITS, _MOST_CELLS, _FEWEST_CELLS = 5, 16, 4
-"""Visits to poses a block of the model error, and bounds on the number of blocks."""
+"""Visits per block of the model error, and bounds on the number of blocks."""
 SAME_COMMAND = 1e-4
-"""Joint positions (rad or m) closer than this are one command."""
+"""Difference of joint positions (rad or m) below which they are one command."""
 _FEWEST_REPEATED = 5
-"""Commands visited more than once that a variance between commands needs."""
+"""Least number of repeatedly visited commands for a variance between commands."""
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorGroups:
-    """Labels (N,) of points that share an error, whole numbers from 0.
+    """Labels (N,) of points that share an error, integers from 0.
 
     `pose`: measured in one visit to a pose, each another target; the robot's scatter is common to them. The others share a model error:
     a cell of the `workspace`, a stretch of the measuring `order`, a `command` with its target; None where there are too few poses, or too
@@ -36,7 +36,7 @@ class ErrorGroups:
 
     @classmethod
     def of(cls, poses: PoseSet) -> ErrorGroups:
-        """Rows of one pose number are a visit; those of a target that the visit already has begin another."""
+        """Groups by visit: rows of one pose number are a visit; a target that the visit already has begins another."""
         _, target = np.unique(poses.target, return_inverse=True)
         visit = group_numbers(np.column_stack([poses.pose, occurrence(group_numbers(poses.pose, target))]))
         commands = group_numbers(np.column_stack([np.round(poses.q / SAME_COMMAND), target]))
@@ -51,13 +51,13 @@ class ErrorGroups:
         return cls(visit, workspace[visit], order_folds(len(size), count)[visit], command)
 
     def subset(self, rows: np.ndarray) -> ErrorGroups:
-        """Those of the rows with these indices, or where this mask is true."""
+        """Groups of the rows with these indices or of this mask."""
         blocks = {name: group_numbers(labels[rows]) for name, labels in self.blocks.items()}
         return ErrorGroups(group_numbers(self.pose[rows]), **blocks)
 
     @property
     def blocks(self) -> dict[str, np.ndarray]:
-        """The labels (N,) of a common model error that there are, by name."""
+        """Labels (N,) of the blocks of a common model error, by name."""
         named = {"workspace": self.workspace, "order": self.order, COMMAND: self.command}
         return {name: labels for name, labels in named.items() if labels is not None}
 
@@ -88,7 +88,7 @@ class ErrorGroups:
 
 
 def block_columns(labels: np.ndarray) -> np.ndarray:
-    """Columns (N, 3, 3 K) of an error that is common to each of K blocks."""
+    """Columns (N, 3, 3 K) of an error common to each of K blocks."""
     rows = (labels[:, None] == np.unique(labels)[None]).astype(float)
     return np.kron(rows, np.eye(3)).reshape(len(labels), 3, -1)
 
@@ -100,7 +100,7 @@ def group_numbers(*columns: np.ndarray) -> np.ndarray:
 
 
 def occurrence(labels: np.ndarray) -> np.ndarray:
-    """How many earlier rows (N,) have the same label."""
+    """Number of earlier rows (N,) with the same label."""
     order = np.argsort(labels, kind="stable")
     starts = np.flatnonzero(np.diff(labels[order], prepend=labels[order][0] - 1))
     counts = np.diff(np.append(starts, len(labels)))

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def incidence(labels: np.ndarray, columns: np.ndarray, shape: tuple[int, int]) -> csr_matrix:
-    """Matrix of ones at row `labels` and column `columns`, of any shapes that go together; none where a label is negative."""
+    """Sparse matrix of ones at rows `labels` and columns `columns`, of broadcastable shapes; none where a label is negative."""
     from scipy.sparse import csr_matrix
 
     labels, columns = np.broadcast_arrays(labels, columns)
@@ -20,7 +20,7 @@ def incidence(labels: np.ndarray, columns: np.ndarray, shape: tuple[int, int]) -
 
 
 def pairs_of(first: np.ndarray, second: np.ndarray, rows: int, columns: int) -> csr_matrix:
-    """(rows columns, G T T): adds the pairs of rows of a visit whose labels (G, T, kinds) are one of the `first` and one of the `second`.
+    """Incidence matrix (rows columns, G T T) of pairs of rows of a visit, one label (G, T, kinds) out of `first` and one out of `second`.
 
     Negative labels are of no row.
     """
@@ -32,7 +32,7 @@ def pairs_of(first: np.ndarray, second: np.ndarray, rows: int, columns: int) -> 
 
 
 def by_axes(inner: np.ndarray) -> np.ndarray:
-    """The 3 × 3 entries (G T T, 9) of blocks (G, 3 T, 3 T)."""
+    """Entries (G T T, 9) of the 3 × 3 submatrices of blocks (G, 3 T, 3 T)."""
     places = inner.shape[1] // 3
     return inner.reshape(-1, places, 3, places, 3).transpose(0, 1, 3, 2, 4).reshape(-1, 9)
 

@@ -1,4 +1,4 @@
-"""Scalar products of the columns of a linear fit and of the blocks that share an error, from sums over visits to poses."""
+"""Scalar products of the columns of a linear fit and of blocks with a common error, from sums over visits to poses."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class PointSums:
-    """Columns of a linear fit by visits to poses, and the sums that make scalar products of the columns that blocks share.
+    """Columns of a linear fit by visits to poses, and the sums for scalar products of columns shared by blocks.
 
     `columns` (G, 3 T, p + w + k + 1) are those of the fit, w waves of transmission errors, k further ones and, the last, its residual;
     `structures` are ∂V/∂variance of the components that visits have on their own, (G, 3 T, 3 T) or as diagonals (G, 3 T); `blocks` says
@@ -38,7 +38,7 @@ class PointSums:
 
     @classmethod
     def of(cls, fit: LinearFit, further: np.ndarray | None = None) -> PointSums:
-        """Of a fit, with `further` columns (N, 3, k) that are not of it."""
+        """Sums of a fit, with `further` columns (N, 3, k) that do not belong to it."""
         more = np.zeros((*fit.residual.shape, 0)) if further is None else further
         cells = fit.cells
         columns = cells.gathered(
@@ -65,7 +65,7 @@ class PointSums:
         return cls(fit, columns, structures, blocks, sums, pairs_of(label, label, count, count), commands)
 
     def gram(self, inner: np.ndarray, *, commands: bool) -> Arrowhead:
-        """CᵀQC of all columns C with Q by its blocks `inner` (G, 3 T, 3 T).
+        """Gram matrix CᵀQC of all columns C with Q given by its blocks `inner` (G, 3 T, 3 T).
 
         The corner is of `columns` and of the cells and stretches (three columns each, 1 where a point belongs to it); the blocks are of
         the commands, where they are asked for.
@@ -91,16 +91,16 @@ class PointSums:
         return sum(len(own) for own in self.blocks.values())
 
     def spread(self, values: np.ndarray) -> np.ndarray:
-        """Errors (G, 3 T) of all points from those (3 K,) of each cell and stretch."""
+        """Errors (G, 3 T) of all points from the errors (3 K,) of each cell and stretch."""
         return (self.sums.T @ values.reshape(-1, 3)).reshape(len(self.columns), -1)
 
     @property
     def fixed(self) -> int:
-        """Number of the columns of the fit, the first."""
+        """Number of columns of the fit, which come first."""
         return self.fit.free.shape[2] + self.fit.tied.shape[2]
 
     def index(self, name: str) -> np.ndarray:
-        """Numbers of the columns of a component in the corner: of its cells or stretches, or of the waves."""
+        """Column numbers of a component in the corner: of its cells or stretches, or of the waves."""
         if name not in self.blocks:
             return self.fixed + np.arange(self.fit.waves.shape[2])
         first = self.columns.shape[2] + 3 * self.blocks[name]

@@ -17,7 +17,7 @@ from flexcal.calibration.error_model.point_sums import PointSums
 
 @dataclass(frozen=True, eq=False)
 class RestrictedLikelihood:
-    """Restricted likelihood at some components: with P = V⁻¹ - V⁻¹X(XᵀV⁻¹X)⁻¹XᵀV⁻¹ of the parameters X, the shared errors being in V.
+    """Restricted likelihood at given components, with P = V⁻¹ - V⁻¹X(XᵀV⁻¹X)⁻¹XᵀV⁻¹ of the parameters X; V includes the shared errors.
 
     `inverse` (G, 3 T, 3 T) is that of the visits' own covariance; `used` are the columns of X, of what is known of them beforehand and of
     the cells, `sizes` their standard deviations (1 for X), `outer` that of the commands, whose columns go first; `factor` L with
@@ -37,7 +37,7 @@ class RestrictedLikelihood:
 
     @classmethod
     def of(cls, sums: PointSums, names: Sequence[str], scatter: ErrorComponents) -> RestrictedLikelihood:
-        """At a scatter, to be derived by the variances of the components `names`."""
+        """Likelihood at a scatter, with derivatives by the variances of the components `names`."""
         fit = sums.fit
         own = scatter.jointly(fit.sigma, fit.turns, fit.cells)
         if sums.commands is not None and COMMAND in names:
@@ -64,7 +64,7 @@ class RestrictedLikelihood:
         return cls(sums, tuple(names), inverse, gram, used, sizes, outer, lower, solution, deviance)
 
     def products(self, columns: np.ndarray) -> np.ndarray:
-        """CᵀPC (k, k) of the `columns` (k,) with these numbers."""
+        """Matrix CᵀPC (k, k) of the `columns` (k,) with these numbers."""
         half = self.factor.half(self.gram.rows(self.outer, self.sizes, self.used, columns))
         return self.gram.corner[np.ix_(columns, columns)] - half.T @ half
 
@@ -84,7 +84,7 @@ class RestrictedLikelihood:
         return result
 
     def _slope_by_commands(self) -> float:
-        """Derivative by an error that all visits of commands share."""
+        """Derivative by the variance of an error shared by all visits of a command."""
         gram, outer = self.gram, self.outer
         trace = sum(float(np.trace(own, axis1=1, axis2=2).sum()) for own in gram.blocks)
         blocks = tuple(outer * own for own in gram.blocks)
@@ -93,7 +93,7 @@ class RestrictedLikelihood:
         return trace - self.factor.squares(across) - float(pushed @ pushed)
 
     def _slope_by_visits(self, structure: np.ndarray) -> float:
-        """Derivative by an error that every visit has on its own, (G, 3 T, 3 T) or its diagonal (G, 3 T)."""
+        """Derivative by the variance of an error independent in every visit, (G, 3 T, 3 T) or its diagonal (G, 3 T)."""
         if structure.ndim == 2:
             inner = (self.inverse * structure[:, None]) @ self.inverse
             trace = float(np.sum(np.diagonal(self.inverse, axis1=1, axis2=2) * structure))
@@ -127,7 +127,7 @@ class RestrictedLikelihood:
         return next(flat).T @ next(flat) - inside.T @ inside
 
     def _pushed(self, name: str, weighted: np.ndarray) -> np.ndarray:
-        """V' (G, 3 T, 1) of one component times P y."""
+        """Product V' P y (G, 3 T, 1) for one component."""
         sums = self.sums
         if name == COMMAND and sums.commands is not None:
             again = sums.commands.spread(added(sums.commands.sums, weighted)).reshape(weighted.shape)

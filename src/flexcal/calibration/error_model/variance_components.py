@@ -15,25 +15,25 @@ from flexcal.calibration.error_model.restricted_likelihood import RestrictedLike
 _CLEAR_GAIN = 3.0
 """Gain in log-likelihood from which a stated sigma counts as too large (p = 0.01, one parameter at its bound)."""
 _SUPPORTED = 2.7
-"""Gain in log-likelihood by which a component counts as found (p = 0.01, one variance at its bound of zero)."""
+"""Gain in log-likelihood from which a component is significant (p = 0.01, one variance at its bound of zero)."""
 _LARGEST = 30.0
-"""Variance over that about the fit, which no component exceeds."""
+"""Upper bound of a component, relative to the variance about the fit."""
 _NEGLIGIBLE = 1e-4
 """Share of the total variance below which a component is zero."""
 TRANSMISSION = "transmission"
-"""The component of transmission errors."""
+"""Name of the component of transmission errors."""
 _SMALLEST = 1e-9
 """Share of the total variance that bounds a component from below."""
 _STEPS, _HALVINGS = 60, 30
 _STILL = 1e-6
-"""Change of the deviance, by its slope, below which the greatest likelihood is found."""
+"""Change of the deviance, by its slope, below which the maximisation has converged."""
 _ARMIJO = 1e-4
-"""Share of the change by the slope that a step must bring (Armijo 1966)."""
+"""Share of the predicted change that a step must achieve (Armijo 1966)."""
 
 
 @dataclass(frozen=True, eq=False)
 class LinearFit:
-    """A fit linearised at its solution: `residual` (N, 3) m = `free` x + `tied` z + error, z standard normal a priori.
+    """Fit linearised at its solution: `residual` (N, 3) m = `free` x + `tied` z + error, z standard normal a priori.
 
     `free` (N, 3, p) and `tied` (N, 3, t) m; `waves` (N, 3, w) m/rad move the points with the waves of transmission errors; `sigma` (N, 3) m
     as stated, `turns` (N, 3, r) m/rad; `cells` say which points share an error.
@@ -48,7 +48,7 @@ class LinearFit:
     cells: ErrorGroups
 
     def products(self, scatter: ErrorComponents, columns: np.ndarray) -> np.ndarray:
-        """Scalar products (k + 1, k + 1) of further `columns` (N, 3, k) m and, the last, the residual, less what the parameters explain.
+        """Scalar products (k + 1, k + 1) of further `columns` (N, 3, k) m and, last, the residual, after projection off the parameters.
 
         They are weighted by the inverse of the residual's marginal covariance, the `tied` numbers and shared errors integrated out.
         """
@@ -60,7 +60,7 @@ class LinearFit:
         return RestrictedLikelihood.of(sums, names, scatter).products(own)
 
     def scatter(self, *, stated: bool) -> tuple[ErrorComponents, dict[str, float]]:
-        """The components, and the standard deviation of each of them that is not zero.
+        """Estimated components, and the standard deviation of each that is not zero.
 
         Where a sigma is `stated`, the instrument's part is that, or less where the points scatter clearly less than it says.
         """
@@ -92,9 +92,7 @@ class LinearFit:
     def _supported(
         self, names: list[str], scale: np.ndarray, variances: np.ndarray, likelihood: float, share: float
     ) -> tuple[list[str], np.ndarray, np.ndarray]:
-        """Model error, and the components of repeatability that the data support: others are taken out one by one while that costs no
-        more than chance gains.
-        """
+        """Model error, and the components of repeatability supported by the data, by backward elimination with a likelihood-ratio test."""
         seen = [k for k in range(len(names)) if k == 0 or variances[k] > _NEGLIGIBLE * scale[k]]
         names, scale, variances = [names[k] for k in seen], scale[seen], variances[seen]
         while len(names) > 1:
@@ -116,7 +114,8 @@ class LinearFit:
         return names, scale, variances
 
     def _favour(self, name: str) -> float:
-        """Power of a standard deviation by which the likelihood is multiplied: 1 of transmission errors, together 1 of other model errors.
+        """Power of a standard deviation in the prior factor of the likelihood: 1 for transmission errors, together 1 for other model
+        errors.
 
         Few poses would often put these at zero, which claims to know that there are none (Chung, Rabe-Hesketh, Dorie, Gelman & Liu 2013).
         """
@@ -125,7 +124,7 @@ class LinearFit:
         return 1.0 / len(self.cells.blocks) if name in self.cells.blocks else 0.0
 
     def _mean_square(self) -> float:
-        """Variance of a coordinate about the fit, m²; the parameters take their degrees of freedom."""
+        """Residual variance of a coordinate, m², with the parameters' degrees of freedom deducted."""
         rows, size = self.residual.size, self.free.shape[2]
         basis = np.linalg.qr(self.free.reshape(rows, size))[0]
         left = self.residual.ravel() - basis @ (basis.T @ self.residual.ravel())
@@ -140,7 +139,7 @@ class LinearFit:
         *,
         favour: bool = True,
     ) -> tuple[np.ndarray, float]:
-        """Variances (k,) of the greatest restricted likelihood, and its logarithm; `share` None: it is the last of the variances.
+        """Variances (k,) that maximise the restricted likelihood, and its logarithm; `share` None: it is the last of the variances.
 
         Newton's steps with the average information, cut at the bounds. `near` (k,) is where to begin, in units of `scale`. The
         likelihood is multiplied by each standard deviation to the power of `_favour`, unless not to `favour` any.
@@ -199,12 +198,12 @@ class LinearFit:
 
 
 def _lever(moved: np.ndarray) -> float:
-    """Mean square of a coordinate (m²) that columns (N, 3, k) make together; 1 where there are none."""
+    """Mean square of a coordinate (m²) due to columns (N, 3, k) together; 1 where there are none."""
     return float((moved**2).sum()) / (3 * len(moved)) or 1.0
 
 
 def _step(x: np.ndarray, slope: np.ndarray, information: np.ndarray, largest: np.ndarray) -> np.ndarray:
-    """Newton's step (k,) of the variances that do not rest on a bound which it would cross."""
+    """Newton step (k,) of the variances that are not at a bound which it would cross."""
     free = ~(((x <= _SMALLEST) & (slope > 0)) | ((x >= largest) & (slope < 0)))
     while True:
         step = np.zeros(len(x))

@@ -21,14 +21,14 @@ from flexcal.model.robot import (
 
 @dataclass(frozen=True, eq=False)
 class ElasticPrior:
-    """Stiffness, inertia and payload parameters that deflection depends on, and their joint covariance (estimation coordinates)."""
+    """Prior of the stiffness, inertia and payload parameters that deflection depends on, with joint covariance (estimation coordinates)."""
 
     parameters: Parameters
     covariance: np.ndarray
 
     @classmethod
     def of(cls, model: RobotModel, poses: PoseSet, *, secant_scale: float = 0.0) -> ElasticPrior:
-        """Prior of the parameters: the model's posterior where it has them, else the declared priors.
+        """Prior of the parameters: the model's posterior for those in it, else the declared priors.
 
         `secant_scale` is the relative 1σ by which a drive's stiffness under gravity may differ from the tangent one of a frequency
         response: it widens the drive stiffnesses by one scale each.
@@ -44,7 +44,7 @@ class ElasticPrior:
         return cls(Parameters(items), covariance)
 
     def beside(self, waves: Mapping[str, float], std: float) -> ElasticPrior:
-        """With the `waves` of transmission errors, each with its size over that of order 1, whose 1σ is `std` rad; none where that is 0."""
+        """Prior with the `waves` of transmission errors, each with its size relative to order 1, whose 1σ is `std` rad; none for 0."""
         if not waves or std == 0:
             return self
         items = Parameters(Parameter(name, unit_of(name), 0.0) for name in waves)
@@ -69,5 +69,5 @@ def _names(model: RobotModel, poses: PoseSet) -> list[str]:
 
 
 def _carried(model: RobotModel, link: int) -> bool:
-    """Whether a link hangs on a spring."""
+    """Whether a link is carried by a spring."""
     return any(joint in model.springs.bearing_frames for joint in model.path_to(link))

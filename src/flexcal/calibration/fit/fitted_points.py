@@ -39,16 +39,16 @@ from flexcal.progress import Progress
 
 _FLANK_PASSES = 4
 _FIRST_SCATTER = 1e-4
-"""Scatter (m) that a fit begins with: its size matters against priors only."""
+"""Initial scatter (m) of a fit: its size matters relative to priors only."""
 _CHI_MEDIAN = 2.366
 """Median of chi-square with three degrees of freedom."""
 _SUSPICION = 1e-3
-"""Chance of suspecting an outlier where there is none."""
+"""Probability of suspecting an outlier without one."""
 _SLACK = 1.5
-"""By which the squared scatter of few points, taken from their median, may be too small."""
+"""Factor by which the squared scatter of few points, from their median, may be too small."""
 
 _FREE_STIFFNESS = 0.3
-"""Relative 1σ by which every stiffness may differ from its prior while the scatter is estimated."""
+"""Relative 1σ of every stiffness about its prior while the scatter is estimated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ class PointFit:
         marginalised: bool,
         progress: Progress,
     ) -> PointFit:
-        """Without the term `transmission` where there are fewer than 20 different poses, which do not tell its variance.
+        """Input without the term `transmission` for fewer than 20 different poses, which do not determine its variance.
 
         Raises `FlexcalError` for a backlash seen from one flank and for too few poses.
         """
@@ -101,34 +101,34 @@ class PointFit:
 
     @cached_property
     def waves(self) -> dict[str, float]:
-        """Waves of transmission errors that have one variance, with their sizes over that of order 1."""
+        """Waves of transmission errors with a common variance, and their sizes relative to order 1."""
         return random_waves(self.start, self.poses, self.geometric) if TRANSMISSION in self.terms else {}
 
     @cached_property
     def cells(self) -> ErrorGroups:
-        """Which points share an error."""
+        """Groups of points that share an error."""
         return ErrorGroups.of(self.poses)
 
     @cached_property
     def straight(self) -> PredictedMeasurements:
-        """The points of the robot that the fit starts from, undeflected."""
+        """Points of the undeflected robot at the start of the fit."""
         return predict_measurements(self.start, self.poses, elastic=False, jacobians=True)
 
     @property
     def first_scatter(self) -> ErrorComponents:
-        """The error model to begin with: what is stated, and what robots usually have."""
+        """Initial error model: stated values, and typical ones of robots."""
         return ErrorComponents(share=1.0 if self.poses.sigma_given else 0.0, robot=_FIRST_SCATTER)
 
     @property
     def hidden(self) -> tuple[str, ...]:
-        """Parameters that random poses would determine and these do not, and that no declared prior does."""
+        """Parameters that random poses would determine, but neither these poses nor a declared prior."""
         seen = self.identifiability.kept_names
         declared = [p.name for p in self.geometric if np.isfinite(p.prior_std)]
         return tuple(name for name in self.structural.kept_names if name not in (*seen, *declared))
 
     @property
     def free(self) -> Parameters:
-        """Parameters that rank or a declared prior determine."""
+        """Parameters determined by rank or a declared prior."""
         kept = self.identifiability.kept_names
         return Parameters(p for p in self.geometric if p.name in kept or np.isfinite(p.prior_std))
 
@@ -141,7 +141,7 @@ class PointFit:
         fixed: tuple[Undetermined, ...] = (),
         spread: dict[str, float] | None = None,
     ) -> FittedPoints:
-        """The fit under some scatter, from the solution `near`, repeated until the flanks are those of the robot that it finds.
+        """Fit under a given scatter from the solution `near`, repeated until the flanks agree with the fitted robot.
 
         `fixed` parameters stay at their nominal values; `spread` are the standard deviations of the scatter's components.
         """
@@ -178,7 +178,7 @@ class PointFit:
 
 @dataclass(frozen=True, eq=False)
 class FittedPoints:
-    """A solution: `estimate` of the parameters that move, the robot `model`, its prediction `at` the poses on `flank` (N, n)."""
+    """Solution of a fit: `estimate` of the fitted parameters, the robot `model`, its prediction `at` the poses on `flank` (N, n)."""
 
     fit: PointFit
     scatter: ErrorComponents
@@ -197,17 +197,17 @@ class FittedPoints:
 
     @cached_property
     def turns(self) -> np.ndarray:
-        """How every revolute joint moves the points (N, 3, r), m/rad."""
+        """Derivative (N, 3, r), m/rad, of the points with respect to a rotation of every revolute joint."""
         return joint_rotation_jacobian(self.at)
 
     @cached_property
     def inliers(self) -> np.ndarray:
-        """(N,) rows that a robust loss did not set aside."""
+        """Mask (N,) of rows that a robust loss keeps."""
         return ~np.isin(np.arange(len(self.fit.poses)), self.estimate.outliers)
 
     @cached_property
     def linear(self) -> LinearFit:
-        """The fit linearised at its solution, without outliers.
+        """Fit linearised at its solution, without outliers.
 
         Stiffness is nearly free there: an error of stage 1 must not pass for scatter of the robot, which would hide it.
         """
@@ -250,14 +250,14 @@ class FittedPoints:
         return self.linear.scatter(stated=self.fit.poses.sigma_given)
 
     def robust_scatter(self) -> ErrorComponents:
-        """One scatter for all coordinates, from the median of the residuals' distances."""
+        """Common scatter of all coordinates, from the median of the residuals' distances."""
         rows = self.residuals.size
         freedom = max(rows - self.fit.identifiability.rank, 1)
         variance = float(np.median((self.residuals**2).sum(axis=1))) / _CHI_MEDIAN * rows / freedom
         return ErrorComponents(share=0.0, robot=float(np.sqrt(variance)))
 
     def undetermined(self, scatter: ErrorComponents) -> tuple[Undetermined, ...]:
-        """What the poses leave unknown under some scatter."""
+        """Parameters that the poses do not determine under a given scatter."""
         fit = self.fit
         kept = Parameters(p for p in fit.free if not np.isfinite(p.prior_std))
         whitening = scatter.whitening(fit.poses.sigma, self.turns)
@@ -265,7 +265,7 @@ class FittedPoints:
 
     @property
     def suspects_outliers(self) -> bool:
-        """Whether single points are farther off than the scatter of most others allows."""
+        """Whether single points deviate by more than the scatter of most others allows."""
         from scipy.special import chdtri
 
         whitening = self.scatter.whitening(self.fit.poses.sigma, self.turns)
@@ -275,7 +275,7 @@ class FittedPoints:
 
     @property
     def poses(self) -> PoseSet:
-        """The poses; where they state no sigma, with that of the scatter."""
+        """Poses; those without a stated sigma have that of the scatter."""
         poses, scatter = self.fit.poses, self.scatter
         if poses.sigma_given:
             return poses
@@ -285,7 +285,7 @@ class FittedPoints:
         return replace(poses, sigma=np.sqrt(variances + scatter.model**2))
 
     def whole_estimate(self) -> Estimate:
-        """All parameters: those that moved, those that were held with the uncertainty that this leaves, and the scatter."""
+        """Estimate of all parameters: fitted, held (with the uncertainty due to holding them), and the scatter."""
         undetermined_names = [item.name for item in self.fixed]
         dropped = tuple(d for d in self.fit.identifiability.dropped if d.name not in self.task.kept.names)
         turns = [f"station.{s}.{key}" for s in self.fit.poses.stations for key in ("rx", "ry", "rz")]
@@ -315,7 +315,7 @@ class FittedPoints:
         )
 
     def _covariance(self) -> np.ndarray:
-        """Covariance (p, p) of the estimate under errors V that the weights V₀ take for independent and alike in all directions.
+        """Covariance (p, p) of the estimate under errors V, where the weights V₀ assume independent, isotropic errors.
 
         Σ + G (V - V₀) Gᵀ with the estimate's response G = Σ Aᵀ V₀⁻¹ to errors of the points; Σ has the prior in it.
         """
@@ -333,14 +333,14 @@ class FittedPoints:
         return estimate.covariance + spread - taken + together.T @ together
 
     def _gain(self, names: list[str]) -> np.ndarray:
-        """How the estimates (p, h) follow parameters that are held, per unit of these: -Σ Aᵀ A_h of the whitened columns."""
+        """Sensitivity (p, h) of the estimates to held parameters: -Σ Aᵀ A_h of the whitened columns."""
         estimate = self.estimate
         slopes = estimate.parameters.natural_slope(estimate.parameters.coordinates())
         own = self.task.columns(self.at, estimate.parameters.names) * slopes
         return -estimate.covariance @ own.T @ self.task.columns(self.at, tuple(names))
 
     def _identifiable(self) -> tuple[bool, ...]:
-        """Those of the estimate, less what a declared prior, or the variance of transmission errors, alone determines."""
+        """Parameters of the estimate without those determined only by a declared prior or the variance of transmission errors."""
         estimate = self.estimate
         stds = np.sqrt(np.diag(estimate.covariance))
         waves = {name: size * self.scatter.transmission for name, size in self.fit.waves.items()}

@@ -1,4 +1,4 @@
-"""Most probable robot among those with the same measured points.
+"""Gauge freedom: the most probable robot among those with the same measured points.
 
 Positions of a point tell where it moves, not how the flange that carries it is turned, nor whether the point or the flange is off: an
 offset of the last joint moves the point as another place of the reflector does. The fit holds such directions at whatever its choice
@@ -21,24 +21,24 @@ from flexcal.model.kinematics import found_xyz, joint_limits
 from flexcal.model.robot import GEOMETRY, STATION, Posterior, RobotModel, propagated_covariance_root, unit_of
 
 KNOWN_POINT_STD = 0.002
-"""m, 1σ: a measured point that is known less well than this on the tool was not found at all."""
+"""Standard deviation, m, above which a measured point's place on the tool counts as undetermined."""
 POINT_STD = 0.010
-"""m: how well a ruler has the place of a measured point, 1σ a coordinate."""
+"""Standard deviation, m, per coordinate of a point's place measured with a ruler."""
 _POSES = 60
 _STEPS = 10
 _SMALL = 1e-10
-"""m and rad."""
+"""Convergence limit, m and rad."""
 _UNSEEN = 1e-8
 """Relative singular value below which a direction moves no measured point."""
 
 
 def probable_robot(model: RobotModel, targets: Sequence[str]) -> RobotModel:
-    """The first of `probable_robots`."""
+    """First of `probable_robots`."""
     return probable_robots(model, targets)[0]
 
 
 def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotModel, RobotModel]:
-    """`model` with the directions of its geometry that do not move the measured points `targets` where they are most probable.
+    """Robots with their geometry most probable along the directions that do not move the measured points `targets`.
 
     Weighted least squares of all geometric errors, subject to unchanged positions of the points, as every calibrated station sees them, by
     Gauss-Newton, of the robot taken as stiff under gravity: tilting axes would show such directions faintly. The posterior follows: what
@@ -84,7 +84,7 @@ def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotMod
 
 
 def with_calibrated_points(nominal: RobotModel, model: RobotModel, targets: Sequence[str]) -> RobotModel:
-    """The `nominal` robot with the calibrated positions of the measured points `targets` of `model` in their frames."""
+    """Nominal robot with the calibrated positions of the measured points `targets` of `model` in their frames."""
     values = {}
     for target in targets:
         moved = found_xyz(model, target) - nominal.points[target].xyz
@@ -93,13 +93,13 @@ def with_calibrated_points(nominal: RobotModel, model: RobotModel, targets: Sequ
 
 
 def point_uncertainty(model: RobotModel, target: str) -> float:
-    """1σ distance (m) to which the posterior of `model` has the place of a measured point in its frame."""
+    """Standard deviation (1σ distance, m) of a measured point's place in its frame, by the posterior of `model`."""
     spread = propagated_covariance_root(model, lambda changed: found_xyz(changed, target))
     return float(np.linalg.norm(spread))
 
 
 def _names(model: RobotModel, targets: Sequence[str], stations: Sequence[str]) -> list[str]:
-    """Geometric parameters, those of a station that measures in the base frame without its rotation."""
+    """Names of the geometric parameters; for a station in the base frame without its rotation."""
     moving = {i for target in targets for i in model.path_to(model.point(target).joint)}
     names = [f"{model.joints[i].name}.{key}" for i in sorted(moving) for key in GEOMETRY]
     names += [f"tool.{key}" for key in GEOMETRY]
@@ -113,7 +113,7 @@ def _names(model: RobotModel, targets: Sequence[str], stations: Sequence[str]) -
 
 
 def _std(model: RobotModel, name: str, targets: Sequence[str]) -> float:
-    """How far a parameter may be off beforehand, 1σ; infinite where nothing is known."""
+    """Prior 1σ of a parameter; infinite if nothing is known."""
     owner, _, key = name.rpartition(".")
     if owner.startswith("station."):
         return np.inf
@@ -144,8 +144,9 @@ def _random_poses(model: RobotModel, targets: Sequence[str], stations: Sequence[
 def _propagated(
     model: RobotModel, names: list[str], free: np.ndarray, weight: np.ndarray
 ) -> tuple[Posterior, Posterior]:
-    """The posterior about `model`, whose free directions, spanned by `free` (p, k), follow the others to where they are most probable; and
-    the part of it that these directions alone make."""
+    """Posterior about `model` whose free directions, spanned by `free` (p, k), follow the others to where they are most probable; and
+    the part due to these directions alone.
+    """
     old = model.posterior
     added = [name for name in names if name not in old.parameters]
     every = [*old.parameters.names, *added]

@@ -1,4 +1,4 @@
-"""Stage 2: the geometry from measured points, with the elastic deflection taken into account (Neubauer et al. 2015, §3 and §5)."""
+"""Stage 2: geometry from measured points, with the elastic deflection taken into account (Neubauer et al. 2015, §3 and §5)."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from flexcal.units import MILLIMETRE
 
 _PASSES = 8
 _SETTLED = 2e-3
-"""Relative change of every standard deviation of the errors at which the components count as found."""
+"""Relative change of every standard deviation of the errors at which the components have converged."""
 
 
 @dataclass(frozen=True, eq=False)
 class GeometricFit:
-    """A fitted geometry.
+    """Result of the geometric fit.
 
     `model` is the calibrated robot; `estimate` holds all geometric parameters (dropped and undetermined ones at their start, not
     identifiable), stiffness and inertia as `prior` and points together have them, and the `scatter`; `identifiability` is that of
@@ -54,7 +54,7 @@ class GeometricFit:
         return f"<{type(self).__name__} of {self.model.name}: {self.errors}>"
 
     def summary(self) -> str:
-        """Errors at the poses of the fit and every identified parameter with its standard deviation, for people."""
+        """Errors at the poses of the fit and every identified parameter with its standard deviation, as text."""
         rows = [
             f"{item.name:<40} {self.estimate.values[item.name]:>12.5g} ± {std:<10.2g} {item.unit}"
             for item in self.estimate.parameters
@@ -71,12 +71,12 @@ class GeometricFit:
 
     @property
     def errors(self) -> ErrorStatistics:
-        """How far the calibrated robot is from the points it was fitted to."""
+        """Errors of the calibrated robot at the points of the fit."""
         return ErrorStatistics.of(self.residuals)
 
     @property
     def variances(self) -> dict[str, float | None]:
-        """The uncertainty budget of a measured point, 1σ of a coordinate in mm, as results.json has it.
+        """Uncertainty budget of a measured point, 1σ of a coordinate in mm, as in results.json.
 
         `instrument_mm` is null where no sigma is stated: the robot's part then holds it. `robot_mm` has the repeatability of the
         joints at the measured points in it. `stated_mm` is the sigma of the files, root mean square.
@@ -179,7 +179,7 @@ def fit_geometry(
 
 
 def _settled(fit: PointFit, loss: Loss | Literal["squares", "huber", "cauchy"]) -> FittedPoints:
-    """The fit with the scatter that its own residuals have, and with what is undetermined under that scatter held."""
+    """Fit with the scatter of its own residuals, with the parameters undetermined under that scatter held."""
     robust = not isinstance(loss_named(loss), Squares)
     fitted = fit.solved(fit.first_scatter, "squares")
     if robust:

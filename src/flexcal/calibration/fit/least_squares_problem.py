@@ -1,4 +1,4 @@
-"""The least-squares problem of stage 2: geometry from measured points, with stiffness and inertia estimated jointly."""
+"""Least-squares problem of stage 2: geometry from measured points, with stiffness and inertia estimated jointly."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LossName = Literal["auto", "squares", "huber", "cauchy"]
 
 @dataclass(frozen=True, eq=False)
 class GeometryProblem:
-    """Geometric parameters `kept` of the robot `start` to be fitted to `poses` that rest on `flank` (N, n).
+    """Problem of fitting the geometric parameters `kept` of the robot `start` to `poses` on the backlash flanks `flank` (N, n).
 
     `prior` is what is known of stiffness and inertia beforehand; `elastic` says whether the arm deflects at all; `whitening` W (N, 3, 3) in
     1/m weighs the points: WᵀW is the inverse covariance of each.
@@ -37,14 +37,14 @@ class GeometryProblem:
     whitening: np.ndarray
 
     def predicted(self, values: Mapping[str, float], *, jacobians: bool = False) -> PredictedMeasurements:
-        """Where the robot with some named values should be seen, on the flanks of this fit."""
+        """Predicted measurements of the robot with the given named values, on the flanks of this fit."""
         robot = self.start.with_values(values)
         return predict_measurements(
             robot, self.poses, flank=self.flank, elastic=self.elastic, jacobians=jacobians
         )
 
     def residual(self, at: PredictedMeasurements) -> np.ndarray:
-        """Whitened measured minus predicted coordinates (3 N,), Eq. (28)."""
+        """Whitened residual (3 N,), measured minus predicted coordinates, Eq. (28)."""
         return whitened(self.whitening, self.poses.position - at.position)
 
     def columns(self, at: PredictedMeasurements, names: tuple[str, ...]) -> np.ndarray:

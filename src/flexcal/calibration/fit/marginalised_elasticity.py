@@ -12,11 +12,11 @@ from flexcal.progress import Progress
 
 _RELINEARISATIONS = 10
 _SETTLED = 1e-4
-"""Step of the marginalised parameters, in standard deviations of their prior, below which they count as found."""
+"""Step of the marginalised parameters, in standard deviations of their prior, at which they have converged."""
 
 
 def marginalised(fit: GeometryProblem, *, progress: Progress) -> Estimate:
-    """Fit the geometry alone, then read stiffness and inertia θ off the residual r: what `fit.reestimated` finds, by another way.
+    """Fit of the geometry alone, with stiffness and inertia θ then inferred from the residual r; same optimum as `fit.reestimated`.
 
     With S = R + J Σ Jᵀ the posterior is θ₀ + Σ Jᵀ S⁻¹ r, and geometry x and θ have the joint covariance of one Gaussian update. J is
     taken again about what was found until it stands still, which makes both ways agree beyond first order. There is no robust loss here:
@@ -40,7 +40,7 @@ def marginalised(fit: GeometryProblem, *, progress: Progress) -> Estimate:
 
 @dataclass(frozen=True, eq=False)
 class _Marginal:
-    """S about some values of geometry and elasticity, as W with WᵀW = S⁻¹, rows whitened by R⁻¹ᐟ² beforehand.
+    """Marginal covariance S at given geometry and elasticity, as W with WᵀW = S⁻¹, rows whitened by R⁻¹ᐟ² beforehand.
 
     With R⁻¹ᐟ² J Σ¹ᐟ² = Q s Pᵀ, W = 1 - Q diag(1 - (1 + s²)⁻¹ᐟ²) Qᵀ. `slopes` (3 N, t) is R⁻¹ᐟ² J, `spread` (3 N, t) is W R⁻¹ᐟ² J Σ, so that
     Σ Jᵀ S⁻¹ = spreadᵀ W; `shift` (3 N,) is how far the elasticity's step from its prior has already moved the points.
@@ -65,7 +65,7 @@ class _Marginal:
         return cls(fit, kept, elastic, slopes, shift, basis, 1 - 1 / np.sqrt(1 + sizes**2))
 
     def shrunk(self, rows: np.ndarray) -> np.ndarray:
-        """W times whitened rows (3 N,) or (3 N, k)."""
+        """Product of W with whitened rows (3 N,) or (3 N, k)."""
         return rows - self.basis @ ((self.basis.T @ rows).T * self.lost).T
 
     def residual(self, values: dict[str, float]) -> np.ndarray:
@@ -77,7 +77,7 @@ class _Marginal:
         return self.shrunk(self.slopes @ self.fit.prior.covariance)
 
     def geometry_alone(self) -> Problem:
-        """The least-squares problem of the geometry, with θ where it is and S as the covariance."""
+        """Least-squares problem of the geometry, with θ fixed and S as the covariance."""
         fit, kept, elastic_values = self.fit, self.kept, _values(self.elastic)
 
         def values(x: np.ndarray) -> dict[str, float]:
@@ -95,7 +95,7 @@ class _Marginal:
 
 
 def _joint(at: _Marginal, geometry: Estimate) -> Estimate:
-    """The estimate of geometry and elasticity together: cov(x, θ) = -P (K A)ᵀ and cov(θ) = Σ - K J Σ + K A P (K A)ᵀ.
+    """Joint estimate of geometry and elasticity: cov(x, θ) = -P (K A)ᵀ and cov(θ) = Σ - K J Σ + K A P (K A)ᵀ.
 
     P is the geometry's covariance, A = ∂(points)/∂x, J = ∂(points)/∂θ and K = Σ Jᵀ S⁻¹.
     """

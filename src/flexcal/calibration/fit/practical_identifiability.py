@@ -1,4 +1,4 @@
-"""Practical identifiability: parameters that noise and the choice of poses leave undetermined in spite of full rank."""
+"""Practical identifiability: parameters that noise and the choice of poses leave undetermined despite full rank."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from flexcal.model.robot import RobotModel
 from flexcal.units import MILLIMETRE
 
 _SMALL_TURN = np.deg2rad(10)
-"""Turning of the tool over all poses below which the instrument's place takes up the point's offset."""
+"""Rotation of the tool over all poses below which the instrument's place absorbs the point's offset."""
 _SMALL_RANGE = np.deg2rad(20)
-"""Range of a joint below which its errors look like those of its neighbours."""
+"""Range of a joint below which its errors resemble those of its neighbours."""
 _FLAT = 0.05
-"""Extent of the points across a plane, over that along it, below which they count as flat."""
+"""Ratio of the extent of the points normal to a plane to that in it, below which they count as flat."""
 
 
 @dataclass(frozen=True)
 class Undetermined:
-    """A parameter that the data leave less certain than `size`, how far it may plausibly be off: held, and `cause` says why."""
+    """Parameter whose standard deviation from the data exceeds its plausible `size`: held, with the `cause`."""
 
     name: str
     size: float

@@ -1,4 +1,4 @@
-"""Stratified sample of a measurement with more points than a fit with variance components can take."""
+"""Stratified sample of a measurement with too many points for a fit with variance components."""
 
 from __future__ import annotations
 
@@ -13,18 +13,20 @@ from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 
 MOST = 10_000
-"""Points of a fit: their noise moves the calibrated tool by a hundredth of its size, far below every instrument's own error."""
+"""Largest number of points of a fit: their noise contributes a hundredth of its size to the calibrated tool, far below any instrument's
+own error.
+"""
 _COMMANDS = 400
-"""Positions of which several visits are kept."""
+"""Number of positions of which several visits are kept."""
 _LEAST = 100
-"""Positions of every station and payload, as far as there are any and all together are no more than the others."""
+"""Least number of positions per station and payload, if available and together no more than the others."""
 _PAYLOADS = 20
-"""Of a station; more are no payloads that are changed, but what is measured at every pose."""
+"""Largest number of payloads of a station; more are measured values of each pose, not changes of payload."""
 
 
 @dataclass(frozen=True, eq=False)
 class StratifiedSample:
-    """`rows` (M,) of `total` that were drawn evenly over positions, stations and payloads, in measuring order.
+    """Sample of `rows` (M,) out of `total`, drawn evenly over positions, stations and payloads, in measuring order.
 
     Visits to a pose are kept whole. Where positions were visited again, several visits, evenly in time, of fewer positions are kept.
     """
@@ -34,7 +36,7 @@ class StratifiedSample:
 
     @classmethod
     def of(cls, poses: PoseSet, most: int = MOST) -> StratifiedSample | None:
-        """About `most` rows, always the same ones; None where there are no more than that."""
+        """Sample of about `most` rows, deterministic; None if there are no more than that."""
         if len(poses) <= most:
             return None
         _, target = np.unique(poses.target, return_inverse=True)
@@ -75,5 +77,5 @@ def _kept_visits(command: np.ndarray, stratum: np.ndarray, budget: int) -> np.nd
 
 
 def all_errors(model: RobotModel, poses: PoseSet, progress: Progress = silent) -> ErrorStatistics:
-    """Errors of a calibrated robot at any number of poses, in constant memory beside these."""
+    """Errors of a calibrated robot at any number of poses, in constant memory besides these."""
     return ErrorStatistics.of(poses.position - predicted_positions(model, poses, progress=progress))

@@ -25,7 +25,7 @@ def kinematic_identifiability(
     scale: np.ndarray | None = None,
     prefer: Sequence[str] = (),
 ) -> Identifiability:
-    """Rank at zero deflection with both flanks as they are: exact derivatives leave a gap of many decades.
+    """Rank at zero deflection with the flanks unchanged: exact derivatives leave a gap of many decades.
 
     `scale` (p,) is the size of a change that matters, tolerances of manufacture by default: larger columns are kept first.
     """
@@ -51,7 +51,7 @@ def random_identifiability(
     *,
     scale: np.ndarray | None = None,
 ) -> Identifiability:
-    """The same on random poses of the whole joint ranges, the parameters that `seen` keeps tried first."""
+    """Rank on random poses over the whole joint ranges, with the parameters kept in `seen` ordered first."""
     limits = np.array([(max(j.lower, -np.pi), min(j.upper, np.pi)) for j in model.joints])
     many = poses.subset(np.resize(np.arange(len(poses)), _RANDOM_POSES))
     spread = np.random.default_rng(0).uniform(limits[:, 0], limits[:, 1], many.q.shape)
@@ -63,7 +63,7 @@ def random_identifiability(
 def require_enough(
     model: RobotModel, poses: PoseSet, parameters: Parameters, identifiability: Identifiability
 ) -> None:
-    """Raise `FlexcalError` where the rows are too few for the parameters that many random poses would determine."""
+    """Raise `FlexcalError` if there are too few rows for the parameters that many random poses would determine."""
     rows = 3 * len(poses)
     if identifiability.rank < rows:
         return

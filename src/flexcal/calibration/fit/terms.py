@@ -12,10 +12,10 @@ from flexcal.model.robot import GEOMETRY, LATERAL, RobotModel, unit_of
 from flexcal.model.statics import carried_mass, gravity_moments, gravity_torque
 
 LEAST_POSES = 20
-"""Different poses that a choice of terms needs, and the variance of transmission errors."""
+"""Least number of different poses for a selection of terms and for the variance of transmission errors."""
 
 TOLERANCE = {"m": 3e-4, "rad": 5e-4, "rad/(N m)": 1e-6}
-"""Size of a change that matters (1σ of manufacture), by unit: what makes parameters of different units comparable."""
+"""Size of a relevant change (1σ of manufacture), by unit, which makes parameters of different units comparable."""
 
 
 PER_JOINT = ("gravity_compliance", "lateral_compliance")
@@ -23,13 +23,13 @@ PER_JOINT = ("gravity_compliance", "lateral_compliance")
 
 
 _LOADED = 0.01
-"""Share of the largest spread of any gravity load that a load must spread by for its compliance to be told from a constant."""
+"""Least standard deviation of a gravity load, relative to the largest, at which its compliance is separable from a constant."""
 _LEAST_LOAD = 1e-6
-"""N m: loads of rounding."""
+"""Load, N m, below which it is a rounding error."""
 
 
 def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]) -> Parameters:
-    """The geometric parameters of some terms, starting at the model's values (Neubauer et al. 2015, §3).
+    """Geometric parameters of some terms, starting at the model's values (Neubauer et al. 2015, §3).
 
     `kinematic`: a place for every station, and a rotation for all but the first, whose rotation the first joint's errors span; six
     errors for every joint that moves a measured target, six for the tool, three for each further target. `backlash`: the joints declared
@@ -70,7 +70,7 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
 
 
 def random_waves(model: RobotModel, poses: PoseSet, free: Parameters) -> dict[str, float]:
-    """The waves of the term `transmission`, each with its size over that of order 1, which is 1 / order.
+    """Waves of the term `transmission`, each with its size relative to order 1, which is 1 / order.
 
     Those of every revolute joint on the way to a measured target that are not among the `free` parameters.
     """
@@ -85,7 +85,7 @@ def random_waves(model: RobotModel, poses: PoseSet, free: Parameters) -> dict[st
 
 
 def free_joints(model: RobotModel, kind: str, joints: Sequence[int]) -> list[int]:
-    """Those of some revolute joints that may have a term of this kind: without a spring that robot.yaml declares in its place."""
+    """Revolute joints that may have a term of this kind: those without a spring declared in robot.yaml in its place."""
     springs = {e.index: e.components for e in model.elastic}
     taken = {"gravity_compliance": 2, "lateral_compliance": 0}.get(kind)
     return [i for i in joints if model.joints[i].kind == "revolute" and taken not in springs.get(i, ())]
@@ -116,7 +116,7 @@ def _keys(kind: str) -> tuple[str, ...]:
 
 
 def manufacturing_tolerances(parameters: Parameters) -> np.ndarray:
-    """Size of a change that matters in each geometric parameter (p,), natural units."""
+    """Size of a relevant change of each geometric parameter (p,), natural units."""
     return np.array([TOLERANCE[p.unit] for p in parameters])
 
 
@@ -131,7 +131,7 @@ _PLAUSIBLE_COMPLIANCE, _PLAUSIBLE_TRANSMISSION = 1e-4, 1e-3
 
 
 def plausible_size(model: RobotModel, name: str) -> float:
-    """How far a geometric parameter may plausibly be from its nominal value (1σ, natural units).
+    """Plausible deviation of a geometric parameter from its nominal value (1σ, natural units).
 
     What robot.yaml declares under `prior:` comes first; else joint offsets 5 mrad, misalignments 2 mrad, lengths 1 mm, the place of a
     reflector on the tool 10 mm, the instrument 1 m or rad, and so the rotations of a joint at the base, which take up that of the first
@@ -156,7 +156,7 @@ def plausible_size(model: RobotModel, name: str) -> float:
 
 
 def declared_size(model: RobotModel, name: str) -> float | None:
-    """The standard deviation that robot.yaml's `prior:` gives a geometric parameter, by name or by kind; None where it gives none."""
+    """Standard deviation of a geometric parameter in robot.yaml's `prior:`, by name or by kind; None if not given."""
     prior, (owner, _, key) = model.prior, name.rpartition(".")
     if name in prior.parameters:
         return prior.parameters[name]

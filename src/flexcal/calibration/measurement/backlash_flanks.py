@@ -21,7 +21,7 @@ def ambiguous_poses(model: RobotModel, prediction: PredictedMeasurements) -> np.
 
 
 def require_both_flanks(model: RobotModel, flank: np.ndarray) -> None:
-    """Raise `FlexcalError` naming the joints whose backlash cannot be told from their offset because one flank only was seen."""
+    """Raise `FlexcalError` naming the joints whose backlash is not separable from their offset because only one flank was measured."""
     for i in model.backlash_joints:
         seen = np.unique(flank[:, i])
         if not {-1.0, 1.0} <= set(seen):

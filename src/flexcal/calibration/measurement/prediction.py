@@ -25,7 +25,7 @@ from flexcal.progress import Progress, silent
 
 
 def require_points(poses: PoseSet, where: str = "the poses") -> None:
-    """Raise `FlexcalError` for what is measured beside or in place of points and would be left out; `where` names the files."""
+    """Raise `FlexcalError` for measured quantities other than points, which would be ignored; `where` names the files."""
     if poses.length is not None:
         raise FlexcalError(
             "E-CAL-011", f"{where}: lengths of a wire cannot be used yet; give points x, y, z."
@@ -38,12 +38,12 @@ def require_points(poses: PoseSet, where: str = "the poses") -> None:
 
 
 _BLOCK = 20_000
-"""Poses whose predictions are in memory together."""
+"""Number of poses whose predictions are in memory together."""
 
 
 @dataclass(frozen=True, eq=False)
 class PredictedMeasurements:
-    """Points (N, 3) in the instrument's frame at the poses, with what their derivatives need."""
+    """Predicted points (N, 3) in the instrument's frame at the poses, with the data for their derivatives."""
 
     model: RobotModel
     poses: PoseSet
@@ -93,7 +93,7 @@ class PredictedMeasurements:
         return result
 
     def _twist(self, joint: int, key: str) -> np.ndarray:
-        """How far a joint turns (N,) with its backlash, gravity compliance, hardening or one wave of its transmission error."""
+        """Rotation (N,) of a joint by its backlash, gravity compliance, hardening or one wave of its transmission error."""
         if key == "hardening":
             hardening = self.model.springs.hardening[joint]
             twist = twist_from_torque(
@@ -156,7 +156,7 @@ class PredictedMeasurements:
 
 
 def left_jacobian(vector: np.ndarray) -> np.ndarray:
-    """How a rotation turns (3, 3), in fixed axes, as its rotation vector (3,) changes."""
+    """Left Jacobian (3, 3) of a rotation vector (3,): rotation in fixed axes per change of the vector."""
     angle = float(np.linalg.norm(vector))
     skew = skew_matrix(vector)
     if angle < 1e-8:
@@ -193,7 +193,7 @@ def predict_measurements(
 def predicted_positions(
     model: RobotModel, poses: PoseSet, *, elastic: bool = True, progress: Progress = silent
 ) -> np.ndarray:
-    """The positions (N, 3) of `predict_measurements`, m, for any number of poses: block by block."""
+    """Positions (N, 3) of `predict_measurements`, m, for any number of poses, block by block."""
     parts = [np.zeros((0, 3))]
     for first in range(0, len(poses), _BLOCK):
         progress("all points", first / len(poses))

@@ -26,13 +26,13 @@ _GEOMETRIC = (*GEOMETRY, *STATION, "backlash", "gravity_compliance", *LATERAL)
 
 
 def moving_parameters(model: RobotModel, *, elastic: bool = True) -> list[str]:
-    """The names in the robot's posterior that move a point at rest; without `elastic` those that move one of the rigid arm."""
+    """Names in the robot's posterior that affect a point at rest; without `elastic` those that affect the rigid arm."""
     names = model.posterior.parameters.names
     return [n for n in names if _is_geometric(n) or (elastic and _is_elastic(n))]
 
 
 def covariance_root(model: RobotModel, names: list[str]) -> np.ndarray:
-    """R (p, p) with R Rᵀ the covariance of the named parameters in natural units."""
+    """Square root R (p, p), R Rᵀ being the covariance of the named parameters in natural units."""
     values, vectors = np.linalg.eigh(model.posterior.marginal(names))
     parameters = model.posterior.parameters.subset(names)
     slopes = parameters.natural_slope(parameters.coordinates())
@@ -41,7 +41,7 @@ def covariance_root(model: RobotModel, names: list[str]) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Propagation:
-    """A root of the parameters' covariance, sorted by how its rows reach the point `target` under `payload` kg.
+    """Square root of the parameters' covariance, with rows sorted by their effect on the point `target` under `payload` kg.
 
     `rows` (6 n + 6 + d + 4 n + T + 6, p): by geometric errors of joints and tool, by the stiffness of each of the d elastic coordinates, by
     mass and first moment of each link, by the T `twisting` parameters (joint and kind, those that tilt its axis included), by the place
@@ -88,7 +88,7 @@ class Propagation:
         )
 
     def _scatter(self, by_geometry: np.ndarray) -> list[np.ndarray]:
-        """Columns (N, 3, k) m of the errors beside the parameters: repeatability and model error."""
+        """Columns (N, 3, k) m of the errors besides the parameters: repeatability and model error."""
         model, columns = self.model, []
         angular = model.value("scatter.angular")
         if angular > 0:
@@ -100,7 +100,7 @@ class Propagation:
         return columns
 
     def _twist(self, q: np.ndarray, loads: np.ndarray) -> np.ndarray:
-        """How far joints turn (N, T) with the twisting parameters, springs being loaded by `loads` (N, d)."""
+        """Rotations (N, T) of joints by the twisting parameters, for springs loaded by `loads` (N, d)."""
         columns = np.empty((len(q), len(self.twisting)))
         torque = self._torque(q, loads)
         for k, (joint, kind) in enumerate(self.twisting):
@@ -134,7 +134,7 @@ class Propagation:
                 twists[:, :, k] = np.matmul(by_tilt[:, :, joint], slopes[:, joint, axis, :, None])[:, :, 0]
 
     def _torque(self, q: np.ndarray, loads: np.ndarray) -> np.ndarray:
-        """Gravity torque (N, n) on the joints that twist by it; that on drives with springs is among the `loads`."""
+        """Gravity torque (N, n) on joints with gravity compliance; torques on drives with springs are in `loads`."""
         loaded = {
             joint for joint, kind in self.twisting if kind in ("backlash", "gravity_compliance", "hardening")
         }
@@ -162,7 +162,7 @@ class Propagation:
 def propagation(
     model: RobotModel, *, target: str | None = None, station: str | None = None, payload: float | None = None
 ) -> Propagation:
-    """How the posterior of `model` reaches a target (default: the first), seen from a station (default: the first), under a payload.
+    """Propagation of the posterior of `model` to a target (default: the first), seen from a station (default: the first), under a payload.
 
     `payload` in kg as `carried_mass` takes it, None for the declared one. Raises `FlexcalError` for unknown names, a payload without a
     declaration, and a robot of which nothing was estimated that moves a point.

@@ -10,7 +10,7 @@ from flexcal.model.parts import rotation_vector
 from flexcal.model.robot import RobotModel
 
 ALREADY_ALIGNED = 0.010
-"""Instrument and base frame are the same where nominal and measured points differ by less than this (m, median)."""
+"""Median distance, m, between nominal and measured points below which instrument and base frame are the same."""
 
 
 def register(model: RobotModel, poses: PoseSet, predicted: np.ndarray) -> RobotModel:

@@ -1,4 +1,4 @@
-"""Candidate terms of a robot and its poses, and reasons why others are not considered."""
+"""Candidate terms of a robot and its poses, and the reasons for excluding others."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from flexcal.model.robot import RobotModel
 from flexcal.model.statics import carried_mass, certain_flank, gravity_moments, gravity_torque
 
 _CLEAR = 0.2
-"""Share of its largest gravity torque that a joint must carry on both sides for a backlash to be considered."""
+"""Share of its largest gravity torque that a joint must carry in both directions for a backlash to be considered."""
 _KNOWN = 0.5
 """Share of the poses at which the flank of a joint must be certain for its backlash to be considered."""
 _LOAD = 1e-3
-"""N m: a robot whose gravity loads are below that has none."""
+"""Gravity load, N m, below which a robot has none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class CandidateTerms:
 
 
 def candidates(model: RobotModel, poses: PoseSet) -> CandidateTerms:
-    """Terms that can be considered on some poses, by gravity, the declared springs and the joints that move."""
+    """Terms to be considered on some poses, by gravity, the declared springs and the moving joints."""
     joints = moving_joints(model, poses)
     masses = carried_mass(model, poses.payload, len(poses))
     torque = gravity_torque(model, poses.q, masses)

@@ -15,12 +15,12 @@ from flexcal.model.robot import RobotModel
 
 FOLDS = 8
 MANY_POSES = 10 * FOLDS
-"""Different poses from which whole folds are left out, rather than single poses."""
+"""Number of different poses from which whole folds are left out rather than single poses."""
 
 
 @dataclass(frozen=True, eq=False)
 class TermSelection:
-    """`terms` that cross-validation supports, for a `model` that declares them, and every term that was `considered`.
+    """Result of the selection: `terms` supported by cross-validation, for a `model` that declares them, and every term `considered`.
 
     `by` says what was left out: "poses" one by one, or "folds"; "nothing" where there are too few, as `remark` then says.
     """
@@ -41,7 +41,7 @@ class TermSelection:
 
 @dataclass(frozen=True)
 class CrossValidation:
-    """`mean` error (m) of a fit at poses left out of it: `by` "poses" one by one, or by "folds", the larger of both kinds.
+    """Cross-validated `mean` error (m): `by` "poses", left out one by one, or by "folds", the larger of both kinds.
 
     `freedom` is the number of parameters of the fit, the trace of its hat matrix.
     """
@@ -52,7 +52,7 @@ class CrossValidation:
 
 
 def cross_validated(fit: GeometricFit) -> CrossValidation | None:
-    """The fit with all its terms, linear about itself and without its outliers; None with fewer than 20 different poses."""
+    """Cross-validation of a fit with all its terms, linearised and without its outliers; None with fewer than 20 different poses."""
     rows = np.setdiff1d(np.arange(len(fit.poses)), list(fit.estimate.outliers))
     inside = replace(fit, poses=fit.poses.subset(rows), residuals=fit.residuals[rows])
     folds, distinct = _folds(inside.poses)
@@ -66,7 +66,7 @@ def cross_validated(fit: GeometricFit) -> CrossValidation | None:
 
 
 def _folds(poses: PoseSet) -> tuple[tuple[np.ndarray, ...], int]:
-    """Folds (N,) in measuring order, in the workspace, and of single poses, and how many of these there are."""
+    """Folds (N,) in measuring order, in the workspace, and of single poses, and the number of single poses."""
     alone = repeated_pose_numbers(poses.q)
     folds = (order_folds(len(poses), FOLDS), workspace_folds(poses.position, FOLDS), alone)
     return folds, len(np.unique(alone))
@@ -96,7 +96,7 @@ def select_terms(model: RobotModel, poses: PoseSet) -> TermSelection:
     left: dict[str, TermComparison] = {}
 
     def grow(options: list[str], extra: float) -> list[str]:
-        """Add the best of the supported options until there is none; those that remain."""
+        """Add the best supported option repeatedly; returns the remaining ones."""
         nonlocal chosen
         while options:
             tried = {o: trials.compare(chosen, o, extra) for o in options}

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 _REACH = 1e-2
-"""m: how far, in root mean square, one column may move the points; only directions that no other pose sees feel it."""
+"""Bound, m, on the root mean square displacement of the points by one column; it affects only directions seen by no other pose."""
 
 
 @dataclass(frozen=True, eq=False)
 class LeaveOutErrors:
-    """A linear fit of p columns to the residuals of N points.
+    """Leave-out errors of a linear fit of p columns to the residuals of N points.
 
     `distances` has, for each kind of fold, the distance (N,) m between points and their prediction from the other folds; `squares` (m²) is
     what the fit to all points leaves, a prior's penalty included; `freedom` the trace of the hat matrix, its number of parameters.
@@ -62,7 +62,7 @@ def leave_out_fit(
 
 
 def _scale(block: np.ndarray) -> np.ndarray:
-    """Factors (k,) that make each column move the points by 1 in root mean square; 0 for columns that move nothing."""
+    """Factors (k,) that normalise the displacement of the points by each column to 1 in root mean square; 0 for zero columns."""
     size = np.sqrt((block**2).sum(axis=1).mean(axis=0))
     return np.divide(1.0, size, out=np.zeros_like(size), where=size > 0)
 

@@ -1,4 +1,4 @@
-"""Terms that were considered, to and from `term_selection` of results.json."""
+"""Conversion of considered terms to and from `term_selection` of results.json."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flexcal.units import MILLIMETRE
 
 
 def considered_document(row: TermComparison) -> dict[str, Any]:
-    """A term that was considered, as results.json has it; null for what was not computed."""
+    """Document of a considered term in results.json; null for values that were not computed."""
     return {
         "term": row.term,
         "terms": list(row.terms),
@@ -26,7 +26,7 @@ def considered_document(row: TermComparison) -> dict[str, Any]:
 
 
 def considered_terms(results: Mapping[str, Any]) -> tuple[TermComparison, ...]:
-    """Terms that the selection considered, as results.json has them; empty where the terms were given, or the poses too few."""
+    """Considered terms read from results.json; empty if the terms were given, or the poses too few."""
     return tuple(_considered(row) for row in results["term_selection"])
 
 

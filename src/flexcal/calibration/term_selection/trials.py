@@ -19,14 +19,14 @@ _WORSE = 1.05
 
 
 _LEAST_GAIN = 1e-12
-"""m: gains of rounding are none."""
+"""Gain, m, below which it is a rounding error."""
 
 _OUT = ("left out in measuring order", "left out in the workspace", "left out one by one")
 
 
 @dataclass(frozen=True)
 class TermComparison:
-    """A term that was considered; `term` is None for the base terms, with which all are compared.
+    """Comparison of a considered term with the base terms; `term` is None for the base terms themselves.
 
     `terms` are those fitted, it among them; `order`, `workspace` the mean errors (m) with folds contiguous in measuring order and in the
     workspace, `single` with single poses left out, `largest` the largest of the errors that decide; NaN where it could not be tried.
@@ -45,7 +45,7 @@ class TermComparison:
 
 
 def not_tried(term: str, chosen: tuple[str, ...], reason: str) -> TermComparison:
-    """The row of a term that cannot be considered."""
+    """Comparison row of a term that cannot be considered."""
     nan = float("nan")
     return TermComparison(term, (*chosen, term), nan, nan, nan, nan, nan, False, reason)
 
@@ -79,11 +79,11 @@ class TermTrials:
         self._base = base
 
     def start(self) -> TermComparison:
-        """The row of the base terms."""
+        """Comparison row of the base terms."""
         return self._row(None, self._base, 0.0, taken=True, reason="")
 
     def compare(self, chosen: tuple[str, ...], term: str, extra: float) -> TermComparison:
-        """Whether a term is taken beside those chosen; `extra` is what the criterion must fall by beyond 0."""
+        """Comparison of a term added to the chosen ones; `extra` is the further fall of the criterion required beyond 0."""
         terms = (*chosen, term)
         old, new = self.fit(chosen), self.fit(terms)
         bic = self._criterion(old, new)
@@ -110,7 +110,7 @@ class TermTrials:
         return self._row(term, terms, bic, taken=taken, reason=reason)
 
     def fit(self, terms: tuple[str, ...]) -> LeaveOutErrors:
-        """The fit of some terms, with springs and inertia where the base fit has them."""
+        """Fit of some terms, with springs and inertia as in the base fit."""
         if terms not in self._fits:
             blocks = [self._block(term) for term in terms] + [self._held]
             penalty = [0.0] * len(terms) + [self._noise]
@@ -118,7 +118,7 @@ class TermTrials:
         return self._fits[terms]
 
     def mean(self, terms: tuple[str, ...]) -> float:
-        """Mean error at left-out poses, m, over the kinds of folds that decide."""
+        """Mean error at left-out poses, m, over the decisive kinds of folds."""
         return self.fit(terms).mean(self.deciding)
 
     def _row(
@@ -135,7 +135,7 @@ class TermTrials:
         return free * np.log(new.squares / old.squares) + (new.freedom - old.freedom) * np.log(free)
 
     def _gain(self, old: LeaveOutErrors, new: LeaveOutErrors, kind: int) -> tuple[float, float]:
-        """Mean gain (m) over the folds of a kind, which are the independent units, and its standard error."""
+        """Mean gain (m) over the folds of a kind, as independent units, and its standard error."""
         fold, gain = self.folds[kind], old.distances[kind] - new.distances[kind]
         gains = np.array([gain[fold == k].mean() for k in np.unique(fold)])
         return float(gains.mean()), float(gains.std(ddof=1) / np.sqrt(len(gains))) + _LEAST_GAIN
@@ -153,7 +153,7 @@ class TermTrials:
 
     @cached_property
     def _held(self) -> np.ndarray:
-        """Columns (N, 3, k) of springs and inertia, in standard deviations of what is known of them beforehand."""
+        """Columns (N, 3, k) of springs and inertia, in prior standard deviations."""
         prior = self.rigid.prior
         if not len(prior.parameters):
             return np.zeros((len(self.rigid.poses), 3, 0))

@@ -15,7 +15,7 @@ from flexcal.model.robot import STATION, RobotModel
 
 @dataclass(frozen=True, eq=False)
 class ArmPoses:
-    """The arm at measured points, in the robot's base frame, m.
+    """Arm configurations at measured points, in the robot's base frame, m.
 
     `corners` (K, joints + 2, 3) from the base through every joint to the point, of some of the poses; `surface` (E, V, 3) vertices and
     `triangles` (F, 3) of the links in a few of them; `pose` (N,) numbers, `tip` (N, 3) points and `errors` (N, 3) by model of all.
@@ -30,7 +30,7 @@ class ArmPoses:
 
 
 _EXAMPLES = 3
-"""Poses in which the links are drawn, as in the paper's figure."""
+"""Number of poses in which the links are drawn, as in the paper's figure."""
 
 
 _MOST_ARMS = 60
@@ -40,7 +40,7 @@ _MOST_ARROWS = 1500
 
 
 def arms_at(model: RobotModel, poses: PoseSet, errors: Mapping[str, np.ndarray]) -> ArmPoses:
-    """The arm of `model` at the points, with `errors` (N, 3) m of the instrument's frame; of many arms and arrows some, evenly chosen."""
+    """Arm of `model` at the points, with `errors` (N, 3) m of the instrument's frame; if there are many, an even selection."""
     rows = _evenly(len(poses), _MOST_ARROWS)
     corners = joint_polylines(model, poses.subset(rows))
     turned = {name: in_base(model, poses, vectors)[rows] for name, vectors in errors.items()}
@@ -51,7 +51,9 @@ def arms_at(model: RobotModel, poses: PoseSet, errors: Mapping[str, np.ndarray])
 
 
 def joint_polylines(model: RobotModel, poses: PoseSet) -> np.ndarray:
-    """Corners (N, joints + 2, 3) m of the arm from the base through every joint to the measured point, base frame, undeflected."""
+    """Polyline (N, joints + 2, 3) m of the undeflected arm from the base through every joint to the measured point, base frame,
+    undeflected.
+    """
     still = np.zeros((len(poses), model.n, 3))
     q = np.ascontiguousarray(poses.q)
     target = model.point(str(poses.target[0]))

@@ -1,4 +1,4 @@
-"""Best-fit registration: where the instrument, and the measured points on the tool, have to be for given positions of a robot."""
+"""Best-fit registration of the instrument, and of the measured points on the tool, to given positions of a robot."""
 
 from __future__ import annotations
 
@@ -16,22 +16,23 @@ from flexcal.model.robot import STATION, RobotModel
 _LEAST_POINTS = 4
 _STEPS = 20
 _SMALL = 1e-10
-"""m and rad: a Gauss-Newton step after which there is no other."""
+"""Gauss-Newton step, m and rad, at which the iteration has converged."""
 _RANK = 1e-8
 _BLOCK = 20_000
-"""Points that are linearised together."""
+"""Number of points linearised together."""
 
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """Rotation (3, 3) and position (3,) m of the robot's base in each station's frame, and by how much (3,) m each target is moved in the
-    axes of its own frame."""
+    """Rotation (3, 3) and position (3,) m of the robot's base in each station's frame, and shift (3,) m of each target in the axes of
+    its own frame.
+    """
 
     stations: Mapping[str, tuple[np.ndarray, np.ndarray]]
     shifts: Mapping[str, np.ndarray]
 
     def values(self, model: RobotModel) -> dict[str, float]:
-        """The parameters of stations and points that put `model` there."""
+        """Parameters of stations and points that place `model` there."""
         parameters: dict[str, float] = {}
         for name, (turn, offset) in self.stations.items():
             numbers = (*offset, *rotation_vector(turn))
@@ -42,7 +43,7 @@ class Placement:
         return parameters
 
     def expected(self, poses: PoseSet, nominal: np.ndarray, orientation: np.ndarray) -> np.ndarray:
-        """Where the instrument should read the targets (N, 3) m, which are at `nominal` (N, 3), turned by `orientation` (N, 3, 3)."""
+        """Expected instrument readings of the targets (N, 3) m, which are at `nominal` (N, 3), rotated by `orientation` (N, 3, 3)."""
         expected = np.empty(nominal.shape)
         shift = np.zeros(nominal.shape)
         for target, moved in self.shifts.items():
@@ -55,7 +56,9 @@ class Placement:
 
 
 def rigid_placement(poses: PoseSet, nominal: np.ndarray) -> Placement:
-    """Every station by the rigid motion that best maps `nominal` (N, 3) m, base frame, to the measured points (Kabsch 1976)."""
+    """Placement of every station by the rigid motion that best maps `nominal` (N, 3) m, base frame, to the measured points (Kabsch
+    1976).
+    """
     stations = {}
     for name in poses.stations:
         own = poses.station == name
@@ -64,7 +67,8 @@ def rigid_placement(poses: PoseSet, nominal: np.ndarray) -> Placement:
 
 
 def best_placement(poses: PoseSet, nominal: np.ndarray, orientation: np.ndarray) -> Placement:
-    """Stations and measured points by least squares: measured = R (nominal + orientation · shift) + t, by Gauss-Newton from Kabsch's R, t.
+    """Least-squares placement of stations and points: measured = R (nominal + orientation · shift) + t, by Gauss-Newton from Kabsch's R,
+    t.
 
     `nominal` (N, 3) m and `orientation` (N, 3, 3) of each target's frame, in the base frame. What the poses cannot tell apart (a tool that
     never turns: where the point is, and where the instrument) is the shortest step from where it was.
@@ -97,7 +101,7 @@ def best_placement(poses: PoseSet, nominal: np.ndarray, orientation: np.ndarray)
 def _linearised(
     placement: Placement, poses: PoseSet, nominal: np.ndarray, orientation: np.ndarray
 ) -> np.ndarray:
-    """(3 N, k + 1): how the points move with every station's turn and offset and every target's shift, and what they miss, m."""
+    """Jacobian (3 N, k + 1) of the points by each station's rotation and offset and every target's shift; last column the residual, m."""
     points_from = 6 * len(placement.stations)
     expected = placement.expected(poses, nominal, orientation)
     columns = np.zeros((len(poses), 3, points_from + 3 * len(placement.shifts) + 1))
@@ -115,12 +119,14 @@ def _linearised(
 
 
 def can_register_with_points(poses: PoseSet) -> bool:
-    """Whether there are three coordinates for each parameter of `best_placement`, repeated visits apart."""
+    """Whether there are three coordinates per parameter of `best_placement`, without repeated visits."""
     return _distinct(poses) >= 6 * len(poses.stations) + 3 * len(poses.targets)
 
 
 def can_register(poses: PoseSet) -> bool:
-    """Whether every station has the four points off a line that a registration with something left to say needs, repeated visits apart."""
+    """Whether every station has four points that are not collinear, without repeated visits, so that residuals remain after
+    registration.
+    """
     for station in poses.stations:
         own = poses.subset(poses.station == station)
         centred = own.position - own.position.mean(axis=0)

@@ -14,7 +14,7 @@ from flexcal.estimation import distance_probability, principal_variances
 
 @dataclass(frozen=True, eq=False)
 class ErrorScale:
-    """Observed over predicted size of the errors, with 95 % intervals.
+    """Ratio of observed to predicted size of the errors, with 95 % intervals.
 
     `ratio`, between `ratio_low` and `ratio_high`, is of the whole root mean square. `factor`, between `low` and `high`, is by how much
     the errors of parameters and model must be larger for that, independent noise being as it is. `freedom`: so many independent numbers the
@@ -39,7 +39,7 @@ class ErrorScale:
         return float((self.probability <= 0.95).mean())
 
     def document(self) -> dict[str, float | str | int]:
-        """For JSON documents."""
+        """Block of a JSON document."""
         return {
             "poses": len(self.probability),
             "ratio": self.ratio,
@@ -55,8 +55,8 @@ class ErrorScale:
 
     @property
     def verdict(self) -> str:
-        """Whether the prediction is "optimistic", "cautious", or "right" within chance; "unknown" where noise that is not known may be
-        what makes errors larger.
+        """Verdict on the prediction: "optimistic", "cautious", or "right" within chance; "unknown" if unknown noise may explain larger
+        errors.
         """
         if self.low > 1:
             return "optimistic" if self.noise_known else "unknown"
@@ -64,7 +64,7 @@ class ErrorScale:
 
 
 def error_scale(verification: PredictionErrors, covariance: ErrorCovariance) -> ErrorScale:
-    """Compare the errors of a verification with their prediction, as `prediction_errors_with_covariance` gives both.
+    """Compare the errors of a verification with their prediction by `prediction_errors_with_covariance`.
 
     With the errors' covariance f² A Aᵀ + S, A the roots of all poses together and S what is independent, their squared size has the mean
     f² tr A Aᵀ + tr S, which gives f, and is taken as χ² distributed with ν = (tr V)² / tr V² degrees of freedom (Satterthwaite, 1946),
@@ -122,7 +122,7 @@ def error_scale(verification: PredictionErrors, covariance: ErrorCovariance) -> 
 def prediction_document(
     verification: PredictionErrors, covariance: ErrorCovariance
 ) -> dict[str, float | str | int] | None:
-    """`error_scale` for JSON documents; None where errors and prediction cannot be compared."""
+    """Block of a JSON document from `error_scale`; None if errors and prediction cannot be compared."""
     try:
         return error_scale(verification, covariance).document()
     except FlexcalError:
@@ -130,7 +130,7 @@ def prediction_document(
 
 
 def _bound(total: float, mean_and_freedom: Callable[[float], tuple[float, float]], share: float) -> float:
-    """The factor with which errors as large as the observed `total` m² would be exceeded with the probability 1 - `share`."""
+    """Scale factor for which errors as large as the observed `total` m² are exceeded with the probability 1 - `share`."""
     from scipy.optimize import brentq
     from scipy.special import gammaincinv
 

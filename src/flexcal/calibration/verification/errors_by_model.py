@@ -1,4 +1,4 @@
-"""Measured points and their errors for several models, as the reports draw them."""
+"""Measured points and their errors for several models, as plotted in the reports."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from flexcal.calibration.verification.unseen_poses import PredictionErrors
 from flexcal.data.poses import PoseSet
 
 DECLARED, NOMINAL, OWN = "declared", "nominal", "own"
-"""The robot as delivered: as declared, best-fit registered, and registered with the measured points found too."""
+"""Names of the uncalibrated robot: as declared, best-fit registered, and registered with the measured points fitted too."""
 RIGID, CALIBRATED = "rigid", "calibrated"
-"""The robot fitted without further terms, and as it is used."""
+"""Names of the calibrated robot: fitted without further terms, and with the selected ones."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,18 +35,17 @@ class MeasuredPoints:
 
     @property
     def calibrated(self) -> np.ndarray:
-        """Errors (N, 3) m of the model that is used."""
+        """Errors (N, 3) m of the selected model."""
         return self.errors[CALIBRATED]
 
     @property
     def delivered(self) -> np.ndarray | None:
-        """The robot's own errors (N, 3) m as delivered: with the points found too, else registered; None where neither is known."""
+        """Errors (N, 3) m of the uncalibrated robot: with the points fitted too, else registered; None if neither is known."""
         return self.errors.get(OWN, self.errors.get(NOMINAL))
 
     @property
     def verification(self) -> PredictionErrors:
-        """Errors of the model that is used, and what the parameters' covariance says of them; raises `ValueError` where that was not asked
-        for."""
+        """Errors of the selected model with their expected size by the parameters' covariance; raises `ValueError` if not computed."""
         if self.parameter_rms is None or self.scatter_rms is None:
             raise ValueError("points of a verification have the distances that the covariance predicts")
         position = self.poses.position - self.calibrated
@@ -56,20 +55,20 @@ class MeasuredPoints:
 
     @property
     def shown(self) -> dict[str, np.ndarray]:
-        """The errors that drawings of the arm show: calibrated, and as delivered where known."""
+        """Errors shown in drawings of the arm: calibrated and, if known, uncalibrated."""
         shown = {CALIBRATED: self.calibrated}
         return shown if self.delivered is None else shown | {NOMINAL: self.delivered}
 
     @property
     def before(self) -> ErrorStatistics | None:
-        """Of the robot's own errors as delivered; None where they are not known."""
+        """Statistics of the uncalibrated robot's errors; None if unknown."""
         return None if self.delivered is None else ErrorStatistics.of(self.delivered)
 
     def statistics(self, model: str) -> ErrorStatistics:
-        """Of one model's errors."""
+        """Error statistics of one model."""
         return ErrorStatistics.of(self.errors[model])
 
 
 def errors_before(before: UncalibratedErrors) -> dict[str, np.ndarray]:
-    """The errors of an uncalibrated robot by the names that they have among `MeasuredPoints.errors`."""
+    """Errors of an uncalibrated robot by their names in `MeasuredPoints.errors`."""
     return {NOMINAL if name == "registered" else name: errors for name, errors in before.known.items()}

@@ -22,7 +22,7 @@ from flexcal.model.robot import RobotModel
 Refit = Literal["station", "point"]
 _RANK = 1e-9
 _FREE = 1e-6
-"""A pose whose own coordinates decide a refitted parameter but for this cannot be left out."""
+"""Least remaining redundancy of a pose's coordinates at which it can be left out."""
 _STEPS = 10
 _SMALL = 1e-10
 
@@ -44,7 +44,7 @@ class RefittedVerification:
 
 
 def verify_refitted(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) -> RefittedVerification:
-    """Verify `model` at `poses` with stations or points fitted again and everything else as calibrated.
+    """Verify `model` at `poses` with stations or points fitted again, all else as calibrated.
 
     Linear least squares leaves one pose out by its hat matrix H: e_i = (I - H_ii)⁻¹ r_i. Raises `FlexcalError` where the poses are too
     few for that.
@@ -104,7 +104,7 @@ def _names(poses: PoseSet, what: Sequence[Refit]) -> list[str]:
 
 
 def _placed(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) -> RobotModel:
-    """The robot with what is refitted placed by all poses."""
+    """Robot with the refitted placement from all poses."""
     if "station" not in what:
         return _points_found(model, poses)
     base = predict_measurements(
@@ -116,7 +116,7 @@ def _placed(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) -> RobotMo
 
 
 def _points_found(model: RobotModel, poses: PoseSet) -> RobotModel:
-    """The robot with its points moved to where the measurements from known stations have them."""
+    """Robot with its points at the positions measured from known stations."""
     names = _names(poses, ("point",))
     robot = model
     for _ in range(_STEPS):
@@ -131,7 +131,7 @@ def _points_found(model: RobotModel, poses: PoseSet) -> RobotModel:
 
 
 def _left_out_noise(independent: np.ndarray, blocks: np.ndarray, own: np.ndarray) -> np.ndarray:
-    """Covariance (N, 3, 3) m² that `independent` errors of all poses give leave-one-out errors: own⁻¹ (I - H) Σ (I - H) own⁻¹."""
+    """Covariance (N, 3, 3) m² of leave-one-out errors due to `independent` errors of all poses: own⁻¹ (I - H) Σ (I - H) own⁻¹."""
     across = blocks @ np.matmul(np.swapaxes(blocks, 1, 2), independent)
     weighted = np.einsum("nik,nij,njl->kl", blocks, independent, blocks, optimize=True)
     total = independent - across - np.swapaxes(across, 1, 2) + blocks @ weighted @ np.swapaxes(blocks, 1, 2)

@@ -26,7 +26,9 @@ from flexcal.model.robot import RobotModel
 
 _BLOCK = 20_000
 DECLARED_WITHIN = 0.05
-"""Of the reach: with a larger median distance between nominal and measured points the instrument's frame is not the declared one."""
+"""Median distance between nominal and measured points, relative to the reach, above which the instrument's frame is not the declared
+one.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +45,7 @@ class UncalibratedRobot:
     own: RobotModel | None
 
     def errors(self, poses: PoseSet) -> UncalibratedErrors:
-        """Errors at `poses`, whose stations and targets are those that were placed."""
+        """Errors at `poses`, whose stations and targets are among the placed ones."""
         statistics = (
             None if robot is None else poses.position - predicted_positions(robot, poses, elastic=False)
             for robot in (self.declared, self.registered, self.own)
@@ -53,7 +55,7 @@ class UncalibratedRobot:
 
 @dataclass(frozen=True, eq=False)
 class UncalibratedErrors:
-    """Error vectors (N, 3) m, measured minus predicted, of an uncalibrated robot placed as in `UncalibratedRobot`; None where it is not."""
+    """Error vectors (N, 3) m, measured minus predicted, of an uncalibrated robot placed as in `UncalibratedRobot`; None if not placed."""
 
     declared: np.ndarray | None
     registered: np.ndarray | None
@@ -61,17 +63,17 @@ class UncalibratedErrors:
 
     @property
     def known(self) -> Mapping[str, np.ndarray]:
-        """The errors by name, where they are known."""
+        """Known errors by name."""
         every = {"declared": self.declared, "registered": self.registered, "own": self.own}
         return {name: errors for name, errors in every.items() if errors is not None}
 
     @property
     def robots_own(self) -> np.ndarray | None:
-        """The headline: the robot's own errors, where the poses are too few for that those after registration; None where they are too."""
+        """Errors of the robot itself for the headline; with too few poses those after registration, or None."""
         return self.registered if self.own is None else self.own
 
     def document(self) -> dict[str, Any]:
-        """The block `before` of results.json; null where the errors are not known."""
+        """Block `before` of results.json; null if the errors are unknown."""
         every = (("declared", self.declared), ("registered", self.registered), ("own", self.own))
         return {
             name: None if errors is None else ErrorStatistics.of(errors).in_millimetres()
@@ -111,7 +113,7 @@ def _tools(model: RobotModel, poses: PoseSet) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _declared(model: RobotModel, poses: PoseSet) -> RobotModel | None:
-    """The robot in the instrument's frame, where that is the base frame or at the declared stations; None where it is neither."""
+    """Robot in the instrument's frame, if that is the base frame or at the declared stations; else None."""
     places = {
         name: np.array(station.xyz)
         for name, station in model.config.stations.items()

@@ -46,30 +46,30 @@ class PredictionErrors:
         return f"<{type(self).__name__}: {self.all}>"
 
     def summary(self) -> str:
-        """Errors, and how large they were predicted to be, for people."""
+        """Errors and their predicted size, as text."""
         predicted = float(np.sqrt(np.mean(self.expected_rms**2))) / MILLIMETRE
         observed = float(np.sqrt(np.mean(np.sum(self.errors**2, axis=1)))) / MILLIMETRE
         return f"errors: {self.all}\nroot mean square {observed:.3f} mm, predicted {predicted:.3f} mm"
 
     @property
     def expected_rms(self) -> np.ndarray:
-        """Root mean square distance error (N,) m that is predicted in all."""
+        """Total predicted root mean square distance error (N,) m."""
         return np.hypot(self.parameter_rms, self.scatter_rms)
 
     @property
     def all(self) -> ErrorStatistics:
-        """Over all poses."""
+        """Statistics over all poses."""
         return ErrorStatistics.of(self.errors)
 
     @property
     def unambiguous(self) -> ErrorStatistics:
-        """Over the poses whose flank is certain."""
+        """Statistics over the poses with a certain flank."""
         return ErrorStatistics.of(self.errors[~self.ambiguous])
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorCovariance:
-    """Covariance of the errors at N poses: between poses i and j `roots`_i `roots`_jᵀ (N, 3, k), m; `independent` (N, 3, 3) m² beside it.
+    """Covariance of the errors at N poses: `roots`_i `roots`_jᵀ (N, 3, k), m, between poses i and j, plus `independent` (N, 3, 3) m².
 
     The roots are of the parameters and, the last `shared` of them, of the model error that neighbouring poses have in common; independent
     are instrument and repeatability, None where neither was estimated nor stated. Of these the points of one `visit` (N,) to a pose
@@ -85,7 +85,7 @@ class ErrorCovariance:
     common: np.ndarray | None = None
 
     def by_visits(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Roots (G, 3 T, k) and what is independent of other visits (G, 3 T, 3 T) of the points of a mask `rows` (N,), visit by visit."""
+        """Roots (G, 3 T, k) and independent covariance (G, 3 T, 3 T) of the points of a mask `rows` (N,), visit by visit."""
         roots = self.roots[rows]
         size = len(roots)
         own = np.zeros((size, 3, 3)) if self.independent is None else self.independent[rows]

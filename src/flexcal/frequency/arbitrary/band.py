@@ -1,4 +1,4 @@
-"""Band in which an excitation determines a frequency response."""
+"""Frequency band in which an excitation determines a frequency response."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from flexcal.frequency.arbitrary.spectra import RecordSpectra
 from flexcal.frequency.periodic import LocalWindows, projected
 
 _TAIL = 1e-3
-"""Share of the input's power that is left out at either end."""
+"""Share of the input's power beyond either end of the band."""
 _KNOWN = 0.25
 """Relative standard deviation below which a line counts as determined."""
 _SMOOTHED = 7
 _SMOOTH = 0.15
-"""Share of the input's power that must not be smooth over frequency."""
+"""Least share of the input's power that is not smooth over frequency."""
 _ABSENT = 0.5
-"""What a line that is not determined takes away, against what one that is brings."""
+"""Penalty for a line that is not determined, where a determined one counts 1."""
 
 
 def excited_band(
     spectra: RecordSpectra, response: LocalResponse, usable: np.ndarray | None = None
 ) -> tuple[float, float] | None:
-    """Lowest and highest frequency (Hz) of the stretch with the most determined lines, within nearly all of the input's power.
+    """Lowest and highest frequency (Hz) of the stretch with most determined lines, within nearly all of the input's power.
 
     None where hardly any line is determined.
 
@@ -57,7 +57,7 @@ def excited_band(
 
 
 def _rough(spectra: RecordSpectra, at: np.ndarray, width: int) -> np.ndarray:
-    """Share (L,) of the power about the bins `at` (L,) that no polynomial over a window explains, of the input where it is largest."""
+    """Share (L,) of the power about the bins `at` (L,) that a polynomial over a window does not explain; largest over the inputs."""
     windows = LocalWindows.of(at, len(spectra.frequencies_hz), width)
     seen = windows.seen(spectra.instruments)
     left = seen - projected(windows.smooth, seen)

@@ -1,4 +1,4 @@
-"""Records of an excited axis without a plan: input, output and reference columns on a uniform time base."""
+"""Records of an excited axis without an experiment plan: input, output and reference columns on a uniform time base."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ import numpy as np
 from flexcal.errors import FlexcalError
 
 LONGEST = 65536
-"""Samples of a piece, at most: a longer record is divided, which lowers the resolution and leaves all data in use."""
+"""Largest number of samples of a piece: a longer record is divided, which lowers the resolution and leaves all data in use."""
 SHORTEST = 64
 _NEARLY_ALL = 0.9
 
 
 @dataclass(frozen=True)
 class Channel:
-    """A column: its name in the file, the unit of the values, and what they are the derivative of.
+    """Column of a record: its name in the file, its unit, and the order of its time derivative.
 
     `derivative` is 0 for a position or a torque, 1 for a velocity, 2 for an acceleration.
     """
@@ -42,7 +42,7 @@ class ExcitationRecord:
         return len(self.inputs)
 
     def part(self, first: int, end: int) -> ExcitationRecord:
-        """Samples `first` to `end`."""
+        """Record of the samples from `first` to `end`."""
         return replace(
             self,
             inputs=self.inputs[first:end],
@@ -52,7 +52,7 @@ class ExcitationRecord:
 
 
 def equal_pieces(records: Sequence[ExcitationRecord]) -> list[ExcitationRecord]:
-    """The records cut into pieces of one length, at most `LONGEST` samples: the longest that uses nearly all of their samples.
+    """Records cut into pieces of one length, at most `LONGEST` samples: the longest that uses nearly all samples.
 
     Raises `FlexcalError` where they are too short or have different time steps.
     """

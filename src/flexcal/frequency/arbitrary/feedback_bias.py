@@ -1,4 +1,4 @@
-"""Share of an input that a controller feeds back from the outputs' noise, and the bias of the response that follows from it."""
+"""Share of the input that a controller feeds back from output noise, and the resulting bias of the response."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from flexcal.frequency.arbitrary.excitation_record import ExcitationRecord
 from flexcal.frequency.arbitrary.spectra import HIGHEST
 
 _MEMORY = 160
-"""Lags of the model, at most."""
+"""Largest number of lags of the autoregressive model."""
 _SAMPLES = 12
-"""Samples for each of its coefficients, at least."""
+"""Least number of samples per coefficient of the model."""
 _LEAST = 10
 _RIDGE = 1e-13
-"""Of the mean of the diagonal: periodic and swept excitations are predicted by themselves, with coefficients of any size."""
+"""Ridge, relative to the mean of the diagonal: periodic and swept excitations predict themselves with coefficients of any size."""
 _GRID, _LOWEST = 400, 5e-4
 _ACTS = 0.3
-"""Share of the input, averaged over a third of an octave anywhere, from which a controller acts. In open loop it stays below 0.1."""
+"""Share of the input, averaged over any third of an octave, from which feedback counts as acting; below 0.1 in open loop."""
 _THIRD = 0.23
 _NEARLY_ALL, _BEYOND = 0.999, 1.5
-"""Share of the inputs' power, and factor on the frequency up to which it reaches, beyond which there is none."""
+"""Share of the inputs' power that defines its highest frequency, and factor on that beyond which there is none."""
 
 
 @dataclass(frozen=True, eq=False)
 class Feedback:
-    """At `frequencies_hz` (F,) the `share` (F,) of fed-back noise in the power of the input, the largest of all inputs.
+    """Share of fed-back noise in the power of the input at `frequencies_hz` (F,): `share` (F,), the largest of all inputs.
 
     `bias` (F, n_y, n_u), relative and complex, is that of a response that takes the inputs as free of it; `power` (F,) is the spectral
     density of the inputs, each relative to its variance.
@@ -40,7 +40,7 @@ class Feedback:
 
     @property
     def acts(self) -> bool:
-        """Whether a controller acts on the outputs, by what it does somewhere between zero and 0.4 of the sampling rate.
+        """Whether a controller acts on the outputs at any frequency up to 0.4 of the sampling rate.
 
         Where the inputs leave an octave or more without power, by what it does there: friction lets an axis tell how a sweep goes on,
         but not beyond it.
@@ -64,7 +64,7 @@ class Feedback:
 
 
 def feedback(pieces: Sequence[ExcitationRecord], at_once: Sequence[bool]) -> Feedback | None:
-    """By a vector autoregressive model of inputs and outputs (Geweke 1982); None where the records are too short.
+    """Feedback by a vector autoregressive model of inputs and outputs (Geweke 1982); None for records that are too short.
 
     An output may act on the input of the same sample, but the input acts on the outputs of later ones alone, except on those that follow it
     `at_once` (n_y,), as accelerations do; of these only earlier samples can be fed back. With the innovations of the outputs e and of the

@@ -1,4 +1,4 @@
-"""The part of measured inputs that a reference explains, for responses in closed loop."""
+"""Instrumental variables: the part of measured inputs that a reference explains, for responses in closed loop."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from flexcal.frequency.periodic import ORDER, LocalWindows, projected
 
 _FREEDOM = 16
 _CHANCE = 1e-3
-"""Probability that a reference without effect counts as one with it, at a bin."""
+"""Significance level, at a bin, of the test that a reference has an effect."""
 _CHUNK = 256
 _DEGENERATE = 1e-9
-"""Singular value, relative to the largest, below which references do not differ."""
+"""Singular value, relative to the largest, below which references count as linearly dependent."""
 _MOST_LEVERAGE = 0.9
 _LEAST_SLOPE = 1e-3
-"""Where the references explain nothing."""
+"""Slope used where the references explain nothing."""
 
 
 def with_reference(spectra: RecordSpectra, references: np.ndarray) -> tuple[RecordSpectra, np.ndarray]:
-    """`spectra` whose instruments are what references (R, K, n_r) explain of the inputs, with the local polynomial method.
+    """Spectra whose instruments are the part of the inputs explained by references (R, K, n_r), with the local polynomial method.
 
     Beside them (K,) whether that is more than chance (F-test of the local fit): where it is not, they are a part of the inputs' noise.
 
@@ -60,7 +60,7 @@ def with_reference(spectra: RecordSpectra, references: np.ndarray) -> tuple[Reco
 def _explained(
     inputs: np.ndarray, references: np.ndarray, at: np.ndarray, window: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The fitted inputs (R, L, n_u) at the bins `at` (L,), and the share (L,) of the power in the window that is explained."""
+    """Fitted inputs (R, L, n_u) at the bins `at` (L,), and the explained share (L,) of the power in the window."""
     records, bins, n_u = inputs.shape
     windows = LocalWindows.of(at, bins, window)
     smooth = windows.smooth
@@ -89,7 +89,7 @@ def _explained(
 
 
 def _shrunk(instruments: np.ndarray, inputs: np.ndarray, window: int) -> np.ndarray:
-    """Instruments (R, K, n_u) times the slope of the inputs by them in a window, after which they do not correlate with the rest."""
+    """Instruments (R, K, n_u) times the slope of the inputs by them in a window, which makes them uncorrelated with the rest."""
     products = np.real(instruments.conj() * inputs).sum(0), (np.abs(instruments) ** 2).sum(0)
     across, power = (uniform_filter1d(product, window, axis=0, mode="nearest") for product in products)
     return instruments * np.clip(across / np.maximum(power, np.finfo(float).tiny), _LEAST_SLOPE, 1.0)

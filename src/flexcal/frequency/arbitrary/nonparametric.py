@@ -12,13 +12,13 @@ from flexcal.frequency.arbitrary.spectra import RecordSpectra
 from flexcal.frequency.periodic import ORDER, LocalWindows, kronecker, projected
 
 _FREEDOM = 12
-"""Degrees of freedom of the scatter in a window, at least."""
+"""Least degrees of freedom of the scatter in a window."""
 _MOST_LINES = 1500
 _CHUNK = 256
 _DEGENERATE, _MOST_DEGENERATE = 1e-9, 0.9
-"""Diagonal of R, relative to its largest, below which regressors do not differ, and share of such lines from which nothing can be said."""
+"""Diagonal of R, relative to its largest, below which regressors count as dependent, and largest share of such lines."""
 _UNKNOWN = 1e30
-"""Variance, relative, of a response that the data do not determine."""
+"""Relative variance assigned to a response that the data do not determine."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class LocalResponse:
 
 
 def local_response(spectra: RecordSpectra, noise: np.ndarray | None = None) -> LocalResponse:
-    """G by the local polynomial method (Pintelon and Schoukens 2012, ch. 7), from records with transients.
+    """Frequency response by the local polynomial method (Pintelon and Schoukens 2012, ch. 7), from records with transients.
 
     In a window of bins d about a line, all records share G: Y = (G_0 + G_1 d + G_2 d²) U + T_0 + T_1 d + T_2 d² + V, with a transient T of
     each record and output. The regressors are the instruments. `noise` (K,): shape over frequency of the standard deviation of V, where it
@@ -81,7 +81,7 @@ def local_response(spectra: RecordSpectra, noise: np.ndarray | None = None) -> L
 
 
 def local_window(spectra: RecordSpectra) -> int:
-    """Bins in a window of the local polynomial method, an odd number: enough for the degrees of freedom.
+    """Number of bins in a window of the local polynomial method, odd: enough for the degrees of freedom.
 
     Raises `FlexcalError` where there are too few bins.
     """
@@ -111,7 +111,7 @@ def _chunks(at: np.ndarray) -> Iterator[np.ndarray]:
 def _windows(
     spectra: RecordSpectra, at: np.ndarray, window: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:
-    """G, the right factor of its covariance, the scatter, the outputs' power that G explains, and degrees of freedom, at bins `at`."""
+    """Response, right factor of its covariance, scatter, explained output power, and degrees of freedom, at the bins `at`."""
     records, bins, n_u = spectra.inputs.shape
     n_y, lines = spectra.outputs.shape[2], len(at)
     windows = LocalWindows.of(at, bins, window)

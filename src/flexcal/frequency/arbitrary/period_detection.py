@@ -1,4 +1,4 @@
-"""Period of an excitation that repeats itself."""
+"""Detection of the period of a repeated excitation."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import numpy as np
 from scipy.signal import fftconvolve
 
 _SAME = 0.1
-"""Variance of the difference between two periods, relative to twice the signal's, below which they are the same."""
+"""Variance of the difference of two periods, relative to twice the signal's, below which they count as equal."""
 _DIFFERENT = 0.5
-"""It must have risen above this at a shorter lag: any signal resembles itself shortly after."""
+"""Level that this variance must exceed at a shorter lag, since any signal resembles itself after a short time."""
 _MULTIPLE = 2.0
 _FRACTION = 0.02
-"""Samples by which a period may differ from a whole number, over the record, times the number of periods."""
+"""Largest deviation of a period from a whole number of samples, over the record, times the number of periods."""
 
 
 def find_period(signal: np.ndarray) -> int | None:
-    """Period of a signal (N, c) in samples, at most N/2; None where it does not repeat itself, or not after a whole number of samples.
+    """Period of a signal (N, c) in samples, at most N/2; None without a period of a whole number of samples.
 
     The lag P with the least mean square of x(t + P) - x(t), where that is small; of multiples the shortest.
     """
@@ -47,7 +47,7 @@ def find_period(signal: np.ndarray) -> int | None:
 
 
 def _is_whole(difference: np.ndarray, at: int, periods: int) -> bool:
-    """Whether the minimum lies at a whole number of samples, by the parabola through it, and stays there over all periods."""
+    """Whether the minimum lies at a whole number of samples, by the parabola through it, over all periods."""
     if not 0 < at < len(difference) - 1:
         return True
     left, middle, right = difference[at - 1 : at + 2]

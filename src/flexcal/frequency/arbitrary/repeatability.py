@@ -22,7 +22,7 @@ class HalfDifference:
 
 
 def half_difference(first: LocalResponse, second: LocalResponse) -> HalfDifference:
-    """Between responses at the same lines; lines that share data count as one."""
+    """Difference between responses at the same lines; lines that share data count as one."""
     difference = np.abs(first.response - second.response)
     std = np.hypot(first.std, second.std)
     freedom = min(first.degrees_of_freedom, second.degrees_of_freedom)

@@ -1,4 +1,4 @@
-"""Spectra of whole records, with what a transient and feedback need."""
+"""Spectra of whole records, with the data that transient and feedback corrections need."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from flexcal.frequency.periodic import hold_factor
 
 Hold = Literal["held", "instantaneous", "mean"]
 HIGHEST = 0.4
-"""Of the sampling rate: above it a sampled signal says little about a continuous one."""
+"""Highest frequency, relative to the sampling rate: above it a sampled signal says little about a continuous one."""
 _CARRIED, _NEIGHBOURS = 0.01, 10
-"""Power of a harmonic, relative to the strongest of so many on either side, above which it is excited."""
+"""Power of a harmonic, relative to the strongest of this many neighbours on either side, above which it counts as excited."""
 _REST, _LEAST_REST, _STILL = 0.05, 5, 0.02
-"""Last share of a record, and samples at its ends, that tell whether it is at rest: less motion than so much of the largest."""
+"""Final share of a record and samples at its ends that are tested for rest, and the motion allowed, relative to the largest."""
 _LOWEST = 2
-"""First bin that is used: below it drift and offset dominate."""
+"""First bin used: below it drift and offset dominate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,20 +45,20 @@ class RecordSpectra:
     periods: int | None = None
 
     def of_records(self, part: slice) -> RecordSpectra:
-        """Some of the records."""
+        """Spectra of some of the records."""
         return replace(
             self, inputs=self.inputs[part], outputs=self.outputs[part], instruments=self.instruments[part]
         )
 
     def divided(self, by: np.ndarray) -> RecordSpectra:
-        """All phasors over positive numbers `by` (K,) of their bins."""
+        """Spectra with all phasors divided by positive numbers `by` (K,) of their bins."""
         over = by[:, None]
         return replace(
             self, inputs=self.inputs / over, outputs=self.outputs / over, instruments=self.instruments / over
         )
 
     def between(self, low_hz: float, high_hz: float) -> RecordSpectra:
-        """The bins of a band."""
+        """Spectra at the bins of a band."""
         tolerance = 1e-6 * self.resolution_hz
         kept = (self.frequencies_hz >= low_hz - tolerance) & (self.frequencies_hz <= high_hz + tolerance)
         return replace(
@@ -124,7 +124,7 @@ def record_spectra(
 
 
 def _is_settled(piece: ExcitationRecord) -> bool:
-    """Whether input and outputs stand at one level at the beginning and at the end, as around a blow."""
+    """Whether input and outputs have the same level at the beginning and at the end, as in an impact test."""
     signals = np.hstack([piece.inputs, piece.outputs])
     rest = max(_LEAST_REST, int(_REST * len(signals)))
     ends = (signals[:_LEAST_REST], signals[-rest:])
@@ -134,7 +134,7 @@ def _is_settled(piece: ExcitationRecord) -> bool:
 
 
 def _carrying(inputs: np.ndarray, harmonic: np.ndarray) -> np.ndarray:
-    """Harmonics (K,) that carry power of any input (R, K, n_u), compared with the strongest of their neighbours."""
+    """Mask (K,) of harmonics with power of any input (R, K, n_u), compared with the strongest of their neighbours."""
     from scipy.ndimage import maximum_filter1d
 
     power = (np.abs(inputs[:, harmonic]) ** 2).mean(0)

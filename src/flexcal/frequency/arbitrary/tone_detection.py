@@ -1,4 +1,4 @@
-"""Lines of an excitation that consists of few frequencies."""
+"""Detection of an excitation that consists of few frequencies."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 from flexcal.frequency.arbitrary.excitation_record import ExcitationRecord
 
 _ALL, _NEARLY_ALL = 0.999, 0.95
-"""Shares of the power in the lines from which there is nothing else to speak of, and little."""
+"""Shares of the power in the lines from which the rest counts as absent, and as small."""
 _MOST = 6
 _LOBE = 3
-"""Bins on either side of a line over which a Hann window spreads it, and what is between the bins."""
+"""Bins on either side of a line covered by the main lobe of a Hann window and interpolation between bins."""
 _FIRST = 2
 
 
@@ -26,7 +26,7 @@ class Tones:
 
     @property
     def sentence(self) -> str:
-        """What the input is, and what is needed instead."""
+        """Description of the input, and of the excitation required instead."""
         nearly = "" if self.alone else "nearly "
         listed = ", ".join(f"{frequency:.4g}" for frequency in self.frequencies_hz)
         said = f"{len(self.frequencies_hz)} sines, of {listed} Hz"
@@ -39,7 +39,7 @@ class Tones:
 
 
 def detect_tones(pieces: Sequence[ExcitationRecord]) -> Tones | None:
-    """Of records of equal length; None where 95 % of the power are not in six lines."""
+    """Tones of records of equal length; None unless six lines hold 95 % of the power."""
     size = len(pieces[0])
     window = np.hanning(size)[:, None]
     power = np.zeros(size // 2 + 1)

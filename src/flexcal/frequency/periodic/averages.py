@@ -23,7 +23,7 @@ _ROUNDING = 1e-10
 
 
 def average_response(spectra: ExperimentSpectra, realisations: np.ndarray, average: Average) -> np.ndarray:
-    """The frequency response (L, n, n) of the named average; `realisations` (R, L, n, n) are those of eq. (20)."""
+    """Frequency response (L, n, n) of the named average; `realisations` (R, L, n, n) are those of eq. (20)."""
     match average:
         case "arithmetic":
             return arithmetic(realisations)
@@ -48,8 +48,9 @@ def arithmetic(realisations: np.ndarray) -> np.ndarray:
 
 
 def harmonic(realisations: np.ndarray) -> np.ndarray:
-    """Inverse of the mean inverse of (R, L, n, n): right where the noise is in the output alone is arithmetic, in the
-    torque alone this."""
+    """Inverse of the mean inverse of (R, L, n, n): unbiased for noise in the torque alone, as `arithmetic` is for noise in the output
+    alone.
+    """
     identity = np.broadcast_to(np.eye(realisations.shape[-1]), realisations.shape)
     return np.linalg.solve(np.linalg.solve(realisations, identity).mean(0), identity[0])
 
@@ -65,14 +66,15 @@ def logarithmic(realisations: np.ndarray) -> np.ndarray:
 
 
 def h1(acceleration: np.ndarray, torque: np.ndarray) -> np.ndarray:
-    """Least squares over all experiments of all realisations, (Σ Q̈ Γᴴ)(Σ Γ Γᴴ)⁻¹; torque noise pulls it to zero."""
+    """H1 estimate, least squares over all experiments of all realisations, (Σ Q̈ Γᴴ)(Σ Γ Γᴴ)⁻¹; torque noise biases it to zero."""
     dagger = np.swapaxes(torque, -1, -2).conj()
     return right_divide((acceleration @ dagger).sum(0), (torque @ dagger).sum(0))
 
 
 def joint_input_output(acceleration: np.ndarray, torque: np.ndarray, excitation: np.ndarray) -> np.ndarray:
-    """Both measured spectra are first averaged relative to the known excitation D of the realisation:
-    (mean Q̈ D⁻¹)(mean Γ D⁻¹)⁻¹ (Pintelon and Schoukens 2012, §2.7)."""
+    """Joint input-output estimate (mean Q̈ D⁻¹)(mean Γ D⁻¹)⁻¹ with the known excitation D of each realisation (Pintelon and Schoukens
+    2012, §2.7).
+    """
     return right_divide(
         right_divide(acceleration, excitation).mean(0), right_divide(torque, excitation).mean(0)
     )
@@ -103,7 +105,7 @@ def right_divide(numerator: np.ndarray, denominator: np.ndarray) -> np.ndarray:
 
 
 def _matrix_logarithm(matrix: np.ndarray) -> np.ndarray:
-    """Principal logarithm of (…, n, n) matrices that are not far from 1."""
+    """Principal logarithm of (…, n, n) matrices near the identity."""
     delta = matrix - np.eye(matrix.shape[-1])
     near = np.linalg.norm(delta, axis=(-2, -1)) < _SERIES_RADIUS
     result = np.empty_like(matrix)

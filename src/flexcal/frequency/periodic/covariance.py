@@ -11,7 +11,7 @@ _SMALLEST_RELATIVE_STD = (
 
 
 def vec(matrices: np.ndarray) -> np.ndarray:
-    """Matrices (L, m, n) stacked by columns, (L, m n)."""
+    """Matrices (L, m, n) vectorised column by column, (L, m n)."""
     return np.swapaxes(matrices, -1, -2).reshape(len(matrices), -1)
 
 
@@ -67,7 +67,7 @@ def kronecker(right: np.ndarray, left: np.ndarray) -> np.ndarray:
 def total_covariance(
     realisations: np.ndarray, response: np.ndarray, noise: np.ndarray, gain: np.ndarray, count: int
 ) -> tuple[np.ndarray, float]:
-    """Covariance (L, m n, m n) of vec G of ONE realisation, noise and nonlinear distortion, and its degrees of freedom.
+    """Covariance (L, m n, m n) of vec G of one realisation, noise and nonlinear distortion, and its degrees of freedom.
 
     The first n of the m rows of G are those of the n driven axes.
     The scatter G^[r] - mean (R, L, m, n) has no structure over frequency but the gain of the plant itself, so it is
@@ -109,7 +109,7 @@ def total_covariance(
 
 
 def shrink_to_diagonal(covariance: np.ndarray, freedom: float) -> np.ndarray:
-    """Sample covariances (L, p, p) of complex normal vectors with `freedom` degrees of freedom, off-diagonals damped.
+    """Sample covariances (L, p, p) of complex normal vectors with `freedom` degrees of freedom, shrunk towards their diagonals.
 
     The intensity min(1, Σ var(s_ij) / Σ |s_ij|²) over i ≠ j, with var(s_ij) = s_ii s_jj / freedom, leaves a true
     correlation alone and removes what chance alone would give; the result is positive definite where the diagonal is.
@@ -134,7 +134,7 @@ def transform_covariance(covariance: np.ndarray, right: np.ndarray, left: np.nda
 
 
 def _from_left(matrix: np.ndarray, right: np.ndarray, left: np.ndarray) -> np.ndarray:
-    """(right ⊗ left) · matrix without the Kronecker product."""
+    """Product (right ⊗ left) · matrix without forming the Kronecker product."""
     lines, n, m = *right.shape[:2], left.shape[-1]
     columns = (right @ matrix.reshape(lines, n, -1)).reshape(lines, n, m, -1)
     return (left[:, None] @ columns).reshape(matrix.shape)

@@ -12,7 +12,7 @@ from flexcal.frequency.periodic.multisine import samples_per_period
 
 @dataclass(frozen=True, eq=False)
 class ExperimentSpectra:
-    """Everything the averages need of one pose, in phasors (cosine amplitudes); E experiments, n excited axes.
+    """Spectra of one pose that the averages need, in phasors (cosine amplitudes); E experiments, n excited axes.
 
     `outputs` (R, L, m, E), accelerations of the axes in rad/s² and the readings of m - n sensors, and `torque` (R, L, n, E)
     N m are measured, hold corrected and averaged over periods; `excitation` (R, L, n, E) N m is what the plan asked for;
@@ -26,7 +26,7 @@ class ExperimentSpectra:
 
 
 def kept_samples(plan: MultisinePlan, recording: Recording) -> slice:
-    """The rows of a recording from the end of the settle periods to the last whole period of the plan.
+    """Range of samples of a recording from the end of the settle periods to the last whole period of the plan.
 
     Raises `FlexcalError` that names the recording where it is too short, or its sample time does not fit the plan.
     """
@@ -79,12 +79,12 @@ def spectrum(signal: np.ndarray, periods: int, lines: np.ndarray) -> np.ndarray:
 
 
 def noise_in_half_sum(plan: MultisinePlan) -> bool:
-    """Whether the noise is read from (plus + minus)/2 at the excited lines themselves; see `noise_lines`."""
+    """Whether the noise is estimated from (plus + minus)/2 at the excited lines themselves; see `noise_lines`."""
     return plan.signs and not (has_reference(plan) and _is_whole(_reference_ratio(plan)))
 
 
 def noise_lines(plan: MultisinePlan) -> np.ndarray:
-    """The bins (multiples of f0) that carry noise and least of anything else, for the noise covariance.
+    """Bins (multiples of f0) for the noise covariance, which hold noise and least of anything else.
 
     Both signs, reference at (m + 1/2) f0 or none: the half sum (plus + minus)/2 at the excited odd lines. The linear
     response and all terms odd in the excitation cancel there; what is even in it falls on even lines or, times the
@@ -124,12 +124,12 @@ def noise_lines(plan: MultisinePlan) -> np.ndarray:
 
 
 def torque_hold(plan: MultisinePlan | TrajectoryPlan, omega: np.ndarray, time_step: float) -> np.ndarray:
-    """`hold_factor` of the torque that a plan declares."""
+    """Hold correction `hold_factor` of the torque that a plan declares."""
     return hold_factor(plan.torque, omega, time_step)
 
 
 def hold_factor(kind: str, omega: np.ndarray, time_step: float) -> np.ndarray:
-    """Factor (L,) from the spectrum of the logged torque samples to that of the torque that acted; T = time_step.
+    """Factor (L,) from the spectrum of logged torque samples to that of the applied torque; T = time_step.
 
     "held": the sample acts until the next one, sinc(ωT/2) exp(-jωT/2), exact for a staircase. "instantaneous": 1, the
     log is the torque at the sampling instant. "mean": the log is the mean over the step that begins at the sample, of
@@ -144,7 +144,7 @@ def hold_factor(kind: str, omega: np.ndarray, time_step: float) -> np.ndarray:
 
 
 def has_reference(plan: MultisinePlan) -> bool:
-    """Whether there is a reference motion under the excitation."""
+    """Whether the plan has a reference motion under the excitation."""
     return plan.reference_amplitude != 0.0 and plan.reference_frequency_hz != 0.0
 
 

@@ -22,9 +22,9 @@ from flexcal.frequency.periodic.response import SMALLEST_FREEDOM, FrequencyRespo
 from flexcal.frequency.periodic.steady_state import column_factor
 
 LEAST_LINES, MOST_LINES = 3, 7
-"""Lines in a window: enough for a parabola, and not so many that a resonance is none."""
+"""Least and largest number of lines in a window: enough for a parabola, few enough to resolve a resonance."""
 TRANSIENT_BINS = 12
-"""Bins between the lines that a transient is found from."""
+"""Number of bins between the lines from which a transient is estimated."""
 _RANK_TOLERANCE = 1e-10
 
 
@@ -42,7 +42,7 @@ class LocalPolynomialFit:
 
 
 def local_polynomial(inputs: np.ndarray, outputs: np.ndarray, count: int) -> LocalPolynomialFit:
-    """The fit to the spectra of E experiments at L lines, U (E, L, n_u) and Y (E, L, n_y), from the `count` lines around each.
+    """Local polynomial fit to spectra of E experiments at L lines, U (E, L, n_u) and Y (E, L, n_y), from `count` lines around each.
 
     Raises `FlexcalError` where these are too few, or where the excitation does not tell the inputs apart.
     """
@@ -87,7 +87,7 @@ def local_polynomial(inputs: np.ndarray, outputs: np.ndarray, count: int) -> Loc
 def without_transient(
     columns: np.ndarray, lines: np.ndarray, quiet: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Spectra (E, K, c) at the bins `lines` (L,) less the transient, (E, L, c), and the covariance (L, c, c) of what noise leaves there.
+    """Spectra (E, K, c) at the bins `lines` (L,) less the transient, (E, L, c), and the covariance (L, c, c) of the remaining noise.
 
     The transient is a polynomial through the nearest of the bins `quiet` (B,), which carry no periodic signal. Raises `FlexcalError`
     where these are too few.
@@ -133,8 +133,9 @@ def local_polynomial_responses(
 
 
 def keep_whole(plan: MultisinePlan, recording: Recording) -> tuple[np.ndarray, ...]:
-    """Mean position, and the spectrum (K, m + n) of position, sensors and torque over the whole record, at all bins from the first line to
-    the last."""
+    """Mean position, and the spectrum (K, m + n) of position, sensors and torque over the whole record, at all bins from first to last
+    line.
+    """
     rows, axes = slice(0, kept_samples(plan, recording).stop), np.asarray(plan.joints)
     position = recording.q[rows]
     mean, readings = position.mean(0), recording.sensor_readings[rows]
@@ -174,7 +175,7 @@ def _response(records: PoseRecords, names: tuple[str, ...]) -> FrequencyResponse
 
 
 def _quiet_bins(plan: MultisinePlan) -> np.ndarray:
-    """Bins of a record of P periods, from the first line to the last, without anything periodic: distortion keeps to multiples of f0.
+    """Bins of a record of P periods, from first to last line, without periodic components: distortion lies at multiples of f0.
 
     A reference at (m + 1/2) f0 reaches the half-integers too. One period has no bins between; there the even lines are taken.
     """

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 ORDER = 2
-"""Of the polynomials in frequency, of response and transient."""
+"""Order of the polynomials in frequency, of response and transient."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,13 +19,13 @@ class LocalWindows:
 
     @classmethod
     def of(cls, at: np.ndarray, bins: int, width: int) -> LocalWindows:
-        """About the bins `at` (L,) of so many `bins`, `width` bins each; next to an end they are one-sided."""
+        """Windows about the bins `at` (L,) out of `bins`, `width` bins each; one-sided near the ends."""
         index = np.clip(at - width // 2, 0, bins - width)[:, None] + np.arange(width)
         distance = (index - at[:, None]) / max(width // 2, 1)
         return cls(index, distance[:, :, None] ** np.arange(ORDER + 1))
 
     def seen(self, values: np.ndarray) -> np.ndarray:
-        """Values (R, K, c) of R records in the windows, (L, R, W, c)."""
+        """Values (R, K, c) of R records restricted to the windows, (L, R, W, c)."""
         return np.moveaxis(values[:, self.index], 0, 1)
 
     def regressors(self, scaled: np.ndarray) -> np.ndarray:
@@ -36,10 +36,10 @@ class LocalWindows:
 
     @property
     def smooth(self) -> np.ndarray:
-        """Orthonormal columns (L, 1, W, 3) of the transient of a record."""
+        """Orthonormal columns (L, 1, W, 3) that span the transient of a record."""
         return np.linalg.qr(self.powers)[0][:, None]
 
 
 def projected(smooth: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """The part of values (L, R, W, c) in the span of real orthonormal columns `smooth`."""
+    """Projection of values (L, R, W, c) onto the span of real orthonormal columns `smooth`."""
     return smooth @ (np.swapaxes(smooth, -1, -2) @ values)

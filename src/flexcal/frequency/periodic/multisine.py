@@ -17,7 +17,7 @@ _PEAK_SAMPLES_PER_LINE = 8  # time grid of the crest factor: samples per period 
 
 
 def orthogonal_matrix(n_u: int) -> np.ndarray:
-    """The (n_u, n_u) unitary matrix T of eq. (24), T_pq = n_u^(-1/2) exp(j 2π (p-1)(q-1) / n_u), for any n_u ≥ 1."""
+    """Unitary matrix T (n_u, n_u) of eq. (24), T_pq = n_u^(-1/2) exp(j 2π (p-1)(q-1) / n_u), for any n_u ≥ 1."""
     if n_u < 1:
         raise FlexcalError("E-FRF-019", f"a multisine needs at least one excited axis, not {n_u}.")
     index = np.arange(n_u)
@@ -25,7 +25,7 @@ def orthogonal_matrix(n_u: int) -> np.ndarray:
 
 
 def odd_lines(base_frequency_hz: float, low_hz: float, high_hz: float) -> np.ndarray:
-    """All odd multiples (integers) of the base frequency in [low_hz, high_hz]: the lines of eq. (22)."""
+    """Odd multiples (integers) of the base frequency in [low_hz, high_hz]: the lines of eq. (22)."""
     first = int(np.ceil(low_hz / base_frequency_hz - 1e-9))
     last = int(np.floor(high_hz / base_frequency_hz + 1e-9))
     lines = np.arange(max(first, 1), last + 1)
@@ -39,7 +39,7 @@ def odd_lines(base_frequency_hz: float, low_hz: float, high_hz: float) -> np.nda
 
 
 def leave_out_detection_lines(plan: MultisinePlan, group: int = 4) -> MultisinePlan:
-    """The plan without one random line of every `group` successive ones, the others amplified so that the power stays.
+    """Plan without one random line of every `group` successive ones, the others amplified to the same power.
 
     What these detection lines show above the noise is the odd nonlinear distortion (Pintelon & Schoukens 2012, §4.3); the same lines are
     left out in all experiments, so the excited ones stay orthogonal. Which ones is a function of the plan's seed.
@@ -59,7 +59,7 @@ def leave_out_detection_lines(plan: MultisinePlan, group: int = 4) -> MultisineP
 
 
 def half_integer_frequency(base_frequency_hz: float, near_hz: float) -> float:
-    """The reference frequency (m + 1/2) f0 nearest `near_hz`.
+    """Reference frequency (m + 1/2) f0 nearest to `near_hz`.
 
     Coulomb friction under the moving reference modulates at even multiples of the reference frequency; with this choice
     the first sidebands (±2 f_ref, odd multiples of f0) of the odd lines fall on even, unexcited lines.
@@ -69,14 +69,14 @@ def half_integer_frequency(base_frequency_hz: float, near_hz: float) -> float:
 
 
 def random_phases(plan: MultisinePlan, realisation: int) -> np.ndarray:
-    """Uniform phases (n_u, L) in rad of one realisation; a function of (plan.seed, realisation) alone."""
+    """Uniform random phases (n_u, L) in rad of one realisation; a function of (plan.seed, realisation) alone."""
     sequence = np.random.SeedSequence(entropy=plan.seed, spawn_key=(int(realisation),))
     return np.random.default_rng(sequence).uniform(0.0, 2.0 * np.pi, np.shape(plan.amplitude))
 
 
 @lru_cache(maxsize=64)
 def phases(plan: MultisinePlan, realisation: int) -> np.ndarray:
-    """The phases (n_u, L) in rad of one realisation as the plan wants them: random, or shifted from there for a low crest factor."""
+    """Phases (n_u, L) in rad of one realisation by the plan: random, or optimised from there for a low crest factor."""
     drawn = random_phases(plan, realisation)
     return optimise_crest(plan.amplitude, drawn, plan.lines) if plan.crest == "optimised" else drawn
 
@@ -123,7 +123,7 @@ def reference_trajectory(
 
 
 def samples_per_period(base_frequency_hz: float, time_step: float) -> int:
-    """Samples in one period; `FlexcalError` where the period is not a whole number of steps (leakage would follow)."""
+    """Samples in one period; raises `FlexcalError` if the period is not a whole number of steps (leakage would follow)."""
     samples = 1.0 / (base_frequency_hz * time_step)
     if abs(samples - round(samples)) > 1e-6 * samples:
         raise FlexcalError(
@@ -135,14 +135,14 @@ def samples_per_period(base_frequency_hz: float, time_step: float) -> int:
 
 
 def crest_factor(signal: np.ndarray) -> np.ndarray:
-    """Peak over root mean square of the signals (samples, …), one for each column."""
+    """Crest factor, peak over root mean square, of each column of the signals (samples, …)."""
     return np.abs(signal).max(0) / np.sqrt(np.mean(np.square(signal), 0))
 
 
 def optimise_crest(
     amplitude: np.ndarray, start: np.ndarray, lines: np.ndarray, iterations: int = 200
 ) -> np.ndarray:
-    """Phases (n_u, L) with a lower crest factor, begun at the phases `start`, jointly over the n_u experiments.
+    """Phases (n_u, L) of low crest factor, starting at the phases `start`, jointly over the n_u experiments.
 
     In experiment e axis p carries its multisine with all phases turned by 2π(p-1)(e-1)/n_u, so each axis has one phase
     vector and n_u signals to keep low. Clip and swap (Van der Ouderaa, Schoukens and Renneboog 1988): clip all n_u

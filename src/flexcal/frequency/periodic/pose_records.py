@@ -1,4 +1,4 @@
-"""Spectra and mean positions of the recordings of one pose, collected while they are read."""
+"""Spectra and mean positions of the recordings of one pose, accumulated while reading."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
@@ -9,11 +9,11 @@ from flexcal.data.recordings import Recording, RecordingLabel
 from flexcal.errors import FlexcalError
 
 Keep = Callable[[MultisinePlan, Recording], tuple[np.ndarray, ...]]
-"""Reduces a recording to the mean position (n,) of all joints and the spectra (bins, columns) that a method needs."""
+"""Function that reduces a recording to the mean position (n,) of all joints and the spectra (bins, columns) of a method."""
 
 
 class PoseRecords:
-    """Collects the recordings of one pose of a plan; holds only what `keep` makes of them, so any number fits in memory.
+    """Accumulator of the recordings of one pose of a plan; stores only the output of `keep`, so that any number fits in memory.
 
     The first row of a recording is the start of its experiment (excitation and reference at t = 0), whatever its clock.
     """
@@ -31,7 +31,7 @@ class PoseRecords:
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """Names of the sensors on the arm that recorded too."""
+        """Names of the recorded sensors on the arm."""
         return self._sensors or ()
 
     @property
@@ -50,11 +50,11 @@ class PoseRecords:
 
     @property
     def complete(self) -> bool:
-        """Whether every realisation, experiment and sign is there."""
+        """Whether all realisations, experiments and signs are present."""
         return len(self._kept) == len(self._expected)
 
     def check_complete(self) -> None:
-        """Raise `FlexcalError` with the first recording that is missing."""
+        """Raise `FlexcalError` that names the first missing recording."""
         missing = [key for key in self._expected if key not in self._kept]
         if missing:
             first = RecordingLabel(self.pose, *missing[0])
@@ -65,7 +65,7 @@ class PoseRecords:
             )
 
     def add(self, recording: Recording) -> None:
-        """Take in one recording; `FlexcalError` where it is double, too short, or of another sample time."""
+        """Add one recording; raises `FlexcalError` if it is a duplicate, too short, or of another sample time."""
         label = recording.label
         assert label is not None
         key = (label.realisation, label.experiment, label.sign)
@@ -114,7 +114,7 @@ class PoseRecords:
 def by_pose(
     plan: MultisinePlan, recordings: Iterable[Recording], keep: Keep, poses: Sequence[int] | None = None
 ) -> Iterator[PoseRecords]:
-    """The records of `poses` (None: all of the plan) in one pass over recordings in any order; each is yielded when complete.
+    """Records of `poses` (None: all of the plan) in one pass over recordings in any order; each is yielded once complete.
 
     Recordings of other poses are passed over. Raises `FlexcalError` for a recording without a label or that does not fit, and where one
     is missing.

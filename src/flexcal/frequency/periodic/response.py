@@ -1,4 +1,4 @@
-"""The frequency response matrix of a robot in one pose, from motor torque to motor acceleration (eqs. (19)-(21))."""
+"""Frequency response matrix of a robot in one pose, from motor torque to motor acceleration (eqs. (19)-(21))."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
@@ -103,14 +103,14 @@ class FrequencyResponse:
 
     @property
     def stacked(self) -> np.ndarray:
-        """(L, n + S, n): `response`, and below it the rows of the sensors where there are any."""
+        """Response with the sensors' rows appended, (L, n + S, n)."""
         if self.sensor_response is None:
             return self.response
         return np.concatenate([self.response, self.sensor_response], axis=1)
 
     @property
     def stacked_covariance(self) -> np.ndarray:
-        """Covariance (L, (n + S) n, (n + S) n) of vec `stacked`."""
+        """Covariance (L, (n + S) n, (n + S) n) of vec(`stacked`)."""
         return self.covariance if self.joint_covariance is None else self.joint_covariance
 
     @property
@@ -124,7 +124,7 @@ class FrequencyResponse:
         return _elements(self.stacked_covariance, self.response.shape[-1])
 
     def at_lines(self, rows: slice) -> "FrequencyResponse":
-        """Frequency response at some of the lines.
+        """Frequency response restricted to some lines.
 
         Parameters
         ----------
@@ -153,7 +153,7 @@ class FrequencyResponse:
 
     @property
     def vec(self) -> np.ndarray:
-        """`response` stacked by columns, (L, n²): the order of the covariances."""
+        """Response (L, n²) vectorised column by column: the order of the covariances."""
         return vec(self.response)
 
     @property
@@ -163,12 +163,12 @@ class FrequencyResponse:
 
     @property
     def noise_std(self) -> np.ndarray:
-        """The part of `std` that the noise alone explains, (L, n, n)."""
+        """Noise part (L, n, n) of `std`."""
         return _elements(self.noise_covariance, self.response.shape[-1])
 
     @property
     def distortion_std(self) -> np.ndarray:
-        """The rest, (L, n, n): stochastic nonlinear distortion G_S of eq. (19); 0 where the noise explains it all."""
+        """Remainder (L, n, n) of `std`: stochastic nonlinear distortion G_S of eq. (19); 0 where the noise explains it all."""
         return np.sqrt(np.maximum(self.std**2 - self.noise_std**2, 0.0))
 
     def log_covariance(self) -> np.ndarray:
@@ -177,7 +177,7 @@ class FrequencyResponse:
         return self.covariance / (vec[:, :, None] * vec[:, None, :].conj())
 
     def save(self, path: str | Path) -> None:
-        """Write everything into one .npz file, atomically.
+        """Write the response to one .npz file, atomically.
 
         Parameters
         ----------
@@ -195,7 +195,7 @@ class FrequencyResponse:
 
     @classmethod
     def load(cls, path: str | Path) -> "FrequencyResponse":
-        """Read what `save` wrote.
+        """Read a response written by `save`.
 
         Parameters
         ----------
@@ -368,7 +368,7 @@ def response_of(
     joint_names: Sequence[str] | None = None,
     pooled_lines: int = POOLED_LINES,
 ) -> FrequencyResponse:
-    """The frequency response from collected spectra; see `frequency_response`."""
+    """Frequency response from collected spectra; see `frequency_response`."""
     plan = records.plan
     joints = axis_names(plan, joint_names)
     members = plan.realisations
@@ -420,7 +420,7 @@ def response_of(
 def sensed(
     sensors: tuple[str, ...], axes: int, stacked: np.ndarray, covariance: np.ndarray
 ) -> dict[str, Any]:
-    """The fields of a response whose rows `stacked` (L, n + S, n), of this `covariance` of their vec, are axes and then sensors."""
+    """Response fields split from `stacked` rows (L, n + S, n), axes then sensors, and the `covariance` of their vec."""
     own = (
         np.arange(axes)[:, None] * stacked.shape[1] + np.arange(axes)
     ).ravel()  # columns, of each the axes' rows
@@ -437,7 +437,7 @@ def _elements(covariance: np.ndarray, axes: int) -> np.ndarray:
 
 
 def axis_names(plan: MultisinePlan, given: Sequence[str] | None) -> tuple[str, ...]:
-    """The names of the excited axes; raises `FlexcalError` where another number of them is given."""
+    """Names of the excited axes; raises `FlexcalError` for a wrong number of them."""
     names = tuple(given) if given is not None else tuple(f"joint_{j + 1}" for j in plan.joints)
     if len(names) != len(plan.joints):
         raise FlexcalError(

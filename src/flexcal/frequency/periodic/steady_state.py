@@ -18,8 +18,8 @@ from flexcal.frequency.periodic.pose_records import PoseRecords
 
 
 def keep_periods(plan: MultisinePlan, recording: Recording) -> tuple[np.ndarray, ...]:
-    """Mean position, and spectra (bins, m + n) of position, sensors and torque after the settle periods: at lines, detection lines, empty
-    bins.
+    """Mean position, and spectra (bins, m + n) of position, sensors and torque after the settle periods: at lines, detection lines,
+    empty bins.
 
     The last only where the noise is not read from the half sum of both signs. Raises `FlexcalError` as `kept_samples` does.
     """
@@ -37,7 +37,7 @@ def keep_periods(plan: MultisinePlan, recording: Recording) -> tuple[np.ndarray,
 
 
 def experiment_spectra(records: PoseRecords, pooled_lines: int) -> ExperimentSpectra:
-    """The spectra of all realisations: signs subtracted, hold corrected, noise pooled over neighbouring bins."""
+    """Spectra of all realisations: signs subtracted, hold corrected, noise pooled over neighbouring bins."""
     plan = records.plan
     m = len(plan.joints) + len(records.sensors)
     lines, empty_lines = np.asarray(plan.lines), noise_lines(plan)
@@ -57,7 +57,7 @@ def experiment_spectra(records: PoseRecords, pooled_lines: int) -> ExperimentSpe
 
 
 def column_factor(records: PoseRecords, lines: np.ndarray) -> np.ndarray:
-    """What makes phasors of position and logged torque those of acceleration and acting torque, (L, m + n); sensors stay as they are."""
+    """Factors (L, m + n) from phasors of position and logged torque to acceleration and applied torque; 1 for sensors."""
     n = len(records.plan.joints)
     omega = 2.0 * np.pi * records.plan.base_frequency_hz * lines
     hold = torque_hold(records.plan, omega, records.time_step)

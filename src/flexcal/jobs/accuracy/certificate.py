@@ -43,12 +43,13 @@ from flexcal.report.results import NOT_GIVEN, MeasurementDetails
 from flexcal.units import MILLIMETRE
 
 _FAR = 0.25
-"""rad or m: a measured pose farther than this from the joint positions of its target belongs to another one."""
+"""Distance, rad or m, above which a measured pose does not belong to the joint positions of a target."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredTargets:
-    """Measured `poses`, their `errors` (N, 3) m from their targets, and `centres` (P, 3) m, those of the barycentres of `numbers` (P,).
+    """Measured `poses`, their `errors` (N, 3) m from their targets, and `centres` (P, 3) m, errors of the barycentres of the targets
+    `numbers` (P,).
 
     `visits` is None where no target was visited twice.
     """
@@ -61,11 +62,11 @@ class MeasuredTargets:
 
     @property
     def accuracy(self) -> ErrorStatistics:
-        """Of the pose accuracy AP over all targets."""
+        """Pose accuracy AP over all targets."""
         return ErrorStatistics.of(self.centres)
 
     def block(self) -> dict[str, Any]:
-        """For the JSON document."""
+        """Block of the JSON document."""
         repeated = None
         if self.visits is not None:
             rp = np.array([pose.repeatability for pose in self.visits]) / MILLIMETRE
@@ -79,7 +80,7 @@ class MeasuredTargets:
 
 @dataclass(frozen=True, eq=False)
 class RobotCertificate:
-    """Before and after at the same targets; `refitted`: after, with instrument and point registered by best fit, as before.
+    """Errors before and after at the same targets; `refitted`: after, with instrument and point registered by best fit, as before.
 
     `before` are the robot's own errors, `declared` and `registered` the others of `UncalibratedRobot`. `verification` and `scale`: the
     measurements after against what the calibration predicts, of a `sample` where there are very many. `command`: the command line.
@@ -101,7 +102,7 @@ class RobotCertificate:
 
     @property
     def rms(self) -> dict[str, float]:
-        """Root mean square distances after compensation, m: measured, and the parts that are known."""
+        """Root mean square distances after compensation, m: measured, and the known contributions."""
         parts = {
             "measured": float(np.sqrt((self.after.errors**2).sum(axis=1).mean())),
             "parameters": float(np.sqrt((self.verification.parameter_rms**2).mean())),
@@ -114,7 +115,7 @@ class RobotCertificate:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """One sentence each."""
+        """Remarks, one sentence each."""
         remarks = list(unmeasured_targets_remark(self.robot, self.after.poses.targets))
         if self.unmatched_targets:
             remarks.append(
@@ -268,7 +269,7 @@ def certify_robot(
 
 
 def _rows(file: Path, poses: PoseSet, targets: Path, desired: ToolTargets) -> np.ndarray:
-    """The row of the targets (N,) that every measured row belongs to."""
+    """Index of the target, out of `targets` (N,), of every measured row."""
     order = np.argsort(desired.pose)
     place = np.searchsorted(desired.pose, poses.pose, sorter=order).clip(max=len(order) - 1)
     rows = order[place]
@@ -312,7 +313,7 @@ def _registered(poses: PoseSet, points: np.ndarray) -> np.ndarray:
 
 
 def _best_fit(nominal: RobotModel, poses: PoseSet, points: np.ndarray) -> np.ndarray:
-    """As `_registered`, with the place of the measured point on the tool found too, where the poses are enough for that."""
+    """As `_registered`, with the measured point on the tool fitted as well if the number of poses allows."""
     if not can_register_with_points(poses):
         return _registered(poses, points)
     turn = points_kinematics(nominal, poses.q, None, poses.target, jacobians=False).orientation
@@ -328,7 +329,7 @@ def _visited(poses: PoseSet, targets: np.ndarray) -> MeasuredTargets:
 
 
 def _measured_noise(visited: MeasuredTargets, covariance: ErrorCovariance) -> ErrorCovariance:
-    """The covariance with the scatter that was seen from visit to visit in place of the predicted one, where there were several visits."""
+    """Covariance with the observed scatter of visits in place of the predicted one, if there were several visits."""
     if visited.visits is None:
         return covariance
     variance = _visit_to_visit(visited.visits) ** 2 / 3
@@ -336,12 +337,12 @@ def _measured_noise(visited: MeasuredTargets, covariance: ErrorCovariance) -> Er
 
 
 def _visit_to_visit(visits: list[PoseRepeatability]) -> float:
-    """Root mean square distance of single visits from where many would centre, m."""
+    """Root mean square distance of single visits from their expected barycentre, m."""
     spread = np.concatenate([pose.deviations for pose in visits])
     return float(np.sqrt((spread**2).sum() / (len(spread) - len(visits))))
 
 
 def _files(robot: list[Path], others: Mapping[str, Path]) -> dict[str, str]:
-    """What each file is, its name and its SHA-256."""
+    """Role, name and SHA-256 of each file."""
     named = {"robot": robot[0], "URDF": robot[1]} | dict(others)
     return {f"{label}: {path.name}": sha256_of(path) for label, path in named.items()}

@@ -14,10 +14,10 @@ from flexcal.model.robot import RobotModel
 from flexcal.units import MILLIMETRE
 
 _WORTH = 0.5
-"""A refit is proposed where it reduces the root mean square error to less than this fraction."""
+"""Fraction of the root mean square error below which a refit must bring it to be proposed."""
 _TENTH = 0.1
 _MUCH = 1e-4
-"""m: mean error below which no refit is proposed."""
+"""Mean error, m, below which no refit is proposed."""
 _CHANGED = {
     ("station",): (
         "after a refit of the station",
@@ -87,7 +87,7 @@ def refit_remarks(
 
 
 def refit_document(refit: RefittedVerification | None, poses: int) -> dict[str, Any] | None:
-    """For results.json."""
+    """Block of results.json on the refit."""
     if refit is None:
         return None
     return {

@@ -54,7 +54,7 @@ class RobotRepeatability:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """One sentence each."""
+        """Remarks, one sentence each."""
         timed = self.poses.time is not None
         remarks = list(ignored_columns_remarks(replace(self.poses, time=None)))
         if timed and not self.drifts:
@@ -195,7 +195,7 @@ def repeat_robot(
 
 
 def _calibrated(robot_file: Path, estimates: Path | None, nominal: RobotModel) -> CalibratedRobot | None:
-    """The calibrated robot; None where none was named and there is none beside robot.yaml."""
+    """Calibrated robot; None if none was named and none lies beside robot.yaml."""
     if estimates is None and not stored_estimates(nominal, None).exists():
         return None
     return CalibratedRobot.from_yaml(robot_file, estimates)

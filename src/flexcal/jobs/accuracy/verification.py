@@ -110,16 +110,16 @@ class Verification(ReportedResult):
 
     @property
     def errors(self) -> ErrorStatistics:
-        """Distances between predicted and measured points, at all poses."""
+        """Distances between predicted and measured points at all poses."""
         return self.everywhere or self.predicted.all
 
     @property
     def headline(self) -> str:
-        """The errors."""
+        """Errors in one line."""
         return str(self.errors)
 
     def summary(self) -> str:
-        """Errors, how large they were predicted to be, remarks and verdict."""
+        """Errors, their predicted size, remarks and verdict."""
         return "\n".join([self.predicted.summary(), *self.remarks, self.trust.sentence])
 
     def write_arrays(self, folder: Path) -> None:
@@ -130,7 +130,7 @@ class Verification(ReportedResult):
 
     @property
     def points(self) -> MeasuredPoints:
-        """The points with the errors before and after."""
+        """Points with the errors before and after."""
         errors = errors_before(self.before) | {CALIBRATED: self.predicted.errors}
         return MeasuredPoints(
             self.poses,
@@ -142,7 +142,7 @@ class Verification(ReportedResult):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """One sentence each."""
+        """Remarks, one sentence each."""
         remarks = [
             *verification_subsample_remark(self.sample, self.everywhere),
             *ignored_columns_remarks(self.poses),
@@ -172,7 +172,7 @@ class Verification(ReportedResult):
 
     @cached_property
     def _numbers(self) -> dict[str, Any]:
-        """Everything but the verdict; `rms_mm` has the root mean square distances.
+        """Document without the verdict; `rms_mm` has the root mean square distances.
 
         `parameters` is what the parameters' covariance predicts, `expected` with instrument, robot and model error on top (null where
         neither instrument nor robot are known), `measured` what was found.
@@ -306,7 +306,7 @@ def verify_robot(
 def verification_poses(
     robot: CalibratedRobot, files: Sequence[Path], *, placed_again: bool = False
 ) -> PoseSet:
-    """Measured points of the `files`, from stations that the calibration found, or any with `placed_again`.
+    """Measured points of the `files`, from stations estimated by the calibration, or any with `placed_again`.
 
     Raises `FlexcalError` where they are not that.
     """

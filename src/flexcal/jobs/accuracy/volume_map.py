@@ -46,14 +46,14 @@ from flexcal.units import MILLIMETRE
 
 _WORST = 5
 _APART = 0.1
-"""Of the extent of all points: worst places are at least so far from each other."""
+"""Least distance between the listed worst places, relative to the extent of all points."""
 _SOURCE_POSES = 200
-"""Poses at which the sources of the error are averaged."""
+"""Number of poses over which the sources of the error are averaged."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AccuracyMap(PlottedResult):
-    """Result of `accuracy_map`: predicted error of the tool over the working volume, and where it comes from.
+    """Result of `accuracy_map`: predicted error of the tool over the working volume, and its sources.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ class AccuracyMap(PlottedResult):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """One sentence each."""
+        """Remarks, one sentence each."""
         remarks = list(self.unmeasured)
         if self.scale is None:
             remarks.append(
@@ -189,7 +189,7 @@ class AccuracyMap(PlottedResult):
 
 
 def error_scale_factor(scale: ErrorScale | None) -> float:
-    """Factor of the map, where errors are larger than chance allows; never less than one."""
+    """Factor by which the map is scaled if observed errors are larger than predicted beyond chance; at least one."""
     return scale.factor if scale is not None and scale.low > 1 else 1.0
 
 
@@ -334,7 +334,7 @@ def map_accuracy(
 
 @dataclass(frozen=True, eq=False)
 class _Check:
-    """Check by verification poses: their errors, those before, their ratio to the prediction, and what was fitted."""
+    """Check by verification poses: errors after and before calibration, ratio to the prediction, and refitted quantities."""
 
     errors: PredictionErrors
     before: UncalibratedErrors
@@ -358,7 +358,7 @@ class _Check:
 
 
 def _worst(predicted: PredictedAccuracy) -> np.ndarray:
-    """Rows of the worst places that are apart from each other, the worst first."""
+    """Rows of the worst places, apart from each other, the worst first."""
     least = _APART * float(np.linalg.norm(np.ptp(predicted.position, axis=0)))
     chosen: list[int] = []
     for k in np.argsort(-predicted.p95, kind="stable"):

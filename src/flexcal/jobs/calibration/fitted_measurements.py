@@ -13,11 +13,11 @@ from flexcal.files.formats import sha256_of
 from flexcal.jobs.inputs import CalibratedRobot
 
 _RESOLUTION = 1e-7
-"""rad or m: measurements that differ by less are one, in whatever file and unit they are."""
+"""Difference, rad or m, below which measurements count as the same, in whatever file and unit they are."""
 
 
 def measurement_digests(poses: PoseSet) -> tuple[str, ...]:
-    """Eight hexadecimal digits for every measurement, of its joint positions and its point."""
+    """Digest of eight hexadecimal digits for every measurement, from its joint positions and its point."""
     return tuple(_digests(poses))
 
 
@@ -33,7 +33,7 @@ def fitted_files(calibrated: CalibratedRobot, files: Sequence[Path]) -> tuple[st
 
 
 def fitted_points(calibrated: CalibratedRobot, poses: PoseSet) -> tuple[str, ...]:
-    """How many of the `poses` the calibration was fitted to, in words; empty for none."""
+    """Number of `poses` that the calibration was fitted to, in words; empty for none."""
     fitted = set(calibrated.blocks["calibration"].measurements)
     again = sum(digest in fitted for digest in _digests(poses))
     return (f"{again} of these {len(poses)} points",) if again else ()

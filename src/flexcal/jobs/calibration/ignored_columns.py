@@ -6,7 +6,7 @@ from flexcal.data.poses import PoseSet
 
 
 def ignored_columns_remarks(poses: PoseSet) -> tuple[str, ...]:
-    """One sentence a quantity that is there and has no effect."""
+    """Remarks on quantities that are present without effect, one sentence each."""
     remarks = []
     if poses.torque is not None:
         remarks.append(

@@ -10,7 +10,7 @@ from flexcal.model.robot import RobotModel
 _BEYOND = 0.1
 """Share of a calibrated joint range by which a pose may lie outside it."""
 _FEW = 0.05
-"""Share of the poses outside that is not worth a word."""
+"""Share of poses outside below which no remark is made."""
 
 
 def joint_extents(model: RobotModel, q: np.ndarray) -> dict[str, tuple[float, float]]:
@@ -20,7 +20,7 @@ def joint_extents(model: RobotModel, q: np.ndarray) -> dict[str, tuple[float, fl
 
 
 def outside_ranges(calibrated: CalibratedRobot, q: np.ndarray) -> str:
-    """One sentence where poses `q` (N, n) lie outside the joint ranges that the calibration was measured in; empty where hardly any do."""
+    """Remark on poses `q` (N, n) outside the joint ranges of the calibration; empty if there are hardly any."""
     ranges, model = calibrated.blocks["calibration"].ranges, calibrated.model
     known = [name for name in model.joint_names if name in ranges]
     if not known:

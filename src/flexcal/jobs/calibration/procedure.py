@@ -179,7 +179,7 @@ def _with_random_waves(terms: Sequence[str]) -> tuple[str, ...]:
 
 
 def _terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str, ...] | None:
-    """The terms to fit, None for those that cross-validation supports."""
+    """Terms to fit; None for those that cross-validation supports."""
     declared = model.config.geometry.terms
     asked = tuple(given) if given else ((declared,) if isinstance(declared, str) else declared)
     if asked == (AUTO,):

@@ -19,7 +19,7 @@ _LOOK = (
 )
 
 _OVERSTATED, _UNDERSTATED = 0.5, 2.0
-"""Estimated noise over the stated sigma, below and above which a remark is made."""
+"""Ratio of estimated noise to the stated sigma, below and above which a remark is made."""
 
 _SHOWN = 3
 _LISTED = 20
@@ -27,7 +27,7 @@ _LISTED = 20
 
 @dataclass(frozen=True)
 class Outlier:
-    """A measurement with a small weight in the robust loss: number of its pose, point, distance from the fit (m)."""
+    """Measurement with a small weight in the robust loss: number of its pose, point, distance from the fit (m)."""
 
     pose: int
     target: str
@@ -35,14 +35,14 @@ class Outlier:
 
 
 def outliers_of(fit: GeometricFit) -> tuple[Outlier, ...]:
-    """The outliers of a fit, the farthest first."""
+    """Outliers of a fit, the farthest first."""
     distance = np.linalg.norm(fit.residuals, axis=1)
     rows = sorted(fit.estimate.outliers, key=lambda row: -distance[row])
     return tuple(Outlier(int(fit.poses.pose[i]), str(fit.poses.target[i]), float(distance[i])) for i in rows)
 
 
 def calibration_remarks(fit: GeometricFit, cause: Sequence[str] = ()) -> tuple[str, ...]:
-    """One sentence each, the most important last; a known `cause` of a bad fit precedes its consequences."""
+    """Remarks on a calibration, the most important last; a known `cause` of a bad fit precedes its consequences."""
     remarks = [*ignored_columns_remarks(fit.poses), *_nominal_springs(fit)]
     if fit.ambiguous.any():
         remarks.append(f"the flank of a backlash is uncertain at {fit.ambiguous.sum()} poses")
@@ -88,7 +88,7 @@ def _nominal_springs(fit: GeometricFit) -> Sequence[str]:
 
 
 def _undetermined(fit: GeometricFit) -> Sequence[str]:
-    """Parameters that the poses do not determine, one sentence per cause."""
+    """Remarks on parameters that the poses do not determine, one sentence per cause."""
     causes: dict[str, list[str]] = {}
     for item in fit.undetermined:
         causes.setdefault(item.cause, []).append(item.name)

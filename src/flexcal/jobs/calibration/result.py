@@ -60,7 +60,7 @@ from flexcal.units import MILLIMETRE
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(Identification):
-    """Result of `calibrate`: the calibrated robot, its errors before and after, and what the points tell about it.
+    """Result of `calibrate`: the calibrated robot, its errors before and after, and its uncertainty.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ class Calibration(Identification):
 
     @property
     def robot(self) -> CalibratedRobot:
-        """The calibrated robot beside the nominal one, as `verify`, `predict`, `compensate` and `accuracy_map` take it."""
+        """Calibrated robot with the nominal one, as `verify`, `predict`, `compensate` and `accuracy_map` take it."""
         return CalibratedRobot(self.nominal, self.model, {self.block: self.estimate})
 
     @property
@@ -125,7 +125,7 @@ class Calibration(Identification):
 
     @property
     def headline(self) -> str:
-        """The errors at the poses of the fit."""
+        """Errors at the poses of the fit."""
         return str(self.errors)
 
     def summary(self) -> str:
@@ -142,7 +142,7 @@ class Calibration(Identification):
 
     @property
     def points(self) -> MeasuredPoints:
-        """The points of the fit with the errors of every model, the rigid one where it is not the selected."""
+        """Points of the fit with the errors of every model; includes the rigid model if it is not the selected one."""
         fit = self.selected
         errors = errors_before(self.before) | {RIGID: self.rigid.residuals, CALIBRATED: fit.residuals}
         if self.rigid is fit:
@@ -155,12 +155,12 @@ class Calibration(Identification):
         return Trust(calibration_checks(json_values(self._numbers), self.estimate, self.points))
 
     def document(self) -> dict[str, Any]:
-        """The content of results.json; `identifiability` is that of kinematics and backlash, within it `selected` of all terms."""
+        """Content of results.json; `identifiability` is that of kinematics and backlash, within it `selected` of all terms."""
         return {**header("calibration"), **self._numbers, "verdict": self.trust.document()}
 
     @cached_property
     def found_points(self) -> dict[str, dict[str, Any]]:
-        """Measured points: frame, and position in it, m, as declared and as calibrated, with the 1σ distance of the latter."""
+        """Measured points: frame, and position in it, m, declared and calibrated, with the 1σ distance of the latter."""
         fit = self.selected
         targets = fit.poses.targets
         robot = probable_robot(fit.model, targets)

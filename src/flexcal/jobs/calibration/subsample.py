@@ -1,4 +1,4 @@
-"""Remarks on a calibration of which a sample of the points was fitted."""
+"""Remarks on a calibration fitted to a sample of the points."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from flexcal.units import MILLIMETRE
 def subsample_document(
     sample: StratifiedSample | None, everywhere: ErrorStatistics | None
 ) -> dict[str, Any] | None:
-    """The block `sample` of results.json; null where every point was taken."""
+    """Block `sample` of results.json; null if every point was taken."""
     if sample is None or everywhere is None:
         return None
     return {"points": sample.total, "taken": len(sample.rows), "all": everywhere.in_millimetres()}
@@ -21,7 +21,7 @@ def subsample_document(
 def calibration_subsample_remark(
     sample: StratifiedSample | None, everywhere: ErrorStatistics | None
 ) -> list[str]:
-    """One sentence of a calibration."""
+    """Remark of a calibration on its sample of points."""
     if sample is None or everywhere is None:
         return []
     return [
@@ -33,7 +33,7 @@ def calibration_subsample_remark(
 def verification_subsample_remark(
     sample: StratifiedSample | None, everywhere: ErrorStatistics | None
 ) -> list[str]:
-    """One sentence of a verification."""
+    """Remark of a verification on the calibration's sample of points."""
     if sample is None or everywhere is None:
         return []
     return [

@@ -23,7 +23,7 @@ from flexcal.progress import Progress, silent
 from flexcal.units import MILLIMETRE
 
 _FAR = 0.25
-"""Of the reach: points that are farther than this from the joint positions beside them do not belong to them."""
+"""Distance, relative to the reach, above which points do not belong to the joint positions beside them."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -57,7 +57,7 @@ class Compensation(Result):
 
     @property
     def headline(self) -> str:
-        """How many targets have a command, and how far the tool would be off without."""
+        """Number of targets with a command, and the tool's error without compensation."""
         before = self.commands.before[self.commands.reached] / MILLIMETRE
         return (
             f"commands for {int(self.commands.reached.sum())} of {len(self.targets)} targets, errors with nominal commands: "
@@ -65,14 +65,14 @@ class Compensation(Result):
         )
 
     def summary(self) -> str:
-        """How many targets have a command, and the reasons of the others."""
+        """Number of targets with a command, and the reasons for the others."""
         return "\n".join(
             [self.headline, *(f"pose {item['pose']}: {item['reason']}" for item in self.refused)]
         )
 
     @property
     def refused(self) -> list[dict[str, Any]]:
-        """Number of the pose, line or row of the file, and reason of every target without a command."""
+        """Number of the pose, line or row of the file, and reason, of every target without a command."""
         return [
             {
                 "pose": int(self.targets.pose[k]),
@@ -84,7 +84,7 @@ class Compensation(Result):
 
     @property
     def points(self) -> dict[str, dict[str, Any]]:
-        """The points that are brought to the targets: frame, and place in it (m) as declared and, where measured, as found."""
+        """Points that are brought to the targets: frame, and position in it (m), declared or, if measured, calibrated."""
         named = dict.fromkeys(self.targets.target.tolist())
         return {
             name: {
@@ -103,7 +103,7 @@ class Compensation(Result):
         return {name: std for name, std in every.items() if std > KNOWN_POINT_STD}
 
     def document(self) -> dict[str, Any]:
-        """The JSON document; `error_before_mm` is how far the real tool would be off with the nominal commands."""
+        """JSON document; `error_before_mm` is the error of the real tool with the nominal commands."""
         commands, reached = self.commands, self.commands.reached
         before = commands.before[reached] / MILLIMETRE
         change = np.abs(commands.q - commands.nominal)[reached].max(axis=0)
@@ -245,7 +245,7 @@ def compensate_robot(
 
 
 def _check_frame(nominal: RobotModel, targets: ToolTargets) -> None:
-    """Raise `FlexcalError` where points said to be in the base frame are far from where the joint positions beside them put the tool."""
+    """Raise `FlexcalError` for base-frame points far from the tool at the joint positions beside them."""
     if targets.q is None or targets.position is None or targets.station is not None:
         return
     at = points_kinematics(nominal, targets.q, None, targets.target, jacobians=False).position

@@ -26,7 +26,7 @@ from flexcal.model.robot import RobotModel, with_blocks
 
 @dataclass(frozen=True, eq=False)
 class Exportable:
-    """The `nominal` robot and the calibrated `model`; `unseen` has only that in its posterior which the `measured` points leave open."""
+    """The `nominal` robot and the calibrated `model`; the posterior of `unseen` has only what the `measured` points leave undetermined."""
 
     nominal: RobotModel
     model: RobotModel
@@ -35,7 +35,7 @@ class Exportable:
 
     @property
     def undetermined(self) -> tuple[int, ...]:
-        """Joints whose zeros the measured points do not tell; before an instrument with a frame of its own the base is anywhere."""
+        """Joints whose zero positions the measured points do not determine; with an instrument's own frame the base is free."""
         if not self.measured:
             return ()
         registered = bool(self.model.stations.pose[:, 3:].any())
@@ -43,12 +43,12 @@ class Exportable:
 
 
 Render = Callable[[Exportable], RenderedModel]
-"""A robot to the text of a file."""
+"""Function from a robot to the text of a file."""
 
 
 @dataclass(frozen=True)
 class ExportedRobot:
-    """Exported file; `calibrated` is False where there is no calibration: the joints are then those of the nominal robot."""
+    """Exported file; `calibrated` is False without a calibration: the joints are then those of the nominal robot."""
 
     export: ExportedFile
     calibrated: bool

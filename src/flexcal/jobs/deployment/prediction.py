@@ -18,12 +18,12 @@ from flexcal.model.statics import carried_mass, certain_flank, points_kinematics
 from flexcal.progress import Progress, silent
 
 _BLOCK = 20_000
-"""Commands whose tool poses are computed together."""
+"""Number of commands whose tool poses are computed together."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Prediction(Result):
-    """Result of `predict`: where the real tool is.
+    """Result of `predict`: poses of the real tool.
 
     Attributes
     ----------
@@ -127,7 +127,7 @@ def predict_robot(
 def _predicted(
     model: RobotModel, nominal: RobotModel, commands: ToolTargets
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Positions (N, 3), orientations (N, 3, 3), how far these positions are from the nominal robot's (N, 3), and sure flanks (N,)."""
+    """Positions (N, 3), orientations (N, 3, 3), deviations from the nominal positions (N, 3), and mask of certain flanks (N,)."""
     assert commands.q is not None
     at = tool_at_rest(model, commands.q, commands.payload, commands.target)
     there = points_kinematics(nominal, commands.q, None, commands.target, jacobians=False).position

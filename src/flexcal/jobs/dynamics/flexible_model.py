@@ -14,15 +14,15 @@ from flexcal.errors import InputError
 from flexcal.model.robot import RobotModel
 
 _LARGEST_TILT = 0.1
-"""rad"""
+"""Largest tilt of a bearing, rad."""
 _KNOWING: tuple[EstimatorName, ...] = ("wls", "ols", "sdp", "irls")
-"""Estimators that take any equations, those of motors too; the others are of rigid robots."""
+"""Estimators that accept any equations, those of motors included; the others are for rigid robots."""
 
 
 def require_flexible_drives(
     model: RobotModel, logs: Sequence[Path], estimator: EstimatorName
 ) -> tuple[DriveSpring, ...]:
-    """The drives of the elastic joints.
+    """Drives of the elastic joints.
 
     Raises `InputError` for an `estimator` of rigid robots, for a robot without elastic joints, for a coupling of an elastic joint with a
     rigid one or with backlash, and for a log that lacks the arm side.
@@ -66,7 +66,7 @@ def require_flexible_drives(
 
 
 def require_flexible_bearings(model: RobotModel, logs: Sequence[Path]) -> tuple[BearingSpring, ...]:
-    """The bearings' springs, where the logs have the tilts; none where they have not.
+    """Bearing springs if the logs have the tilts; none otherwise.
 
     Raises `InputError` for tilts in some logs alone, about one axis alone, of no bearings, beside a force sensor, or larger than bearings
     tilt.

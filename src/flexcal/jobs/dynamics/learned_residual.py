@@ -42,7 +42,7 @@ class LearnedDynamics:
         estimate: Estimate,
         progress: Progress,
     ) -> LearnedDynamics:
-        """Learned from `recorded` alone, of which `systems` are the equations; raises `FlexcalError` as `learn_residual` does."""
+        """Residual learned from `recorded` alone, with the equations `systems`; raises `FlexcalError` as `learn_residual` does."""
         learned, blocks = learn_residual(recorded, systems, estimate, progress)
         values = estimate.parameters.coordinates()
         held_out = None if unseen is None else residual_errors(learned, unseen, values)
@@ -50,20 +50,20 @@ class LearnedDynamics:
 
     @staticmethod
     def require_place(estimates: Path) -> None:
-        """Raise `InputError` where another program's file stands where it would be written, beside the file `estimates`."""
+        """Raise `InputError` if another program's file stands at the output path, beside the file `estimates`."""
         require_residual_path(estimates.with_name(LEARNED))
 
     def file(self, estimates: Path) -> Path | None:
-        """Where it is written: beside the file `estimates`, and nowhere where nothing was learned."""
+        """Output path beside the file `estimates`; None if nothing was learned."""
         return estimates.with_name(LEARNED) if self.learned.learned else None
 
     def store(self, estimates: Path) -> None:
-        """Write it, for the block `dynamics` of the file `estimates`."""
+        """Write the learned residual, for the block `dynamics` of the file `estimates`."""
         if file := self.file(estimates):
             write_learned_residual(file, self.learned, estimates)
 
     def document(self, estimates: Path) -> dict[str, Any]:
-        """Its part of results.json."""
+        """Block of results.json."""
         errors = self.blocks
         motors = zip(self.learned.motors, errors.measured, errors.physical, errors.together, strict=True)
         return {
@@ -85,7 +85,7 @@ class LearnedDynamics:
         }
 
     def _per_joint(self) -> dict[str, dict[str, Any]]:
-        """Of the held-out part where there is one."""
+        """Errors per joint, of the held-out part if there is one."""
         shown = self.train if self.held_out is None else self.held_out
         rows = zip(shown.measured, shown.physical, shown.together, shown.inside, strict=True)
         return {

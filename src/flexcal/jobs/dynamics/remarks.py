@@ -12,11 +12,11 @@ from flexcal.estimation import Estimate
 from flexcal.model.parts import LINK_PARAMETERS
 
 _CLEAR = 5.0
-"""Standard deviations from zero, at least, of a stiffness that is worth a sentence."""
+"""Least distance of a stiffness from zero, in standard deviations, for a remark."""
 
 
 def undeclared_spring_remarks(data: RegressionData, estimate: Estimate) -> Iterator[str]:
-    """A sentence for every joint whose identified `cable_stiffness` is clearly not zero: stiffness, rest and what to declare."""
+    """Remark for every joint whose identified `cable_stiffness` is clearly not zero: stiffness, rest and what to declare."""
     model = data.observation.model
     known = {entry.joint: entry.stiffness for entry in model.config.dynamics.joint_springs}
     for joint in model.joints:
@@ -50,7 +50,7 @@ _LARGEST_ATTENUATION = 0.5
 
 
 def dynamics_remarks(data: RegressionData, estimate: Estimate) -> tuple[str, ...]:
-    """One sentence each; every parameter of a drive that a declared term brings and the data do not determine is named."""
+    """Remarks on identified dynamics; names every drive parameter of a declared term that the data do not determine."""
     base = data.base.identifiability
     structural = {base.names[i] for i in base.kept}
     absorbed = {entry.name: entry.absorbed_by for entry in estimate.dropped}
@@ -72,7 +72,7 @@ def dynamics_remarks(data: RegressionData, estimate: Estimate) -> tuple[str, ...
 
 
 def dynamics_notes(data: RegressionData, estimate: Estimate, estimator: EstimatorName) -> tuple[str, ...]:
-    """One sentence each: an assumed controller, springs that robot.yaml does not declare, a stiffness that noise may have reduced."""
+    """Notes: an assumed controller, springs that robot.yaml does not declare, a stiffness that noise may have reduced."""
     notes = []
     if estimator in ("iv", "didim") and data.observation.model.controller is None:
         notes.append(
@@ -82,7 +82,7 @@ def dynamics_notes(data: RegressionData, estimate: Estimate, estimator: Estimato
 
 
 def selection_remark(friction: FrictionSelection, estimate: Estimate) -> str | None:
-    """What other friction terms that predict as well do to the standard deviations; None without such."""
+    """Effect of other friction terms of equal predictive power on the standard deviations; None if there are none."""
     if friction.uncertainty is None:
         return None
     growth = friction.uncertainty.growth(estimate)

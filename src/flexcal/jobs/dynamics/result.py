@@ -40,7 +40,7 @@ from flexcal.report.pages import dynamics_checks
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DynamicsIdentification(TorqueIdentification):
-    """Result of `identify_dynamics`: the estimate, and how well it predicts torques inside and outside the fit.
+    """Result of `identify_dynamics`: the estimate, and its torque prediction errors inside and outside the fit.
 
     Attributes
     ----------
@@ -164,14 +164,14 @@ class DynamicsIdentification(TorqueIdentification):
         )
 
     def write_arrays(self, folder: Path) -> None:
-        """Leave predictions.npz in a folder, and learned_residual.npz where something was learned."""
+        """Leave predictions.npz in a folder, and learned_residual.npz if a residual was learned."""
         super().write_arrays(folder)
         if self.learned is not None:
             self.learned.store(folder / ESTIMATES)
 
     @property
     def bodiless(self) -> tuple[str, ...]:
-        """Links whose identified inertials are not physically consistent: right for torques, useless for springs and for a URDF."""
+        """Links whose identified inertials are not physically consistent: valid for torques, not for springs or a URDF."""
         links = (joint.link for joint in self.train.observation.model.joints)
         return tuple(link for link in links if not is_physically_consistent(self.estimate.values, link))
 
@@ -238,7 +238,7 @@ class DynamicsIdentification(TorqueIdentification):
         }
 
     def _essential_parameters(self) -> dict[str, Any]:
-        """What stays of the base parameters, with value and standard deviation, and the error of the torques with it alone."""
+        """Essential base parameters with value and standard deviation, and the torque error with these alone."""
         essential = self.essential
         percent = {"train": 100 * self.train.errors(essential.parameters)[0], "held_out": None}
         if self.held_out is not None:
@@ -251,7 +251,7 @@ class DynamicsIdentification(TorqueIdentification):
         }
 
     def _base_parameters(self) -> list[dict[str, Any]]:
-        """Value, standard deviation and that in per cent of every base parameter, written out; None where the data do not tell.
+        """Value, absolute and relative (%) standard deviation of every base parameter; None for those that the data do not determine.
 
         `kept` is the parameter that it is counted as; `essential` its value where the others are left out, None where it is left out
         itself.

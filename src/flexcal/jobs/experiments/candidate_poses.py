@@ -23,12 +23,12 @@ from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress
 
 MOST_GIVEN = 20_000
-"""Poses of a file that are considered; more are drawn from."""
+"""Largest number of poses of a file that are considered; of more, a random subset."""
 
 
 @dataclass(frozen=True, eq=False)
 class PoseRequest:
-    """Which poses `design_poses` and `design_next_poses` choose.
+    """Requested poses of `design_poses` and `design_next_poses`.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class PoseRequest:
     seed: int = 0
 
     def volume(self, checker: CollisionChecker) -> WorkingVolume | None:
-        """Where the robot will work; None for anywhere. Raises `FlexcalError` for a box that it does not reach."""
+        """Working volume of the robot; None for anywhere. Raises `FlexcalError` for a box that it does not reach."""
         if isinstance(self.working, WorkingVolume):
             return self.working
         box, declared = self.working, checker.model.config.working_volume
@@ -76,7 +76,7 @@ DEFAULT_REQUEST = PoseRequest()
 
 @dataclass(frozen=True, eq=False)
 class CandidatePoses:
-    """The `candidates`, the given `pool` that they come from, if any, and where the robot will work (None: anywhere)."""
+    """Candidate poses: the `candidates`, the `pool` they come from, if any, and the working volume (None: anywhere)."""
 
     checker: CollisionChecker
     candidates: PoseCandidates
@@ -91,7 +91,7 @@ class CandidatePoses:
         rng: np.random.Generator,
         progress: Progress,
     ) -> CandidatePoses:
-        """As many as are to be chosen or more; raises `FlexcalError` as `pose_candidates` and `working_box` do."""
+        """Candidates, at least as many as requested; raises `FlexcalError` as `pose_candidates` and `working_box` do."""
         checker, given = CollisionChecker(model), request.candidates
         place = request.volume(checker)
         candidates = pose_candidates(
@@ -109,19 +109,20 @@ class CandidatePoses:
 
 @dataclass(frozen=True)
 class PoseRequestFiles:
-    """Files of a `PoseRequest`: a `pool` of poses to choose from, and `working`, a box "x:X,y:Y,z:Z" (m, base frame) or a file of points or
-    poses where the robot will work."""
+    """Files of a `PoseRequest`: a `pool` of poses to choose from, and the `working` volume, a box "x:X,y:Y,z:Z" (m, base frame) or a
+    file of points or poses.
+    """
 
     pool: Path | None = None
     working: str | None = None
 
     @property
     def paths(self) -> tuple[Path, ...]:
-        """Those that are files."""
+        """Options that are paths of files."""
         return tuple(file for file in (self.pool, working_file(self.working)) if file is not None)
 
     def read(self, model: RobotModel, request: PoseRequest) -> PoseRequest:
-        """The request with what the files hold; raises `FlexcalError` as `read_pose_pool`, `read_working` and `working_box` do."""
+        """Request with the contents of the files; raises `FlexcalError` as `read_pose_pool`, `read_working` and `working_box` do."""
         if self.working is not None:
             place = working_volume(CollisionChecker(model), self.working, request.seed)
             request = replace(request, working=place)
@@ -131,12 +132,12 @@ class PoseRequestFiles:
 
 
 def working_file(given: str | None) -> Path | None:
-    """The file that says where the robot will work; None where a box does, or robot.yaml."""
+    """File that defines the working volume; None if a box or robot.yaml does."""
     return None if given is None or ":" in given else Path(given)
 
 
 def working_volume(checker: CollisionChecker, given: str, seed: int) -> WorkingVolume:
-    """Where the robot will work: a box "x:X,y:Y,z:Z" (m, base frame), else a file for `read_working`.
+    """Working volume of the robot: a box "x:X,y:Y,z:Z" (m, base frame), else a file for `read_working`.
 
     Raises `FlexcalError` for a box that is none, and what the robot does not reach.
     """

@@ -45,7 +45,7 @@ from flexcal.report.pages import FrequencyDesignStudy, frequency_page
 
 @dataclass(frozen=True, eq=False)
 class FrequencyRequest:
-    """Which frequency experiments `design_frequency` plans.
+    """Requested frequency experiments of `design_frequency`.
 
     Parameters
     ----------
@@ -135,12 +135,12 @@ class DesignedFrequency(PlottedResult):
 
     @property
     def plan(self) -> MultisinePlan:
-        """What is written."""
+        """Plan to be written."""
         return self.planned.plan
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """Names of the sensors on the arm that the prediction counts on."""
+        """Names of the arm-side sensors assumed in the prediction."""
         named = (name.split(".")[1] for name in self.planned.parameters.names if name.startswith("sensor."))
         return tuple(dict.fromkeys(named))
 
@@ -288,7 +288,7 @@ def plan_frequency_experiments(
 
 
 def _require_all(model: RobotModel, request: FrequencyRequest, file: Path | None = None) -> None:
-    """Raise `InputError` that names everything that a plan needs and is not there, not one thing after another."""
+    """Raise one `InputError` that names all missing requirements of a plan."""
     missing = []
     if not model.driven:
         missing.append("declares no elastic joint: add `elastic:`")

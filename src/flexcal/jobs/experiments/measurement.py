@@ -24,8 +24,9 @@ VIRTUAL = "virtual"
 
 @dataclass(frozen=True)
 class Measurement:
-    """What lies in `folder`: joint logs of an experiment, or measured poses, by a plan of this kind and name, `loaded` where it holds the
-    payload."""
+    """Measurements in `folder`: joint logs of an experiment, or measured poses, by a plan of this kind and name; `loaded` if with
+    payload.
+    """
 
     folder: Path
     kind: str
@@ -47,7 +48,7 @@ class Measurement:
 
     @property
     def for_verification(self) -> bool:
-        """Whether these are random poses, which a calibration should not see."""
+        """Whether the poses are random ones, reserved for verification."""
         return self.plan == VERIFICATION
 
 

@@ -32,7 +32,7 @@ from flexcal.units import MILLIMETRE
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DesignedNextPoses(PlottedResult):
-    """Result of `design_next_poses`: the next poses to measure, best first, and when to stop.
+    """Result of `design_next_poses`: the next poses to measure, best first, and a stopping rule.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class DesignedNextPoses(PlottedResult):
         return plan_page(self.model, self.plan, self.document(), self.working)
 
     def document(self) -> dict[str, Any]:
-        """The JSON document; `stop_after` counts the next poses, and is null where those asked for do not suffice."""
+        """The JSON document; `stop_after` counts the next poses, and is null if the requested ones do not suffice."""
         poses, design = self.poses, self.poses.design
         return (
             {
@@ -115,7 +115,7 @@ def design_next_poses(
     *,
     progress: Progress = silent,
 ) -> DesignedNextPoses:
-    """Choose the next poses to measure, best first, and say when to stop.
+    """Choose the next poses to measure, best first, with a stopping rule.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ def plan_next_poses(
     command: str = "",
     progress: Progress = silent,
 ) -> DesignedNextPoses:
-    """`design_next_poses` for the robot of a robot.yaml after the files of `measured` ones; the plan goes to `out`, if there is one.
+    """`design_next_poses` for the robot of a robot.yaml after the files `measured`; the plan goes to `out`, if given.
 
     Raises `FlexcalError` as `design_next_poses`, `read_poses` and reading the `files` do.
     """

@@ -29,17 +29,17 @@ from flexcal.progress import Progress, silent
 from flexcal.virtual_cell import CellConfig, encoder_resolution
 
 PlanName = Literal["default", "paper", "designed", "quick"]
-"""All plans that there are; poses and amplitudes of the last two are chosen for the robot."""
+"""Names of the plans; poses and amplitudes of the last two are optimised for the robot."""
 
 POSES = 6
 CANDIDATES = 300
 SCHEDULES = {"designed": Schedule(0.2, 3, 1, 4), "quick": Schedule(0.3125, 3, 1, 3)}
-"""360 and 173 s a pose with three axes."""
+"""Schedules of 360 and 173 s per pose with three axes."""
 
 
 @dataclass(frozen=True, eq=False)
 class OptimisedExcitation:
-    """Planned experiments, the same with equal amplitudes, and the choice of poses behind both."""
+    """Optimised experiments, the same with equal amplitudes, and the pose selection of both."""
 
     planned: PlannedResponses
     flat: PlannedResponses
@@ -55,7 +55,7 @@ def optimise_excitation(
     sensors: ResponseSensors = COMMON_SENSORS,
     progress: Progress = silent,
 ) -> OptimisedExcitation:
-    """Choose `count` poses for the flat `plan`, whose own do not count, and the amplitudes in them, for a robot as it is known.
+    """Choose `count` poses for the flat `plan`, whose own are ignored, and the amplitudes in them, for the present robot model.
 
     Raises `FlexcalError` as `choose_frequency_poses` does.
     """
@@ -74,7 +74,7 @@ def optimise_excitation(
 def plan_without_poses(
     model: RobotModel, kind: str, *, detection_lines: bool = False, seed: int
 ) -> MultisinePlan:
-    """The flat plan `designed` or `quick`, in no pose that counts; payload as declared and reference motion as in the plan `default`."""
+    """Flat plan `designed` or `quick` without valid poses; payload as declared and reference motion as in the plan `default`."""
     plan = flat_multisine(
         model,
         np.zeros((1, model.n)),
@@ -88,13 +88,13 @@ def plan_without_poses(
 
 
 def declared_sensors(robot_file: Path) -> Path | None:
-    """cell.yaml beside robot.yaml, where there is one."""
+    """Path of cell.yaml beside robot.yaml, if it exists."""
     file = robot_file.parent / "cell.yaml"
     return file if file.is_file() else None
 
 
 def response_sensors(robot_file: Path) -> ResponseSensors:
-    """The sensors that cell.yaml beside robot.yaml declares, common ones where there is none."""
+    """Sensors that cell.yaml beside robot.yaml declares; typical ones without it."""
     file = declared_sensors(robot_file)
     if file is None:
         return COMMON_SENSORS

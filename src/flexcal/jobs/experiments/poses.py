@@ -45,7 +45,7 @@ VERIFICATION = "verification"
 
 @dataclass(frozen=True, eq=False)
 class RandomPoses:
-    """A plan of random poses for a verification, its file, the seed they were drawn with, and what it comes from."""
+    """Plan of random poses for a verification, with its file, random seed and provenance."""
 
     plan: PosePlan
     file: Path
@@ -64,7 +64,7 @@ class RandomPoses:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DesignedPoses(PlottedResult):
-    """Result of `design_poses`: a plan of calibration poses, with the reasons for the choice and the order of measuring.
+    """Result of `design_poses`: a plan of calibration poses, with the criteria of the selection and the order of measurement.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ class DesignedPoses(PlottedResult):
         return f"{len(self.plan)} poses, predicted tool error {self.design.tool_error / MILLIMETRE:.4f} mm from tracker noise alone"
 
     def summary(self) -> str:
-        """Predicted tool error, rank, and from how many poses on more only average noise."""
+        """Predicted tool error, rank, and the number of poses beyond which more only average noise."""
         seen = self.design.identifiability
         return "\n".join(
             [
@@ -120,7 +120,7 @@ class DesignedPoses(PlottedResult):
         return plan_page(self.model, self.plan, self.document(), self.working)
 
     def document(self) -> dict[str, Any]:
-        """The JSON document; `chosen` are the poses' numbers in the file they come from; those left out there stand beside, with why.
+        """JSON document; `chosen` are the poses' numbers in their file; poses left out there are listed with the reason.
 
         Moves in `blocked_moves` are pairs of poses of the plan, counted from 1.
         """
@@ -154,7 +154,7 @@ class DesignedPoses(PlottedResult):
 
 
 def pool_block(design: PoseDesign, pool: PosePool | None, seed: int) -> dict[str, Any]:
-    """Which poses of a given pool were chosen, and which could not be; without one, the seed of the random poses."""
+    """Selected poses of a pool, and those that were excluded; without a pool, the seed of the random poses."""
     if pool is None:
         return {"seed": seed}
     left_out = np.setdiff1d(pool.pose, design.candidates.pose)
@@ -169,7 +169,7 @@ def pool_block(design: PoseDesign, pool: PosePool | None, seed: int) -> dict[str
 
 
 def flank_block(design: PoseDesign) -> dict[str, dict[str, int]]:
-    """How many poses press each backlash onto which flank."""
+    """Number of poses on each flank of every backlash."""
     return {
         joint: {"positive": int(np.sum(side > 0)), "negative": int(np.sum(side < 0))}
         for joint, side in zip(design.flank_joints, design.flank.T, strict=True)
@@ -177,7 +177,7 @@ def flank_block(design: PoseDesign) -> dict[str, dict[str, int]]:
 
 
 def working_block(working: WorkingVolume | None) -> dict[str, Any] | None:
-    """Where the tool error counts; None for anywhere."""
+    """Working volume for which the tool error counts; None for anywhere."""
     if working is None:
         return None
     return {"poses": len(working.q), "reached_share": working.reached, "box_m": working.box}
@@ -186,7 +186,7 @@ def working_block(working: WorkingVolume | None) -> dict[str, Any] | None:
 def design_poses(
     model: RobotModel, request: PoseRequest = DEFAULT_REQUEST, *, progress: Progress = silent
 ) -> DesignedPoses:
-    """Choose calibration poses for a robot as it is known, in an order of short moves (Neubauer et al. 2015, section 5.2).
+    """Choose calibration poses for the present robot model, in an order of short moves (Neubauer et al. 2015, section 5.2).
 
     Parameters
     ----------
@@ -263,7 +263,7 @@ def plan_calibration_poses(
 def plan_verification_poses(
     robot_file: Path, out: Path, count: int, *, payload: float | None = None, seed: int = 0, command: str = ""
 ) -> RandomPoses:
-    """Draw `count` random poses over the whole workspace, for a verification, and write the plan to `out`, and its page beside it."""
+    """Draw `count` random verification poses over the whole workspace, and write the plan to `out` with its page beside it."""
     model = RobotModel.from_yaml(robot_file)
     setup = MeasuringSetup.declared(model, payload)
     plan = random_poses(model, count, np.random.default_rng([seed, 4]), setup)
@@ -277,7 +277,7 @@ def plan_verification_poses(
 def plan_page(
     model: RobotModel, plan: PosePlan, document: dict[str, Any], working: WorkingVolume | None
 ) -> Page:
-    """The page of a plan of poses."""
+    """Report page of a plan of poses."""
     study = PoseStudy(model, plan.q, document)
     if working is not None:
         study = replace(study, working=working.points, box=working.box)

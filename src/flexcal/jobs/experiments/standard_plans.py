@@ -18,7 +18,7 @@ from flexcal.units import DEGREE
 REFERENCE = {"default": 1.5 * DEGREE, "paper": 3.0 * DEGREE}
 """Amplitude of the reference motion, rad."""
 _LEAST = 0.5
-"""What is left of the excitation at least: a drive that gravity does not load crosses its gap however small that is."""
+"""Least excitation that remains: a drive without gravity load crosses its gap, however small."""
 
 
 def reference_amplitude(kind: str) -> float:
@@ -29,7 +29,7 @@ def reference_amplitude(kind: str) -> float:
 def frequency_plan(
     model: RobotModel, poses_file: str | Path, kind: Literal["default", "paper"], seed: int
 ) -> MultisinePlan:
-    """Standard plan of frequency experiments in the poses that a file gives (Neubauer et al. 2015, section 4.1.3); see `standard_plan`.
+    """Standard plan of frequency experiments in the poses of a file (Neubauer et al. 2015, section 4.1.3); see `standard_plan`.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def frequency_plan(
 def standard_plan(
     model: RobotModel, poses: np.ndarray, kind: Literal["default", "paper"], seed: int
 ) -> MultisinePlan:
-    """The plan `default` (payload as declared, 1.5° reference at 2.125 Hz) or `paper` (no payload, 3°) in `poses` (P, n), rad.
+    """Plan `default` (payload as declared, 1.5° reference at 2.125 Hz) or `paper` (no payload, 3°) in `poses` (P, n), rad.
 
     Neubauer et al. 2015, §4.1.3, Fig. 4. Odd lines from 3 to 80 Hz on f0 = 0.25 Hz, flat amplitudes, four realisations of four periods, two
     of them dropped, both signs. The excitation is lowered, on all axes alike, until its peaks no longer pull a drive with backlash

@@ -37,17 +37,17 @@ from flexcal.report.pages import trajectory_page
 
 SEARCHES = 3
 ALIKE = 1.3
-"""Condition numbers of searches that differ by more than this factor are said."""
+"""Ratio of the condition numbers of searches above which they are reported."""
 LEAST_RATE_HZ = 100.0
-"""Of timed joint positions, where none is asked for; more where the motion is fast."""
+"""Least rate of timed joint positions if none is requested; higher for fast motions."""
 _INSTANTS_A_PERIOD = 50
-"""Of the highest harmonic."""
+"""Samples per period of the highest harmonic."""
 _NEXT_SEED = 7919
 
 
 @dataclass(frozen=True)
 class TrajectoryRequest:
-    """Which exciting trajectories `design_trajectories` plans.
+    """Requested exciting trajectories of `design_trajectories`.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ class TrajectoryRequest:
     seed: int = 0
 
     def optimise(self, nominal: RobotModel, progress: Progress = silent) -> list[TrajectoryDesign]:
-        """The designs of all searches, best first.
+        """Designs of all searches, best first.
 
         Raises `FlexcalError` as `design_trajectories` does, and for a start of another number of joints.
         """
@@ -173,7 +173,7 @@ class DesignedTrajectories(PlottedResult):
 
     @property
     def plan(self) -> TrajectoryPlan:
-        """The trajectories."""
+        """Plan of the trajectories."""
         return self.design.plan
 
     @property
@@ -191,17 +191,17 @@ class DesignedTrajectories(PlottedResult):
 
     @property
     def design(self) -> TrajectoryDesign:
-        """The best."""
+        """Best design."""
         return self.designs[0]
 
     @property
     def page(self) -> Path | None:
-        """Where the pictures are: beside the plan; None where it was not written."""
+        """Path of the page beside the plan; None if the plan was not written."""
         return None if self.file is None else page_beside(self.file)
 
     @property
     def timed_files(self) -> list[tuple[Path, Path]]:
-        """CSV and ROS message of every trajectory, beside the plan, or where that would be."""
+        """Paths of CSV and ROS message of every trajectory, beside the plan."""
         plan = Path("trajectory.yaml") if self.file is None else self.file
         stems = [f"{plan.stem}_{number}" for number in range(1, len(self.timed) + 1)]
         return [(plan.with_name(f"{stem}.csv"), plan.with_name(f"{stem}_ros.yaml")) for stem in stems]
@@ -213,7 +213,7 @@ class DesignedTrajectories(PlottedResult):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """One sentence each, on the plan's assumptions."""
+        """Remarks on the plan's assumptions, one sentence each."""
         remarks = []
         if self.assumed_friction:
             remarks.append(

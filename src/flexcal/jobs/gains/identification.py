@@ -106,7 +106,7 @@ def identify_gains(
 
 
 def _declared(model: RobotModel) -> np.ndarray:
-    """Gains (n,) of `signals: tau:`, one a joint."""
+    """Declared gains (n,) of `signals: tau:`, one per joint."""
     config, mapped = model.config.signals.get("tau"), mapped_signals(model).get("tau")
     matrix = None if mapped is None else mapped.matrix
     if matrix is not None and (

@@ -23,7 +23,7 @@ def identify_robot_gains(
     jobs: int = 1,
     progress: Progress = silent,
 ) -> GainsIdentification:
-    """`identify_gains` of the robot of a robot.yaml, which stays as it is.
+    """`identify_gains` of the robot of a robot.yaml, which is not changed.
 
     With `out`, results.json and report.html go to that folder. Raises `FlexcalError` as `identify_gains` does; nothing is written then.
     """

@@ -18,7 +18,7 @@ from flexcal.report.checks import Trust, gain_checks
 
 @dataclass(frozen=True, eq=False, repr=False)
 class GainsIdentification(ReportedResult):
-    """Result of `identify_gains`: factors of the drive gains that robot.yaml declares. No block of estimates.yaml has them.
+    """Result of `identify_gains`: factors of the drive gains that robot.yaml declares; not stored in estimates.yaml.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class GainsIdentification(ReportedResult):
 
     @property
     def gains(self) -> list[float]:
-        """Declared gains times factors (n,); as declared where the recordings do not determine the factor."""
+        """Declared gains times factors (n,); as declared if the recordings do not determine the factor."""
         factors = zip(
             self.declared, self.estimate.parameters.coordinates(), self.estimate.identifiable, strict=True
         )
@@ -55,7 +55,7 @@ class GainsIdentification(ReportedResult):
 
     @property
     def headline(self) -> str:
-        """The gains, and how many of them the recordings determine."""
+        """Gains, and the number of those that the recordings determine."""
         gains = ", ".join(f"{gain:.5g}" for gain in self.gains)
         return f"gains {gains}; {sum(self.estimate.identifiable)} of {len(self.gains)} determined"
 
@@ -77,7 +77,7 @@ class GainsIdentification(ReportedResult):
         return None if self.halves is None else self.halves.document()
 
     def write_arrays(self, folder: Path) -> None:
-        """Leave nothing: the page shows the results alone."""
+        """Write no arrays: the page shows the results alone."""
 
     def document(self) -> dict[str, Any]:
         """The content of results.json."""

@@ -15,12 +15,12 @@ from flexcal.report.results import ParameterChanges, parameter_changes
 
 @dataclass(frozen=True)
 class SplitHalfGains:
-    """Factors of the gains from each half alone, and how they differ."""
+    """Factors of the gains from each half alone, and their differences."""
 
     changes: ParameterChanges
 
     def document(self) -> dict[str, Any]:
-        """The block `halves` of results.json."""
+        """Block `halves` of results.json."""
         return {
             "probability": self.changes.probability,
             "factors": {

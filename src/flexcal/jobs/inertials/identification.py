@@ -16,9 +16,9 @@ from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 
 _SENSELESS = 0.5
-"""Relative torque error from which the torques are of another robot or unit."""
+"""Relative torque error from which the torques must be of another robot or unit."""
 _READING = 0.7
-"""Share of the progress that the recordings take."""
+"""Share of the progress assigned to reading the recordings."""
 
 
 def identify_inertials(
@@ -88,7 +88,7 @@ def identify_inertials(
 
 
 def _checked(recording: Recording, model: RobotModel) -> Recording:
-    """The recording with the torques τ + τ_ext; raises `InputError` for faults of its sensors."""
+    """Recording with the torques τ + τ_ext; raises `InputError` for faults of its sensors."""
     faults = LogFaults(Path(recording.name), model)
     faults.add(recording)
     faults.check()

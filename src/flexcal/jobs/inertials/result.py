@@ -52,7 +52,7 @@ class InertialsIdentification(Identification):
 
     @cached_property
     def nominal_error(self) -> float:
-        """Relative torque error of the robot before, as a fraction."""
+        """Relative torque error of the nominal robot, as a fraction."""
         return relative_torque_error(self.before)
 
     @cached_property
@@ -87,7 +87,7 @@ class InertialsIdentification(Identification):
         return {**header("inertials"), **self._numbers, "verdict": self.trust.document()}
 
     def write_arrays(self, folder: Path) -> None:
-        """Leave nothing: the page shows results and estimate alone."""
+        """Write no arrays: the page shows results and estimate alone."""
 
     @property
     def _numbers(self) -> dict[str, Any]:

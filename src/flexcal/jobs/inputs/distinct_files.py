@@ -1,4 +1,4 @@
-"""Check that no recording is given twice, or both fitted and validated."""
+"""Check that no recording is given twice, or used for both fit and validation."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from flexcal.errors import InputError
 
 
 def require_distinct_files(files: Sequence[Path], unseen: Sequence[Path] = ()) -> None:
-    """Raises `InputError` for a file, or a copy of it, that stands twice among the `files` of a fit or those `unseen` by it, or in both."""
+    """Raise `InputError` for a file, or a copy of it, given twice among the `files` of a fit or those `unseen` by it, or in both."""
     for given in (files, unseen):
         for k, file in enumerate(given):
             if twin := _twin(file, given[:k]):
@@ -26,7 +26,7 @@ def require_distinct_files(files: Sequence[Path], unseen: Sequence[Path] = ()) -
 
 
 def _twin(file: Path, others: Sequence[Path]) -> Path | None:
-    """The first of the `others` that is this file or has its content."""
+    """First of the `others` that is this file or has its content."""
     return next((other for other in others if _same_place(file, other) or _same_content(file, other)), None)
 
 

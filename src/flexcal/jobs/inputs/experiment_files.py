@@ -1,4 +1,4 @@
-"""Files that verbs pass to each other."""
+"""Lookup and reading of files that verbs pass to each other."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from flexcal.model.robot import RobotModel
 
 FREQUENCY_PLAN = "frequency_plan.yaml"
 _PLANS = (PLAN, FREQUENCY_PLAN)
-"""The frequency plan in a folder of responses: as 'identify response' leaves it, and as the demo does."""
+"""Paths of the frequency plan in a folder of responses: as 'identify response' writes it, and as the demo does."""
 
 
 def robot_file(plan: Path, given: Path | None) -> Path:
-    """The robot.yaml of a plan: the one given, else that beside the plan, else that in the current folder; raises `InputError`."""
+    """Path of a plan's robot.yaml: the given one, else beside the plan, else in the current folder; raises `InputError`."""
     if given is not None:
         return given
     for folder in (plan.parent, Path()):
@@ -31,7 +31,7 @@ def robot_file(plan: Path, given: Path | None) -> Path:
 
 
 def example_robot(name: str) -> Path:
-    """robot.yaml of an example: in `examples/` of the current folder, else of flexcal's checkout; raises `InputError`."""
+    """Path of an example's robot.yaml: in `examples/` of the current folder, else of flexcal's checkout; raises `InputError`."""
     places = [Path("examples"), Path(__file__).parents[4] / "examples"]
     for place in places:
         if (place / name / "robot.yaml").is_file():
@@ -43,7 +43,7 @@ def example_robot(name: str) -> Path:
 
 
 def read_plan_for_robot(path: Path, model: RobotModel) -> Plan:
-    """A plan for this robot; raises `InputError` where it has another number of joints."""
+    """Plan for this robot; raises `InputError` for a different number of joints."""
     plan = read_plan(path)
     if plan.joint_count != model.n:
         raise InputError(
@@ -77,14 +77,14 @@ def read_responses(paths: Sequence[Path], model: RobotModel) -> tuple[list[Path]
 
 
 def plan_files(files: Sequence[Path]) -> list[Path]:
-    """The frequency plans beside responses, one a folder; none where a folder lacks it."""
+    """Frequency plans beside responses, one per folder; none if a folder lacks it."""
     folders = dict.fromkeys(file.parent for file in files)
     plans = [next((f / name for name in _PLANS if (f / name).is_file()), None) for f in folders]
     return [path for path in plans if path is not None] if all(plans) else []
 
 
 def common_plan(paths: Sequence[Path]) -> MultisinePlan | None:
-    """The plan in these files, None without any; raises `InputError` where plans differ."""
+    """Plan common to these files, None without any; raises `InputError` if plans differ."""
     plans = [read_plan_of(path, MultisinePlan) for path in paths]
     for path, plan in zip(paths[1:], plans[1:], strict=True):
         if to_plain(plan) != to_plain(plans[0]):

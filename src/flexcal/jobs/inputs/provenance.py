@@ -1,4 +1,4 @@
-"""Provenance of pages that are based on the present robot model."""
+"""Provenance of pages that are based on the current robot model."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from flexcal.model.robot import RobotModel
 
 
 def robot_provenance(model: RobotModel, files: Iterable[Path] = ()) -> dict[str, str]:
-    """Program, and SHA-256 of robot.yaml, its URDF, all blocks of its estimates where there are some, and the `files`."""
+    """Program version, and SHA-256 of robot.yaml, its URDF, all blocks of its estimates, if any, and the `files`."""
     stored = model.path.parent / model.config.estimates
     blocks = tuple(read_estimates(stored)) if stored.exists() else ()
     return provenance([model.path, model.urdf, *files], estimates=stored, blocks=blocks)

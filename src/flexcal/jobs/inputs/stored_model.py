@@ -1,4 +1,4 @@
-"""The calibrated robot, from robot.yaml and stored estimates."""
+"""Calibrated robot, from robot.yaml and stored estimates."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from flexcal.jobs.result_files import ESTIMATES
 from flexcal.model.robot import RobotModel, with_blocks
 
 TARGETS = "targets"
-"""Option in the provenance of a calibration: the points that it measured."""
+"""Provenance key of a calibration: the measured points."""
 TARGETS_BETWEEN = ", "
 
 
 @dataclass(frozen=True, eq=False)
 class CalibratedRobot:
-    """A calibrated robot together with its nominal one.
+    """Calibrated robot together with its nominal one.
 
     Attributes
     ----------
@@ -89,22 +89,22 @@ class CalibratedRobot:
 
     @property
     def measured(self) -> tuple[str, ...]:
-        """The points that the calibration measured."""
+        """Points measured in the calibration."""
         return measured_points(self.nominal, self.blocks)
 
     @cached_property
     def probable(self) -> RobotModel:
-        """`model` with the most probable values of the directions that the measured points do not determine; for all other frames."""
+        """Robot with the most probable values along the directions that the measured points do not determine; for all other frames."""
         return probable_robot(self.model, self.measured)
 
     @cached_property
     def with_points(self) -> RobotModel:
-        """`nominal` with the measured points at their calibrated positions on the tool."""
+        """Nominal robot with the measured points at their calibrated positions on the tool."""
         return with_calibrated_points(self.nominal, self.probable, self.measured)
 
 
 def unmeasured_targets_remark(calibrated: CalibratedRobot, targets: Iterable[str]) -> tuple[str, ...]:
-    """A sentence on those of the `targets` that no calibration pose measured; none where there are none."""
+    """Remark on `targets` that no calibration pose measured; none if all were."""
     named = [name for name in targets if name not in calibrated.measured]
     if not named:
         return ()
@@ -115,7 +115,7 @@ def unmeasured_targets_remark(calibrated: CalibratedRobot, targets: Iterable[str
 
 
 def measured_points(nominal: RobotModel, blocks: Mapping[Block, Estimate]) -> tuple[str, ...]:
-    """The points that the calibration among `blocks` measured; none without one."""
+    """Points measured in the calibration among `blocks`; none without one."""
     if "calibration" not in blocks:
         return ()
     estimate = blocks["calibration"]
@@ -127,7 +127,7 @@ def measured_points(nominal: RobotModel, blocks: Mapping[Block, Estimate]) -> tu
 
 
 def stored_estimates(nominal: RobotModel, estimates: Path | None) -> Path:
-    """The estimates.yaml of a robot: that named or in the folder named, else that beside robot.yaml.
+    """Path of a robot's estimates.yaml: the named file or that in the named folder, else that beside robot.yaml.
 
     Raises `InputError` where what is named is another kind of file, or a folder without one.
     """

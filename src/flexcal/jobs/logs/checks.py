@@ -10,7 +10,7 @@ from flexcal.model.robot import RobotModel
 
 
 def payload_masses(logs: Sequence[JointLog], model: RobotModel) -> list[float]:
-    """kg, one a log; 0 where robot.yaml declares none. Raises `InputError` for a log that does not say, though one is declared."""
+    """Payload masses, kg, one per log; 0 if robot.yaml declares none. Raises `InputError` for a log without a declared payload's state."""
     return [_payload(log, model) for log in logs]
 
 
@@ -27,7 +27,7 @@ def _payload(log: JointLog, model: RobotModel) -> float:
 
 
 def require_unloaded(logs: Sequence[JointLog], model: RobotModel) -> None:
-    """Raises `InputError` for a log that was recorded with a payload."""
+    """Raise `InputError` for a log recorded with a payload."""
     for log, payload in zip(logs, payload_masses(logs, model), strict=True):
         if payload > 0:
             raise InputError(
@@ -38,7 +38,7 @@ def require_unloaded(logs: Sequence[JointLog], model: RobotModel) -> None:
 
 
 def require_wrenches(logs: Sequence[JointLog], model: RobotModel) -> None:
-    """Raises `InputError` for a log without the columns of the force sensor that robot.yaml declares."""
+    """Raise `InputError` for a log without the columns of the force sensor that robot.yaml declares."""
     for log in logs:
         if model.force_sensor is not None and not log.wrench:
             raise InputError(
@@ -49,7 +49,7 @@ def require_wrenches(logs: Sequence[JointLog], model: RobotModel) -> None:
 
 
 def require_no_wrenches(logs: Sequence[JointLog]) -> None:
-    """Raises `InputError` for a log with the columns of a force sensor, which carries the payload and so takes it out of the torques."""
+    """Raise `InputError` for a log with columns of a force sensor, which measures the payload and so removes it from the torques."""
     for log in logs:
         if log.wrench:
             raise InputError(
@@ -66,7 +66,7 @@ _OVERRIDE = (
 
 
 def weight_faults(logs: Sequence[JointLog], model: RobotModel) -> Iterator[str]:
-    """A sentence for every log of torques that are the motors' own, or of the other sign."""
+    """One sentence for every log whose torques are motor-side or of opposite sign."""
     for log in logs:
         joint = log.weight.reversed
         if joint is not None:
@@ -84,6 +84,6 @@ def weight_faults(logs: Sequence[JointLog], model: RobotModel) -> Iterator[str]:
 
 
 def require_joint_torques(logs: Sequence[JointLog], model: RobotModel) -> None:
-    """Raises `InputError` for the first of the `weight_faults`."""
+    """Raise `InputError` for the first of the `weight_faults`."""
     for fault in weight_faults(logs, model):
         raise InputError("E-RUN-061", f"{fault}{_OVERRIDE}.")

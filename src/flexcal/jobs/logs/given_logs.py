@@ -1,4 +1,4 @@
-"""Joint logs as a caller gives them: files, or recordings in memory."""
+"""Joint logs passed by a caller: files, or recordings in memory."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ JointLogs = Sequence[str | Path | Recording]
 
 
 def model_for_logs(model: RobotModel, logs: JointLogs) -> RobotModel:
-    """The robot for logs in memory, which are in SI units of the joints already; raises `FlexcalError` where they stand beside files."""
+    """Robot for logs in memory, which are already in SI units at the joints; raises `FlexcalError` if mixed with files."""
     in_memory = sum(isinstance(log, Recording) for log in logs)
     if not in_memory or not model.config.signals:
         return model
@@ -28,7 +28,7 @@ def model_for_logs(model: RobotModel, logs: JointLogs) -> RobotModel:
 
 
 def log_files(logs: JointLogs, folder: Path, name: str) -> list[Path]:
-    """The logs as files; those in memory are written to `folder`."""
+    """Paths of the logs; logs in memory are written to `folder`."""
     files = []
     for number, log in enumerate(logs, start=1):
         if isinstance(log, Recording):

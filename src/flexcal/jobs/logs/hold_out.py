@@ -29,7 +29,7 @@ from flexcal.progress import Progress
 
 @dataclass(frozen=True, eq=False)
 class HoldOutLogs:
-    """All `logs`, filtered; the parts of them that are `fitted`, and those `unseen`; each log's time in s `borders` between both.
+    """Logs, filtered, with their `fitted` and `unseen` parts, and the time in s `borders` between both in each log.
 
     Equations are made by so many `jobs` (processes).
     """
@@ -56,7 +56,7 @@ class HoldOutLogs:
         jobs: int,
         progress: Progress,
     ) -> HoldOutLogs:
-        """The last share `hold_out` of the time of every log to `fit` is unseen, and so are the logs `validate`.
+        """Split the last share `hold_out` of the time of every log to `fit` off as unseen, together with the logs `validate`.
 
         Filtered logs are files of the folder `scratch`. Raises `InputError` and `FlexcalError` for a log that lies, has a payload, or
         has the torques of motors without a map, unless they are to be accepted (`accept_weight`).
@@ -90,15 +90,15 @@ class HoldOutLogs:
         return self._systems(self.unseen, observation, 1)
 
     def rows(self, observation: Observation, base: BaseParameters) -> RecordedRows:
-        """Rows of the fitted part, log after log in this process; every pass over them reports its progress."""
+        """Rows of the fitted part, log after log in this process; every pass reports its progress."""
         return self._rows(self.fitted, observation, base)
 
     def unseen_rows(self, observation: Observation, base: BaseParameters) -> RecordedRows | None:
-        """Rows of the held-out part, if there is any."""
+        """Rows of the held-out part, if any."""
         return self._rows(self.unseen, observation, base) if self.unseen else None
 
     def predictions(self, observation: Observation, estimate: Estimate) -> list[TorquePrediction]:
-        """Of all logs, for the report."""
+        """Torque predictions of all logs, for the report."""
         predicted = [(observation, estimate.parameters.coordinates())] * len(self.logs)
         return predict_log_torques(
             self.logs, self.borders, predicted, self.preprocessing, progress=self.progress

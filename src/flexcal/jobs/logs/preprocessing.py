@@ -1,4 +1,4 @@
-"""Filtering and decimation of a log: as robot.yaml declares, else proposed from the motion."""
+"""Filtering and decimation of a log: as declared in robot.yaml, else proposed from the motion."""
 
 from __future__ import annotations
 
@@ -14,15 +14,17 @@ from flexcal.errors import InputError
 from flexcal.model.robot import RobotModel
 
 _PASSED = 20.0
-"""Cut-off, and rows a second, over the bandwidth of the motion: ten times twice of it, as products of two velocities reach twice as far."""
+"""Ratio of cut-off and row rate to the bandwidth of the motion: ten times twice of it, since products of two velocities have twice its
+bandwidth.
+"""
 _HIGHEST = 0.4
-"""Cut-off over the sampling rate, at most."""
+"""Largest ratio of cut-off to sampling rate."""
 _REVERSALS = 0.1
-"""Cut-off over the sampling rate, at least, where springs are identified."""
+"""Least ratio of cut-off to sampling rate if springs are identified."""
 _ROWS = 4.0
-"""Rows a second over a cut-off that is chosen by cross-validation: twice what it passes."""
+"""Rows per second, relative to a cut-off chosen by cross-validation: twice the passed bandwidth."""
 _SAMPLES = 40_000
-"""Of all logs, at most, that cross-validation looks at."""
+"""Largest number of samples, over all logs, used by cross-validation."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ class Preprocessing:
 def choose_preprocessing(
     model: RobotModel, logs: Sequence[Path], *, flexible: bool = False, loaded: Sequence[bool] | None = None
 ) -> Preprocessing:
-    """Declared, or proposed from the fastest motion and the lowest sampling rate of `logs`.
+    """Preprocessing as declared, or proposed from the fastest motion and the lowest sampling rate of `logs`.
 
     The cut-off is ten times the bandwidth (Gautier 1997), which is twice that of the velocities, unless a lower one predicts the torques of
     left-out blocks better (`choose_cutoff`); logs differ in load where `loaded` or their column says so. For `flexible` drives it is a
@@ -81,7 +83,7 @@ def choose_preprocessing(
 def _chosen(
     model: RobotModel, logs: Sequence[Path], proposed_hz: float, loaded: Sequence[bool] | None
 ) -> CutoffChoice | None:
-    """By cross-validation within the logs of each load."""
+    """Preprocessing chosen by cross-validation within the logs of each load."""
     loads: dict[tuple[bool, float | None], list[ContinuousSamples]] = {}
     for number, log in enumerate(logs):
         for piece in pieces(log_blocks(log, model), _SAMPLES // len(logs), proposed_hz):
@@ -91,7 +93,7 @@ def _chosen(
 
 
 def preprocessing_document(preprocessing: Preprocessing, logs: Sequence[JointLog]) -> dict[str, Any]:
-    """The entry `signals` of results.json: filters, and what was done with the time stamps of each log where they are not uniform."""
+    """Entry `signals` of results.json: filters, and the treatment of nonuniform time stamps of each log."""
     return {
         "cutoff_hz": preprocessing.cutoff_hz,
         "decimation": preprocessing.decimation.factor,
@@ -107,7 +109,7 @@ def preprocessing_document(preprocessing: Preprocessing, logs: Sequence[JointLog
 
 
 def preprocessing_remarks(signals: Mapping[str, Any]) -> list[str]:
-    """The same in words: what was proposed and from what, and the treatment of time stamps."""
+    """Remarks on proposed filters, with the reason, and on the treatment of time stamps."""
     said = []
     if signals["proposed"]:
         tried = signals["cross_validation"]

@@ -1,4 +1,4 @@
-"""Equations of joint logs, one after the other or in several processes."""
+"""Regression systems of joint logs, assembled one after the other or in several processes."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress
 
 _LEAST = 1e-6
-"""Share of a log that is fitted, at least, when it is told how much of that is done."""
+"""Least fitted share of a log whose progress is reported."""
 
 
 @dataclass(frozen=True, eq=False)
 class LogSegment:
-    """Part of a log in a window of time."""
+    """Part of a log within a time window."""
 
     log: JointLog
     window: Window
@@ -33,7 +33,7 @@ class LogSegment:
 def read_logs(
     paths: Sequence[Path], model: RobotModel, preprocessing: Preprocessing, scratch: Path, *, jobs: int
 ) -> list[JointLog]:
-    """The logs, filtered into files of the folder `scratch`, so many at once as there are `jobs` (processes).
+    """Logs filtered into files of the folder `scratch`, by `jobs` processes in parallel.
 
     Raises `InputError` and `FlexcalError` as `JointLog.read` does.
     """
@@ -57,7 +57,7 @@ def assemble_log_systems(
     jobs: int,
     progress: Progress,
 ) -> list[ExperimentSystem]:
-    """The equations of every part, in their order, whatever the number of `jobs` (processes) is.
+    """Regression systems of every part, in their order, independent of the number of processes `jobs`.
 
     Each part has at most about so many `batches`. Raises `FlexcalError` as `experiment_system` does.
     """
@@ -85,7 +85,7 @@ def assemble_log_systems(
 def split_hold_out(
     log: JointLog, preprocessing: Preprocessing, hold_out: float
 ) -> tuple[Window, Window | None]:
-    """What of a log is fitted, and its last share `hold_out` of time, if there is one; the filters reach from neither into the other."""
+    """Fitted part of a log, and its last share `hold_out` of time, if any; the filters of neither reach into the other."""
     if hold_out == 0:
         return Window(), None
     border = log.last(hold_out)
@@ -94,7 +94,7 @@ def split_hold_out(
 
 
 def with_progress(parts: Sequence[LogSegment], stage: str, progress: Progress) -> list[LogSegment]:
-    """The parts, of which every pass over all of them is told to `progress` as a `stage`."""
+    """Iterable over the parts that reports every complete pass to `progress` as a `stage`."""
 
     def told(number: int, until: float) -> Callable[[float], None]:
         return lambda share: progress(stage, (number + min(1.0, share / until)) / len(parts))

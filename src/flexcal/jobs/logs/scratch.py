@@ -17,7 +17,7 @@ _OWNER = "owner"
 
 @contextmanager
 def scratch_folder() -> Iterator[Path]:
-    """A folder among the temporary files of the system, removed at the end; those of runs that were killed are removed before."""
+    """Temporary folder of the system, removed at the end; those of killed runs are removed first."""
     _remove_orphans(Path(tempfile.gettempdir()))
     with tempfile.TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True) as name:
         folder = Path(name)

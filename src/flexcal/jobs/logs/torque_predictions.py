@@ -13,9 +13,9 @@ from flexcal.jobs.logs.preprocessing import Preprocessing
 from flexcal.progress import Progress
 
 _POINTS = 6000
-"""Points of each joint in all logs together, about: what a page can carry."""
+"""Approximate number of points of each joint in all logs together that a page can hold."""
 _FEWEST = 300
-"""Points of each joint in one log, at least."""
+"""Least number of points of each joint in one log."""
 
 
 def predict_log_torques(
@@ -26,7 +26,9 @@ def predict_log_torques(
     *,
     progress: Progress,
 ) -> list[TorquePrediction]:
-    """One a log, which the fit did not see from its time `held_out_from` on, s; `predicted` has each one's columns and parameters (p,)."""
+    """Predictions, one per log, unseen by the fit from the time `held_out_from` on, s; `predicted` has columns and parameters (p,) of
+    each.
+    """
     points = max(_FEWEST, _POINTS // len(logs))
     predictions = []
     progress("report", 0.0)

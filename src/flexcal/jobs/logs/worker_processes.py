@@ -1,4 +1,4 @@
-"""Worker processes, which end with the process that asked for them, and are quiet at Ctrl-C."""
+"""Worker processes that end with their parent process and ignore Ctrl-C."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 _EVERY = 0.5
-"""s between two looks at whether the parent is alive."""
+"""Seconds between two checks that the parent is alive."""
 _watched = threading.Lock()
 
 
 @dataclass(frozen=True)
 class WorkerTask(Generic[P, T]):
-    """`function`, to be called in a worker process; that ends within a second when the process that started it does, even by a kill."""
+    """Function to be called in a worker process, which ends within a second of its parent, even if that is killed."""
 
     function: Callable[P, T]
     _asked_by: int = field(default_factory=os.getpid)
@@ -32,7 +32,7 @@ class WorkerTask(Generic[P, T]):
 
 
 def start_workers(jobs: int) -> None:
-    """Start so many worker processes of joblib, which leave Ctrl-C to this process: it comes to all processes of a terminal at once."""
+    """Start joblib worker processes that leave Ctrl-C, sent to all processes of a terminal, to this process."""
     from multiprocessing import resource_tracker
 
     from joblib import Parallel, delayed

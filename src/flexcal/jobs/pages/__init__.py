@@ -1,4 +1,4 @@
-"""Reports, comparisons and customers' versions, made from the folders that jobs have left."""
+"""Reports, comparisons and customers' versions, made from the folders written by jobs."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Two folders of the same verb, side by side."""
+"""Comparison of two folders of the same verb."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from flexcal.report.sections import common_origin
 
 COMPARISON = "comparison.html"
 _DECLARED = (".yaml", ".yml", ".urdf", ".xml")
-"""Inputs that say what the robot is, and measure nothing."""
+"""Inputs that describe the robot and are not measurements."""
 
 
 def compare_folders(first: Path, second: Path) -> dict[str, Any]:
@@ -52,7 +52,7 @@ def compare_folders(first: Path, second: Path) -> dict[str, Any]:
 
 
 def _names(first: Path, second: Path) -> tuple[str, str]:
-    """The folders' names, with as much of the path as tells them apart."""
+    """Names of the folders, with as much of the path as distinguishes them."""
     parts = [path.resolve().parts for path in (first, second)]
     for depth in range(1, max(len(p) for p in parts) + 1):
         one, two = ("/".join(p[-depth:]) for p in parts)
@@ -117,7 +117,7 @@ def _left(folder: Path, name: str) -> Run:
 
 
 def _data(origin: Mapping[str, str]) -> dict[str, str]:
-    """Digests of measurements and of blocks that were used, by name."""
+    """Digests of the measurements and blocks used, by name."""
     return {
         key.partition(".")[2]: value
         for key, value in origin.items()

@@ -1,4 +1,4 @@
-"""The customer's version of a report, from a folder of calibrate or verify."""
+"""Customer's version of a report, from a folder of calibrate or verify."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Report of a folder that a verb has written."""
+"""Report of a folder written by a verb."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ REPORT = "report.html"
 
 
 def report_folder(folder: Path) -> Path:
-    """Write report.html of a folder from what a verb left in it: results.json and, as they are there, estimates, points or responses.
+    """Write report.html of a verb's folder from results.json and, if present, estimates, points or responses.
 
     Raises `InputError` where there are no results, or none that a report could show, and where a file cannot be read.
     """
@@ -102,7 +102,7 @@ def report_folder(folder: Path) -> Path:
 
 
 def missing_key_error(folder: Path, problem: KeyError) -> InputError:
-    """Of a results.json that lacks a key."""
+    """Error for a results.json that lacks a key."""
     return InputError(
         "E-REPORT-010",
         f"{folder / RESULTS} lacks {problem}, as if another program or an older flexcal had written it; run the verb that writes it again.",
@@ -110,7 +110,7 @@ def missing_key_error(folder: Path, problem: KeyError) -> InputError:
 
 
 def calibration_study(folder: Path) -> CalibrationStudy:
-    """What `fit_geometry` left in a folder; raises `InputError` where a file is not there or cannot be read."""
+    """Study read from a folder written by `fit_geometry`; raises `InputError` for missing or unreadable files."""
     results = read_results(folder)
     points = read_points(folder, sigma=results["fit"]["sigma_mm"] * MILLIMETRE)
     return CalibrationStudy(
@@ -119,7 +119,7 @@ def calibration_study(folder: Path) -> CalibrationStudy:
 
 
 def two_stage_study(folder: Path) -> TwoStageStudy:
-    """What `demo` left in a folder; raises `InputError` where a file is not there or cannot be read."""
+    """Study read from a folder written by `demo`; raises `InputError` for missing or unreadable files."""
     results = read_results(folder)
     fresh, exact = read_verification(folder / VERIFICATION)
     return TwoStageStudy(

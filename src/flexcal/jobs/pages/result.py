@@ -31,15 +31,15 @@ class Result(ABC):
     @property
     @abstractmethod
     def headline(self) -> str:
-        """The result in one line, without the robot's name."""
+        """Result in one line, without the robot's name."""
 
     @abstractmethod
     def summary(self) -> str:
-        """The result in a few lines of text, for people."""
+        """Summary of the result in a few lines of text."""
 
     @abstractmethod
     def document(self) -> dict[str, Any]:
-        """All numbers, as results.json or --json has them."""
+        """Results as a document, as results.json or --json has them."""
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.model.name}: {self.headline}>"
@@ -50,7 +50,7 @@ class Result(ABC):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PlottedResult(Result):
-    """Result whose report is made from itself alone."""
+    """Result whose report needs no further files."""
 
     @abstractmethod
     def _page(self) -> Page:
@@ -76,7 +76,7 @@ class PlottedResult(Result):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ReportedResult(Result):
-    """Result with a report and a folder of files that it is made from."""
+    """Result with a report and the folder of files that it is made from."""
 
     @abstractmethod
     def write_arrays(self, folder: Path) -> None:
@@ -118,18 +118,18 @@ class ReportedResult(Result):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Identification(ReportedResult):
-    """Result of a verb that estimates parameters: `estimate`, which `model` has, is the block `block` of estimates.yaml."""
+    """Result of a verb that estimates parameters: `estimate`, already applied to `model`, is the block `block` of estimates.yaml."""
 
     block: ClassVar[Block]
     estimate: Estimate
 
     def write(self, folder: str | Path) -> None:
-        """As `ReportedResult.write`, with estimates.yaml, whose other blocks stay as they are."""
+        """As `ReportedResult.write`, with estimates.yaml, whose other blocks are kept."""
         write_estimates(Path(folder) / ESTIMATES, self.block, self.estimate)
         super().write(folder)
 
     def store(self, source: Path, out: Path | None, others: Mapping[Block, Estimate]) -> None:
-        """Put the estimate into the robot's own estimates.yaml `source`, or all to the folder `out` with the `others` it began from."""
+        """Store the estimate in the robot's own estimates.yaml `source`, or with the `others` it started from in the folder `out`."""
         if out is None:
             write_estimates(source, self.block, self.estimate)
             return
@@ -156,5 +156,5 @@ class TorqueIdentification(Identification):
 
 
 def summary_row(name: str, value: float, std: float | None, unit: str) -> str:
-    """A parameter as a line of a summary; without a standard deviation where it is not identifiable."""
+    """Summary line of a parameter; without a standard deviation if it is not identifiable."""
     return f"{name:<60.60} {value:>12.5g} {'' if std is None else f'± {std:.2g}':<12} {unit}"

@@ -1,4 +1,4 @@
-"""The equations of recordings with and without a payload, and what a fit of them predicts."""
+"""Equations of recordings with and without a payload, and the predictions of their fit."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from flexcal.progress import silent
 
 @dataclass(frozen=True, eq=False)
 class PayloadLogEquations:
-    """The `equations` of `logs`, each of which has its own `observations`, for springs yield along its own motion."""
+    """Equations of `logs`, each with its own `observations`, since springs deflect with its own motion."""
 
     logs: Sequence[JointLog]
     observations: Sequence[Observation]
@@ -37,7 +37,7 @@ class PayloadLogEquations:
         sources: tuple[str, ...],
         preprocessing: Preprocessing,
     ) -> PayloadLogEquations:
-        """With springs that yield under the payload of the `model`; raises `FlexcalError` as `FlexibilityCorrection` and
+        """Equations with springs deflected by the payload of `model`; raises `FlexcalError` as `FlexibilityCorrection` and
         `experiment_system` do.
         """
         plain = Observation(model, CLASSIC)
@@ -63,7 +63,7 @@ class PayloadLogEquations:
         return cls(logs, observations, PayloadEquations(data, loaded, model.payload, prior), preprocessing)
 
     def predictions(self, fit: PayloadFit) -> list[TorquePrediction]:
-        """Torques of every log as the `fit` of these equations has them, beside the measured ones."""
+        """Measured torques of every log, and those predicted by the `fit` of these equations."""
         predicted = [
             (observation, self.equations.coefficients(fit.unknowns, with_payload))
             for observation, with_payload in zip(self.observations, self.equations.loaded, strict=True)

@@ -35,11 +35,11 @@ from flexcal.model.robot import PAYLOAD_FRAME, RobotModel, last_frame, with_payl
 from flexcal.progress import Progress, silent
 
 _ROUGH = 2
-"""Fits of an elastic robot before the last one, each with the springs loaded by the payload of the one before."""
+"""Number of fits of an elastic robot before the last one, each with the springs loaded by the previous payload."""
 _ROWS_HZ = 6.0
-"""Rows a second of an elastic robot, at most: its springs yield as `FlexibilityCorrection` has it only well below the first resonance."""
+"""Largest row rate of an elastic robot: `FlexibilityCorrection` holds only well below the first resonance."""
 _SENSELESS = 0.5
-"""Relative torque error from which the torques are of another robot or unit."""
+"""Relative torque error from which the torques must be of another robot or unit."""
 
 
 def identify_payload(
@@ -165,7 +165,7 @@ def identify_payload(
 
 
 def attach_payload(model: RobotModel, frame: str) -> tuple[RobotModel, str]:
-    """The robot with a payload in its frame, and that frame."""
+    """Robot with a payload in its frame, and that frame."""
     declared = model.payload
     if declared is None:
         place = frame or last_frame(model)
@@ -179,13 +179,13 @@ def attach_payload(model: RobotModel, frame: str) -> tuple[RobotModel, str]:
 
 
 def _has(model: RobotModel, estimate: Estimate) -> bool:
-    """Whether the model was updated with all parameters of an estimate that are the robot's own."""
+    """Whether the model already has all robot parameters of an estimate."""
     own = set(estimate.parameters.names) & set(model.values)
     return own <= set(model.posterior.parameters.names)
 
 
 def _slow(preprocessing: Preprocessing, model: RobotModel, logs: Sequence[Path]) -> Preprocessing:
-    """With rows no closer than springs allow."""
+    """Preprocessing with a row rate that the springs allow."""
     if not model.elastic:
         return preprocessing
     rate = min(1.0 / next(log_blocks(log, model)).time_step for log in logs)
@@ -197,7 +197,7 @@ def _slow(preprocessing: Preprocessing, model: RobotModel, logs: Sequence[Path])
 
 
 def _require_unused(logs: Sequence[Path], dynamics: Estimate | None) -> None:
-    """Raises `InputError` for a log that the robot's own `dynamics` were identified from: it would count twice."""
+    """Raise `InputError` for a log used in the identification of the robot's `dynamics`: it would count twice."""
     if dynamics is None:
         return
     used = {digest for key, digest in dynamics.provenance.items() if key.startswith("input.")}

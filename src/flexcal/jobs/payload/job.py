@@ -87,7 +87,7 @@ def identify_robot_payload(
 
 
 def _require_plans(loaded: PlannedLogs, free: PlannedLogs) -> None:
-    """Raises `InputError` for trajectories that were planned otherwise than they are given here."""
+    """Raise `InputError` for trajectories recorded by another plan than the given one."""
     if any(plan.payload == 0 for plan in loaded.plans):
         raise InputError(
             "E-RUN-068",

@@ -14,7 +14,7 @@ from flexcal.model.robot import RobotModel
 
 @dataclass(frozen=True)
 class PlannedLogs:
-    """Their `files`; of those in folders the `plans`, which say what a torque is over its sample, and the `plan_files` that have them."""
+    """Paths `files` of joint logs; for those in folders the `plans`, which define how torque is sampled, and their `plan_files`."""
 
     files: tuple[Path, ...]
     plans: tuple[TrajectoryPlan, ...]
@@ -22,7 +22,7 @@ class PlannedLogs:
 
     @classmethod
     def of(cls, paths: Sequence[Path]) -> PlannedLogs:
-        """Files, and folders as 'measure' leaves them; raises `InputError` for a folder that holds no trajectories."""
+        """Logs from files, and from folders written by 'measure'; raises `InputError` for a folder without trajectories."""
         files: list[Path] = []
         plans: list[TrajectoryPlan] = []
         plan_files: list[Path] = []
@@ -37,7 +37,7 @@ class PlannedLogs:
 
 
 def with_planned_torque(model: RobotModel, plans: Sequence[TrajectoryPlan]) -> RobotModel:
-    """The robot, its `dynamics: tau:` as the plans have it; raises `InputError` where these differ."""
+    """Robot with `dynamics: tau:` as in the plans; raises `InputError` if these differ."""
     torques = sorted({plan.torque for plan in plans})
     if len(torques) > 1:
         raise InputError(

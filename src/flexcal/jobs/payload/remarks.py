@@ -15,7 +15,7 @@ from flexcal.report.checks import BODILESS, UNLIKE
 
 
 def payload_remarks(fit: PayloadFit, declared: RobotModel, blocks: Mapping[Block, Estimate]) -> Iterator[str]:
-    """One sentence each."""
+    """Remarks on an identified payload, one sentence each."""
     estimate = fit.estimate
     hidden = [
         name for name, seen in zip(estimate.parameters.names, estimate.identifiable, strict=True) if not seen
@@ -44,14 +44,14 @@ def payload_remarks(fit: PayloadFit, declared: RobotModel, blocks: Mapping[Block
 
 
 def other_payloads(estimate: Estimate, blocks: Mapping[Block, Estimate]) -> dict[str, float]:
-    """Mass (kg) of the payload of those `blocks` that were found with another one than `estimate`."""
+    """Mass (kg) of the payload of those `blocks` that were estimated with another one than `estimate`."""
     low, high = _certain_mass(estimate)
     masses = {name: block.values.get("payload.mass", low) for name, block in blocks.items()}
     return {name: mass for name, mass in masses.items() if not low <= mass <= high}
 
 
 def declared_payload(payload: Payload) -> dict[str, float]:
-    """What robot.yaml declares of a payload, by the names of what is identified."""
+    """Payload values declared in robot.yaml, by the names of the identified ones."""
     values = np.concatenate([[payload.mass], payload.com, payload.moments])
     return {f"payload.{key}": float(value) for key, value in zip(BODY, values, strict=True)}
 

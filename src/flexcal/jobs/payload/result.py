@@ -21,7 +21,7 @@ from flexcal.units import MILLIMETRE
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PayloadIdentification(TorqueIdentification):
-    """Result of `identify_payload`: mass, centre of mass and inertia of what the robot held.
+    """Result of `identify_payload`: mass, centre of mass and inertia of the payload.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class PayloadIdentification(TorqueIdentification):
 
     @cached_property
     def _numbers(self) -> dict[str, Any]:
-        """Everything but the verdict; `declaration` is the line of robot.yaml that says the same."""
+        """Document without the verdict; `declaration` is the corresponding line of robot.yaml."""
         fit, payload = self.fit, self.declared.payload
         joints = self.declared.joint_names
         return {
@@ -121,7 +121,7 @@ class PayloadIdentification(TorqueIdentification):
 
     @property
     def declaration(self) -> str:
-        """`payload:` of robot.yaml with the identified values."""
+        """Line `payload:` of robot.yaml with the identified values."""
         estimate, values = self.estimate, self.estimate.values
         com = ", ".join(f"{values[f'payload.com_{key}']:.5g}" for key in "xyz")
         text = f"frame: {self.frame}, mass: {values['payload.mass']:.5g}, com: [{com}], mass_std: {estimate.std('payload.mass'):.2g}"

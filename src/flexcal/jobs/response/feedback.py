@@ -1,4 +1,4 @@
-"""What a controller on the output does to a measured response, in results.json and in a sentence."""
+"""Effect of a controller on the measured response of an axis: check, sentence, and block of results.json."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from flexcal.frequency.arbitrary import ExcitationRecord, Feedback, LocalRespons
 from flexcal.report.layout import percent
 
 MOSTLY = 0.5
-"""Share of fed-back noise in the input from which a line says more of the controller than of the axis."""
+"""Share of fed-back noise in the input from which a line reflects the controller more than the axis."""
 _NEARLY_ALL = 0.95
 _SEEMS = "a controller seems to act on the output"
 _HARDLY = 0.01
-"""Bias that is not worth a warning."""
+"""Bias below which no warning is given."""
 
 
 def line_noise_share(share: np.ndarray, periods: int | None) -> np.ndarray:
-    """Share of noise in lines of a periodic excitation, which noise between them does not reach, from that over all frequencies."""
+    """Share of noise at the lines of a periodic excitation, from the share over all frequencies."""
     return share / (share + (1.0 - share) * (periods or 1))
 
 
 def references_free_of_feedback(pieces: Sequence[ExcitationRecord], at_once: Sequence[bool]) -> bool:
-    """Whether the references of the records carry no noise of the outputs, so that they can be references."""
+    """Whether the references of the records are free of output noise, and so valid as references."""
     loop = feedback([replace(piece, inputs=piece.references) for piece in pieces], at_once)
     return loop is not None and not loop.acts
 
 
 @dataclass(frozen=True)
 class FeedbackCheck:
-    """`acts`: whether a controller acts on the output (None where that cannot be told).
+    """Check for feedback: `acts` tells whether a controller acts on the output (None if undecidable).
 
     In the band of the response: the median `share` of noise in the input that it feeds back, the `bias` of the response by it, relative
     and median, and what that exceeds at one line in twenty, `worst`, the most at `worst_hz`. All are zero where a `reference` tells noise
@@ -57,7 +57,7 @@ class FeedbackCheck:
         *,
         guessed: bool,
     ) -> FeedbackCheck:
-        """In the band of a response of so many `periods` of a periodic excitation."""
+        """Check within the band of a response with `periods` of a periodic excitation."""
         acts = None if loop is None else loop.acts
         if references or loop is None:
             return cls(acts, reference=", ".join(references), guessed=guessed)
@@ -76,7 +76,7 @@ class FeedbackCheck:
 
     @property
     def remark(self) -> str:
-        """A sentence for the console and the page."""
+        """Remark for console and page."""
         if self.reference:
             lead = f"{_SEEMS}; " if self.guessed else ""
             return (

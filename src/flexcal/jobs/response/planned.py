@@ -61,7 +61,7 @@ class IdentifiedResponses:
 
     @property
     def sensor_remarks(self) -> tuple[str, ...]:
-        """What the sensors on the arm recorded, and which of those declared did not."""
+        """Remarks on the recorded arm-side sensors, and on declared ones without recordings."""
         recorded = dict.fromkeys(name for response in self.responses for name in response.sensors)
         remarks = [
             f"sensor {name} on the arm: 1σ {100 * worst:.2g} % of its response, in the worst pose"
@@ -93,7 +93,7 @@ def identify_response(
     command: str = "",
     progress: Progress = silent,
 ) -> IdentifiedResponses:
-    """Reduce the joint logs in `folder` to response_pose_<p>.npz in `out`, streaming: no two recordings are ever in memory.
+    """Reduce the joint logs in `folder` to response_pose_<p>.npz in `out`, one recording in memory at a time.
 
     `method` averages the realisations in one of the ways of `frequency_response`, or is the local polynomial method. The plan goes with
     the responses: the fit of stage 1 needs its reference motion. results.json and report.html go there too.
@@ -159,7 +159,7 @@ def _summary(response: FrequencyResponse, file: Path) -> dict[str, Any]:
 
 
 def _sensor_std(response: FrequencyResponse, row: int) -> float:
-    """Standard deviation of a sensor's row of the response over its size, at the median line."""
+    """Relative standard deviation of a sensor's row of the response, at the median line."""
     at = len(response.joints) + row
     sizes = np.linalg.norm(response.stacked[:, at], axis=1)
     return float(np.median(np.linalg.norm(response.stacked_std[:, at], axis=1) / sizes))

@@ -1,4 +1,4 @@
-"""Spectra of an excited axis, with the reference that tells the excitation from what a controller feeds back."""
+"""Spectra of an excited axis, and the reference that separates excitation from feedback."""
 
 from __future__ import annotations
 
@@ -23,13 +23,14 @@ from flexcal.importing.columns import ResponseRecords
 from flexcal.jobs.response.feedback import MOSTLY, line_noise_share, references_free_of_feedback
 
 _NARROW = 0.5
-"""Share of the band without a reference that one which was not named must explain."""
+"""Share of the band without a reference that a recognised, not named, reference must explain."""
 
 
 @dataclass(frozen=True, eq=False)
 class ExcitationSpectra:
-    """Of the records `measured` in `pieces` of equal length: the `whole` spectra, which of their bins are `usable` (K,; None for all), the
-    feedback of their `loop`, and the `period` of the excitation in samples."""
+    """Spectra of the records `measured` in `pieces` of equal length: the `whole` spectra, their `usable` bins (K,; None for all), the
+    feedback of their `loop`, and the `period` of the excitation in samples.
+    """
 
     measured: ResponseRecords
     pieces: list[ExcitationRecord]
@@ -40,13 +41,13 @@ class ExcitationSpectra:
 
     @property
     def width_hz(self) -> float:
-        """Of the excited band; zero where there is none."""
+        """Width of the excited band; zero if there is none."""
         band = excited_band(self.whole, local_response(self.whole), self.usable)
         return 0.0 if band is None else band[1] - band[0]
 
 
 def measure_spectra(measured: ResponseRecords, hold: Hold) -> ExcitationSpectra:
-    """With the references that were named; with those that were recognised only where a controller acts and they explain the input."""
+    """Spectra with the named references; recognised ones are used only if a controller acts and they explain the input."""
     pieces = equal_pieces(measured.records)
     at_once = [channel.derivative == 2 for channel in measured.outputs]
     loop = feedback(pieces, at_once)

@@ -50,7 +50,7 @@ RESPONSE_TABLE = "response.csv"
 
 @dataclass(frozen=True)
 class ExcitationOptions:
-    """What a user may say: columns, sampling rate, band (Hz), kind of the input, numbers of modes and of masses (None: by evidence)."""
+    """Options: columns, sampling rate, band (Hz), kind of the input, numbers of modes and of masses (None: by evidence)."""
 
     inputs: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
@@ -64,7 +64,7 @@ class ExcitationOptions:
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedExcitation:
-    """The response measured from `measured`, its modes, and the masses of the axis."""
+    """Frequency response of the records `measured`, its modes, and the masses of the axis."""
 
     measured: ResponseRecords
     options: ExcitationOptions
@@ -314,7 +314,7 @@ def _in_band(
 
 
 def _halves(spectra: RecordSpectra, identified: IdentifiedModes) -> HalfDifference | None:
-    """The first half of the records against the second; None where there is one record, or they are too few."""
+    """Comparison of the first half of the records with the second; None for one record, or too few."""
     records = spectra.inputs.shape[0]
     if records < 2:
         return None
@@ -341,7 +341,7 @@ def _write(out: Path, result: IdentifiedExcitation) -> None:
 
 
 def _table(result: IdentifiedExcitation) -> str:
-    """response.csv: one row a line and element."""
+    """Text of response.csv: one row per line and element."""
     rows = ["frequency_hz,output,input,real,imaginary,std,coherence"]
     response, std = result.response.response, result.response.std
     for y, output in enumerate(result.measured.outputs):

@@ -1,4 +1,4 @@
-"""Files that a job leaves in its folder, and their readers: results.json, estimates, points, responses and torques."""
+"""Files that a job writes to its folder, and their readers: results.json, estimates, points, responses and torques."""
 
 import lazy_loader
 

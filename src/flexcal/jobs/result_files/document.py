@@ -1,4 +1,4 @@
-"""results.json: kinds, common blocks, writing and reading (docs/file-formats.md)."""
+"""Content of results.json: kinds, common blocks, writing and reading (docs/file-formats.md)."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from flexcal.files.transaction import current_path, recover, write_text
 RESULTS = "results.json"
 
 AGAIN = "run the verb that writes it again"
-"""What to do where a file of a run cannot be used."""
+"""Advice if a file of a run cannot be used."""
 
 _ROUNDING = 1e-9
-"""A coefficient below this, in SI units, is what rounding leaves of zero."""
+"""Size of a coefficient, in SI units, below which it counts as a rounding error of zero."""
 
 
 Kind = Literal[
@@ -36,9 +36,9 @@ Kind = Literal[
     "stiffness",
     "verification",
 ]
-"""What results.json is of."""
+"""Kind of document in results.json."""
 SCHEMA = 1
-"""Version of the form of results.json; it counts up where a key changes its meaning or goes."""
+"""Schema version of results.json, incremented when a key changes its meaning or is removed."""
 
 
 def header(kind: Kind) -> dict[str, Any]:
@@ -48,32 +48,32 @@ def header(kind: Kind) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class RunRecord:
-    """What a result comes from: program, options and the SHA-256 of all files; and the command line, where there was one."""
+    """Provenance of a result: program, options, the SHA-256 of all files, and the command line, if any."""
 
     provenance: Mapping[str, str]
     command: str = ""
 
     def document(self) -> dict[str, Any]:
-        """The end of a JSON document."""
+        """Last entries of a JSON document."""
         return {"provenance": dict(self.provenance), "command": self.command}
 
 
 NOT_RECORDED = RunRecord({})
-"""That of a result which was not made from files."""
+"""Provenance of a result that was not made from files."""
 
 
 def json_text(document: Mapping[str, Any]) -> str:
-    """`document` as JSON, in ASCII letters; numbers that are not finite become null."""
+    """Document as JSON text in ASCII; numbers that are not finite become null."""
     return json.dumps(json_values(document), indent=2, allow_nan=False)
 
 
 def write_results(folder: Path, document: Mapping[str, Any]) -> None:
-    """Leave `document` in `folder` as results.json, atomically."""
+    """Write `document` to `folder` as results.json, atomically."""
     write_text(folder / RESULTS, json_text(document) + "\n")
 
 
 def read_results(folder: Path) -> dict[str, Any]:
-    """The document that a verb left in `folder`; raises `InputError` where there is none, and for one of another schema."""
+    """Document in `folder`; raises `InputError` if there is none, and for one of another schema."""
     recover(folder)
     path = folder / RESULTS
     try:
@@ -96,7 +96,7 @@ def quantities(estimate: Estimate, truth: Mapping[str, float] | None = None) -> 
 
 
 def dropped_parameters(dropped: Iterable[Dropped]) -> list[dict[str, Any]]:
-    """The dropped parameters and what absorbed each: kept + coefficient · dropped is what the kept one estimates."""
+    """Dropped parameters and those that absorbed each: kept + coefficient · dropped is what the kept one estimates."""
     return [
         {
             "name": d.name,
@@ -107,7 +107,7 @@ def dropped_parameters(dropped: Iterable[Dropped]) -> list[dict[str, Any]]:
 
 
 def identifiability_block(identifiability: Identifiability) -> dict[str, Any]:
-    """Number of parameters, rank, dropped parameters, decades of the gap, and the weakest of the directions that are seen."""
+    """Number of parameters, rank, dropped parameters, decades of the gap, and the weakest of the determined directions."""
     return {
         "parameters": len(identifiability.names),
         "rank": identifiability.rank,
@@ -121,7 +121,7 @@ def identifiability_block(identifiability: Identifiability) -> dict[str, Any]:
 
 
 def identifiability_spectrum(identifiability: Identifiability) -> dict[str, Any]:
-    """The parameters that are kept, and singular values and the diagonal of R, relative to the largest: what a figure of the rank shows."""
+    """Kept parameters, and singular values and diagonal of R relative to the largest, as plotted in a figure of the rank."""
     return {
         "kept": list(identifiability.kept_names),
         "singular_values": identifiability.singular_values,

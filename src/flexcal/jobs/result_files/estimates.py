@@ -1,4 +1,4 @@
-"""File of an identification's estimate."""
+"""Path of the file of an identification's estimate."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ ESTIMATES = "estimates.yaml"
 
 
 def estimates_target(source: Path, out: Path | None, block: Block) -> Path:
-    """The file into which an identification puts its block: in the folder `out`, else the robot's own `source`.
+    """Path of the file for an identification's block: in the folder `out`, else the robot's own `source`.
 
     Raises `InputError` where that cannot take the block, as one that another program wrote.
     """

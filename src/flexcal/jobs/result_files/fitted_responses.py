@@ -16,12 +16,13 @@ from flexcal.report.results import FittedResponse
 FITTED = "fitted_responses.npz"
 
 _SINGLE = {"complex128": np.complex64, "float64": np.float32}
-"""What a figure can show needs no more digits."""
+"""Single precision, sufficient for figures."""
 
 
 def write_fitted_responses(folder: Path, responses: Sequence[FittedResponse]) -> None:
-    """Leave `responses` as fitted_responses.npz in `folder`, atomically: the fields of `FittedResponse` as `<name>_<pose>`, poses from 1,
-    (L, n, n) and (L, S, n) arrays in single precision."""
+    """Write `responses` to fitted_responses.npz in `folder`, atomically: the fields of `FittedResponse` as `<name>_<pose>`, poses from
+    1, (L, n, n) and (L, S, n) arrays in single precision.
+    """
     arrays: dict[str, np.ndarray] = {"pose": np.array([item.pose + 1 for item in responses])}
     for item in responses:
         for field in fields(item)[1:]:
@@ -33,7 +34,7 @@ def write_fitted_responses(folder: Path, responses: Sequence[FittedResponse]) ->
 
 
 def read_fitted_responses(folder: Path) -> tuple[FittedResponse, ...]:
-    """What `write_fitted_responses` left; raises `InputError` where the file is not there or not such a one."""
+    """Fitted responses from a file of `write_fitted_responses`; raises `InputError` if it is missing or invalid."""
     file = NpzFile(folder / FITTED, AGAIN)
     poses = file.read({"pose": ArrayForm("whole", ("poses",))})["pose"]
     return tuple(_response(file, pose) for pose in poses.tolist())

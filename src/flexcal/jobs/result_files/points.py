@@ -30,7 +30,7 @@ _TEXTS = ("target", "station")
 
 
 def write_points(folder: Path, points: MeasuredPoints) -> None:
-    """Leave `points` as points.csv in `folder`, atomically; rad and m."""
+    """Write `points` to points.csv in `folder`, atomically; rad and m."""
     poses = points.poses
     columns: dict[str, np.ndarray] = {"pose": poses.pose, "target": poses.target, "station": poses.station}
     columns |= {f"q{i + 1}": poses.q[:, i] for i in range(poses.q.shape[1])}
@@ -55,7 +55,7 @@ def write_points(folder: Path, points: MeasuredPoints) -> None:
 
 
 def read_points(folder: Path, *, sigma: float) -> MeasuredPoints:
-    """The points that `write_points` left; `sigma` (m) is that of each coordinate where the file gives none.
+    """Points from a file of `write_points`; `sigma` (m) is that of each coordinate if the file gives none.
 
     Raises `InputError` where the file is not there or not such a one.
     """
@@ -106,7 +106,7 @@ def _numbers(path: Path, columns: pl.DataFrame) -> np.ndarray:
 
 
 def write_arm(folder: Path, arms: ArmPoses) -> None:
-    """Leave `arms` as arm.npz in `folder`, atomically."""
+    """Write `arms` to arm.npz in `folder`, atomically."""
     arrays = {
         "corners": arms.corners,
         "surface": arms.surface,
@@ -119,7 +119,7 @@ def write_arm(folder: Path, arms: ArmPoses) -> None:
 
 
 def read_arm(folder: Path) -> ArmPoses:
-    """What `write_arm` left; raises `InputError` where the file is not there or not such a one."""
+    """Arm drawings from a file of `write_arm`; raises `InputError` if it is missing or invalid."""
     file = NpzFile(folder / ARM, AGAIN)
     forms = {
         "corners": ArrayForm("real", ("drawn", "corners", 3)),
@@ -139,13 +139,13 @@ def read_arm(folder: Path) -> ArmPoses:
 
 
 def write_loads(folder: Path, loads: GravityLoads) -> None:
-    """Leave `loads` as gravity_loads.npz in `folder`, atomically."""
+    """Write `loads` to gravity_loads.npz in `folder`, atomically."""
     arrays = {"torque": loads.torque} | {f"along_{model}": along for model, along in loads.along.items()}
     write_npz(folder / LOADS, arrays)
 
 
 def read_loads(folder: Path) -> GravityLoads | None:
-    """What `write_loads` left, None without the file, as in folders of an older flexcal; raises `InputError` where it cannot be read."""
+    """Gravity loads from a file of `write_loads`, None without it, as in folders of an older flexcal; raises `InputError` if unreadable."""
     path = folder / LOADS
     if not current_path(path).is_file():
         return None

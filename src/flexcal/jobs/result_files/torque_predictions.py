@@ -14,11 +14,11 @@ from flexcal.jobs.result_files.document import AGAIN
 PREDICTIONS = "predictions.npz"
 _ARRAYS = ("time", "measured", "predicted", "frequencies_hz", "measured_density", "residual_density")
 _KIND = {"time": np.float64}
-"""Torques are drawn, so four bytes each are enough; times tell what was held out."""
+"""Types of arrays that differ from single precision, which is enough for plotted torques; times mark the held-out part."""
 
 
 def write_predictions(folder: Path, predictions: Sequence[TorquePrediction]) -> None:
-    """Leave `predictions`, one a log, in `folder`, atomically: arrays `<name>_<k>` of log k, counted from 0."""
+    """Write `predictions`, one per log, to `folder`, atomically: arrays `<name>_<k>` of log k, counted from 0."""
     arrays = {
         "names": np.array([log.name for log in predictions]),
         "strides": np.array([log.stride for log in predictions]),
@@ -32,7 +32,7 @@ def write_predictions(folder: Path, predictions: Sequence[TorquePrediction]) -> 
 
 
 def read_predictions(folder: Path) -> tuple[TorquePrediction, ...]:
-    """What `write_predictions` left; raises `InputError` where the file is not there or not such a one."""
+    """Torque predictions from a file of `write_predictions`; raises `InputError` if it is missing or invalid."""
     file = NpzFile(folder / PREDICTIONS, AGAIN)
     logs = file.read(
         {

@@ -21,13 +21,14 @@ VERIFICATION = "verification.csv"
 
 
 _COLUMNS = {NOMINAL: "nominal", OWN: "own", CALIBRATED: "elastic", RIGID: "rigid"}
-"""Models of verification.csv, and what their columns are called there."""
+"""Models of verification.csv, and the names of their columns there."""
 
 
 def write_verification(path: Path, run: TwoStageRun) -> None:
-    """Write verification.csv, atomically; rad and m: pose, q1…, x, y, z (noise-free truth), where the tracker read the point, with 1σ, and
-    where every model has it, the distance that the covariance of the elastic model's parameters predicts, and whether the flanks are
-    certain."""
+    """Write verification.csv, atomically; rad and m: pose, q1…, x, y, z (noise-free truth), the tracker's reading with 1σ, the
+    prediction of every model, the distance expected from the covariance of the elastic model's parameters, and whether the flanks are
+    certain.
+    """
     poses, elastic = run.verification_poses, run.elastic_verification
     before = {NOMINAL: run.nominal_verification, OWN: run.own_verification}
     models = before | {CALIBRATED: elastic, RIGID: run.rigid_verification[0]}
@@ -47,7 +48,7 @@ def write_verification(path: Path, run: TwoStageRun) -> None:
 
 
 def read_verification(path: Path) -> tuple[MeasuredPoints, MeasuredPoints]:
-    """The fresh poses that `write_verification` left, as the tracker read them and in truth; raises `InputError` where it cannot."""
+    """Verification poses from a file of `write_verification`, as measured and in truth; raises `InputError` if unreadable."""
     try:
         table = pl.read_csv(current_path(path).read_bytes())
 

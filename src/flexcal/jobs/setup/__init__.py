@@ -1,4 +1,4 @@
-"""Beginning with a robot: a robot.yaml from a URDF, import of measurements, and additions to robot.yaml."""
+"""Setup of a robot: a robot.yaml from a URDF, import of measurements, and additions to robot.yaml."""
 
 import lazy_loader
 

@@ -71,12 +71,12 @@ class ImportedFile:
 
     @property
     def signals(self) -> dict[str, dict[str, Any]]:
-        """The block `signals:` that reads the file's columns; empty where none is needed."""
+        """Block `signals:` that reads the file's columns; empty if none is needed."""
         return {p.quantity: p.config() for p in self.placed if p.quantity != "pose" and not p.standard()}
 
     @property
     def trusted(self) -> bool:
-        """Whether the points can be this robot's."""
+        """Whether the points are plausible for this robot."""
         return self.misfit is None or not self.misfit.doubtful
 
     def document(self) -> dict[str, Any]:
@@ -125,7 +125,7 @@ def import_file(
     topic: str | None = None,
     unchecked: bool = False,
 ) -> ImportedFile:
-    """Recognise the columns of `file`, with `mapped` over the guess, and write them as flexcal has them to `out`.
+    """Recognise the columns of `file`, with `mapped` overriding the guess, and write them in flexcal's format to `out`.
 
     `sigma` (m) is the instrument's 1σ a coordinate where the file does not say it. Nothing is written without `out`, nor, unless
     `unchecked`, where the nominal robot cannot go with the points. Raises `InputError` where the file cannot be read, joint positions are
@@ -177,7 +177,7 @@ def import_file(
 def _kind(
     foreign: ForeignTable, guess: RecognisedColumns, model: RobotModel
 ) -> tuple[Literal["poses", "log", "joints"], RecognisedColumns]:
-    """What the file holds, and the guess with what belongs to that only, in the order of the columns to write."""
+    """Kind of the file, and the guess restricted to its quantities, in the order of the columns to write."""
     unsure = [left for left in guess.left_out if "could both be" in left.why]
     if "q" not in guess.placed or (unsure and not {"xyz", "length", "t"} & guess.placed.keys()):
         left = "; ".join(reasons_unused(guess.left_out)) or "every column is something else"
@@ -221,7 +221,7 @@ def _kind(
 def _converted(
     foreign: ForeignTable, guess: RecognisedColumns, model: RobotModel
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Columns (N,) by flexcal's names, and quantities (N, m); raises `InputError` at the first value that is missing."""
+    """Columns (N,) by flexcal's names, and quantities (N, m); raises `InputError` at the first missing value."""
     columns: dict[str, np.ndarray] = {}
     values: dict[str, np.ndarray] = {}
     if "pose" not in guess.placed and ({"xyz", "length"} & guess.placed.keys() or "t" not in guess.placed):
@@ -310,7 +310,7 @@ def _check_time(foreign: ForeignTable, guess: RecognisedColumns, t: np.ndarray) 
 def _misfit(
     guess: RecognisedColumns, model: RobotModel, columns: dict[str, np.ndarray], values: dict[str, np.ndarray]
 ) -> NominalMismatch | None:
-    """That of the largest group of rows with one station and target."""
+    """Misfit of the largest group of rows with one station and target."""
     if "xyz" not in values or not model.points:
         return None
     n = len(values["q"])

@@ -14,11 +14,11 @@ from flexcal.files.transaction import current_path, write_text
 from flexcal.model.robot import RobotConfig
 
 _DIGITS = 6
-"""m: micrometres."""
+"""Resolution of written positions, m: micrometres."""
 
 
 def write_point_position(robot_file: Path, name: str, xyz: np.ndarray) -> None:
-    """Put `xyz` (3,) m in place of the `xyz` of the point `name` under `points:`; comments and everything else stay as they are.
+    """Put `xyz` (3,) m in place of the `xyz` of the point `name` under `points:`; comments and all else are kept.
 
     Raises `InputError`, and changes nothing, where the file says it in a way that cannot be replaced.
     """
@@ -46,7 +46,7 @@ def write_point_position(robot_file: Path, name: str, xyz: np.ndarray) -> None:
 
 
 def _blanked(text: str) -> str:
-    """The text with comments blanked, every character in its place."""
+    """Text with comments blanked, every character in its place."""
     return re.sub(r"(?:(?<=\s)|^)#[^\n]*", lambda match: " " * len(match[0]), text, flags=re.MULTILINE)
 
 

@@ -1,4 +1,4 @@
-"""A robot.yaml for a URDF, to be completed by hand."""
+"""Creation of a robot.yaml for a URDF, to be completed by hand."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _NO_TEXT = {"true", "false", "null", "yes", "no", "on", "off"}
 
 @dataclass(frozen=True)
 class InitialisedRobot:
-    """The robot.yaml that was written, the robot that it describes, and what its owner should know about the URDF."""
+    """Written robot.yaml, the robot that it describes, and remarks on the URDF."""
 
     file: Path
     model: RobotModel
@@ -46,7 +46,7 @@ class InitialisedRobot:
 
 
 def init_robot(urdf: Path, out: Path, *, tip: str | None = None) -> InitialisedRobot:
-    """Write `out`/robot.yaml for a URDF, read it back, and look at masses and collision shapes.
+    """Write `out`/robot.yaml for a URDF, read it back, and check masses and collision shapes.
 
     Raises `InputError` as `find_arm` and reading a robot do, and then where there is a robot.yaml already; nothing is written then.
     """
@@ -147,7 +147,7 @@ gravity: [0, 0, -9.81]         # in the robot's base frame; turn it for a robot 
 
 
 def _position_unit(model: RobotModel) -> str:
-    """The rest of the line of q under `signals:`: one unit where all joints move alike, else a factor to rad or m for every joint."""
+    """Remainder of the line of q under `signals:`: one unit if all joints are of one type, else a factor to rad or m for every joint."""
     slides = [joint.kind == "prismatic" for joint in model.joints]
     if all(slides):
         return "unit: mm}"
@@ -167,7 +167,7 @@ def _range(joint: Joint) -> str:
 
 
 def _text(name: str) -> str:
-    """A name as YAML has it, in quotes where it needs them."""
+    """Name as a YAML scalar, quoted if needed."""
     plain = _PLAIN.fullmatch(name) and name.strip() == name and name.lower() not in _NO_TEXT
     return name if plain else json.dumps(name, ensure_ascii=False)
 

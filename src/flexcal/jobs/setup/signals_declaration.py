@@ -1,4 +1,4 @@
-"""The block `signals:` of a robot.yaml."""
+"""Block `signals:` of a robot.yaml."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from flexcal.model.robot import RobotModel
 
 
 def signals_text(signals: Mapping[str, Mapping[str, Any]]) -> str:
-    """The block as YAML."""
+    """Block as YAML text."""
     lines = ["signals:"]
     for quantity, entry in signals.items():
         parts = [f"{key}: {json.dumps(value, ensure_ascii=False)}" for key, value in entry.items()]
@@ -23,7 +23,7 @@ def signals_text(signals: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def add_signals(robot_file: Path, signals: Mapping[str, Mapping[str, Any]]) -> None:
-    """Add the block at the end of robot.yaml, every byte before it kept.
+    """Append the block to robot.yaml, every byte before it kept.
 
     Raises `InputError` where there is one already that says something else, and gives the lines to put there by hand.
     """

@@ -16,7 +16,7 @@ _AXES = {"before": "fixed to the parent link", "after": "that turn with the chil
 
 
 def bearing_remarks(axes: BearingAxes | None, fit: GeometricFit) -> tuple[str, ...]:
-    """A sentence where the points of a `fit` determined the bearing axes, or contradict the declared ones."""
+    """Remark if the points of a `fit` determined the bearing axes, or contradict the declared ones."""
     if axes is None:
         return ()
     springs = (p for p in fit.prior.parameters if p.name.endswith(".stiffness"))
@@ -31,7 +31,7 @@ def bearing_remarks(axes: BearingAxes | None, fit: GeometricFit) -> tuple[str, .
 
 
 def response_bearings_remarks(bearings: ResponseBearings | None) -> tuple[str, ...]:
-    """A sentence where frequency responses determined the bearing axes, or contradict the declared ones."""
+    """Remark if frequency responses determined the bearing axes, or contradict the declared ones."""
     if bearings is None:
         return ()
     chi2 = {key: f"reduced chi-square {own:.2f}" for key, own in bearings.reduced_chi2.items()}
@@ -55,14 +55,14 @@ def _remarks(
 
 
 def bearings_block(axes: BearingAxes | None) -> dict[str, Any] | None:
-    """As results.json has it."""
+    """Block of results.json of a calibration."""
     if axes is None:
         return None
     return _block(axes) | {"errors": {key: errors.in_millimetres() for key, errors in axes.errors.items()}}
 
 
 def response_bearings_block(bearings: ResponseBearings | None) -> dict[str, Any] | None:
-    """As results.json of stage 1 has it."""
+    """Block of results.json of stage 1."""
     return None if bearings is None else _block(bearings) | {"reduced_chi2": dict(bearings.reduced_chi2)}
 
 

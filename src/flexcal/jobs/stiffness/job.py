@@ -33,7 +33,7 @@ _WEIGHTINGS: dict[WeightingName, Weighting] = {
 _SEARCHES: dict[SearchName, Search] = {"multi-start": MultiStart(), "population": PopulationSearch()}
 
 _GEOMETRIC = (*GEOMETRY, "backlash")
-"""What the calibration knows that stage 1 does not estimate itself."""
+"""Parameters of the calibration that stage 1 does not estimate itself."""
 
 
 def identify_robot_stiffness(

@@ -15,11 +15,11 @@ from flexcal.report.sections import hardening_sentence
 
 _ONE_SIDED = 1.645
 _ODD = 3.0
-"""Standard deviations of a sensor's sensitivity from which it is remarked."""
+"""Deviation of a sensor's sensitivity, in standard deviations, from which a remark is made."""
 
 
 def further_joints(estimate: Estimate, model: RobotModel) -> tuple[str, ...]:
-    """Joints that robot.yaml declares rigid and that were given a drive spring because the responses require it."""
+    """Joints declared rigid in robot.yaml that received a drive spring because the responses require it."""
     declared = {entry.joint for entry in model.config.elastic}
     return tuple(
         name
@@ -29,7 +29,7 @@ def further_joints(estimate: Estimate, model: RobotModel) -> tuple[str, ...]:
 
 
 def stiffness_remarks(result: SpringFit, model: RobotModel) -> tuple[str, ...]:
-    """One sentence each, the most important last."""
+    """Remarks on identified springs, the most important last."""
     estimate, joints = result.estimate, further_joints(result.estimate, model)
     remarks: list[str] = []
     if joints:
@@ -57,7 +57,7 @@ def stiffness_remarks(result: SpringFit, model: RobotModel) -> tuple[str, ...]:
 
 
 def sensor_remarks(result: SpringFit, model: RobotModel) -> tuple[str, ...]:
-    """What was found of every sensor on the arm."""
+    """Remarks on every arm-side sensor."""
     remarks = []
     for name in result.sensors:
         sensitivity = result.quantity(sensitivity_name(name))
@@ -92,13 +92,13 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _lower_limit(estimate: Estimate, name: str) -> float:
-    """Lower 95 % limit of a stiffness whose compliance is known to its standard deviation."""
+    """Lower 95 % limit of a stiffness, from the standard deviation of its compliance."""
     number = estimate.parameters.index(name)
     return estimate.values[name] / (1.0 + _ONE_SIDED * float(np.sqrt(estimate.covariance[number, number])))
 
 
 def _moves(estimate: Estimate, joint: str, model: RobotModel) -> bool:
-    """Whether more than half of the rotor's inertia moves with the arm, beyond three standard deviations."""
+    """Whether more than half of the rotor's inertia moves with the arm, by more than three standard deviations."""
     name = f"{joint}.held_inertia"
     if name not in estimate.parameters:
         return False

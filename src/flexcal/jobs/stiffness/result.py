@@ -73,7 +73,7 @@ class StiffnessIdentification(Identification):
 
     @property
     def residuals(self) -> tuple[np.ndarray, ...]:
-        """Complex errors (L, n, n) of every pose, as the fit weighs them (Eq. 27): of log Ĝ/G, or of Ĝ where it is poorly known."""
+        """Complex errors (L, n, n) of every pose, as in the fit (Eq. 27): of log Ĝ/G, or of Ĝ where it is poorly determined."""
         return self.fit.errors
 
     @property

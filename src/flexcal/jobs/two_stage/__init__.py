@@ -1,4 +1,4 @@
-"""The demonstration: the complete two-stage calibration of a virtual robot, compared with its true parameters."""
+"""Demonstration: the complete two-stage calibration of a virtual robot, compared with its true parameters."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""The cells of the demonstration: the virtual cell and the hard cell."""
+"""Cells of the demonstration: the virtual cell and the hard cell."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from flexcal.model.robot import RobotModel
 from flexcal.virtual_cell import CellConfig, VirtualCell, write_truth
 
 CellName = Literal["virtual", "hard"]
-"""Which robot stands in the demonstration's cell."""
+"""Name of the demonstration's cell."""
 
 
 class KnownCell(Cell, Protocol):
-    """Cell whose true values are known and compared at the end."""
+    """Cell with known true values, for comparison at the end."""
 
     def noise_free(self, plan: PosePlan) -> np.ndarray:
         """True positions (N, 3) m of the point at every pose in the instrument's frame, for verification only."""
@@ -30,7 +30,7 @@ class KnownCell(Cell, Protocol):
 def open_cell(
     kind: CellName, robot_file: Path, nominal: RobotModel, *, truth: Path | None, hidden: Path, seed: int
 ) -> KnownCell:
-    """A cell with the robot of `robot_file` in it, whose true values of the model's parameters are left in the file `hidden`.
+    """Cell with the robot of `robot_file`; the true values of the model's parameters are written to the file `hidden`.
 
     They are drawn from `seed`, or those of the file `truth`; of a hard robot only those that have a counterpart in the model. Raises
     `FlexcalError` where the cell cannot hold the robot, and for a `truth` of a hard one.

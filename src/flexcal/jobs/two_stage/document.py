@@ -1,4 +1,4 @@
-"""The document and table of a two-stage run (results.json)."""
+"""Document and table of a two-stage run (results.json)."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def two_stage_document(run: TwoStageRun, exported: ExportedFile) -> dict[str, An
 
 
 def _cad_alone(run: TwoStageRun, cad: CadInertialsRun) -> dict[str, Any]:
-    """The numbers of both stages without stage 0, under the names of the run's own."""
+    """Results of both stages without stage 0, under the same names as those of the run."""
     kinds = ("stiffness", "damping")
     return {
         "stage1": {kind: _springs(run, cad.stiffness.estimate, kind) for kind in kinds},
@@ -94,7 +94,7 @@ def _cad_alone(run: TwoStageRun, cad: CadInertialsRun) -> dict[str, Any]:
 
 
 def _measured(run: TwoStageRun) -> dict[str, Any]:
-    """Errors of the rigid calibrations as the tracker reads them."""
+    """Errors of the rigid calibrations at the tracker's readings."""
     seen = run.measured_verification.position + run.measured_verification.errors
     return {
         f"measured_rigid_{len(fit.poses)}": ErrorStatistics.of(seen - verification.position).in_millimetres()
@@ -103,7 +103,7 @@ def _measured(run: TwoStageRun) -> dict[str, Any]:
 
 
 def _verified(verification: PredictionErrors) -> dict[str, Any]:
-    """Errors of an elastic calibration, and the root mean square that the covariance of its parameters expects."""
+    """Errors of an elastic calibration, and the root mean square expected from the covariance of its parameters."""
     return {
         "elastic": verification.all.in_millimetres(),
         "elastic_unambiguous": verification.unambiguous.in_millimetres(),
@@ -117,7 +117,7 @@ def _springs(run: TwoStageRun, estimate: Estimate, kind: str) -> dict[str, Any]:
 
 
 def wrong_flanks(run: TwoStageRun) -> int:
-    """Calibration poses at which the flank assumed for a backlash is not the true one."""
+    """Calibration poses at which the assumed flank of a backlash is not the true one."""
     from flexcal.model.statics import static_equilibrium
 
     poses = run.calibration.poses

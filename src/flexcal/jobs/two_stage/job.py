@@ -1,4 +1,4 @@
-"""The complete two-stage procedure: inertials, stiffness, pose selection, measurement, calibration, verification, report (Neubauer et al.
+"""Complete two-stage procedure: inertials, stiffness, pose selection, measurement, calibration, verification, report (Neubauer et al.
 2015).
 """
 
@@ -75,13 +75,13 @@ STAGES = (*TIMED, "report")
 
 @dataclass
 class Stopwatch:
-    """Wall-clock seconds of every stage but the report, which has them in it."""
+    """Wall-clock seconds of every stage, the report's excepted."""
 
     seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(TIMED, 0.0))
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
-        """Add the time that the block takes to a stage."""
+        """Add the duration of the block to a stage."""
         started = time.perf_counter()
         yield
         self.seconds[name] += time.perf_counter() - started
@@ -100,7 +100,7 @@ def run_two_stage(
     command: str = "",
     progress: Progress = silent,
 ) -> TwoStageRun:
-    """Run the two-stage calibration on a simulated robot and leave every intermediate file, results.json and report.html in `out`.
+    """Run the two-stage calibration on a simulated robot and write every intermediate file, results.json and report.html in `out`.
 
     `robot_file` is a robot.yaml with frequency_poses.csv and, for the virtual cell, cell.yaml beside it. The hidden truth is drawn from
     `seed`, or taken from the file `truth`; it is written to `out`/truth.yaml and read back only after everything has been identified and
@@ -260,7 +260,7 @@ def run_two_stage(
 def measure_responses(
     cell: Cell, plan: MultisinePlan, model: RobotModel, progress: Callable[[float], None]
 ) -> Iterator[FrequencyResponse]:
-    """Run a frequency experiment and reduce every pose to its response as the recordings come; none is kept."""
+    """Run a frequency experiment and reduce every pose to its response as recordings arrive; none is stored."""
     total = len(plan.poses) * plan.recordings_per_pose
 
     def counted() -> Iterator[Recording]:
@@ -280,7 +280,7 @@ def _store(
     stiffness: Estimate,
     geometry: Estimate,
 ) -> Estimate:
-    """Store both blocks of `out`/estimates.yaml with what they came from; the geometry with its provenance."""
+    """Store both blocks of `out`/estimates.yaml with their provenance."""
     path = out / ESTIMATES
     used: tuple[Block, ...] = () if options["inertias_known"] else ("dynamics",)
     origin = provenance([*robot, out / "frequency_plan.yaml", *responses], options, path, used)

@@ -21,7 +21,7 @@ from flexcal.report.checks import Trust
 
 @dataclass(frozen=True, eq=False)
 class CadInertialsRun:
-    """Both stages fitted again, to the same data, with the inertials of CAD in place of those that trajectories identified."""
+    """Both stages fitted again to the same data with CAD inertials in place of the identified ones."""
 
     stiffness: SpringFit
     calibration: GeometricFit
@@ -30,7 +30,7 @@ class CadInertialsRun:
 
 @dataclass(frozen=True, eq=False)
 class TwoStageRun:
-    """One robot, both stages, and how they were checked.
+    """Two-stage calibration of one robot, both stages, and their verification.
 
     `nominal` is the robot of the data sheet; `informed` what both stages start from, with the inertials `dynamics` that trajectories
     identified, where they did; `calibration.model` the calibrated one. `cad_alone` is what both stages find without these. `rigid` holds

@@ -10,9 +10,9 @@ from flexcal.units import MILLIMETRE
 
 STEPS = 40
 LONGEST = 0.5
-"""rad or m, of a joint in one step."""
+"""Largest change of a joint in one step, rad or m."""
 DAMPING = 0.02
-"""m/rad: directions in which the target moves less than this per rad are hardly used."""
+"""Damping, m/rad: directions in which the target moves less than this per rad are hardly used."""
 REACHED = 0.1 * MILLIMETRE
 
 
@@ -25,7 +25,8 @@ def reach_points(
     *,
     point: str | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Joint positions (samples, n) that bring the target to `position` (samples, 3) m, base frame, and whether they do, (samples,) of bool.
+    """Joint positions (samples, n) that bring the target to `position` (samples, 3) m, base frame, and a mask (samples,) of those that
+    converged.
 
     Found from the starts `q` (samples, n), within `lower` and `upper` (n,), in whatever orientation comes; to 0.1 mm, with the geometric
     errors that are known and without deflection. Raises `FlexcalError` for an unknown point or a wrong number of joints.

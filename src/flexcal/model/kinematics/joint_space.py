@@ -8,7 +8,7 @@ from flexcal.errors import FlexcalError
 from flexcal.model.robot import RobotModel
 
 LIMIT_MARGIN = 0.02
-"""Share of a joint's range that is kept free at either end."""
+"""Share of a joint's range that is left unused at either end."""
 
 
 def joint_limits(model: RobotModel) -> tuple[np.ndarray, np.ndarray]:
@@ -44,7 +44,7 @@ def joint_ranges(model: RobotModel) -> tuple[np.ndarray, np.ndarray]:
 
 
 def low_discrepancy_configurations(model: RobotModel, count: int) -> np.ndarray:
-    """Configurations (count, n) spread evenly over the joint ranges, always the same ones.
+    """Low-discrepancy sequence of configurations (count, n) over the joint ranges, the same at every call.
 
     The additive recurrence whose steps are powers of the generalised golden ratio, the root of x^(n+1) = x + 1.
     """

@@ -1,4 +1,4 @@
-"""The surface of a robot's links, for drawing: the visual or collision shapes of its URDF, else capsules from joint to joint."""
+"""Surface of a robot's links for drawing: the visual or collision shapes of its URDF, else capsules from joint to joint."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from flexcal.model.robot import RobotModel
 from flexcal.model.urdf import locked_joints, read_elements
 
 _MOST = 6000
-"""Triangles of the whole arm."""
+"""Largest number of triangles of the whole arm."""
 _SLENDER = 0.045
-"""Radius of a capsule over the length of the arm."""
+"""Ratio of a capsule's radius to the length of the arm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class LinkSurface:
 
     @classmethod
     def of(cls, model: RobotModel) -> LinkSurface:
-        """From the URDF's visual shapes; where it has none or meshes are missing, from its collision shapes; else capsules."""
+        """Surface from the URDF's visual shapes; without them, or with missing meshes, from its collision shapes; else from capsules."""
         return cls._joined(_urdf_shapes(model) or _capsules(model))
 
     @classmethod
@@ -82,7 +82,7 @@ def _urdf_shapes(model: RobotModel) -> list[tuple[int, np.ndarray, np.ndarray]]:
 
 
 def _mesh(shape: Any) -> tuple[np.ndarray, np.ndarray] | None:
-    """Triangles of a shape of coal, None of a kind that is not drawn."""
+    """Triangles of a coal shape; None for a shape type that is not drawn."""
     import coal
 
     match shape:
@@ -118,7 +118,7 @@ def _capsules(model: RobotModel) -> list[tuple[int, np.ndarray, np.ndarray]]:
 
 
 def _towards(direction: np.ndarray) -> np.ndarray:
-    """A rotation (3, 3) that takes the z axis to a unit vector."""
+    """Rotation (3, 3) that takes the z axis to a unit vector."""
     across = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
     across /= np.linalg.norm(across)
     return np.stack([across, np.cross(direction, across), direction], axis=1)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 _AROUND = 20
-"""Corners of a circle."""
+"""Number of corners of a circle."""
 _RINGS = 4
-"""Rings of a hemisphere."""
+"""Number of rings of a hemisphere."""
 
 
 def box(half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -38,7 +38,7 @@ def ellipsoid(half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def decimated(vertices: np.ndarray, triangles: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
-    """At most `most` triangles: vertices are merged in cells of a grid, which grow until few enough triangles keep three corners."""
+    """Mesh reduced to at most `most` triangles by merging vertices in the cells of a grid, which is coarsened until few enough remain."""
     cell = float(np.ptp(vertices, axis=0).max()) / 256
     while len(triangles) > most:
         cells = np.floor((vertices - vertices.min(axis=0)) / cell).astype(int)

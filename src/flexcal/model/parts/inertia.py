@@ -1,4 +1,4 @@
-"""The inertia of a link."""
+"""Inertia of a link."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A joint of the kinematic tree, as the URDF gives it."""
+"""Joint of the kinematic tree, as the URDF gives it."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ class Payload:
     inertia: np.ndarray
 
     def carried(self, mass: float) -> Inertia:
-        """Inertia in the link's frame of `mass` kg held in its place; the declared inertia scales with the mass."""
+        """Inertia, in the link's frame, of `mass` kg at the payload's place; the declared inertia scales with the mass."""
         share = mass / self.mass if self.mass > 0 else 0.0
         return Inertia(mass, self.com_in_link, self.rotation @ (share * self.inertia) @ self.rotation.T)
 
@@ -54,11 +54,11 @@ class Payload:
 
     @property
     def values(self) -> dict[str, float]:
-        """Its ten parameters by name: mass, com_x … com_z, and Ixx … Izz about the centre of mass."""
+        """The ten parameters by name: mass, com_x … com_z, and Ixx … Izz about the centre of mass."""
         return dict(zip(_PARAMETERS, map(float, [self.mass, *self.com, *self.moments]), strict=True))
 
     def with_values(self, values: Mapping[str, float]) -> Payload:
-        """The payload with some of `values` changed; where the mass is, the inertia that is not named scales with it."""
+        """Payload with some of `values` changed; if the mass changes, the inertia that is not named scales with it."""
         mass = values.get("mass", self.mass)
         moments = self.moments * (mass / self.mass) if self.mass > 0 else self.moments
         unnamed = dict(zip(_PARAMETERS, [mass, *self.com, *moments], strict=True))

@@ -1,4 +1,4 @@
-"""The pseudo-inertia of a link, positive definite for physically consistent inertials (Wensing, Kim & Slotine 2018)."""
+"""Pseudo-inertia matrix of a link, positive definite for physically consistent inertials (Wensing, Kim & Slotine 2018)."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ def _basis() -> np.ndarray:
 
 
 PSEUDO_INERTIA = _basis()
-"""(10, 4, 4): what one unit of each parameter in `LINK_PARAMETERS` adds to [[Σ, mc], [mcᵀ, m]], Σ = ½ tr(I) 1 - I at the joint frame."""
+"""Basis (10, 4, 4): derivative of [[Σ, mc], [mcᵀ, m]], Σ = ½ tr(I) 1 - I at the joint frame, by each parameter in `LINK_PARAMETERS`."""
 
 
 def pseudo_inertia(link: Inertia) -> np.ndarray:
-    """[[Σ, mc], [mcᵀ, m]] (4, 4) of a link at its joint frame, in kg m², kg m and kg."""
+    """Pseudo-inertia matrix [[Σ, mc], [mcᵀ, m]] (4, 4) of a link at its joint frame, in kg m², kg m and kg."""
     at_joint = link.inertia + parallel_axis(link.mass, link.com)
     result = np.empty((4, 4))
     result[:3, :3] = 0.5 * np.trace(at_joint) * np.eye(3) - at_joint
@@ -42,6 +42,6 @@ def pseudo_inertia(link: Inertia) -> np.ndarray:
 
 
 def is_physically_consistent(values: Mapping[str, float], link: str) -> bool:
-    """Whether some body has the ten named parameters of a link: positive mass, and triangle inequalities that hold strictly."""
+    """Whether the ten named parameters of a link are those of a physical body: positive mass and strict triangle inequalities."""
     own = np.array([values[f"{link}.{key}"] for key in LINK_PARAMETERS])
     return bool(np.linalg.eigvalsh(np.tensordot(own, PSEUDO_INERTIA, 1))[0] > 0)

@@ -1,4 +1,4 @@
-"""Rotations in the forms that files use."""
+"""Conversions between rotation matrices, roll-pitch-yaw angles, rotation vectors and quaternions."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def axis_rotations(axis: np.ndarray, angles: np.ndarray | float) -> np.ndarray:
 
 
 def skew_matrix(vector: np.ndarray) -> np.ndarray:
-    """The matrix (3, 3) whose product with a second vector (3,) is the cross product of both."""
+    """Skew-symmetric matrix (3, 3) of a vector (3,): its product with a second vector is the cross product of both."""
     x, y, z = vector
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 

@@ -1,4 +1,4 @@
-"""Kinematic tree of the kernels, made of joints and bearing frames."""
+"""Kinematic tree as the compiled kernels take it, made of joints and bearing frames."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ from flexcal.kernels import Tree
 from flexcal.model.parts.joint import Joint
 
 Bearings = Literal["before", "after"]
-"""Where bearings tilt: before the joint's rotation, about axes fixed to the parent link, or after it, about axes of the child."""
+"""Location of the bearing springs: before the joint's rotation, about axes fixed to the parent link, or after it, about axes of the
+child.
+"""
 
 
 def path_to(joints: Sequence[Joint], joint: int) -> tuple[int, ...]:
-    """Indices of the joints from the base to a joint, this one included; none for -1, the base."""
+    """Indices of the joints from the base to a joint, inclusive; empty for -1, the base."""
     path: list[int] = []
     while joint >= 0:
         path.append(joint)
@@ -32,7 +34,7 @@ def bearing_frame(joint: Joint) -> np.ndarray:
 def kinematic_tree(
     joints: Sequence[Joint], bearing_frames: Mapping[int, np.ndarray], bearings: Bearings | None = None
 ) -> Tree:
-    """The kernels' view of some joints, of the bearing frames (3, 3) of the elastic ones by joint index, and of where bearings tilt."""
+    """Kinematic tree of the given joints for the kernels, with the bearing frames (3, 3) of the elastic ones by joint index."""
     return Tree.build(
         [j.parent for j in joints],
         [j.kind == "prismatic" for j in joints],

@@ -1,4 +1,4 @@
-"""A robot with a payload or a measured point in any URDF frame, and the inertias that its joints carry."""
+"""Robot with a payload or a measured point in any URDF frame, and the inertias of its links with the payload."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 
 def last_frame(model: RobotModel) -> str:
-    """The link of the last joint."""
+    """Name of the last joint's link."""
     return model.joints[-1].link
 
 
 def with_payload(
     model: RobotModel, frame: str, mass: float, com: np.ndarray, inertia: np.ndarray
 ) -> RobotModel:
-    """`model` with a payload of `mass` (kg) in the URDF frame `frame`, as if robot.yaml declared it.
+    """Robot with a payload of `mass` (kg) in the URDF frame `frame`, as if robot.yaml declared it.
 
     `com` (3,) m and `inertia` (3, 3) kg m² about it are in that frame. Raises `InputError` for a frame that the URDF lacks or that no
     joint moves.
@@ -35,7 +35,7 @@ def with_payload(
 
 
 def carried_inertias(model: RobotModel, payload: float | None = None) -> tuple[Inertia, ...]:
-    """Inertia of every joint's link, the payload (kg, default: the declared one) merged into the link that carries it."""
+    """Inertia of every joint's link, the payload (kg; default: declared mass) included in the link that carries it."""
     declared = model.payload
     if declared is None:
         if payload:
@@ -58,7 +58,7 @@ def carried_inertias(model: RobotModel, payload: float | None = None) -> tuple[I
 
 
 def with_point_at_frame(model: RobotModel, frame: str) -> RobotModel:
-    """`model` with a point named as the URDF frame `frame`, at its origin, after the declared ones; itself where robot.yaml declares that.
+    """Robot with a further point at the origin of the URDF frame `frame`, named as the frame; unchanged if robot.yaml declares that point.
 
     Raises `InputError` for a frame that the URDF lacks or that no joint moves, and where a declared point of that name is elsewhere.
     """

@@ -14,7 +14,7 @@ _LEAST_PRIOR = 1e-12
 
 @dataclass(frozen=True)
 class AcceptanceConfig:
-    """A reflector fixed to the tool is seen within `half_angle` (rad) of its `axis`, in the frame of the point: ±30° if not said."""
+    """Acceptance cone of a reflector fixed to the tool: `half_angle` (rad, default ±30°) about its `axis` in the frame of the point."""
 
     axis: Triple
     half_angle: float = 0.5236
@@ -29,7 +29,7 @@ class AcceptanceConfig:
 
 @dataclass(frozen=True)
 class PointConfig:
-    """A reflector: nominal position `xyz` (m) in the URDF frame `frame`; `acceptance` where it does not turn towards the instrument."""
+    """Reflector at the nominal position `xyz` (m) in the URDF frame `frame`; `acceptance` if it does not turn towards the instrument."""
 
     frame: str
     xyz: Triple
@@ -38,7 +38,7 @@ class PointConfig:
 
 @dataclass(frozen=True)
 class ArmSensorConfig:
-    """An accelerometer or a vibrometer that records in frequency experiments: the point `xyz` (m) in the URDF frame `frame`.
+    """Accelerometer or vibrometer of frequency experiments, at the point `xyz` (m) in the URDF frame `frame`.
 
     `direction` in which it measures: of an accelerometer in the axes of `frame`, with which it moves; of a vibrometer, which stands still,
     in the robot's base frame. `quantity` is what the log holds, in m/s², m/s or m: without it the acceleration of an accelerometer and the
@@ -88,8 +88,8 @@ class PayloadConfig:
 
 @dataclass(frozen=True)
 class PriorConfig:
-    """How far nominal values may be off, 1σ: mass (relative), centre of mass (m), rotor inertia (relative), stiffness (relative), and the
-    torque constants behind the motor torques that a controller gives (relative; 0 for torques that were measured).
+    """Prior standard deviations (1σ) of nominal values: mass (relative), centre of mass (m), rotor inertia (relative), stiffness
+    (relative), and the torque constants behind the motor torques that a controller gives (relative; 0 for measured torques).
 
     `length` (m) and `angle` (rad) are those of the joints' geometric errors, and `parameters` those of single ones by name; a geometric
     parameter without is estimated from the measurements alone.
@@ -124,7 +124,7 @@ class PriorConfig:
 
 @dataclass(frozen=True)
 class CouplingConfig:
-    """A transmission in which `motor` also turns `joint`, by `ratio`. For the identification of dynamics."""
+    """Transmission coupling in which `motor` also turns `joint`, by `ratio`; for the identification of dynamics."""
 
     motor: str
     joint: str
@@ -193,7 +193,7 @@ class ElasticConfig:
 
 @dataclass(frozen=True)
 class GeometryConfig:
-    """Which terms the geometric calibration may use, and the joints with backlash."""
+    """Terms that the geometric calibration may use, and the joints with backlash."""
 
     terms: str | tuple[str, ...] = "auto"
     backlash: tuple[str, ...] = ()
@@ -235,7 +235,8 @@ class CableTorqueConfig:
 
 @dataclass(frozen=True)
 class DynamicsConfig:
-    """Preprocessing of signals, and friction, for the identification of dynamics; absent cut-off and decimation follow from the data.
+    """Settings of signal preprocessing and friction for the identification of dynamics; omitted cut-off and decimation follow from the
+    data.
 
     friction: "classic" (viscous, Coulomb, offset), a list of terms, or "auto": the classic ones and what cross-validation adds to them.
     torque: what a logged torque is over a sample, as in plans; `tau` in files.
@@ -279,7 +280,7 @@ class ForceSensorConfig:
 
 @dataclass(frozen=True)
 class StationConfig:
-    """Where the instrument stands, in the robot's base frame (m), for planning; the calibration estimates it, and needs none."""
+    """Place of the measuring instrument in the robot's base frame (m), for planning only; the calibration estimates it."""
 
     xyz: Triple | None = None
     line_of_sight: bool = False
@@ -307,7 +308,7 @@ class BoxConfig:
 
 @dataclass(frozen=True)
 class LimitsConfig:
-    """What a designed motion keeps beside the URDF's limits.
+    """Limits of a designed motion beyond those of the URDF.
 
     Accelerations of the joints, rad/s² or m/s², the speed of the first point, m/s, and a box in which that stays.
     """
@@ -339,7 +340,7 @@ class ControllerConfig:
 
 @dataclass(frozen=True)
 class SignalConfig:
-    """How columns of a log become SI values at the joint: matrix · (gain ⊙ column · unit) + offset · unit."""
+    """Conversion of log columns to SI values at the joint: matrix · (gain ⊙ column · unit) + offset · unit."""
 
     columns: tuple[str, ...]
     unit: str | None = None
@@ -350,7 +351,7 @@ class SignalConfig:
 
 @dataclass(frozen=True)
 class RobotConfig:
-    """The whole of robot.yaml. `locked`: movable joints of the URDF that stand still, as those of a gripper, and where (rad or m).
+    """Content of robot.yaml. `locked`: movable joints of the URDF that stand still, as those of a gripper, and their positions (rad or m).
 
     `bearings` says whether the bearings of elastic joints tilt before or after the joint's rotation (Eq. 1: after); without it the data
     decide, where they tell.

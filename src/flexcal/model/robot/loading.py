@@ -34,7 +34,7 @@ HARMONICS = (1, 2, 3)
 
 
 def read_robot(robot_type: type[RobotModel], path: Path) -> RobotModel:
-    """A robot of a robot.yaml and its URDF; raises `InputError` with file and line where they do not fit."""
+    """Robot model of a robot.yaml and its URDF; raises `InputError` with file and line for inconsistent content."""
     file = read_yaml_file(path)
     config = file.structure(RobotConfig)
     urdf = path.parent / config.robot

@@ -13,7 +13,7 @@ from flexcal.model.parts import Inertia
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """Deviations of the geometry from the URDF, and compliances at rigid joints.
+    """Geometric deviations from the URDF, and compliances of rigid joints.
 
     `errors` (n, 6) of every joint and `tool` (6,) in the order of `GEOMETRY`, rad and m; `point_error` (points, 3), m, in the order of
     the robot's points; `gravity_compliance` (n,) about the joints' axes and `lateral_compliance` (n, 2) across them, rad/(N m).
@@ -44,7 +44,7 @@ class Springs:
 
 @dataclass(frozen=True, eq=False)
 class Drives:
-    """Motors, transmissions and friction; in N, m, kg for a prismatic joint.
+    """Parameters of motors, transmissions and friction; in N, m, kg for a prismatic joint.
 
     (n,) each: `rotor_inertia`, kg m², of the motors at the joint; `held_inertia`, kg m², that moves with the arm of a braked joint beyond
     its links'; `viscous`, N m s/rad, and `coulomb`, N m, friction; `torque_offset`, N m; `delay` of the torque signal, s; `ratio`, motor
@@ -81,7 +81,7 @@ class Links:
 
     @classmethod
     def of(cls, inertias: Sequence[Inertia]) -> Links:
-        """The links with these inertias."""
+        """Parameters of links with the given inertias."""
         return cls(
             np.array([link.mass for link in inertias]),
             np.array([link.com for link in inertias]),
@@ -91,7 +91,7 @@ class Links:
 
 @dataclass(frozen=True, eq=False)
 class Stations:
-    """Places of the measuring instrument: `names`, and `pose` (stations, 6) as x, y, z, m, and the rotation vector rx, ry, rz, rad."""
+    """Poses of the measuring instrument: `names`, and `pose` (stations, 6) as x, y, z, m, and the rotation vector rx, ry, rz, rad."""
 
     names: tuple[str, ...]
     pose: np.ndarray

@@ -1,4 +1,4 @@
-"""Table of parameter names (docs/file-formats.md): place in `RobotModel` and unit of each."""
+"""Table of parameter names (docs/file-formats.md): location in `RobotModel` and unit of each."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ _SLIDING = {
 
 
 def unit_in(model: RobotModel, name: str) -> str:
-    """SI unit of a parameter of a robot: that of a prismatic joint's drive, spring or friction is in N and m."""
+    """SI unit of a robot's parameter; drive, spring and friction of a prismatic joint are in N and m."""
     unit, (owner, _, key) = unit_of(name), name.rpartition(".")
     key, _, other = key.partition("_at_")
     if key not in _OF_DRIVES or owner not in model.joint_names:
@@ -70,7 +70,7 @@ def torque_units(model: RobotModel) -> dict[str, str]:
 
 
 def unit_of(name: str) -> str:
-    """SI unit of a parameter name, of joints that turn."""
+    """SI unit of a parameter name, for revolute joints."""
     last = name.rpartition(".")[2].partition("_at_")[0]
     if last.startswith("transmission_"):
         return "rad"
@@ -90,7 +90,7 @@ def spring_names(model: RobotModel) -> tuple[str, ...]:
 
 
 def unknown_parallel(model: RobotModel, joint: str) -> tuple[str, ...]:
-    """What robot.yaml declares to act on a joint beside motor and friction without saying how much, out of `PARALLEL`."""
+    """Effects out of `PARALLEL` that robot.yaml declares on a joint without a value."""
     config = model.config.dynamics
     springs = [entry for entry in config.joint_springs if entry.joint == joint]
     unknown = ["spring_stiffness"] if any(entry.stiffness is None for entry in springs) else []
@@ -102,7 +102,7 @@ def unknown_parallel(model: RobotModel, joint: str) -> tuple[str, ...]:
 
 
 def parameter_locations(model: RobotModel) -> dict[str, Location]:
-    """Every parameter name of a robot → its place in the groups of arrays.
+    """Location of every named parameter of a robot in its groups of arrays.
 
     The payload's are not here, for it keeps its own (`Payload.values`), nor are inertia entries of links (`<link>.Ixx`…, at the joint
     frame) and first moments (`<link>.mc_x`…), which depend on mass and centre of mass too.

@@ -18,7 +18,7 @@ class Posterior:
     covariance: np.ndarray
 
     def determines(self, name: str) -> bool:
-        """Whether a parameter was estimated, and not held fixed because the data do not separate it from others."""
+        """Whether a parameter was estimated rather than held fixed as not separable from others."""
         if name not in self.parameters:
             return False
         number = self.parameters.index(name)
@@ -30,7 +30,8 @@ class Posterior:
         return self.covariance[np.ix_(numbers, numbers)]
 
     def prior(self, declared: Parameters) -> tuple[Parameters, np.ndarray]:
-        """What to start an identification of `declared` from: these with the marginal priors, and the joint prior covariance (p, p).
+        """Prior for a further identification of `declared`: these values with their marginal priors, and the joint prior covariance (p,
+        p).
 
         Where they were estimated before, on the same scale, the joint covariance of that replaces what was declared of them. Values stay:
         a robot with this posterior has its values.
@@ -47,7 +48,7 @@ class Posterior:
         return Parameters(items), covariance
 
     def updated(self, estimate: Estimate, names: tuple[str, ...]) -> Posterior:
-        """With the named parameters taken from `estimate`; what only the older holds stays, taken as independent of it."""
+        """Posterior with the named parameters taken from `estimate`; the remaining ones are kept and taken as independent of it."""
         newer = estimate.parameters.subset(names)
         older = [name for name in self.parameters.names if name not in newer]
         size = len(older)

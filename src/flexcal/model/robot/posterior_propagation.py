@@ -10,7 +10,7 @@ from flexcal.model.robot.robot_model import RobotModel
 
 
 def propagated_covariance_root(model: RobotModel, result: Callable[[RobotModel], np.ndarray]) -> np.ndarray:
-    """A square root (size, k) of the covariance of `result` (size,) over the posterior of `model`, to first order.
+    """Square root (size, k) of the first-order covariance of `result` (size,) over the posterior of `model`.
 
     Its k columns are what one standard deviation in each independent direction of the estimated parameters changes, by central
     differences over one standard deviation of each; k = 0 where nothing was estimated.

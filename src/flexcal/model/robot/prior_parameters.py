@@ -1,4 +1,4 @@
-"""Prior knowledge of a robot, common to all identifications."""
+"""Prior knowledge about a robot, common to all identifications."""
 
 from __future__ import annotations
 
@@ -20,33 +20,36 @@ GAP_TOLERANCE = 1e-4
 """1σ of an uncalibrated backlash, half the gap, rad."""
 
 SPRING_LOG_STD = 1.5
-"""Prior of every stiffness and damping that a frequency response is to find, 1σ of the logarithm (a factor of 4.5): it only keeps the
-posterior proper."""
+"""Prior 1σ of the logarithm of every stiffness and damping identified from frequency responses (a factor of 4.5): wide, only keeps the
+posterior proper.
+"""
 FURTHER_SPRING_LOG_STD = 2.0
-"""The same for a spring that robot.yaml does not declare and the responses ask for, about a mode at the highest line."""
+"""Prior 1σ of the logarithm of the stiffness of a spring added without declaration, about a mode at the highest line."""
 SOFTEST_FURTHER_SPRING = 16.0
-"""How much softer it may be at most: with a mode at a quarter of the highest line. Softer ones would be seen by eye, and imitate
-friction."""
+"""Lowest relative stiffness of such a spring, with its mode at a quarter of the highest line. Softer ones would be visible, and imitate
+friction.
+"""
 FRICTION_LOG_STD = 1.5
-"""Prior of the motor's viscous coefficient in one pose of a frequency response, 1σ of the logarithm about what is seen or predicted."""
+"""Prior 1σ of the logarithm of a motor's viscous coefficient in one pose, about the measured or predicted value."""
 FRICTION_TOLERANCE = 0.05
-"""1σ of the deviation of a motor's impedance from a viscous coefficient, relative to that, at any frequency."""
+"""Relative 1σ of the deviation of a motor's friction impedance from a viscous coefficient, at any frequency."""
 SHARED_DISTORTION = 0.2
-"""Share of the nonlinear distortion of a frequency response that all realisations have in common, for reference motion and friction are
-the same in all: averaging over realisations does not lower it."""
+"""Share of the nonlinear distortion of a frequency response that is common to all realisations, because reference motion and friction
+are the same in all; averaging over realisations does not lower it.
+"""
 
 _POSITIVE = ("mass", "rotor_inertia", "stiffness")
 
 
 def uncertain_inertials(model: RobotModel, links: Collection[int]) -> list[str]:
-    """Names of mass and centre of mass of those of the `links` that have a mass, as far as robot.yaml's `prior:` lets them be off."""
+    """Names of masses and centres of mass of those `links` with mass that have a nonzero standard deviation in robot.yaml's `prior:`."""
     keys = ["mass"] if model.prior.mass > 0 else []
     keys += ["com_x", "com_y", "com_z"] if model.prior.com > 0 else []
     return [f"{model.joints[i].link}.{key}" for i in sorted(links) if model.links.mass[i] > 0 for key in keys]
 
 
 def uncertain_payload(model: RobotModel) -> tuple[str, ...]:
-    """What is uncertain of the payload: its mass as robot.yaml's `mass_std` says, or what was identified of mass and centre of mass."""
+    """Uncertain payload parameters: the mass with robot.yaml's `mass_std`, or the identified mass and centre of mass."""
     payload = model.payload
     if payload is None:
         return ()
@@ -56,8 +59,7 @@ def uncertain_payload(model: RobotModel) -> tuple[str, ...]:
 
 
 def sensor_parameters(sensor: ArmSensor, sample_time: float) -> tuple[Parameter, ...]:
-    """Of a sensor on the arm: its sensitivity, about that stated, the delay of its readings, 0 ± the sample time in s, and its errors of
-    mounting."""
+    """Parameters of an arm-side sensor: sensitivity about the stated one, delay of 0 ± the sample time (s), and mounting errors."""
     mounting = zip(mounting_names(sensor.name), sensor.mounting_std, strict=True)
     return (
         Parameter(
@@ -69,7 +71,7 @@ def sensor_parameters(sensor: ArmSensor, sample_time: float) -> tuple[Parameter,
 
 
 def springs_and_rotors(model: RobotModel) -> tuple[Parameter, ...]:
-    """Stiffness and damping of every spring, almost free, and the rotor inertias of the driven joints with robot.yaml's prior.
+    """Stiffness and damping of every spring, with wide priors, and the rotor inertias of the driven joints with robot.yaml's prior.
 
     Raises `FlexcalError` for one without a positive value.
     """
@@ -92,7 +94,7 @@ def springs_and_rotors(model: RobotModel) -> tuple[Parameter, ...]:
 
 
 def elastic_inertials(model: RobotModel, *, loaded: bool) -> list[Parameter]:
-    """What robot.yaml leaves uncertain of the links that an elastic joint moves and, where `loaded`, the payload's mass."""
+    """Uncertain inertials, by robot.yaml's prior, of the links moved by an elastic joint and, if `loaded`, the payload's mass."""
     elastic = {joint.index for joint in model.elastic}
     moved = [i for i in range(model.n) if not elastic.isdisjoint(model.path_to(i))]
     items = [declared_parameter(model, name) for name in uncertain_inertials(model, moved)]
@@ -103,7 +105,7 @@ def elastic_inertials(model: RobotModel, *, loaded: bool) -> list[Parameter]:
 
 
 def declared_parameter(model: RobotModel, name: str) -> Parameter:
-    """A parameter at the model's value, with what robot.yaml and workshop tolerances say of it as its prior.
+    """Parameter at the model's value, with its prior from robot.yaml and workshop tolerances.
 
     Mass, rotor inertia and stiffness are estimated as logarithms. A link's inertia about its centre of mass goes with its mass and has no
     prior of its own; friction and torque offset have none at all.

@@ -160,7 +160,7 @@ class RobotModel:
         )
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without the kernels' view, which is built anew where the robot arrives: other processes can be handed robots."""
+        """State for pickling, without the kernels' view, which is rebuilt on arrival."""
         return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "tree"}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -170,7 +170,7 @@ class RobotModel:
         )
 
     def with_bearings(self, bearings: Bearings) -> RobotModel:
-        """Robot with bearings that tilt before or after the joint's rotation; parameters and posterior stay.
+        """Robot with bearing springs before or after the joint's rotation; parameters and posterior are kept.
 
         Parameters
         ----------
@@ -187,7 +187,7 @@ class RobotModel:
         return replace(self, config=config, tree=tree)
 
     def with_drive_springs(self, springs: Mapping[int, tuple[float, float]]) -> RobotModel:
-        """Robot with drive springs at some of the rigid joints.
+        """Robot with drive springs at some of its rigid joints.
 
         In a frequency experiment the motors of these joints are braked.
 
@@ -227,7 +227,7 @@ class RobotModel:
         return replace(self, springs=widened, tree=kinematic_tree(self.joints, frames, self.config.bearings))
 
     def without_springs(self) -> RobotModel:
-        """The robot with no elastic joint."""
+        """Robot without elastic joints."""
         return replace(self, springs=replace(self.springs, bearing_frames={}))
 
     def with_estimated_springs(self, values: Mapping[str, float]) -> RobotModel:
@@ -283,22 +283,22 @@ class RobotModel:
 
     @property
     def prior(self) -> PriorConfig:
-        """How far the nominal inertials may be off."""
+        """Prior standard deviations of the nominal inertials."""
         return self.config.prior
 
     @property
     def controller(self) -> ControllerConfig | None:
-        """The position controller, where declared."""
+        """Position controller, if declared."""
         return self.config.controller
 
     @property
     def bearings(self) -> Bearings:
-        """Whether bearings tilt before the joint's rotation or after it: as Eq. (1) has it where nothing is known."""
+        """Location of the bearing springs, before or after the joint's rotation; as in Eq. (1) if unknown."""
         return self.config.bearings or "after"
 
     @property
     def has_bearings(self) -> bool:
-        """Whether a joint has bearing springs, so that it matters where they tilt."""
+        """Whether any joint has bearing springs, so that their location matters."""
         return any(joint.bearings for joint in self.elastic)
 
     @property
@@ -308,7 +308,7 @@ class RobotModel:
 
     @cached_property
     def elastic(self) -> tuple[ElasticJoint, ...]:
-        """The joints with springs, in chain order."""
+        """Joints with springs, in chain order."""
         return tuple(
             ElasticJoint(
                 i,
@@ -324,7 +324,7 @@ class RobotModel:
 
     @cached_property
     def driven(self) -> tuple[ElasticJoint, ...]:
-        """The elastic joints whose motors are excited in a frequency experiment: those that are not braked."""
+        """Elastic joints whose motors are excited in a frequency experiment, that is, not braked."""
         return tuple(joint for joint in self.elastic if joint.index not in self.springs.braked)
 
     @cached_property
@@ -388,7 +388,7 @@ class RobotModel:
         return path_to(self.joints, joint)
 
     def point(self, name: str | None = None) -> Point:
-        """A target point.
+        """Target point by name.
 
         Parameters
         ----------
@@ -419,7 +419,7 @@ class RobotModel:
         return self.points[key]
 
     def station_index(self, name: str) -> int:
-        """Index of one of the instrument's places.
+        """Index of a station of the instrument.
 
         Parameters
         ----------
@@ -460,7 +460,7 @@ class RobotModel:
 
     @cached_property
     def values(self) -> Mapping[str, float]:
-        """Every named value, SI."""
+        """All named values, SI units."""
         table = {
             name: float(getattr(getattr(self, group), array)[index])
             for name, (group, array, index) in self._locations.items()
@@ -494,7 +494,7 @@ class RobotModel:
         return self.values[name]
 
     def with_values(self, values: Mapping[str, float]) -> RobotModel:
-        """Robot with other values of some named parameters.
+        """Robot with new values of some named parameters.
 
         Parameters
         ----------
@@ -566,7 +566,7 @@ class RobotModel:
         return first_moment / mass if mass != 0 else 0.0
 
     def with_estimate(self, estimate: Estimate) -> RobotModel:
-        """Robot with the values of an estimate that are the robot's own, and with their joint covariance.
+        """Robot with those values of an estimate that belong to the robot itself, and with their joint covariance.
 
         A rigid joint whose drive stiffness was estimated gets that spring.
 

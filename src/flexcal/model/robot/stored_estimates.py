@@ -21,24 +21,24 @@ if TYPE_CHECKING:
     from flexcal.model.robot.robot_model import RobotModel
 
 PAYLOAD_FRAME = "frame"
-"""Of the provenance of the block `payload`: the URDF frame that its values are in."""
+"""Provenance key of the block `payload`: the URDF frame of its values."""
 BEARINGS = "option.bearings"
-"""Of the provenance of the blocks `stiffness` and `calibration`: the bearings that they were estimated with."""
+"""Provenance key of the blocks `stiffness` and `calibration`: the bearings assumed in the identification."""
 NUISANCE = re.compile(
     r".*\.(pose_[0-9]+|half_gap|held_inertia|arm_inertia|arm_viscous|arm_coulomb|(drive|bearing_x|bearing_y)\.torque_offset"
     r"|drive\.gap_torque|drive\.(stiffness|damping)_at_.+)|force_sensor\.[fm][xyz]_offset"
     r"|sensor\..+\.(sensitivity|delay|position_[xyz]|direction_[12])"
 )
-"""Names of what was estimated for an experiment, and of what the flexible model tells apart: not the robot's own here."""
+"""Names of nuisance parameters: estimated for one experiment, or separable only by the flexible model; not applied to the robot."""
 
 
 def apply_estimates(model: RobotModel, path: Path, *, without: Block | None = None) -> RobotModel:
-    """`model` with every block of an estimates file but `without`, later blocks last; raises `InputError` as `with_blocks` does."""
+    """Robot with every block of an estimates file except `without`, applied in order; raises `InputError` as `with_blocks` does."""
     return with_blocks(model, read_estimates(path, without=without), path)
 
 
 def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path) -> RobotModel:
-    """`model` with the estimates of `blocks`, which come from the file `path`.
+    """Robot with the estimates of `blocks`, read from the file `path`.
 
     A joint whose backlash was estimated counts as declared to have backlash, one whose drive stiffness was estimated as elastic, and a
     payload that was identified as declared in its frame.
@@ -97,7 +97,7 @@ def _with_bearings(model: RobotModel, blocks: Mapping[Block, Estimate], path: Pa
 
 
 def _with_payload(model: RobotModel, estimate: Estimate, path: Path) -> RobotModel:
-    """With the identified payload's frame, whose values come with its block."""
+    """Robot with the frame of the identified payload; its values come with its block."""
     frame, declared = estimate.provenance.get(PAYLOAD_FRAME, ""), model.payload
     if declared is None:
         values = estimate.values

@@ -1,4 +1,4 @@
-"""Position of the tool of the deflected, calibrated robot at rest: the forward map of calibration and compensation."""
+"""Tool position of the deflected, calibrated robot at rest: the forward map of calibration and compensation."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from flexcal.model.statics.equilibrium import Equilibrium, static_equilibrium
 
 @dataclass(frozen=True, eq=False)
 class ToolAtRest:
-    """Targets at a batch of motor positions `q` (N, n), in the robot's base frame: how the arm rests, and where that puts them."""
+    """Targets of the resting arm at a batch of motor positions `q` (N, n), in the robot's base frame, and the arm's equilibrium."""
 
     model: RobotModel
     q: np.ndarray
@@ -41,7 +41,7 @@ class ToolAtRest:
 
 
 def carried_mass(model: RobotModel, payload: np.ndarray | None, samples: int) -> np.ndarray:
-    """Payload (N,), kg, that the robot carries where a file says `payload` (N,): the declared one where it says nothing.
+    """Payload mass (N,), kg, from a file's `payload` (N,); the declared mass where the file has none.
 
     Where the payload was found to weigh more or less than declared, the values of the file are as much off. Raises `FlexcalError` for a
     payload without a declaration.
@@ -119,7 +119,7 @@ def tool_at_rest(
 def points_kinematics(
     model: RobotModel, q: np.ndarray, deflection: np.ndarray | None, target: np.ndarray, *, jacobians: bool
 ) -> PointKinematics:
-    """`point_kinematics` with a point (N,) of its own in every row."""
+    """`point_kinematics` with a different point (N,) in every row."""
     names = list(dict.fromkeys(target.tolist()))
     if len(names) < 2:
         return point_kinematics(model, q, deflection, point=next(iter(names), None), jacobians=jacobians)

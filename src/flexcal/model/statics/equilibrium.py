@@ -1,4 +1,4 @@
-"""The elastic arm at rest: deflection under gravity with the motors held (Eqs. 10-14), backlash flanks, sensitivities."""
+"""Static equilibrium of the elastic arm: deflection under gravity with the motors held (Eqs. 10-14), backlash flanks, sensitivities."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def _solve(
 
 
 def gravity_torque(model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None) -> np.ndarray:
-    """Torque that the drives must hold against gravity, on the undeflected robot.
+    """Drive torque that balances gravity, on the undeflected robot.
 
     Computed with a spring of unbounded stiffness in every joint.
 
@@ -146,7 +146,7 @@ def gravity_torque(model: RobotModel, q: np.ndarray, payload: np.ndarray | float
 def gravity_moments(
     model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None
 ) -> np.ndarray:
-    """Moments (samples, n, 2), N m, with which joints hold gravity about their axes of `misalignment_1` and `misalignment_2`.
+    """Moments (samples, n, 2), N m, of joints balancing gravity about their axes of `misalignment_1` and `misalignment_2`.
 
     As `gravity_torque` otherwise: of the undeflected robot, carrying everything beyond the joint; 0 for prismatic joints.
     """
@@ -157,7 +157,7 @@ def gravity_moments(
 
 
 def lateral_slopes(model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None) -> np.ndarray:
-    """Tilt (samples, n, 2, 2) of every joint by its two lateral compliances, about the tilt axes x and y (last), rad per rad/(N m).
+    """Tilt (samples, n, 2, 2) of every joint due to its two lateral compliances, about the tilt axes x and y (last), rad per rad/(N m).
 
     Minus the moment that holds gravity, about an axis that is fixed to the parent link.
     """
@@ -167,7 +167,7 @@ def lateral_slopes(model: RobotModel, q: np.ndarray, payload: np.ndarray | float
 def gravity_regressor(
     model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None
 ) -> np.ndarray:
-    """Derivative (samples, n, 4 n) of `gravity_torque` by mass and first moment of each link, its payload's included."""
+    """Derivative (samples, n, 4 n) of `gravity_torque` with respect to mass and first moment of each link, payload included."""
     axes = _twists(model)
     _, deflection, regressor, _ = _held_rigidly(model, q, payload, axes, sensitivities=True)
     result = np.zeros((len(deflection), model.n, 4 * model.n))
@@ -178,7 +178,7 @@ def gravity_regressor(
 def spring_loads(
     model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Torque (samples, d), N m, with which springs of the undeflected arm hold gravity, `regressor` and `coupling` of `Equilibrium`.
+    """Torque (samples, d), N m, of the springs of the undeflected arm against gravity, `regressor` and `coupling` of `Equilibrium`.
 
     Those of the deflected arm differ by its angles, some 1e-3 of them, and are twice the work.
     """

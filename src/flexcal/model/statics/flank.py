@@ -8,13 +8,13 @@ from flexcal.model.robot import MASS_AND_COM, RobotModel
 from flexcal.model.statics.equilibrium import gravity_regressor, payload_batch
 
 CERTAIN = 3.0
-"""Standard deviations that the torque on a drive must be away from zero for its sign to be certain."""
+"""Distance of a drive torque from zero, in standard deviations, from which its sign counts as certain."""
 
 
 def certain_flank(
     model: RobotModel, q: np.ndarray, torque: np.ndarray, payload: np.ndarray | float | None = None
 ) -> np.ndarray:
-    """Whether the sign of `torque` (samples, n) N m, with which drives hold gravity at `q` (samples, n), is certain, (samples, n)."""
+    """Mask (samples, n) of drives whose gravity `torque` (samples, n) N m at `q` (samples, n) has a certain sign."""
     return np.abs(torque) > CERTAIN * gravity_torque_std(model, q, payload)
 
 

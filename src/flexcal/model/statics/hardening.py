@@ -1,5 +1,4 @@
-"""Drive springs that harden, as of gears whose teeth come into contact one after the other: a twist θ takes the torque
-k θ (1 + h (θ / 1 mrad)²).
+"""Hardening drive springs, as of gears whose teeth come into contact in succession: a twist θ takes the torque k θ (1 + h (θ / 1 mrad)²).
 
 The hardening h is the share by which the torque at a twist of 1 mrad, about that of a loaded gear, exceeds what the stiffness k at no load
 makes of it.
@@ -10,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 REFERENCE_TWIST = 1e-3
-"""The twist, rad, that hardening is stated for."""
+"""Twist, rad, to which hardening refers."""
 _NEWTON_STEPS = 20
 
 
@@ -30,10 +29,10 @@ def twist_from_torque(torque: np.ndarray, stiffness: np.ndarray, hardening: np.n
 
 
 def tangent_ratio(twist: np.ndarray, hardening: np.ndarray) -> np.ndarray:
-    """Tangent stiffness at a twist over that at no load."""
+    """Ratio of the tangent stiffness at a twist to that at no load."""
     return 1 + 3 * hardening * (twist / REFERENCE_TWIST) ** 2
 
 
 def twist_by_hardening(twist: np.ndarray, hardening: np.ndarray) -> np.ndarray:
-    """Derivative of the twist under a given torque by the hardening, rad."""
+    """Derivative, rad, of the twist under a given torque with respect to hardening."""
     return -twist * (twist / REFERENCE_TWIST) ** 2 / tangent_ratio(twist, hardening)

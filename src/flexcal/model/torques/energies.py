@@ -12,7 +12,7 @@ from flexcal.model.torques.inertial_regressor import torque_regressor
 
 
 def energy_regressor(model: RobotModel, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
-    """H (samples, 10 n), J, with H · `inertial_parameters` = ½ q̇ᵀM q̇ + U, U zero where all masses lie in the origin of the base frame.
+    """Energy regressor H (samples, 10 n), J, with H · `inertial_parameters` = ½ q̇ᵀM q̇ + U; U is zero with all masses in the base origin.
 
     `q`, `dq` (samples, n) in rad, m and s; columns are named by `inertial_names`. No acceleration stands in it. The model's geometric
     errors count; deflections and the payload do not. Raises `FlexcalError` where the shapes differ or do not fit the robot.

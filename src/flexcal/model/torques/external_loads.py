@@ -50,7 +50,7 @@ def sensor_jacobian(model: RobotModel, q: np.ndarray) -> np.ndarray:
 
 
 def declared_torque(model: RobotModel, q: np.ndarray) -> np.ndarray:
-    """Torque (samples, n) of springs and cables on the joints, as far as robot.yaml says how much: less what motors give against it."""
+    """Torque (samples, n) that springs and cables with declared values exert on the joints, opposite to what the motors give for them."""
     torque = np.zeros_like(q)
     for spring in model.config.dynamics.joint_springs:
         joint = model.joint_index(spring.joint)

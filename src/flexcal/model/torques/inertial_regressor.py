@@ -16,7 +16,7 @@ def inertial_names(model: RobotModel) -> tuple[str, ...]:
 
 
 def torque_regressor(model: RobotModel, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
-    """W (samples, n, 10 n) with W · `inertial_parameters` = the torques that move the links, gravity included.
+    """Torque regressor W (samples, n, 10 n): W · `inertial_parameters` = torques that move the links, gravity included.
 
     `q`, `dq`, `ddq` (samples, n) in rad, m and s. Rows are N m (N where prismatic); columns are named by `inertial_names`. Column
     10 i + k of joint j is zero where link i is not beyond joint j. In memory the samples of one column follow each other, which is
@@ -33,7 +33,7 @@ def torque_regressor(model: RobotModel, q: np.ndarray, dq: np.ndarray, ddq: np.n
 def write_torque_regressor(
     model: RobotModel, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, places: np.ndarray, out: np.ndarray
 ) -> None:
-    """Only the columns of `torque_regressor` that are needed, below each other: column c of joint j becomes row `places`[j, c] of `out`.
+    """Write selected columns of `torque_regressor` below each other: column c of joint j becomes row `places`[j, c] of `out`.
 
     `places` (n, 10 n) is -1 for what is not needed; `out` is (rows, samples). Entries that are zero because link i is not beyond joint j
     are not written. Raises `FlexcalError` as that does.
@@ -46,7 +46,9 @@ def write_torque_regressor(
 def motion_batch(
     model: RobotModel, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """All three as contiguous (samples, n) arrays. Raises `FlexcalError` where the shapes differ or do not fit the robot."""
+    """Position, velocity and acceleration as contiguous (samples, n) arrays; raises `FlexcalError` for shapes that differ or do not fit
+    the robot.
+    """
     q, dq, ddq = (joint_batch(model, values) for values in (q, dq, ddq))
     if not q.shape == dq.shape == ddq.shape:
         raise FlexcalError(
@@ -57,6 +59,6 @@ def motion_batch(
 
 
 def inertial_parameters(model: RobotModel) -> np.ndarray:
-    """The model's values of the columns, (10 n,)."""
+    """Inertial parameters of the model (10 n,), in the order of the columns."""
     values = model.values
     return np.array([values[name] for name in inertial_names(model)])

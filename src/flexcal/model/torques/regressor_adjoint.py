@@ -1,4 +1,4 @@
-"""Exact derivatives of any scalar function of the torque regressor by the motion, in one reverse sweep over the tree."""
+"""Exact derivatives of a scalar function of the torque regressor with respect to the motion, in one reverse sweep over the tree."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def torque_regressor_adjoint(
 def placed_regressor_adjoint(
     model: RobotModel, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, places: np.ndarray, weights: np.ndarray
 ) -> np.ndarray:
-    """The same of what `write_torque_regressor` writes: row `places`[j, c] of `weights` (rows, samples) belongs to column c of joint j.
+    """Adjoint of `write_torque_regressor`: row `places`[j, c] of `weights` (rows, samples) belongs to column c of joint j.
 
     `places` (n, 10 n) is -1 for what f does not depend on. Raises `FlexcalError` as that does.
     """

@@ -1,4 +1,4 @@
-"""Checks of the completeness and numbers of a URDF, which parsers do not make."""
+"""Checks of a URDF's completeness and numbers beyond those of parsers."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from flexcal.model.urdf.elements import Element
 KINDS = ("revolute", "continuous", "prismatic", "fixed")
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 MOST_JOINTS = 100
-"""Movable ones of a robot."""
+"""Largest number of movable joints of a robot."""
 _ROUNDING = 1e-9
-"""Share of its largest moment by which an inertia may fail to be positive."""
+"""Tolerance of the positivity of an inertia, relative to its largest moment."""
 
 
 def carried_links(robot: Element, locked: Container[str]) -> dict[str, str]:
-    """The link that each joint carries, of a URDF that is complete; depth first, branches in the order of the file.
+    """Link carried by each joint of a complete URDF; depth first, branches in the order of the file.
 
     Raises `InputError` with file, line and link or joint where it is incomplete, unreadable or asks for what flexcal does not have; of
     joints that mimic others, the `locked` ones are none of that.
@@ -85,7 +85,7 @@ def carried_links(robot: Element, locked: Container[str]) -> dict[str, str]:
 
 
 def _beyond(link: str, carried: dict[str, str], parents: dict[str, str]) -> Iterator[str]:
-    """The joints beyond a link, each followed by those beyond the link that it carries."""
+    """Joints beyond a link, each followed by those beyond the link that it carries."""
     of: dict[str, list[str]] = {}
     for joint, child in carried.items():
         of.setdefault(parents[child], []).append(joint)
@@ -133,7 +133,7 @@ def _check_inertial(inertial: Element, owner: str) -> None:
 
 
 def _check_joint(joint: Element, name: str, links: dict[str, Element]) -> tuple[str, str]:
-    """Check a joint, and name its parent and the link it carries."""
+    """Check a joint; returns its parent and child link."""
     owner, kind = f"joint '{name}'", joint.attributes.get("type")
     if kind not in KINDS:
         what = f"is of the type '{kind}'" if kind else "has no type"

@@ -1,4 +1,4 @@
-"""URDF to joints, inertias and frames, through Pinocchio."""
+"""Conversion of a URDF to joints, inertias and frames, through Pinocchio."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Description:
-    """Content of a URDF: movable joints, the inertia of each (fixed and locked children merged), and all frames.
+    """Content of a URDF: movable joints, the inertia of each (with fixed and locked children), and all frames.
 
     Joints stand depth first, branches in the order of the file; Pinocchio sorts them by name.
     """
@@ -107,7 +107,7 @@ def read_urdf(path: Path, locked: Mapping[str, float]) -> Description:
 
 
 def locked_joints(model: Any, locked: Mapping[str, float]) -> tuple[list[int], np.ndarray]:
-    """What Pinocchio's `buildReducedModel` needs to lock joints at positions (rad or m): their numbers, and a configuration (nq,)."""
+    """Arguments of Pinocchio's `buildReducedModel` that lock joints at positions (rad or m): joint numbers and a configuration (nq,)."""
     import pinocchio as pin
 
     q = pin.neutral(model)
@@ -148,7 +148,7 @@ def _kind_and_axis(joint) -> tuple[str, np.ndarray]:
 
 
 def _turning(joint) -> np.ndarray:
-    """The axis (3,) of an unbounded joint, which Pinocchio keeps in the motion subspace alone."""
+    """Axis (3,) of a continuous joint, which Pinocchio stores in the motion subspace alone."""
     data, q = joint.createData(), np.zeros(joint.idx_q + joint.nq)
     q[joint.idx_q] = 1.0
     joint.calc(data, q)
@@ -157,7 +157,7 @@ def _turning(joint) -> np.ndarray:
 
 @contextmanager
 def _silenced() -> Iterator[BinaryIO]:
-    """Keep the C++ parser from printing to the process's standard output and error; the file gets what it says."""
+    """Redirect the process's standard output and error, to which the C++ parser prints, to a file."""
     sys.stdout.flush()
     sys.stderr.flush()
     saved = [os.dup(1), os.dup(2)]

@@ -1,4 +1,4 @@
-"""The elements of a URDF with their line numbers."""
+"""Elements of a URDF with their line numbers."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from flexcal.units import LARGEST
 
 _DEEPEST = 50
 _QUOTED = 60
-"""Letters of an attribute that a message quotes."""
+"""Largest number of characters of an attribute that a message quotes."""
 
 
 @dataclass(frozen=True)
 class Element:
-    """An XML element of the file `path`: its tag, attributes, first `line` and children."""
+    """XML element of the file `path`: its tag, attributes, first `line` and children."""
 
     path: Path
     tag: str
@@ -30,25 +30,25 @@ class Element:
     children: list[Element] = field(default_factory=list)
 
     def all(self, tag: str) -> Iterator[Element]:
-        """The children of this tag."""
+        """Children with this tag."""
         return (child for child in self.children if child.tag == tag)
 
     def find(self, tag: str) -> Element | None:
-        """The first child of this tag."""
+        """First child with this tag."""
         return next(self.all(tag), None)
 
     def text(self) -> str:
-        """The element as XML, with attributes and children alone: no text, comments, entities or encoding."""
+        """XML text of the element with attributes and children alone: no text, comments, entities or encoding."""
         attributes = "".join(f" {name}={quoteattr(value)}" for name, value in self.attributes.items())
         inside = "".join(child.text() for child in self.children)
         return f"<{self.tag}{attributes}>{inside}</{self.tag}>" if inside else f"<{self.tag}{attributes}/>"
 
     def error(self, code: str, sentence: str) -> InputError:
-        """An `InputError` that places `sentence` at the element's line."""
+        """`InputError` that places `sentence` at the element's line."""
         return InputError(code, f"{self.path} line {self.line}: {sentence}")
 
     def numbers(self, attribute: str, count: int, owner: str) -> np.ndarray:
-        """The `count` finite numbers of an attribute; raises `InputError` that names its `owner` where it is missing or holds others."""
+        """The `count` finite numbers of an attribute; raises `InputError` naming its `owner` if it is missing or malformed."""
         text = self.attributes.get(attribute)
         if text is None:
             raise self.error(
@@ -69,7 +69,7 @@ class Element:
 
 
 def read_elements(path: Path) -> Element:
-    """The root element of an XML file; raises `InputError` where it is none, with line and column where it is not well-formed."""
+    """Root element of an XML file; raises `InputError`, with line and column if possible, for a file that is not well-formed."""
     parser = expat.ParserCreate()
     above: list[Element] = []
     roots: list[Element] = []

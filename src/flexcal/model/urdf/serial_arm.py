@@ -1,4 +1,4 @@
-"""The arm in a URDF: its joints, locked joints and tool frame, from the tree of links."""
+"""Serial arm of a URDF: its joints, locked joints and tool frame, from the tree of links."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ _GRIPPER = re.compile(
     r"gripper|finger|knuckle|jaw|thumb|(?<![a-z])(hand|claw|suction|vacuum)(?![a-z])", re.IGNORECASE
 )
 _TOOL_FRAMES = ("tool0", "tcp", "flange", "tool", "end_effector", "ee_link", "ee", "hand")
-"""Links to which tools and reflectors are fixed, the usual names first."""
+"""Link names to which tools and reflectors are fixed, the most usual first."""
 _FEW = 2
-"""Joints of a branch that is no arm beside one with more than twice as many."""
+"""Largest number of joints of a branch that does not count as an arm beside one with more than twice as many."""
 
 
 @dataclass(frozen=True)
 class Arm:
-    """The chain of a URDF that moves its tool.
+    """Chain of a URDF that moves its tool.
 
     joints: names of its movable joints, from the base on. locked: the other movable joints and where they stand (rad or m): 0, or the
     nearest limit. frame: the link that a point is most likely given in; frames: the links that do not move against it, that one first.
@@ -37,7 +37,7 @@ class Arm:
 
 
 def find_arm(path: Path, tip: str | None = None) -> Arm:
-    """The arm of a URDF, or that which ends at the link `tip`.
+    """Arm of a URDF: the only long chain, or the chain that ends at the link `tip`.
 
     Joints that mimic others, are called like a gripper's, or make a short branch beside the one long one, are no part of it. Raises
     `InputError` as `read_urdf` does, where several chains could be the arm, where `tip` is no link or moves with no joint, and where
@@ -94,7 +94,7 @@ def find_arm(path: Path, tip: str | None = None) -> Arm:
 
 
 def _way(link: str, above: dict[str, str], joints: dict[str, Element]) -> tuple[str, ...]:
-    """The joints from the base to a link."""
+    """Joints from the base to a link."""
     way: list[str] = []
     while link in above:
         way.append(above[link])
@@ -107,7 +107,7 @@ def _way(link: str, above: dict[str, str], joints: dict[str, Element]) -> tuple[
 def _only_chain(
     path: Path, moving: Mapping[str, Sequence[str]], beside: set[str], ways: dict[str, tuple[str, ...]]
 ) -> tuple[str, ...]:
-    """The one long chain out of those `moving` the links, less what is `beside` it; raises `InputError` that lists the tips of several."""
+    """The single long chain to one of the links `moving`, without those `beside` it; raises `InputError` that lists several tips."""
     ends: dict[tuple[str, ...], str] = {}
     for link in sorted(moving, key=lambda link: _rank(link, ways), reverse=True):
         ends[tuple(name for name in moving[link] if name not in beside)] = link
@@ -130,7 +130,7 @@ def _only_chain(
 
 
 def _rank(link: str, ways: dict[str, tuple[str, ...]]) -> tuple[int, bool, int]:
-    """Usual names first, a gripper's last, then the farthest from the base."""
+    """Sort key of tool frames: usual names first, a gripper's last, then the farthest from the base."""
     name = f"_{link.lower()}_".replace("-", "_")
     usual_names = [i for i, usual in enumerate(_TOOL_FRAMES) if f"_{usual}_" in name]
     return (

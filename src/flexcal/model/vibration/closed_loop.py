@@ -1,4 +1,4 @@
-"""The linearised robot under position control: motion and drive torques due to an added torque."""
+"""Linearised robot under position control: motion and drive torques due to an added torque."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def drive_stretch(robot: RobotModel, system: Linearisation) -> np.ndarray:
 def strain_power(
     robot: RobotModel, system: Linearisation, frequencies_hz: np.ndarray, kp: np.ndarray, kd: np.ndarray
 ) -> np.ndarray:
-    """Mean square (L, E, E) of the torque in each elastic drive's spring by a cosine of 1 N m added to each motor (last)."""
+    """Mean square (L, E, E) of the torque in each elastic drive's spring due to a cosine of 1 N m added to each motor (last)."""
     stiffness = np.array([joint.stiffness[2] for joint in robot.driven])
     moved = closed_loop_motion(system, frequencies_hz, kp, kd)
     return 0.5 * np.abs(stiffness[:, None] * (drive_stretch(robot, system).T @ moved)) ** 2

@@ -1,4 +1,4 @@
-"""The arm with its springs as a Pinocchio model: every elastic joint is three revolutes, twist, tilt about y, tilt about x (Eq. 1).
+"""Elastic arm as a Pinocchio model: every elastic joint is three revolutes, twist, tilt about y, tilt about x (Eq. 1).
 
 Where the bearings are fixed to the parent link the two tilts come first.
 """
@@ -16,7 +16,7 @@ from flexcal.model.statics import elastic_axes
 
 
 class ElasticArm:
-    """A robot and a payload mass (kg) in Pinocchio, with the arm's own coordinates after the drives.
+    """Robot with a payload mass (kg) in Pinocchio; the arm's own coordinates follow the drives.
 
     `elastic` (d,) are the velocity indices of the elastic coordinates in the order of `elastic_axes`; `model` and `data` are
     Pinocchio's. Inertias can be exchanged (`set_inertia`), which is what derivatives with respect to them need.
@@ -64,7 +64,7 @@ class ElasticArm:
         self._upper = np.minimum(*self._block), np.maximum(*self._block)
 
     def set_inertia(self, joint: int, link: Inertia, carried: Inertia | None = None) -> None:
-        """Give the link of a joint another inertia; the payload, or another one that is `carried`, is added where it hangs there."""
+        """Set the inertia of a joint's link; the payload, or the `carried` one, is added where the link carries it."""
         import pinocchio as pin
 
         total = _pinocchio_inertia(link)
@@ -130,7 +130,7 @@ class ElasticArm:
         return chained[near, middle, far]
 
     def place(self, configuration: np.ndarray, joint: int, xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Where the point `xyz` (3,) m of the link of a joint is in the base frame, and the link's orientation (3, 3) there."""
+        """Position of the point `xyz` (3,) m of a joint's link in the base frame, and the link's orientation (3, 3)."""
         import pinocchio as pin
 
         pin.forwardKinematics(self.model, self.data, configuration)
@@ -150,7 +150,7 @@ class ElasticArm:
         )
 
     def nearer(self) -> np.ndarray:
-        """Whether elastic coordinate k is nearer to the base than l, or the same, (d, d), for coordinates of one branch."""
+        """Mask (d, d) of pairs whose elastic coordinate k is at or nearer to the base than l, for coordinates of one branch."""
         ids = np.array(self._springs)
         return ids[:, None] <= ids[None, :]
 
@@ -162,6 +162,6 @@ def _pinocchio_inertia(body: Inertia) -> Any:
 
 
 def moved_inertia(link: Inertia, mass: float, com: np.ndarray) -> Inertia:
-    """A link with another mass and centre of mass: the inertia about the centre of mass scales with the mass and moves along."""
+    """Link with another mass and centre of mass; the inertia about the centre of mass scales with the mass."""
     scale = mass / link.mass if link.mass > 0 else 1.0
     return Inertia(mass, com, link.inertia * scale)

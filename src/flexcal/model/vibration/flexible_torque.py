@@ -1,4 +1,4 @@
-"""Torques of a robot whose motors move, its springs loaded by gravity and by the motion."""
+"""Motor torques of a robot with given motor motion, its springs loaded by gravity and inertia."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def _loads(
     passes: int,
     flanks: np.ndarray | None,
 ) -> np.ndarray:
-    """Torque (N, d + n) at every coordinate of the arm, as `flexible_joint_torque` has it."""
+    """Torque (N, d + n) at every coordinate of the arm; arguments as of `flexible_joint_torque`."""
     import pinocchio as pin
 
     axes, count = elastic_axes(model), len(motion[0])

@@ -1,4 +1,4 @@
-"""The elastic robot linearised about a rest position: M, D, K of rotors and arm, and their exact derivatives (Eqs. 5, 6)."""
+"""Elastic robot linearised about a rest position: M, D, K of rotors and arm, and their exact derivatives (Eqs. 5, 6)."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def linearise(
     derivatives: Sequence[str] = (),
     sensors: Sequence[ArmSensor] = (),
 ) -> Linearisation:
-    """Linearise about the rest position of motors held at `q` (n,) with `payload` kg (None: the declared mass), and what `sensors` see.
+    """Linearise about the rest position of motors held at `q` (n,) with `payload` kg (None: the declared mass), with outputs of `sensors`.
 
     `derivatives` names parameters: `<joint>.<spring>.stiffness|damping`, `<joint>.rotor_inertia|viscous|held_inertia`,
     `<link>.mass|com_x…`, `payload.mass|com_x…`. Setting a mass carries the inertia along as `RobotModel.with_values` does. Raises
@@ -97,7 +97,7 @@ def linearise(
 def _springs(
     robot: RobotModel, axes: list[tuple[int, int]], rest: Equilibrium
 ) -> dict[tuple[int, int], tuple[np.ndarray, float, float]]:
-    """Each spring's pattern (E + d, E + d), stiffness and damping, by its axis: a drive spring couples rotor and twist.
+    """Pattern (E + d, E + d), stiffness and damping of each spring, by its axis: a drive spring couples rotor and twist.
 
     A braked rotor does not move, so its spring holds the twist against the ground. The pattern of a drive that hardens is larger by its
     tangent stiffness at rest.
@@ -178,7 +178,7 @@ def _derivatives(
 def _rest_motion(
     robot: RobotModel, arm: ElasticArm, rest: Equilibrium, axes: list[tuple[int, int]], name: str
 ) -> np.ndarray:
-    """How the elastic coordinates of the rest position (d,) move with a parameter."""
+    """Derivative (d,) of the elastic rest position with respect to a parameter."""
     owner, _, key = name.rpartition(".")
     joint_name, _, spring = owner.rpartition(".")
     if key == "stiffness" and spring in SPRINGS:
@@ -208,7 +208,7 @@ def _stretch(robot: RobotModel, rest: Equilibrium, axis: tuple[int, int]) -> flo
 def _by_inertia(
     robot: RobotModel, arm: ElasticArm, at: np.ndarray, owner: str, key: str
 ) -> tuple[np.ndarray, np.ndarray]:
-    """∂M and ∂K (d, d) by a mass or centre of mass; both are at most quadratic in it, so central differences are exact."""
+    """∂M and ∂K (d, d) with respect to a mass or centre of mass; both are at most quadratic in it, so central differences are exact."""
     step = 0.05 * (robot.value(f"{owner}.mass") if key == "mass" else 1.0)
     step = step if step > 0 else 1.0
     shift = np.zeros(3) if key == "mass" else step * np.eye(3)["xyz".index(key[-1])]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 KNOT_OCTAVES = 0.5
-"""Octaves between the knots of a change that varies over frequency."""
+"""Octaves between the knots of a frequency-dependent change."""
 
 
 def friction_response_change(
@@ -21,7 +21,9 @@ def friction_response_change(
 
 
 def over_frequency(change: np.ndarray, frequencies_hz: np.ndarray, octave: float) -> np.ndarray:
-    """Changes (L, E, E, k) that may come in any complex proportion that varies over frequency, (L, E, E, 2 k knots)."""
+    """Changes (L, E, E, k) with a complex factor interpolated over frequency, by its real and imaginary part at knots, (L, E, E, 2 k
+    knots).
+    """
     position = np.log2(frequencies_hz / frequencies_hz[0]) / octave
     knots = np.arange(int(np.ceil(position[-1])) + 1)
     hats = np.maximum(0.0, 1.0 - np.abs(position[:, None] - knots))

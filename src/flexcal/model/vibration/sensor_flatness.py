@@ -1,4 +1,4 @@
-"""Sensors on the arm whose sensitivity departs from a constant over frequency."""
+"""Sensors on the arm whose sensitivity varies with frequency."""
 
 from __future__ import annotations
 

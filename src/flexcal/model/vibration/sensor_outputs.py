@@ -28,11 +28,11 @@ class SensorOutputs:
         return len(self.order)
 
     def at(self, s: np.ndarray) -> np.ndarray:
-        """o (L, S, E + d) with y = o x at the Laplace variables `s` (L,)."""
+        """Output matrix o (L, S, E + d) with y = o x at the Laplace variables `s` (L,)."""
         return s[:, None, None] ** self.order[:, None] * self.motion + self.tilt
 
     def changes(self, s: np.ndarray, names: Sequence[str]) -> np.ndarray:
-        """∂o (L, S, E + d, p) by the parameters named."""
+        """Derivatives ∂o (L, S, E + d, p) by the named parameters."""
         motion, tilt = (np.stack([self.derivatives[name][k] for name in names], axis=-1) for k in (0, 1))
         return s[:, None, None, None] ** self.order[:, None, None] * motion + tilt
 
@@ -44,7 +44,7 @@ def assemble_sensor_outputs(
     rotors: int,
     motions: Mapping[str, np.ndarray],
 ) -> SensorOutputs:
-    """The rows of `sensors` for an arm in the configuration `at`, behind `rotors` coordinates.
+    """Output rows of `sensors` for an arm in the configuration `at`, with `rotors` coordinates in front.
 
     `motions` (d,) by name say how the elastic coordinates of the rest position move with a parameter. With the axes a of revolute elastic
     coordinates that carry the point p, from the base outwards, the columns of the displacement are n · (a × (p − o)), those of the tilt
@@ -81,8 +81,9 @@ def assemble_sensor_outputs(
 def sensor_frame(
     arm: ElasticArm, at: np.ndarray, sensor: ArmSensor
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Point (3,) m and direction (3,) of a sensor in the base frame, and how both change (d, 3) with the elastic coordinates: of a sensor
-    that moves with the link the direction turns with every coordinate that carries it."""
+    """Point (3,) m and direction (3,) of a sensor in the base frame, and their derivatives (d, 3) by the elastic coordinates; the
+    direction of a sensor that moves with the link turns with every coordinate that carries it.
+    """
     point, turn = arm.place(at, sensor.joint, sensor.xyz)
     origins, axes, carries = arm.elastic_axes_at(sensor.joint)
     columns = np.cross(axes, point - origins) * carries[:, None]
