@@ -124,6 +124,14 @@ def test_what_no_map_can_be_made_of(
     assert "Traceback" not in done.err and snapshot(ur5) == before
 
 
+def test_the_file_is_named_that_cannot_verify_a_map(run, ur5: Path) -> None:
+    one = ur5 / "one.csv"
+    one.write_text("".join((ur5 / "random.csv").read_text().splitlines(keepends=True)[:2]))
+    done = run("map", ur5 / "robot.yaml", "--verification", one, "--out", ur5 / "not.html")
+    assert done.status == 2 and not (ur5 / "not.html").exists()
+    assert_refusal(done.err, "E-CAL-017", str(one), "1 of the 1")
+
+
 def test_repeatability_of_measured_visits(run, ur5: Path) -> None:
     done = run("repeatability", ur5 / "robot.yaml", ur5 / "after.csv", "--out", ur5 / "visits", "--json")
     assert done.status == 0

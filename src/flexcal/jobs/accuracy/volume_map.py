@@ -24,7 +24,7 @@ from flexcal.data.plans import page_beside
 from flexcal.data.poses import PoseSet
 from flexcal.data.tables import write_table
 from flexcal.design.scene import CollisionChecker
-from flexcal.errors import FlexcalError, InputError
+from flexcal.errors import FlexcalError, InputError, naming
 from flexcal.files.formats import provenance
 from flexcal.jobs.accuracy.registration_refit import proposed_refit, refit_remarks
 from flexcal.jobs.accuracy.verification import verification_poses
@@ -245,10 +245,24 @@ def accuracy_map(
     >>> map.predicted.p95.shape
     (50,)
     """
+    check = None if verification is None else _Check.of(robot, verification)
+    return _checked_map(robot, check, box, q, count, payload, seed, progress)
+
+
+def _checked_map(
+    robot: CalibratedRobot,
+    check: _Check | None,
+    box: np.ndarray | None,
+    q: np.ndarray | None,
+    count: int,
+    payload: float | None,
+    seed: int,
+    progress: Progress,
+) -> AccuracyMap:
+    """`accuracy_map` after the check by verification poses."""
     model = robot.model
     stations = [s for s in model.stations.names if is_station_identified(model, s)]
     reach = propagation(model, station=stations[0] if stations else None, payload=payload)
-    check = None if verification is None else _Check.of(robot, verification)
     rng = np.random.default_rng([seed, 7])
     if q is None:
         declared = model.config.working_volume
@@ -300,7 +314,11 @@ def map_accuracy(
         raise InputError("E-RUN-009", f"{out} must end in .html, .csv or .parquet; give another --out.")
     require_distinct_files(verification)
     robot = CalibratedRobot.from_yaml(robot_file, estimates)
-    poses = verification_poses(robot, verification) if verification else None
+    check = None
+    if verification:
+        poses = verification_poses(robot, verification)
+        with naming(verification[0]):
+            check = _Check.of(robot, poses)
     box, q = None, None
     place = working_file(working)
     if place is not None:
@@ -308,16 +326,7 @@ def map_accuracy(
         q = working_volume(CollisionChecker(robot.model), working, seed).q
     elif working is not None:
         box = box_corners(working)
-    accuracy = accuracy_map(
-        robot,
-        box=box,
-        q=q,
-        count=count,
-        verification=poses,
-        payload=payload,
-        seed=seed,
-        progress=progress,
-    )
+    accuracy = _checked_map(robot, check, box, q, count, payload, seed, progress)
     origin = provenance(
         [robot_file, robot.nominal.urdf, *verification, *(() if place is None else (place,))],
         {"seed": seed},
