@@ -10,14 +10,14 @@ from flexcal.dynamics.regression import RegressionData
 from flexcal.estimation import Estimate
 
 _LARGEST_RATIO = 30.0
-"""Of the relative standard deviations of the essential parameters, largest over smallest (Khalil & Dombre 2002, 12.6: 10 to 30)."""
+"""Largest ratio of relative standard deviations among the essential parameters (Khalil & Dombre 2002, 12.6: 10 to 30)."""
 _LARGEST_GROWTH = 1.05
-"""Of the norm of the residual, over that with all base parameters."""
+"""Largest norm of the residual relative to that with all base parameters."""
 
 
 @dataclass(frozen=True, eq=False)
 class EssentialParameters:
-    """`names` of the base parameters that stay, with their `values` and standard deviations `std` (e,) when the others are zero.
+    """Essential base parameters: `names`, `values` and standard deviations `std` (e,) with the others set to zero.
 
     `eliminated` names the others in the order in which they went. `parameters` (p,) are those of all columns that go with it.
     """

@@ -1,4 +1,4 @@
-"""Share of the measured external torques that the motor torques show: a check of sign, unit and frame of a force sensor."""
+"""Ratio of the external torques seen by the motors to the measured ones: a check of sign, unit and frame of a force sensor."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from flexcal.model.robot import RobotModel
 
 _NAME = "external.excess"
 _INDEPENDENT = 1e-6
-"""Share of the column that the base parameters leave, below which they absorb it."""
+"""Share of the column not explained by the base parameters, below which they absorb it."""
 
 
 @dataclass(frozen=True)
 class ExternalExcess:
-    """`external.excess` · (-τ_ext) of every joint: by how much more than once the external torques act; zero where all is right."""
+    """Drive term `external.excess` · (-τ_ext) of every joint: the relative excess of the external torques; zero for a correct sensor."""
 
     def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
         outside = np.zeros_like(motion.torque) if motion.external is None else motion.external
@@ -31,7 +31,7 @@ class ExternalExcess:
 
 @dataclass(frozen=True)
 class ExternalShare:
-    """The share, 1 where sensor and motors agree, and its 95 % interval from `low` to `high`."""
+    """Ratio of motor to sensor torques, 1 if both agree, and its 95 % interval from `low` to `high`."""
 
     share: float
     low: float
@@ -39,7 +39,7 @@ class ExternalShare:
 
 
 def external_share(data: RegressionData) -> ExternalShare | None:
-    """By weighted least squares of equations whose terms include `ExternalExcess`, beside all base parameters.
+    """Ratio by weighted least squares of equations whose terms include `ExternalExcess`, beside all base parameters.
 
     None where the external torques are zero or cannot be told from the base parameters. Raises `FlexcalError` as `noise_levels` does.
     """

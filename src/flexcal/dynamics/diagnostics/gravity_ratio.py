@@ -1,4 +1,4 @@
-"""Weight of the links on each joint by the identified parameters, relative to that by the URDF's."""
+"""Ratio of the identified gravity torque on each joint to that of the URDF."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from flexcal.model.torques import torque_regressor
 
 _POSES = 300
 _LEAST = 0.1
-"""Root mean square of the weight on a joint, over that on the heaviest one, from which it counts."""
+"""Least root mean square gravity torque of a joint, relative to the largest, for a ratio."""
 UNLIKE = 2.0
-"""Factor between identified weight and that of the URDF, beyond which masses are guesses or something else carries the arm."""
+"""Ratio of identified gravity torque to that of the URDF, beyond which masses are guesses or something else carries the arm."""
 
 
 @dataclass(frozen=True)
 class GravityRatio:
-    """Identified weight over that of the URDF, and its 95 % interval from `low` to `high`."""
+    """Ratio of identified gravity torque to that of the URDF, and its 95 % interval from `low` to `high`."""
 
     share: float
     low: float
@@ -34,7 +34,7 @@ class GravityRatio:
 
 
 def weight_shares(data: RegressionData, estimate: Estimate) -> dict[str, GravityRatio]:
-    """By joint: slope of the identified gravity torque against that of the URDF over the joints' range, through zero.
+    """Gravity ratio by joint: slope through zero of the identified gravity torque against that of the URDF over the joints' range.
 
     Joints without weight of their own, and those with a declared spring, which may carry it, are left out.
     """

@@ -13,15 +13,15 @@ from flexcal.dynamics.signals import Experiment, Window
 
 _LONGEST_SEGMENT = 512
 _SEGMENTS = 4
-"""A recording is cut into no fewer segments for its spectra, side by side, unless it is very short."""
+"""Least number of adjacent segments of a recording for its spectra, unless it is very short."""
 _SHORTEST_SEGMENT = 8
 _APART = 1.5
-"""Steps from one row to the next, at least, across a gap."""
+"""Steps between rows above which there is a gap."""
 
 
 @dataclass(frozen=True, eq=False)
 class TorquePrediction:
-    """One experiment: every `stride`-th row with its `time` (M,), s, and the torques `measured` and `predicted` (M, n), N m.
+    """Torques of one experiment: every `stride`-th row with its `time` (M,), s, `measured` and `predicted` (M, n), N m.
 
     Rows from `held_out_from` (s) on were not part of the fit. The power spectral densities `measured_density` and `residual_density`
     (F, n), (N m)²/Hz, at `frequencies_hz` (F,) are those of all rows, not of the thinned ones; F is 0 for a recording of fewer than 8 rows.
@@ -39,7 +39,7 @@ class TorquePrediction:
 
     @property
     def held_out(self) -> np.ndarray:
-        """Which rows the fit never saw (M,)."""
+        """Mask (M,) of rows excluded from the fit."""
         return self.time >= self.held_out_from
 
 
@@ -90,7 +90,7 @@ def predict_torques(
 
 
 def _segment(rows: int) -> int:
-    """A power of two."""
+    """Length of a segment, a power of two."""
     wanted = min(_LONGEST_SEGMENT, max(_SHORTEST_SEGMENT, rows // _SEGMENTS))
     return 1 << (wanted.bit_length() - 1)
 
@@ -106,7 +106,7 @@ class _Spectrum:
         self._segments = 0
 
     def push(self, values: np.ndarray) -> None:
-        """The next rows (M, k)."""
+        """Add the next rows (M, k)."""
         pending = values if self._pending is None else np.concatenate([self._pending, values])
         while len(pending) >= self._length:
             part = pending[: self._length]
@@ -117,7 +117,7 @@ class _Spectrum:
         self._pending = pending
 
     def interrupt(self) -> None:
-        """A gap precedes the next rows: no segment reaches across it."""
+        """Mark a gap before the next rows: no segment extends across it."""
         self._pending = None
 
     def density(self, step: float, width: int) -> tuple[np.ndarray, np.ndarray]:

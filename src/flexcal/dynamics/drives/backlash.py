@@ -1,4 +1,4 @@
-"""Position of the gaps of elastic drives with backlash, estimated in preceding passes."""
+"""Estimation of the gaps of elastic drives with backlash, in preceding passes."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from flexcal.dynamics.inverse_model import BaseParameters, Observation
 from flexcal.dynamics.regression import ExperimentSystem, RegressionData
 
 _PASSES = 2
-"""The first finds at what reading of both encoders a spring is relaxed, the second how wide the gap there is."""
+"""Number of passes: the first estimates the encoder difference of the relaxed spring, the second the gap width there."""
 
 
 def with_backlash(
     observation: Observation, equations: Callable[[Observation], Sequence[ExperimentSystem]]
 ) -> Observation:
-    """The observation whose springs at joints with backlash know their gap; the same where no spring has one.
+    """Observation with estimated gaps of the springs at joints with backlash; unchanged without such springs.
 
     `equations` gives those of the fit for any observation. Raises `FlexcalError` as `weighted_least_squares` does.
     """

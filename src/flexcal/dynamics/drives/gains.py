@@ -14,7 +14,7 @@ from flexcal.estimation import Dropped, Estimate, Parameter, Parameters, analyse
 from flexcal.model.parts import LINK_PARAMETERS
 
 _SETTLED = 1e-6
-"""Largest relative change of a gain that ends the iteration."""
+"""Largest relative change of a gain at which the iteration has converged."""
 _ITERATIONS = 100
 
 
@@ -79,7 +79,7 @@ def drive_gains(data: RegressionData, payloads: Sequence[float]) -> Estimate:
 
 
 def gain_name(joint: str) -> str:
-    """Name of the parameter that is the factor of a joint's torques."""
+    """Name of the parameter that scales a joint's torques."""
     return f"{joint}.drive_gain"
 
 
@@ -100,7 +100,7 @@ def _settled(terms: _Terms, noise: Sequence[float], kept: Sequence[int]) -> np.n
 
 
 class _Terms:
-    """Columns of the equations: base parameters of the robot, payload without its mass, gains; all joints have all of them."""
+    """Columns of the equations: base parameters of the robot, payload without its mass, gains; the same for all joints."""
 
     def __init__(self, data: RegressionData, payloads: Sequence[float], link: int) -> None:
         self.data, self._payloads = data, payloads
@@ -113,7 +113,7 @@ class _Terms:
 
     @property
     def whole(self) -> list[tuple[Batch]]:
-        """Every experiment as one batch: all that values need, and too little for their covariance."""
+        """Equations with every experiment as one batch: sufficient for values, not for their covariance."""
         by_experiment: dict[int, list[TriangularFactor]] = {}
         for s in self.data.subsystems:
             by_experiment.setdefault(s.experiment, []).append(s.triangle)
@@ -126,13 +126,13 @@ class _Terms:
         noise: Sequence[float],
         kept: Sequence[int],
     ) -> InstrumentalFit:
-        """With the torques that `values` (width,) predict as instruments of those that were measured."""
+        """Instrumental-variable fit with the torques predicted by `values` (width,) as instruments of the measured ones."""
         column_indices = [np.arange(self._width)] * self.data.observation.model.n
         batches = self._mapped(experiments, values)
         return instrumental_fit(batches, column_indices, noise, np.zeros(self._width), kept)
 
     def least_squares(self, noise: Sequence[float], kept: Sequence[int]) -> np.ndarray:
-        """(width,) to begin with."""
+        """Initial values (width,) by least squares."""
         system = self._system(noise)
         solution = np.zeros(self._width)
         scale = 1.0 / np.linalg.norm(system[:, kept], axis=0)
@@ -165,7 +165,7 @@ class _Terms:
         return mapped
 
     def _map(self, joint: int, mass: float, values: np.ndarray) -> np.ndarray:
-        """(m + 1, 2 width + 1): from a joint's [W, Y] in one experiment to instruments, columns and right-hand side."""
+        """Matrix (m + 1, 2 width + 1) from a joint's [W, Y] in one experiment to instruments, columns and right-hand side."""
         column_indices = self.data.observation.column_indices[joint]
         place = {number: row for row, number in enumerate(column_indices)}
         columns = np.zeros((len(column_indices) + 1, self._width + 1))

@@ -1,4 +1,4 @@
-"""Uncertainty of an estimate by the inertials that stay nominal in the equations of bearings that tilt."""
+"""Uncertainty of an estimate due to the inertials kept nominal in the equations of tilting bearings."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from flexcal.estimation import Estimate
 from flexcal.model.robot import declared_parameter, uncertain_inertials
 
 _STEP = 1e-4
-"""Of the central differences, in estimation coordinates."""
+"""Step of the central differences, in estimation coordinates."""
 
 
 def with_nominal_uncertainty(data: RegressionData, estimate: Estimate) -> Estimate:
-    """The estimate, its covariance larger by what nominal values of parameters that it does not estimate may be off.
+    """Estimate with its covariance increased by the uncertainty of nominal parameters that it does not contain.
 
     In a rigid arm the others absorb these exactly, by the regrouping. In the equation of a bearing a link also adds torque in proportion to
     the tilt and to its acceleration, too little to be told from the spring's, so that errors of CAD bias the stiffness. With δ the
@@ -47,7 +47,7 @@ def with_nominal_uncertainty(data: RegressionData, estimate: Estimate) -> Estima
 
 
 def _deviations(observation: Observation) -> np.ndarray:
-    """Columns (p, d) of one standard deviation each of what CAD may have wrong of the links, in all parameters of the observation."""
+    """Columns (p, d) of one CAD standard deviation each of the links, in all parameters of the observation."""
     model, columns = observation.model, []
     for name in uncertain_inertials(model, range(model.n)):
         item = declared_parameter(model, name)

@@ -10,7 +10,7 @@ from flexcal.estimation import Estimate
 
 
 def stiffness_attenuation(data: RegressionData, estimate: Estimate) -> dict[str, float]:
-    """By name of the identified stiffnesses of drives and bearings, the largest share by which noise of q - θ can have made them too small.
+    """Largest relative attenuation of the identified stiffnesses of drives and bearings, by name, due to noise of q - θ.
 
     Noise of size σ_e in N rows of a column of which the others leave t makes K smaller by K N σ_e² / ‖t‖². It also stands in the
     residual of its equation, K σ_e ≤ σ, so that the share is at most N (σ / (K ‖t‖))²: no size of the noise need be known.

@@ -25,13 +25,14 @@ _EXACT = (
     "torque_offset",
     *(key for key in FRICTION_PARAMETERS if unit_of(key) in ("N m", "1")),
 )
-"""What names of columns begin with that are constants or signs of a velocity: these have no errors but at a reversal.
+"""Prefixes of names of columns that are constants or signs of a velocity, free of errors except at reversals. A friction term among them
+has a column that is a number, or a torque of the links: its parameter is a torque, or a number.
 
 Of a friction term these are the ones whose column is a number, or a torque of the links: its parameter is a torque, or a number.
 """
 _ORDER = 4
 _GAIN = 70.0
-"""Variance of the fourth difference of white noise, over its own."""
+"""Ratio of the variance of the fourth difference of white noise to its own."""
 _SEED = 1994
 
 
@@ -70,7 +71,7 @@ def _difference(block: RegressionBlock, spoilt: RegressionBlock) -> Iterable[np.
 
 
 def perturbed_logs(recorded: RecordedRows) -> list[PerturbedLog]:
-    """The recorded logs with their own position noise added once more; raises `FlexcalError` for an experiment that is no log."""
+    """Recorded logs with their own position noise added once more; raises `FlexcalError` for an experiment that is no log."""
     model = recorded.observation.model
     logs = [experiment for experiment in recorded.experiments if isinstance(experiment, JointLog)]
     if len(logs) < len(recorded.experiments):
@@ -84,7 +85,7 @@ def perturbed_logs(recorded: RecordedRows) -> list[PerturbedLog]:
 
 
 def position_noise(log: JointLog, model: RobotModel) -> np.ndarray:
-    """Standard deviation (n,) of the logged positions, rad or m, for white noise: by fourth differences, which no motion has."""
+    """Standard deviation (n,) of white noise in the logged positions, rad or m, by fourth differences, which contain no motion."""
     squares, count = np.zeros(model.n), 0
     for recording in log_blocks(log.path, model):
         rest = np.diff(recording.q, _ORDER, axis=0)
@@ -95,7 +96,7 @@ def position_noise(log: JointLog, model: RobotModel) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class PerturbedLog:
-    """A log whose positions have more white noise, of standard deviations `std` (n,), the same at every pass."""
+    """Log with added white position noise of standard deviations `std` (n,), identical in every pass."""
 
     log: JointLog
     model: RobotModel

@@ -15,7 +15,7 @@ from flexcal.estimation import Estimate
 
 
 def direct_and_inverse(data: RegressionData, recorded: RecordedRows) -> Estimate:
-    """χ̂ that minimises the weighted squares of measured less simulated torques, by Gauss-Newton with W_sim for their derivative.
+    """Estimate χ̂ minimising the weighted squares of measured less simulated torques, by Gauss-Newton with W_sim as derivative.
 
     The simulated torques are W_sim χ exactly, so a step is the weighted least squares of the measured torques on W_sim. Only the torques
     are measured: positions serve to say what was commanded. Weights, covariance and what is dropped are those of `linear_fit` with W_sim.

@@ -25,15 +25,16 @@ from flexcal.estimation import Estimate
 POSITION_NOISE = 1e-5
 """Standard deviation of a measured position, rad or m: R."""
 _FIRST_SPEED = 0.1
-"""Standard deviation of a velocity where the filter starts, rad/s."""
+"""Standard deviation of the initial velocity, rad/s."""
 _PASSES = 2
-"""The first takes the mass matrix from the parameters that it begins with, the others from the result of the one before."""
+"""Number of passes: the first takes the mass matrix from the initial parameters, the others from the previous result."""
 _SHARE = 0.5
-"""Standard deviation of a parameter that CAD does not know, as share of what would explain all torques of a joint alone."""
+"""Standard deviation of a parameter unknown to CAD, relative to the value that explains all torques of a joint alone."""
 
 
 def kalman_filter(data: RegressionData, recorded: RecordedRows) -> Estimate:
-    """χ̂ after two passes over all experiments, each from CAD with P0, and one Gauss-Newton step; its covariance from the innovations.
+    """Estimate χ̂ after two passes over all experiments, each from CAD with P0, and one Gauss-Newton step; covariance from the
+    innovations.
 
     The state is q, q̇ and χ over steps of 2 ms. With a the measured acceleration, q̈ = a + M⁻¹(τ − W(a) χ), which is the direct model and
     linear in χ but for M: each pass takes that from the one before, the first from what it begins with. P0 is 100 % of every CAD value;
@@ -69,7 +70,7 @@ def kalman_filter(data: RegressionData, recorded: RecordedRows) -> Estimate:
 
 
 def _smoothing(recorded: RecordedRows) -> int:
-    """Samples to either side over which accelerations are smoothed: below the band of the decimated rows, but for undecimated ones."""
+    """Samples to either side over which accelerations are smoothed: below the band of decimated rows; 0 for undecimated ones."""
     return 2 * (recorded.decimation.factor - 1)
 
 
@@ -78,15 +79,14 @@ def _recordings(recorded: RecordedRows) -> Iterator[tuple[Experiment, Window]]:
 
 
 def _step_noise(sigma: np.ndarray, steps: IntegrationSteps, recorded: RecordedRows) -> np.ndarray:
-    """Standard deviation (n,) of the mean torque of a step, N m, of noise `sigma` of decimated rows that is white up to their band."""
+    """Standard deviation (n,) of the mean torque of a step, N m, for decimated rows with noise `sigma`, white up to their band."""
     return sigma * np.sqrt(recorded.decimation.factor * steps.spacing / steps.length)
 
 
 def _settled(
     state: _Filter, recorded: RecordedRows, torque: np.ndarray, kept: list[int]
 ) -> tuple[np.ndarray, BatchCovariance]:
-    """All parameters (p,) after one more step, which takes M from the last pass, and the covariance that the scores of the innovations
-    show."""
+    """All parameters (p,) after one more step with M from the last pass, and the covariance from the scores of the innovations."""
     root, scores = state.root(), []
     for sigma, (experiment, window) in zip(torque, _recordings(recorded), strict=True):
         own: InnovationScores | None = None
@@ -127,13 +127,13 @@ class _Filter:
         self.squares, self.count = 0.0, 0
 
     def restart(self) -> None:
-        """Forget the state of the robot, not its parameters."""
+        """Reset the state of the robot, but not its parameters."""
         if self._state is not None:
             self._root = triangular(self._whole[:, 2 * self._n :])
         self._state = None
 
     def root(self) -> np.ndarray:
-        """(k, k) with root · rootᵀ the covariance of the kept parameters."""
+        """Square root (k, k): root · rootᵀ is the covariance of the kept parameters."""
         self.restart()
         return (self._root * self._scale).T
 
@@ -177,7 +177,7 @@ class _Filter:
 
 
 def _prior(data: RegressionData, unknowns: Unknowns) -> tuple[np.ndarray, np.ndarray]:
-    """All parameters (p,) to begin with, and P0 (k, k) of the kept ones, with what the others may change of them."""
+    """Initial values of all parameters (p,), and P0 (k, k) of the kept ones, including the effect of the others."""
     values = data.observation.values()
     alone = np.full(len(values), np.inf)
     for s in data.subsystems:

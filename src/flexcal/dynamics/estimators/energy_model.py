@@ -1,4 +1,4 @@
-"""The energy model: work of the motors between two instants, without accelerations (Gautier & Khalil 1988)."""
+"""Energy model: work of the motors between two instants, without accelerations (Gautier & Khalil 1988)."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from flexcal.model.parts import LINK_PARAMETERS
 from flexcal.model.torques import energy_regressor
 
 _WINDOW = 0.1
-"""From one border to the other, s."""
+"""Length of the windows, s."""
 
 
 def energy_least_squares(recorded: RecordedRows) -> Estimate:
-    """χ̂ of [H(t) − H(t − T)] χ = ∫ q̇ᵀτ dt over windows of 0.1 s, every experiment by its own noise.
+    """Estimate χ̂ of [H(t) − H(t − T)] χ = ∫ q̇ᵀτ dt over windows of 0.1 s, each experiment weighted by its own noise.
 
     H is the energy of links and rotors; friction is integrated as the torque is, by the trapezoidal rule at the full rate. A window
     begins with every sample, so that windows overlap, and so do the errors of rows that follow each other: the covariance of
@@ -34,7 +34,7 @@ def energy_least_squares(recorded: RecordedRows) -> Estimate:
 
 @dataclass(frozen=True, eq=False)
 class EnergyModel(ScalarEquations):
-    """One equation, J: the energy that an `observation` takes in during the 0.1 s before a sample, or since the experiment began.
+    """Energy equation, J: energy supplied to an `observation` in the 0.1 s before a sample, or since the experiment began.
 
     Of its terms, those with inertia count by their energy and the others by their work; a term that is itself made from
     accelerations, as a friction by load, keeps them.
@@ -65,7 +65,7 @@ class EnergyModel(ScalarEquations):
         return energy
 
     def _power(self, motion: Motion, memory: Memory) -> np.ndarray:
-        """Power of what stores no energy, by parameter, and of the motors and of what acts from outside (p + 1, N)."""
+        """Dissipated power by parameter, and power of motors and external loads (p + 1, N)."""
         power = np.zeros((len(self.names) + 1, len(motion)))
         for column in self._columns(motion, memory, inertial=False):
             power[self.names.index(column.name)] += motion.dq[:, column.joint] * column.values
@@ -95,5 +95,5 @@ class _Account:
 
     @classmethod
     def opened(cls, time: float, power: np.ndarray) -> _Account:
-        """At the first sample, with no sample kept."""
+        """Account at the first sample, with no sample stored."""
         return cls(time, power, np.zeros_like(power), np.zeros(0), np.zeros((len(power), 0)))

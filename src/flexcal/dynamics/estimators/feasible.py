@@ -61,7 +61,7 @@ def feasible_least_squares(data: RegressionData) -> Estimate:
 
 
 def _root(matrix: np.ndarray, kept: list[int]) -> np.ndarray:
-    """(p, k): (RᵀR)⁻¹ = root rootᵀ for the kept columns, zero rows for the others."""
+    """Square root (p, k): (RᵀR)⁻¹ = root rootᵀ for the kept columns, zero rows for the others."""
     scale = 1.0 / np.linalg.norm(matrix[:, kept], axis=0)
     triangle = np.linalg.qr(matrix[:, kept] * scale, mode="r")
     result = np.zeros((matrix.shape[1], len(kept)))

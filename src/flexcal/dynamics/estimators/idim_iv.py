@@ -15,7 +15,7 @@ from flexcal.estimation import Estimate, Parameter, Parameters
 
 
 def instrumental_variables(data: RegressionData, recorded: RecordedRows) -> Estimate:
-    """χ̂ with ZᵀW χ̂ = ZᵀY, Z the observation matrix of the simulated closed loop with χ̂ itself, through the filters of W and Y.
+    """Estimate χ̂ of ZᵀW χ̂ = ZᵀY, Z the observation matrix of the closed loop simulated with χ̂, through the filters of W and Y.
 
     The rows of a joint and experiment are divided by `noise_levels` of theirs. Which parameters the data tell, and what the others
     absorb, is as in `weighted_least_squares`; the covariance is (ZᵀW)⁻¹ M (WᵀZ)⁻¹ with M that of `score_covariance`. Raises

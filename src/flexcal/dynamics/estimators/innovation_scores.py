@@ -25,7 +25,7 @@ class InnovationScores:
         self._by_batch: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
     def follow(self, models: StateTransitions, torque_noise: np.ndarray, first_speed: float) -> None:
-        """Steps that follow those before; `torque_noise` (n,) is the standard deviation of a step's mean torque (N m)."""
+        """Add the scores of the next steps; `torque_noise` (n,) is the standard deviation of a step's mean torque (N m)."""
         steps = models.steps
         n, size = len(torque_noise), self._root.shape[1]
         if steps.begins:
@@ -72,7 +72,7 @@ class InnovationScores:
 
     @property
     def scores(self) -> Scores:
-        """Of all steps so far."""
+        """Scores of all steps so far."""
         size = self._root.shape[1]
         length = max(self._by_batch, default=0) + 1
         score, information = np.zeros((length, size)), np.zeros((length, size, size))

@@ -15,16 +15,16 @@ from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 
 _TUNING = 1.345
-"""Standard deviations up to which a row counts in full: 95 % as efficient as least squares where errors are normal (Huber 1981)."""
+"""Standard deviations up to which a row has full weight: 95 % efficiency relative to least squares for normal errors (Huber 1981)."""
 _NORMAL = 1.4826
-"""σ of normal errors over their median absolute value."""
+"""Ratio of σ to the median absolute value of normal errors."""
 _SETTLED = 1e-2
-"""Largest step of a parameter, in its standard deviations, that ends the iteration."""
+"""Largest step of a parameter, in its standard deviations, at which the iteration has converged."""
 _ITERATIONS = 50
 
 
 def huber_least_squares(data: RegressionData, recorded: RecordedRows) -> Estimate:
-    """χ̂ that minimises Huber's loss of every row and joint, from `weighted_least_squares` of the same equations.
+    """Estimate χ̂ minimising Huber's loss of every row and joint, starting from `weighted_least_squares` of the same equations.
 
     Weights are min(1, 1.345 σ̂ / |ρ|), with σ̂ = 1.4826 median |ρ| of each joint and experiment, both renewed at every step: two passes
     over `recorded`. The covariance is that of `linear_fit` for the weighted rows, times (mean weight / share of rows of full weight)²:

@@ -1,4 +1,4 @@
-"""ZᵀW χ = ZᵀY from triangular factors of [Z, W, Y], with its covariance."""
+"""Instrumental-variable estimate ZᵀW χ = ZᵀY from triangular factors of [Z, W, Y], with its covariance."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flexcal.dynamics.regression import Batch, BatchCovariance, parameter_rows, 
 from flexcal.errors import FlexcalError
 
 _WEAKEST = 1e-3
-"""Smallest correlation of an instrument with what it stands for, of all directions of the parameters."""
+"""Least correlation of an instrument with its regressor, over all directions of the parameters."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,7 @@ def instrumental_fit(
 
 
 def _columns(column_indices: np.ndarray, kept: Sequence[int], start: np.ndarray) -> np.ndarray:
-    """(2 m + 1, 2 k + 1): from a joint's [Z, W, Y] to the kept columns of Z, those of W, and Y less what `start` explains."""
+    """Matrix (2 m + 1, 2 k + 1) from a joint's [Z, W, Y] to the kept columns of Z, those of W, and Y less what `start` explains."""
     m, size = len(column_indices), len(kept)
     chosen = parameter_rows(np.eye(size), kept, column_indices)
     mapping = np.zeros((2 * m + 1, 2 * size + 1))

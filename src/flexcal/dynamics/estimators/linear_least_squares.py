@@ -1,4 +1,4 @@
-"""Weighted linear least squares with intervals, common to the estimators."""
+"""Weighted linear least squares with confidence intervals, common to the estimators."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def linear_fit(data: RegressionData, noise: Sequence[float]) -> Estimate:
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """Unknowns of a linear estimator: the `kept` columns (k,), of a system that leaves the `hidden` base parameters open."""
+    """Unknowns of a linear estimator: the `kept` columns (k,) of a system that does not determine the `hidden` base parameters."""
 
     data: RegressionData
     kept: list[int]
@@ -47,20 +47,22 @@ class Unknowns:
 
     @classmethod
     def of(cls, data: RegressionData, system: TriangularFactor) -> Unknowns:
-        """The base parameters that a weighted `system` of all columns determines."""
+        """Base parameters determined by a weighted `system` of all columns."""
         base = data.base.identifiability
         structural = [data.names[i] for i in base.kept]
         seen = analyse(system.matrix[:, base.kept], structural, prefer=structural)
         return cls(data, [base.kept[i] for i in seen.kept], seen.dropped)
 
     def reduced(self, system: TriangularFactor) -> tuple[np.ndarray, np.ndarray]:
-        """R (k + 1, k + 1) of the kept columns times a scale (k,), and of what is left of Y at the model's values; and that scale."""
+        """Factor R (k + 1, k + 1) of the kept columns times a scale (k,), and of the residual of Y at the model's values; and that
+        scale.
+        """
         right = system.right - system.matrix @ self.data.observation.values()
         scale = 1.0 / np.linalg.norm(system.matrix[:, self.kept], axis=0)
         return TriangularFactor.of(system.matrix[:, self.kept] * scale, right).factor, scale
 
     def freedom(self, system: TriangularFactor) -> int:
-        """Rows less parameters; raises `FlexcalError` where none is left."""
+        """Degrees of freedom, rows less parameters; raises `FlexcalError` if there are none."""
         freedom = system.rows - len(self.kept)
         if freedom <= 0:
             raise FlexcalError(
@@ -79,7 +81,7 @@ class Unknowns:
         message: str,
         iterations: int = 1,
     ) -> Estimate:
-        """Of all `parameters` (p,), with the `covariance` (k, k) of the kept ones."""
+        """Estimate of all `parameters` (p,), with the `covariance` (k, k) of the kept ones."""
         names, base, model = self.data.names, self.data.base.identifiability, self.data.observation.model
         whole = np.zeros((len(names), len(names)))
         whole[np.ix_(self.kept, self.kept)] = covariance
@@ -115,7 +117,7 @@ def weighted_system(data: RegressionData, noise: Sequence[float]) -> TriangularF
 def _dropped(
     regrouping: np.ndarray, names: Sequence[str], base: Sequence[int], hidden: Sequence[Dropped]
 ) -> tuple[Dropped, ...]:
-    """What the robot regroups, in terms of the base parameters that the data determine, and what the data hide besides."""
+    """Regrouped parameters of the robot in terms of the determined base parameters, and those that the data do not determine."""
     onward = {entry.name: entry.absorbed_by for entry in hidden}
     result: list[Dropped] = list(hidden)
     for number, name in enumerate(names):

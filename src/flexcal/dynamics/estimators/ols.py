@@ -8,5 +8,5 @@ from flexcal.estimation import Estimate
 
 
 def ordinary_least_squares(data: RegressionData) -> Estimate:
-    """χ̂ with one σ̂ for all joints and experiments; raises `FlexcalError` as `linear_fit` does."""
+    """Estimate χ̂ with one σ̂ for all joints and experiments; raises `FlexcalError` as `linear_fit` does."""
     return linear_fit(data, [1.0] * len(data.subsystems))

@@ -20,7 +20,7 @@ from flexcal.estimation import Estimate
 
 
 def physical_memory() -> int | None:
-    """Bytes; None where the system does not say."""
+    """Size of the physical memory, bytes; None if unknown."""
     try:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):
@@ -28,7 +28,7 @@ def physical_memory() -> int | None:
 
 
 def moderated(variances: np.ndarray, freedom: float) -> tuple[np.ndarray, float]:
-    """Posterior means of the precisions, inverted (k,), and their degrees of freedom.
+    """Inverse posterior means of the precisions (k,), and their degrees of freedom.
 
     Each of the `variances` (k,) has so many degrees of `freedom`. The true ones have an inverse chi-squared prior, whose level and
     degrees of freedom come from the mean and the variance of the logarithms (Smyth 2004, Eqs. 2, 5 and 6); these are at most those of all
@@ -52,22 +52,22 @@ def moderated(variances: np.ndarray, freedom: float) -> tuple[np.ndarray, float]
 
 
 _REACH = 5
-"""Neighbouring lines on either side that the noise of a line is read from."""
+"""Number of neighbouring lines on either side from which the noise of a line is estimated."""
 _CORNERS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, np.inf)
-"""Lines at which the power of first-order noise has fallen by half; the last is white."""
+"""Corner lines of first-order noise, at which its power has fallen by half; the last is white."""
 _SMALLEST = 1e-9
-"""Noise of torques that are fitted exactly, relative to them."""
+"""Lower bound of the noise of exactly fitted torques, relative to them."""
 _SETTLED = 1e-2
-"""Largest step of a parameter, in its standard deviations, that ends the iteration."""
+"""Largest step of a parameter, in its standard deviations, at which the iteration has converged."""
 _ITERATIONS = 20
 _HELD = 100
-"""Bytes a sample and joint of periods that are averaged, filtered and differentiated together; 97 were measured."""
+"""Memory, bytes per sample and joint, of periods averaged, filtered and differentiated together; 97 were measured."""
 _BLOCK = 512
-"""Samples whose columns are in memory at once."""
+"""Number of samples whose columns are in memory at once."""
 
 
 def maximum_likelihood(data: RegressionData, recorded: RecordedRows) -> Estimate:
-    """χ̂ from the mean period of every experiment, its torques weighed by their covariance, line by line and over all joints.
+    """Estimate χ̂ from the mean period of every experiment, its torques weighted by their covariance over lines and joints.
 
     Rows are Fourier coefficients up to the band of the decimated rows. The noise of torque and motion acts together in τ − W(q) χ, whose
     scatter between the periods is therefore what likelihood asks for, to first order in the noise; it is read anew with every χ, as
@@ -125,14 +125,16 @@ def _require_memory(recorded: RecordedRows) -> None:
 
 
 def _mean_rows(observation: Observation, motion: RepeatedMotion, factor: int) -> np.ndarray:
-    """[W, Y] of the mean motion (2 K + 1, n, p + 1), averaged over the times of all periods: friction remembers, and warms up."""
+    """Rows [W, Y] of the mean motion (2 K + 1, n, p + 1), averaged over the times of all periods, since friction depends on time and
+    history.
+    """
     memory: Memory = {}
     again = (replace(motion.mean, time=period.time) for period in motion.periods)
     return np.mean([_coefficients(observation, each, memory, factor) for each in again], axis=0)
 
 
 def _coefficients(observation: Observation, motion: Motion, memory: Memory, factor: int) -> np.ndarray:
-    """Those of [W, Y] for one period (2 K + 1, n, p + 1)."""
+    """Fourier coefficients of [W, Y] for one period (2 K + 1, n, p + 1)."""
     systems = [_rows(system.T, factor) for system in observation.systems(motion, memory)]
     coefficients = np.zeros((len(systems[0]), observation.model.n, len(observation.names) + 1))
     for joint, (system, column_indices) in enumerate(zip(systems, observation.column_indices, strict=True)):
@@ -168,7 +170,7 @@ def _covariance(scores: list[np.ndarray], root: np.ndarray) -> tuple[np.ndarray,
 def _residuals(
     observation: Observation, motion: RepeatedMotion, parameters: np.ndarray, factor: int
 ) -> np.ndarray:
-    """τ − W χ of every period (P, 2 K + 1, n)."""
+    """Residual τ − W χ of every period (P, 2 K + 1, n)."""
     memory: Memory = {}
     return np.array([_rows(_missed(observation, p, parameters, memory), factor) for p in motion.smooth])
 
@@ -188,7 +190,7 @@ def _scatter(residuals: np.ndarray) -> np.ndarray:
 
 
 def _shapes(squares: np.ndarray, lines: np.ndarray) -> np.ndarray:
-    """Amplitude (2 K + 1, n) of first-order noise that fits the lowest lines of `squares` (2 K + 1, n) best.
+    """Amplitude (2 K + 1, n) of the first-order noise that best fits the lowest lines of `squares` (2 K + 1, n).
 
     Noise with a memory has far more power in the lowest lines than in those that they are pooled with.
     """
@@ -203,7 +205,7 @@ def _shapes(squares: np.ndarray, lines: np.ndarray) -> np.ndarray:
 
 
 def _missed(observation: Observation, motion: Motion, parameters: np.ndarray, memory: Memory) -> np.ndarray:
-    """τ − W χ (N, n) of one period."""
+    """Residual τ − W χ (N, n) of one period."""
     residuals = []
     for start in range(0, len(motion), _BLOCK):
         part = motion.part(start, min(start + _BLOCK, len(motion)))
@@ -215,11 +217,11 @@ def _missed(observation: Observation, motion: Motion, parameters: np.ndarray, me
 
 
 def _root(covariance: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Lower Cholesky factors (2 K + 1, n, n), of no less than a share of the torques, which are the last column of `rows`."""
+    """Lower Cholesky factors (2 K + 1, n, n), bounded below by a share of the torques, the last column of `rows`."""
     floor = (_SMALLEST * np.sqrt(np.mean(rows[:, :, -1] ** 2, axis=0))) ** 2
     return np.linalg.cholesky(covariance + np.diag(np.where(floor > 0, floor, 1.0)))
 
 
 def _whitened(rows: np.ndarray, root: np.ndarray) -> np.ndarray:
-    """Equations (n (2 K + 1), ·) whose errors are independent and of variance one."""
+    """Whitened equations (n (2 K + 1), ·) with independent errors of unit variance."""
     return np.linalg.solve(root, rows).reshape(-1, rows.shape[2])

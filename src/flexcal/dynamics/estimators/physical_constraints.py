@@ -15,23 +15,23 @@ from flexcal.model.robot import RobotModel
 
 _LINK_FLOOR = 1e-3
 _DRIVE_FLOOR = 1e-5
-"""Shares of the reference below which a pseudo-inertia or a drive parameter must not fall."""
+"""Lower bounds of a pseudo-inertia and of a drive parameter, relative to the reference."""
 _MASS_BOUND = 3.0
-"""A link's mass keeps within so many of the prior's standard deviations of its CAD mass."""
+"""Bound of a link's mass about its CAD mass, in prior standard deviations."""
 _TIGHTEST = 1e-3
-"""A prior that takes CAD for exact still leaves this relative standard deviation."""
+"""Least relative standard deviation of a prior, even if CAD counts as exact."""
 _STEEL = 8000.0
-"""kg/m³; CAD that gives a link less extent than a ball of steel of its mass has is taken for that ball."""
+"""Density, kg/m³; a link with less extent in CAD than a steel ball of its mass is replaced by that ball."""
 _SILENT = 1e-9
-"""A column smaller than this beside the largest of its kind is zero."""
+"""Size of a column, relative to the largest of its kind, below which it is zero."""
 _UNKNOWN_STD = 100.0
-"""Relative standard deviation of a drive parameter that nothing is known of: next to none, which keeps the problem well posed."""
+"""Relative standard deviation of a drive parameter without prior knowledge: very wide, keeps the problem well posed."""
 _UNKNOWN_MASS, _UNKNOWN_RADIUS = 1.0, 0.05
-"""kg and m, of a link of which neither URDF nor the other links tell anything."""
+"""Mass (kg) and radius (m) of a link unknown to both URDF and the other links."""
 
 
 def feasible_set(observation: Equations, system: TriangularFactor) -> tuple[Cone, ...]:
-    """The cones of all links and drives of an observation, whose weighted equations are `system`.
+    """Cones of all links and drives of an observation, whose weighted equations are `system`.
 
     A link's pseudo-inertia is positive definite (Sousa & Cortesão 2014; Wensing, Kim & Slotine 2018), with CAD as its reference and the
     prior's relative standard deviation of the mass; the CAD mass bounds its mass. Without one the reference is a ball as heavy as the
@@ -56,7 +56,7 @@ def _links(model: RobotModel) -> Iterator[Cone]:
 
 
 def extended(link: Inertia) -> Inertia:
-    """The link with no principal extent below that of a ball of steel of its mass."""
+    """Link with principal extents at least those of a steel ball of its mass."""
     least = link.mass / 5.0 * (3.0 * link.mass / (4.0 * np.pi * _STEEL)) ** (2.0 / 3.0)
     sizes, axes = np.linalg.eigh(0.5 * np.trace(link.inertia) * np.eye(3) - link.inertia)
     moments = (axes * np.maximum(sizes, least)) @ axes.T
@@ -64,7 +64,7 @@ def extended(link: Inertia) -> Inertia:
 
 
 def _guessed(model: RobotModel, link: int) -> Inertia:
-    """A ball for a link without CAD."""
+    """Assumed ball for a link without CAD."""
     masses = [other.mass for other in model.inertias if other.mass > 0]
     mass = float(np.mean(masses)) if masses else _UNKNOWN_MASS
     lengths = [float(np.linalg.norm(joint.translation)) for joint in model.joints if joint.parent == link]
@@ -81,7 +81,7 @@ def _drives(observation: Equations, system: TriangularFactor) -> Iterator[Cone]:
     seen = {name for name, size in zip(names, sizes, strict=True) if size > _SILENT * largest[_kind(name)]}
 
     def reference(name: str) -> tuple[float, float]:
-        """Size and relative standard deviation."""
+        """Reference size and relative standard deviation."""
         known = model.values.get(name, math.nan)
         if known > 0:
             return known, model.prior.rotor_inertia if name.endswith(".rotor_inertia") else _UNKNOWN_STD
@@ -110,7 +110,7 @@ def _drives(observation: Equations, system: TriangularFactor) -> Iterator[Cone]:
 
 
 def _groups(model: RobotModel, seen: list[bool]) -> Iterator[tuple[list[str], list[tuple[str, str, float]]]]:
-    """The joints that `seen` holds, together where couplings join them, with those couplings (motor, joint, ratio)."""
+    """Joints in `seen`, grouped by couplings, with those couplings (motor, joint, ratio)."""
     groups = [[name] for name, there in zip(model.joint_names, seen, strict=True) if there]
     for entry in model.config.drives.coupling:
         ends = [group for group in groups if entry.motor in group or entry.joint in group]
@@ -130,5 +130,5 @@ def _kind(name: str) -> str:
 
 
 def _scalar(member: int, reference: float, floor: float, std: float, *, sign: float = 1.0) -> Cone:
-    """`sign` times one parameter above `floor` times its reference."""
+    """Constraint `sign` times one parameter above `floor` times its reference."""
     return Cone(np.array([member]), np.full((1, 1, 1), sign), np.array([[reference]]), floor, std)

@@ -1,4 +1,4 @@
-"""The power model: power of all motors, one equation per sample (Gautier 1997)."""
+"""Power model: power of all motors, one equation per sample (Gautier 1997)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from flexcal.estimation import Estimate
 
 
 def power_least_squares(recorded: RecordedRows) -> Estimate:
-    """χ̂ of q̇ᵀW χ = q̇ᵀτ, every experiment by its own noise; raises `FlexcalError` as `noise_levels` and `linear_fit` do.
+    """Estimate χ̂ of q̇ᵀW χ = q̇ᵀτ, each experiment weighted by its own noise; raises `FlexcalError` as `noise_levels` and `linear_fit`
+    do.
 
     The products are formed at the full rate, before the decimation. One equation stands for n, and the noise of the strong joints
     hides what the weak ones say; it grows with the speed too. The covariance of `linear_fit` accounts for that, the estimate does not.
@@ -27,7 +28,7 @@ def power_least_squares(recorded: RecordedRows) -> Estimate:
 
 @dataclass(frozen=True, eq=False)
 class PowerModel(ScalarEquations):
-    """One equation, W: q̇ᵀ times the torques of an `observation` and times the columns of them."""
+    """Power equation, W: q̇ᵀ times the torques and columns of an `observation`."""
 
     label = "the power of all joints"
 

@@ -1,4 +1,4 @@
-"""The rows of all experiments, for estimators that need single rows in several passes."""
+"""Rows of all experiments, for estimators that need single rows in several passes."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from flexcal.dynamics.simulation import SimulatedExperiment
 from flexcal.errors import FlexcalError
 
 _Join = Callable[[RegressionBlock, RegressionBlock], RegressionBlock]
-"""Of the same rows as recorded and as simulated."""
+"""Function that combines the same rows as recorded and as simulated."""
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedRows:
-    """Rows of a fit; every method is one pass over all `experiments`, of which each has a window.
+    """Rows of a fit; every method is one pass over all `experiments`, each with a window.
 
     Of the rows that are kept between passes only one number a row and equation stays in memory.
     """
@@ -56,11 +56,11 @@ class RecordedRows:
         return by_experiment
 
     def weighted(self, weights: Sequence[np.ndarray]) -> RegressionData:
-        """The equations, each multiplied by the root of its weight: (equations, rows) an experiment, as `residuals` are."""
+        """Equations multiplied by the roots of their weights: (equations, rows) per experiment, as `residuals`."""
         return self._data(self.observation, weights)
 
     def observed_as(self, equations: Equations) -> RegressionData:
-        """Other equations for the same samples."""
+        """Rows of other equations for the same samples."""
         return self._data(equations, [None] * len(self.experiments))
 
     def _data(self, equations: Equations, weights: Sequence[np.ndarray | None]) -> RegressionData:
@@ -80,7 +80,7 @@ class RecordedRows:
         return RegressionData.of(equations, self.base, systems)
 
     def simulated(self, parameters: np.ndarray) -> RegressionData:
-        """The equations with the observation matrix of the simulated closed loop with `parameters` (p,), and the measured torques.
+        """Equations with the observation matrix of the closed loop simulated with `parameters` (p,), and the measured torques.
 
         Raises `FlexcalError` as `SimulatedExperiment` does.
         """
@@ -90,7 +90,7 @@ class RecordedRows:
         return RegressionData.of(self.observation, self.base, systems)
 
     def instrumented(self, parameters: np.ndarray) -> list[ExperimentSystem]:
-        """The equations with what stands for the noise-free W before it: every joint's columns are [Z, W, Y], twice its members and one.
+        """Equations with the instruments before W: every joint's columns are [Z, W, Y], twice its column indices and one.
 
         Z is the observation matrix of the simulated closed loop with `parameters` (p,), through the filters of W, at the same rows.
         Raises `FlexcalError` as `SimulatedExperiment` does.
@@ -116,7 +116,7 @@ class RecordedRows:
         parameters: np.ndarray,
         join: _Join,
     ) -> Iterator[RegressionBlock]:
-        """Rows that are joined of the measured and the simulated ones, where the simulation is reliable."""
+        """Rows joined from the measured and the simulated ones, where the simulation is reliable."""
         simulated = SimulatedExperiment(self.observation, parameters, experiment, self.decimation)
         pairs = (
             regression_blocks(self.observation, e, self.decimation, window) for e in (experiment, simulated)
@@ -136,7 +136,7 @@ class RecordedRows:
 
 
 def _beside(measured: RegressionBlock, simulated: RegressionBlock) -> RegressionBlock:
-    """The measured rows, with the simulated columns before theirs."""
+    """Measured rows with the simulated columns in front."""
     pairs = zip(measured.reduced, simulated.reduced, strict=True)
     return replace(
         measured,

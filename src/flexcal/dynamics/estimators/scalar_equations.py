@@ -16,7 +16,7 @@ from flexcal.model.robot import RobotModel
 
 @dataclass(frozen=True, eq=False)
 class ScalarEquations(ABC):
-    """Every parameter of an `observation` stands in the one equation, which is called `label`."""
+    """Scalar equation called `label` in which every parameter of an `observation` appears."""
 
     observation: Observation
     label: ClassVar[str]

@@ -1,4 +1,4 @@
-"""Iteration of simulation and estimation until both agree, from a physically consistent start."""
+"""Iteration of simulation and estimation to a fixed point, from a physically consistent start."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 
 _SETTLED = 0.05
-"""Largest difference of estimated and simulated base parameters, in standard deviations, that ends the iteration."""
+"""Largest difference of estimated and simulated base parameters, in standard deviations, at convergence."""
 _ROUNDING = 1e-9
-"""The same, relative to them."""
+"""Largest relative difference of estimated and simulated base parameters at convergence."""
 _WHOLE = 4
-"""Steps that are taken whole; friction that sticks in one simulation and slips in the next can make them swing, and half steps end that."""
+"""Number of full steps, followed by half steps: friction that sticks in one simulation and slips in the next may cause oscillation."""
 _ITERATIONS = 20
 
 
 def simulated_iteration(data: RegressionData, step: Callable[[np.ndarray], Estimate], name: str) -> Estimate:
-    """The estimate that `step` makes of the simulation with its own parameters.
+    """Estimate by `step` from the simulation with its own parameters (fixed point).
 
     It starts from that of `feasible_least_squares`, or from CAD where there is none. `step` gets parameters (p,) that move as the last
     estimate does, and whose links are bodies as far as no torque tells otherwise: what the base parameters leave open stays as it was

@@ -10,11 +10,11 @@ from flexcal.dynamics.regression import RegressionData, Subsystem, batch_covaria
 from flexcal.estimation import Estimate
 
 _LEAST_TORQUE_NOISE = 1e-2
-"""Of the variance of a residual, the share that the torque has at least."""
+"""Least share of the torque noise in the variance of a residual."""
 
 
 def total_least_squares(data: RegressionData, errors: RegressionData) -> Estimate:
-    """χ̂ that minimises ‖A x‖ / ‖B x‖ over x = [χ, −1], with A = [W, Y] and B the errors of the columns of A, all by `noise_levels`.
+    """Estimate χ̂ minimising ‖A x‖ / ‖B x‖ over x = [χ, −1], with A = [W, Y] and B the errors of the columns of A, all by `noise_levels`.
 
     `errors` has for the same subsystems what the position noise makes of W (rows ΔW of it, not of one recording's own errors: of
     any with the same covariance), zero in the columns that are exact, so that sign and constant columns stay as they are. What the residual

@@ -1,4 +1,4 @@
-"""Weighted least squares: the equations of each joint (or motor alone) and experiment by their own noise (Eqs. 2.29-2.31)."""
+"""Weighted least squares: the equations of each joint (or motor alone) and experiment weighted by their own noise (Eqs. 2.29-2.31)."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from flexcal.estimation import Estimate
 from flexcal.model.parts import LINK_PARAMETERS
 
 _FIRST, _ROUNDS = 1e-2, 3
-"""Noise to begin with of equations that nobody drives, over what their links ask, and how often it is renewed."""
+"""Initial noise of undriven equations relative to the torques of their links, and number of its updates."""
 
 
 def weighted_least_squares(data: RegressionData) -> Estimate:
-    """χ̂ with the equations of each subsystem divided by its `noise_levels`; raises `FlexcalError` as that and `linear_fit` do."""
+    """Estimate χ̂ with the equations of each subsystem divided by its `noise_levels`; raises `FlexcalError` as that and `linear_fit` do."""
     return linear_fit(data, noise_levels(data))
 
 
 def noise_levels(data: RegressionData) -> list[float]:
-    """σ̂ of each subsystem, N m, from its own fit, by its rows less its rank (Eq. 2.28).
+    """Noise σ̂ of each subsystem, N m, from its own fit, by rows less rank (Eq. 2.28).
 
     A subsystem that its own parameters fit exactly counts as if it had 1e-12 of its torque as noise. One that nobody drives would be
     fitted by zeros alone: its noise is what a fit of all equations leaves of it, begun with a hundredth of what its links ask. Raises
@@ -57,7 +57,7 @@ def _fitted(data: RegressionData, noise: list[float]) -> np.ndarray:
 
 
 def _first(data: RegressionData, s: Subsystem) -> float:
-    """Noise (N m) to begin with of a subsystem that nobody drives: a share of what CAD says that its links ask, else of the torques."""
+    """Initial noise (N m) of an undriven subsystem: a share of its links' torques by CAD, else of the measured torques."""
     links = s.column_indices < len(LINK_PARAMETERS) * data.observation.model.n
     asked = s.triangle.matrix[:, links] @ data.observation.values()[s.column_indices[links]]
     sizes = [np.linalg.norm(o.triangle.right) / np.sqrt(o.triangle.rows) for o in data.subsystems]
@@ -65,7 +65,7 @@ def _first(data: RegressionData, s: Subsystem) -> float:
 
 
 def _left(s: Subsystem, parameters: np.ndarray) -> float:
-    """Root mean square (N m) of what a fit leaves of a subsystem that nobody drives, at least 1e-12 of what its links ask."""
+    """Root mean square residual (N m) of an undriven subsystem, at least 1e-12 of its links' torques."""
     own = parameters[s.column_indices]
     terms = s.triangle.matrix * own
     least = 1e-12 * float(np.abs(terms).max())

@@ -24,12 +24,12 @@ _PLAIN: dict[str, DriveTerm] = {
 }
 _LIBRARY = {term.key: term for term in LIBRARY_TERMS}
 LIBRARY = tuple(_LIBRARY)
-"""What is tried beyond the classic terms; an asymmetric Coulomb friction is not, as it is a torque offset."""
+"""Candidate terms beyond the classic ones; without asymmetric Coulomb friction, which is a torque offset."""
 FRICTION_TERMS = (*_PLAIN, *LIBRARY)
 
 
 def candidate_shapes(name: str, scale: ExcitationScale) -> tuple[Candidate, ...]:
-    """The term `name` of the library in the shapes to try."""
+    """Library term `name` in its candidate shapes."""
     return tuple(Candidate(name, shape, term) for shape, term in _LIBRARY[name].shapes(scale))
 
 

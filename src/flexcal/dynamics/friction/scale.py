@@ -1,4 +1,4 @@
-"""Speed, stroke and duration of recordings, by which the shapes of friction terms are measured."""
+"""Speed, stroke and duration of recordings, which scale the shapes of friction terms."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from flexcal.dynamics.regression import ExperimentSystem
 
 @dataclass(frozen=True, eq=False)
 class ExcitationScale:
-    """Scales of a motion by which the shapes of friction terms are measured.
+    """Scales of a motion for the shapes of friction terms.
 
     `speed` and `stroke` (n,) are those of the motor axes: the root mean square of ṡ, and its square over that of s̈; `duration` (s) is
     that of the longest recording; `inertials` (10 n,) are the links'. An axis that does not move counts as if both were 1.
@@ -29,7 +29,7 @@ class ExcitationScale:
     def of(
         cls, systems: Sequence[ExperimentSystem], observation: Observation, inertials: np.ndarray
     ) -> ExcitationScale:
-        """Of the equations of an observation with the classic terms, nothing else is needed."""
+        """Scale from the equations of an observation with the classic terms."""
         axes = motor_axes(observation.model)
         speed, push = (
             np.array([_size(systems, observation, axis, kind) for axis in axes])
@@ -41,7 +41,7 @@ class ExcitationScale:
 
 
 def _size(systems: Sequence[ExperimentSystem], observation: Observation, axis: MotorAxis, kind: str) -> float:
-    """Root mean square of ṡ or s̈ of an axis: what its column of that `kind` and those of its coupling sum to at its own joint."""
+    """Root mean square of ṡ or s̈ of an axis: the sum of its column of that `kind` and those of its coupling at its own joint."""
     own = f"{axis.name}.{kind}"
     column_indices = observation.column_indices[axis.joint]
     chosen = [own, *(name for name in observation.names if name.startswith(f"{own}_at_"))]

@@ -29,21 +29,21 @@ from flexcal.model.robot import RobotModel
 
 @dataclass(frozen=True, eq=False)
 class ModelUncertainty:
-    """`deviations` (models, k) of the parameters `names` from those of the selected model, which is the first of the models."""
+    """Model uncertainty: `deviations` (models, k) of the parameters `names` from those of the selected model, the first one."""
 
     names: tuple[str, ...]
     deviations: np.ndarray
 
     @classmethod
     def of(cls, estimates: Sequence[Estimate]) -> ModelUncertainty:
-        """Of the parameters that all `estimates` have identified, the selected model's first."""
+        """Deviations of the parameters identified in all `estimates`, the selected model's first."""
         names = estimates[0].parameters.names
         shared = np.all([estimate.identifiable for estimate in estimates], axis=0)
         values = np.array([estimate.parameters.coordinates()[shared] for estimate in estimates])
         return cls(tuple(name for name, seen in zip(names, shared, strict=True) if seen), values - values[0])
 
     def widened(self, estimate: Estimate) -> Estimate:
-        """The estimate, its covariance larger by the mean square of the deviations.
+        """Estimate with its covariance increased by the mean square of the deviations.
 
         With equal weights of all models that is the unconditional variance of Buckland, Burnham & Augustin (1997) about the selected one.
         """
@@ -56,7 +56,7 @@ class ModelUncertainty:
         return replace(estimate, covariance=covariance)
 
     def growth(self, estimate: Estimate) -> dict[str, float]:
-        """By how much each standard deviation of an estimate that is already `widened` grew, as a factor."""
+        """Factor by which each standard deviation of a `widened` estimate has grown."""
         squares = np.mean(self.deviations**2, axis=0)
         factors = {}
         for name, square in zip(self.names, squares, strict=True):
@@ -71,7 +71,7 @@ _CLASSIC = ("viscous", "coulomb", "torque_offset")
 
 @dataclass(frozen=True, eq=False)
 class FrictionSelection:
-    """All `terms` of the drives, the `names` of the friction terms among them, the trials of the selection.
+    """Selected friction: all `terms` of the drives, the `names` of the friction terms, and the trials of the selection.
 
     `uncertainty` is that between the chosen terms and others that predict as well, None without such.
     """
@@ -84,7 +84,7 @@ class FrictionSelection:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """The names, each with its shape."""
+        """Names of the terms, each with its shape."""
         shapes = {candidate.name: candidate.label for candidate in self.chosen}
         return tuple(shapes.get(name, name) for name in self.names)
 
@@ -95,7 +95,7 @@ def select_friction(
     equations: Callable[[Observation], Sequence[ExperimentSystem]],
     decimation: Decimation,
 ) -> FrictionSelection:
-    """The terms that `friction` names; the shapes of those of the library, and with "auto" which, by cross-validation and significance.
+    """Terms named by `friction`, with the shapes of library terms, and with "auto" also the terms, by cross-validation and significance.
 
     `equations` gives those of the fit for any observation, after `decimation`; nothing else is looked at. Raises `FlexcalError` for an
     unknown term, and as `weighted_least_squares` does.

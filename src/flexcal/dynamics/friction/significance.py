@@ -1,4 +1,4 @@
-"""Significance of friction terms, with noise that may have a memory."""
+"""Significance of friction terms under autocorrelated noise."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from flexcal.dynamics.regression import ExperimentSystem, RegressionData
 from flexcal.estimation import Estimate
 
 _FREEDOM = 8.0
-"""Degrees of freedom of a significance test, at least."""
+"""Least degrees of freedom of a significance test."""
 
 
 @dataclass(frozen=True, eq=False)
 class CandidateFit:
-    """Weighted least squares of some columns of an observation that has all candidates' columns side by side.
+    """Weighted least squares of selected columns of an observation with the columns of all candidates.
 
     `plain` are the numbers of the columns that are always in.
     """
@@ -29,7 +29,7 @@ class CandidateFit:
     plain: Sequence[int]
 
     def estimate(self, further: Sequence[int]) -> Estimate:
-        """With the plain columns and `further` ones, by their numbers; raises `FlexcalError` as `weighted_least_squares` does."""
+        """Estimate with the plain columns and `further` ones, by their numbers; raises `FlexcalError` as `weighted_least_squares` does."""
         kept = tuple(sorted({*self.plain, *further}))
         names = self.observation.names
         regrouping = np.zeros((len(kept), len(names)))
@@ -44,7 +44,7 @@ class CandidateFit:
         return weighted_least_squares(RegressionData.of(self.observation, BaseParameters(base), self.systems))
 
     def p_value(self, before: Sequence[int], group: Sequence[int]) -> float:
-        """Probability that noise alone makes the parameters of a `group` of columns, beside those `before`, as large as they are.
+        """p-value of a `group` of columns added to those `before`.
 
         That of the largest ratio of a parameter to its standard deviation, by Student's t with the degrees of freedom of the covariance,
         times the number of parameters (Bonferroni). The covariance allows for noise with a memory; a term that acts at one joint counts.

@@ -13,14 +13,14 @@ from flexcal.dynamics.signals import Motion
 from flexcal.model.robot import RobotModel
 
 _WORTH = 0.01
-"""A term is worth its parameters if the error falls by this share of itself."""
+"""Least relative reduction of the error for a term to be added."""
 _LEVEL = 0.05
-"""Probability, at most, that noise alone makes any of the candidates as significant as the one that is taken."""
+"""Significance level of the best out of all candidates."""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A friction term of robot.yaml in one `shape` (empty for a term that has none)."""
+    """Friction term of robot.yaml in one `shape` (empty for a term that has none)."""
 
     name: str
     shape: str
@@ -28,11 +28,11 @@ class Candidate:
 
     @property
     def label(self) -> str:
-        """As it is printed."""
+        """Printed name of the candidate."""
         return f"{self.name} ({self.shape})" if self.shape else self.name
 
     def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
-        """Those of the term, named by the shape too, so that several shapes stand side by side."""
+        """Columns of the term, with the shape in their names, so that several shapes can coexist."""
         for column in self.term.columns(model, motion, memory):
             yield replace(column, name=self.column(column.name))
 
@@ -55,15 +55,16 @@ class SelectionStep:
 
 @dataclass(frozen=True)
 class FrictionChoice:
-    """The candidates chosen, and everything that was tried, in order."""
+    """Chosen candidates, and all trials, in order."""
 
     chosen: tuple[Candidate, ...]
     trials: tuple[SelectionStep, ...]
 
     @property
     def rivals(self) -> tuple[tuple[str, ...], ...]:
-        """Other terms, by their labels, that predict as well: as many with an error larger by less than a hundredth, or one more with a
-        smaller error, which is not significant or saves less than a hundredth."""
+        """Labels of other terms of equal predictive power: as many with an error larger by less than a hundredth, or one more with a
+        smaller error, which is not significant or saves less than a hundredth.
+        """
         labels = tuple(candidate.label for candidate in self.chosen)
         (error,) = (trial.error for trial in self.trials if trial.terms == labels)
         most = {len(labels): (1 + _WORTH) * error, len(labels) + 1: error}
@@ -80,7 +81,7 @@ def forward_selection(
     groups: Mapping[Candidate, Sequence[int]],
     p_value: Callable[[Sequence[int], Sequence[int]], float],
 ) -> FrictionChoice:
-    """Adds the significant candidate that lowers the error most, one term after the other, while it falls by a hundredth of itself.
+    """Add the significant candidate that lowers the error most, one after the other, while it falls by a hundredth of itself.
 
     `plain` are the numbers of the columns that are always in, `groups` those of each candidate. `p_value` is that of the columns of a
     candidate beside those of the terms before it; times the number of candidates it must be 0.05 at most (Bonferroni). Cross-validation
@@ -113,7 +114,7 @@ def best_shapes(
     groups: Mapping[Candidate, Sequence[int]],
     names: Sequence[str],
 ) -> FrictionChoice:
-    """The terms `names`, one after the other, each in the shape with the smallest error; all of them are taken."""
+    """Terms `names`, each in the shape with the smallest error, chosen one after the other."""
     chosen: list[Candidate] = []
     trials: list[SelectionStep] = []
     for name in names:
@@ -138,6 +139,6 @@ def _best(
 
 
 def candidate_columns(observation: Observation, candidate: Candidate) -> list[int]:
-    """Numbers of a candidate's columns in an observation that has it among its terms."""
+    """Column numbers of a candidate in an observation that has it among its terms."""
     own = Observation(observation.model, (candidate,)).names
     return [observation.names.index(name) for name in own if name.endswith(candidate.column(""))]

@@ -18,26 +18,26 @@ _SHARES_OF_SPEED = (0.01, 0.03, 0.1, 0.3, 1.0)
 _SHARES_OF_SPEED_LOADED = (0.3, 1.0, 3.0)
 _SHARES_OF_STROKE = (0.001, 0.003, 0.01, 0.03, 0.1)
 _SHARES_OF_DURATION = (0.05, 0.1, 0.2, 1 / 3)
-"""A time constant near the length of a recording is drift by another name: it says nothing about other recordings."""
+"""Largest time constant relative to the recording: slower effects are drift and say nothing about other recordings."""
 
 
 class FrictionTerm(Protocol):
-    """A friction term that is tried beyond the classic ones, by its `key` in robot.yaml; its parameters are `<joint>.<key>`."""
+    """Friction term beyond the classic ones, by its `key` in robot.yaml; its parameters are `<joint>.<key>`."""
 
     key: ClassVar[str]
 
     @classmethod
     def shapes(cls, scale: ExcitationScale) -> Iterator[tuple[str, Self]]:
-        """Its shapes to try, each with what it is called; an empty name where there is but one."""
+        """Candidate shapes of the term with their names; an empty name for a single one."""
         ...
 
     def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
-        """As a `DriveTerm` has them."""
+        """Columns as of a `DriveTerm`."""
         ...
 
 
 class _PerMotor:
-    """One parameter a motor; a joint that the motor turns along feels its share of the torque."""
+    """Term with one parameter per motor; a coupled joint has its share of the torque."""
 
     key: ClassVar[str]
 
@@ -57,7 +57,9 @@ class _PerMotor:
 
 @dataclass(frozen=True)
 class AsymmetricCoulomb(_PerMotor):
-    """`<joint>.coulomb_asymmetry` · |sign ṡ|: half the difference between the directions; equals a torque offset except at rest."""
+    """Asymmetric Coulomb friction `<joint>.coulomb_asymmetry` · |sign ṡ|: half the difference between the directions; a torque offset
+    except at rest.
+    """
 
     key: ClassVar[str] = "coulomb_asymmetry"
 
@@ -67,7 +69,7 @@ class AsymmetricCoulomb(_PerMotor):
 
 @dataclass(frozen=True)
 class SublinearViscous(_PerMotor):
-    """`<joint>.sublinear_viscous` · sign(ṡ) √|ṡ|: shear-thinning grease."""
+    """Sublinear viscous friction `<joint>.sublinear_viscous` · sign(ṡ) √|ṡ| of shear-thinning grease."""
 
     key: ClassVar[str] = "sublinear_viscous"
 
@@ -78,7 +80,9 @@ class SublinearViscous(_PerMotor):
 
 @dataclass(frozen=True)
 class Stribeck(_PerMotor):
-    """`<joint>.stribeck` · sign(ṡ) exp(-(ṡ/v)²), with `velocities` v of the axes, rad/s or m/s (Armstrong-Hélouvry 1994)."""
+    """Stribeck friction `<joint>.stribeck` · sign(ṡ) exp(-(ṡ/v)²), with `velocities` v of the axes, rad/s or m/s (Armstrong-Hélouvry
+    1994).
+    """
 
     velocities: tuple[float, ...]
     key: ClassVar[str] = "stribeck"
@@ -95,7 +99,7 @@ class Stribeck(_PerMotor):
 
 @dataclass(frozen=True)
 class Presliding(_PerMotor):
-    """`<joint>.presliding` · z, dz/ds = (1 - z sign ṡ)/δ, with `travels` δ of the axes, rad or m (Dahl 1968).
+    """Presliding friction `<joint>.presliding` · z, dz/ds = (1 - z sign ṡ)/δ, with `travels` δ of the axes, rad or m (Dahl 1968).
 
     Coulomb friction that builds up over the travel after a reversal instead of jumping; z starts at 0 with the recording.
     """
@@ -119,7 +123,7 @@ class Presliding(_PerMotor):
 
 @dataclass(frozen=True)
 class _Warming(_PerMotor):
-    """A term that goes with exp(-t/τ), with t from the start of the recording and `time` τ, s."""
+    """Term proportional to exp(-t/τ), with t from the start of the recording and `time` τ, s."""
 
     time: float
 
@@ -129,14 +133,14 @@ class _Warming(_PerMotor):
             yield f"{time:.3g} s", cls(time)
 
     def cold(self, motion: Motion, memory: Memory) -> np.ndarray:
-        """exp(-t/τ) (N,) of the instants of a motion."""
+        """Factor exp(-t/τ) (N,) at the instants of a motion."""
         begun, _ = memory.setdefault("begun", (motion.time[0], 0.0))
         return np.exp(-(motion.time - begun) / self.time)
 
 
 @dataclass(frozen=True)
 class WarmUp(_Warming):
-    """`<joint>.warm_up` · ṡ exp(-t/τ), with t from the start of the recording and `time` τ, s: decreasing viscosity during warm-up."""
+    """Warm-up of viscous friction, `<joint>.warm_up` · ṡ exp(-t/τ), with t from the start of the recording and `time` τ, s."""
 
     key: ClassVar[str] = "warm_up"
 
@@ -146,7 +150,7 @@ class WarmUp(_Warming):
 
 @dataclass(frozen=True)
 class CoulombWarmUp(_Warming):
-    """`<joint>.coulomb_warm_up` · sign(ṡ) exp(-t/τ), with `time` τ, s: as `WarmUp`, of Coulomb friction."""
+    """Warm-up of Coulomb friction, `<joint>.coulomb_warm_up` · sign(ṡ) exp(-t/τ), with `time` τ, s, as of `WarmUp`."""
 
     key: ClassVar[str] = "coulomb_warm_up"
 
@@ -156,7 +160,7 @@ class CoulombWarmUp(_Warming):
 
 @dataclass(frozen=True)
 class Cables:
-    """`<joint>.cable_stiffness` · q: cables and hoses along the arm; where they are at rest is part of the torque offset.
+    """Cable stiffness `<joint>.cable_stiffness` · q of cables and hoses along the arm; their rest position is part of the torque offset.
 
     A joint whose declared spring is identified has that in its place: the columns are the same.
     """
@@ -176,7 +180,7 @@ class Cables:
 
 @dataclass(frozen=True, eq=False)
 class _PerLoad:
-    """One parameter a motor, of what the links alone ask of its joint.
+    """Term with one parameter per motor, proportional to the torque of the links on its joint.
 
     That is by `inertials` (10 n,) as a fit without this term found them: the measured torque would put the noise of Y into W, and the
     answer into a prediction.
@@ -202,7 +206,7 @@ class _PerLoad:
 
 @dataclass(frozen=True, eq=False)
 class LoadCoulomb(_PerLoad):
-    """`<joint>.load_coulomb` · |load| sign ṡ: load-dependent friction of the gears."""
+    """Load-dependent Coulomb friction of the gears, `<joint>.load_coulomb` · |load| sign ṡ."""
 
     key: ClassVar[str] = "load_coulomb"
 
@@ -212,7 +216,9 @@ class LoadCoulomb(_PerLoad):
 
 @dataclass(frozen=True, eq=False)
 class LoadStribeck(_PerLoad):
-    """`<joint>.load_stribeck` · |load| sign(ṡ) exp(-(ṡ/v)²), with `velocities` v as `Stribeck` (Bittencourt & Gunnarsson 2012)."""
+    """Load-dependent Stribeck friction `<joint>.load_stribeck` · |load| sign(ṡ) exp(-(ṡ/v)²), with `velocities` v as `Stribeck`
+    (Bittencourt & Gunnarsson 2012).
+    """
 
     velocities: tuple[float, ...]
     key: ClassVar[str] = "load_stribeck"
@@ -227,7 +233,7 @@ class LoadStribeck(_PerLoad):
 
 
 def dahl(position: np.ndarray, travel: float, start: float) -> np.ndarray:
-    """z (N,) of `Presliding` along `position` (N,) from z = `start`, exact for straight moves from sample to sample.
+    """State z (N,) of `Presliding` along `position` (N,) from z = `start`, exact for straight moves from sample to sample.
 
     On a stretch without reversal 1 - z sign ṡ falls by exp(-path/δ), so only the reversals are stepped through.
     """
@@ -257,4 +263,4 @@ LIBRARY_TERMS: tuple[type[FrictionTerm], ...] = (
     CoulombWarmUp,
     Cables,
 )
-"""What is tried beyond the classic terms, in the order of robot.yaml's documentation."""
+"""Candidate terms beyond the classic ones, in the order of robot.yaml's documentation."""

@@ -17,11 +17,11 @@ from flexcal.estimation import Estimate, Problem, solve
 from flexcal.model.robot import RobotModel
 
 _REACH = 6
-"""Neighbouring lines on either side that the noise of a line is read from."""
+"""Number of neighbouring lines on either side from which the noise of a line is estimated."""
 _CORNERS = (1.0, 2.0, 4.0, 8.0, np.inf)
-"""Lines at which a first-order spectrum has fallen by half, among which the residual chooses; the last is white."""
+"""Candidate corner lines of a first-order spectrum, at which it has fallen by half; the last is white."""
 _SMALLEST = 1e-9
-"""Noise of torques that are fitted exactly, relative to them."""
+"""Lower bound of the noise of exactly fitted torques, relative to them."""
 
 
 def noise(rows: LinearisedEquations, estimate: Estimate, weighed: np.ndarray) -> np.ndarray:
@@ -52,13 +52,13 @@ def noise(rows: LinearisedEquations, estimate: Estimate, weighed: np.ndarray) ->
 
 
 CUTOFF_HZ = 5.0
-"""Highest line that is used: half the first resonance of a large arm, five times the highest harmonic of a designed trajectory."""
+"""Highest line used: half the first resonance of a large arm, five times the highest harmonic of a designed trajectory."""
 ROUNDS = 10
-"""Largest number of linearisations, each with the noise read from the last residual: masses multiply centres of mass."""
+"""Largest number of linearisations, each with the noise of the last residual: masses multiply centres of mass."""
 CONVERGED = 0.01
 """Square of the last step, in standard deviations, below which the linearisation is that of the optimum."""
 CURVATURE_PASSES = 2
-"""How often the second-order terms are evaluated with the last covariance."""
+"""Number of evaluations of the second-order terms with the last covariance."""
 
 
 def fit_inertials(model: RobotModel, plan: TrajectoryPlan, recordings: Iterable[Recording]) -> Estimate:
@@ -103,7 +103,7 @@ def _fit(rows: LinearisedEquations, sigma: np.ndarray) -> Estimate:
 
 
 def _marginal(estimate: Estimate, names: tuple[str, ...]) -> Estimate:
-    """The estimate of some parameters, the others integrated out."""
+    """Marginal estimate of some parameters, the others integrated out."""
     numbers = [estimate.parameters.index(name) for name in names]
     return replace(
         estimate,

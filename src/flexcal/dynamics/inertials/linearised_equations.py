@@ -1,4 +1,4 @@
-"""The torques of exciting trajectories as rows of a least-squares problem, linearised about an elastic robot (Eq. 2.26)."""
+"""Torques of exciting trajectories as a least-squares problem, linearised about an elastic robot (Eq. 2.26)."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from flexcal.model.vibration import periodic_torque
 
 SAMPLES_PER_LINE = 4
 _STEP = 1e-3
-"""Of the central differences, in estimation coordinates: torques are polynomials of these, nearly linear over the step."""
+"""Step of the central differences, in estimation coordinates: torques are polynomials of these, nearly linear over the step."""
 _REVERSAL_VELOCITY = 0.02
-"""rad/s below which friction need not be Coulomb's."""
+"""Velocity, rad/s, below which friction may differ from Coulomb's."""
 _FIRST_SIGMA = 0.01
-"""Noise to begin with, relative to the torques of the joint."""
+"""Initial noise, relative to the torques of the joint."""
 
 
 def unknowns(model: RobotModel) -> tuple[Parameters, tuple[str, ...]]:
-    """All unknowns of the torques with their prior, and the names of those that are the robot's dynamics.
+    """All unknowns of the torques with their prior, and the names of those that belong to the robot's dynamics.
 
     These are mass and centre of mass of every link, and the classic terms of the drives; the others are spring stiffnesses, geometric
     errors and what friction does at a reversal. Raises `FlexcalError` where a rotor inertia is missing.
@@ -75,7 +75,7 @@ class LinearisedEquations:
         motions: Sequence[PeriodicMotion],
         payload: float | None,
     ) -> LinearisedEquations:
-        """Linearised at the values of the parameters."""
+        """Equations linearised at the values of the parameters."""
         x = parameters.coordinates()
         measured, predicted, jacobians = [], [], []
         for motion in motions:
@@ -102,7 +102,7 @@ class LinearisedEquations:
         return np.sqrt(np.mean(self.measured**2, axis=(0, 1)))
 
     def first_sigma(self) -> np.ndarray:
-        """Noise (2 K + 1, n) to begin with, N m."""
+        """Initial noise (2 K + 1, n), N m."""
         return np.broadcast_to(_FIRST_SIGMA * self.size, self.measured.shape[1:])
 
 
@@ -136,7 +136,7 @@ def drive_rows(model: RobotModel, motion: PeriodicMotion) -> Iterator[tuple[str,
 
 
 def _reversals(model: RobotModel, motion: PeriodicMotion) -> Iterator[tuple[str, int, np.ndarray]]:
-    """The same of what friction does at a reversal."""
+    """Parameter, joint and rows of friction's deviation at a reversal."""
     dq = motion.states(motion.samples)[1]
     rounded = np.nan_to_num(model.drives.coulomb) * (np.tanh(dq / _REVERSAL_VELOCITY) - np.sign(dq))
     for joint, name in enumerate(model.joint_names):

@@ -21,7 +21,7 @@ from flexcal.model.torques import inertial_parameters, torque_regressor
 
 _STEP = 1e-3
 _NOTHING = 1e-12
-"""A direction of the second-order terms with less than this share of the largest variance is left out."""
+"""Variance, relative to the largest, below which a direction of the second-order terms is left out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class SecondOrderCovariance:
     def of(
         cls, model: RobotModel, estimate: Estimate, motions: Sequence[PeriodicMotion]
     ) -> SecondOrderCovariance:
-        """Moments of the terms δ_a δ_b of the deviations δ of an estimate, by Isserlis' theorem, times their effect on the torques."""
+        """Moments of the products δ_a δ_b of the deviations δ of an estimate, by Isserlis' theorem, times their effect on the torques."""
         names = uncertain_inertials(model, range(model.n))
         bends, pairs = _second_derivatives(model, estimate.parameters.subset(names))
         a, b = pairs.T
@@ -52,7 +52,7 @@ class SecondOrderCovariance:
         return cls(rows @ c[a, b], rows @ (turns[:, kept] * np.sqrt(sizes[kept])))
 
     def added_to(self, rows: LinearisedEquations) -> LinearisedEquations:
-        """The rows with these terms beside the linear ones, as unknowns of their own."""
+        """Rows with these terms beside the linear ones, as further unknowns."""
         count = self.columns.shape[-1]
         unknown = Parameters(Parameter(f"curvature_{k + 1}", "1", 0.0, prior_std=1.0) for k in range(count))
         return LinearisedEquations(

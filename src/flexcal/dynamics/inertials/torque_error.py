@@ -32,7 +32,7 @@ class TrajectoryTorques:
 def trajectory_torques(
     model: RobotModel, plan: TrajectoryPlan, recordings: Iterable[Recording]
 ) -> tuple[TrajectoryTorques, ...]:
-    """Torques of recorded trajectories, and those that `model` predicts.
+    """Measured torques of recorded trajectories, and those predicted by `model`.
 
     Friction that robot.yaml does not know counts as none. Raises `FlexcalError` where a recording does not fit the plan.
     """
@@ -44,7 +44,7 @@ def trajectory_torques(
 
 
 def relative_torque_error(torques: Iterable[TrajectoryTorques]) -> float:
-    """Norm of the residuals over that of the measured torques."""
+    """Norm of the residuals relative to that of the measured torques."""
     measured, missed = 0.0, 0.0
     for trajectory in torques:
         measured = measured + np.sum(trajectory.measured**2)
@@ -53,7 +53,7 @@ def relative_torque_error(torques: Iterable[TrajectoryTorques]) -> float:
 
 
 def _torque(model: RobotModel, motion: PeriodicMotion, payload: float | None) -> np.ndarray:
-    """Rows (2 K + 1, n) of the motor torques that a motion needs."""
+    """Rows (2 K + 1, n) of the motor torques of a motion."""
     states = motion.states(SAMPLES_PER_LINE * motion.lines)
     torque = motion.rows(periodic_torque(model, *states, 1 / motion.base_frequency_hz, payload))
     for name, joint, rows in drive_rows(model, motion):

@@ -12,11 +12,12 @@ from flexcal.dynamics.signals import ArmSide, Motion
 from flexcal.estimation import Identifiability, analyse
 
 _KEPT_FIRST = ("Izz", "Ixx", "Ixy", "Ixz", "Iyz", "Iyy", "mc_x", "mc_y", "mc_z", "mass")
-"""Of a link, in the order in which a person keeps them: the mass and what lies along the axis are regrouped first."""
+"""Order in which parameters of a link are preferably kept: mass and entries along the axis are regrouped first."""
 _SAMPLES_PER_PARAMETER = 3
 _TILT = 1e-10
-"""rad, of the tilts of bearings: real ones are so small too that what links add in proportion to them, and to their accelerations, tells
-nothing of the links beside their noise, which would bend the stiffness."""
+"""Tilts of bearings, rad, as small as real ones, so that the links' contribution in proportion to tilts and tilt accelerations, which is
+below noise and would bias the stiffness, does not count for the rank.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,7 @@ class BaseParameters:
 
     @property
     def expressions(self) -> tuple[str, ...]:
-        """Each base parameter written out, as "link_1.Izz + joint_1.rotor_inertia + 0.0506 link_3.mass"."""
+        """Base parameters as expressions, as "link_1.Izz + joint_1.rotor_inertia + 0.0506 link_3.mass"."""
         return tuple(
             _written(self.identifiability.names[kept], row, self.identifiability.names)
             for kept, row in zip(self.identifiability.kept, self.identifiability.regrouping, strict=True)

@@ -1,4 +1,4 @@
-"""Torques of a bearing's two springs and their columns: equations of the tilts of an elastic joint."""
+"""Torques of a bearing's two springs and their columns, in the equations of the tilts of an elastic joint."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from flexcal.model.robot import SPRINGS, RobotModel
 
 @dataclass(frozen=True)
 class BearingSpring:
-    """The spring of the `joint` (its number) against tilt about x (`component` 0) or y (1).
+    """Spring of the `joint` (its number) against tilt about x (`component` 0) or y (1).
 
     Its equation is that of the links about the tilt's axis, + `<joint>.bearing_x.stiffness` q_x + `.damping` q̇_x
     + `.torque_offset` = 0: nobody drives a bearing. The offset is what the tilt's zero is off, times the stiffness.
@@ -24,11 +24,11 @@ class BearingSpring:
     component: int
 
     def name(self, model: RobotModel) -> str:
-        """As its parameters begin: `joint_1.bearing_x`."""
+        """Prefix of its parameters: `joint_1.bearing_x`."""
         return f"{model.joint_names[self.joint]}.{SPRINGS[self.component]}"
 
     def columns(self, model: RobotModel, motion: Motion, equation: int) -> Iterator[Column]:
-        """The columns, where `equation` is the number of the tilt's; raises `FlexcalError` for a motion without tilts."""
+        """Columns of the spring; `equation` is the number of the tilt's. Raises `FlexcalError` for a motion without tilts."""
         name = self.name(model)
         tilt, rate = (motion.tilt(self.component, order)[:, self.joint] for order in (0, 1))
         yield Column(f"{name}.stiffness", equation, tilt)

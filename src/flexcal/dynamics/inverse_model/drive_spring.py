@@ -15,7 +15,7 @@ from flexcal.model.robot import RobotModel
 
 @dataclass(frozen=True)
 class DriveBacklash:
-    """Backlash in a drive: no torque while q - θ is nearer to `centre` than `half_width`, both in rad."""
+    """Backlash in a drive: zero torque while q - θ is within `half_width` of `centre`, both in rad."""
 
     centre: float
     half_width: float
@@ -23,7 +23,7 @@ class DriveBacklash:
 
 @dataclass(frozen=True)
 class DriveSpring:
-    """The drive of the elastic `joint` (its number), with `backlash` where backlash is looked for.
+    """Drive spring of the elastic `joint` (its number), with `backlash` if estimated.
 
     The equation of the motor alone, which follows those of all joints, gains - `<joint>.drive.stiffness` (q - θ),
     - `.drive.damping` (q̇ - θ̇) and + `.drive.torque_offset`, τ_k0; with backlash also + `.drive.gap_torque` sign(q - θ - centre), the
@@ -36,14 +36,14 @@ class DriveSpring:
     backlash: DriveBacklash | None = None
 
     def with_backlash(self, model: RobotModel, values: Mapping[str, float]) -> DriveSpring:
-        """With the backlash that `values` by name amount to."""
+        """Spring with the backlash given by the named `values`."""
         name = f"{model.joint_names[self.joint]}.drive"
         stiffness = values[f"{name}.stiffness"]
         half_width = max(0.0, values.get(f"{name}.gap_torque", 0.0) / stiffness)
         return replace(self, backlash=DriveBacklash(values[f"{name}.torque_offset"] / stiffness, half_width))
 
     def columns(self, model: RobotModel, motion: Motion, motor: int) -> Iterator[Column]:
-        """The columns, where `motor` is the number of the motor's equation; raises `FlexcalError` for a motion without arm side."""
+        """Columns of the spring; `motor` is the number of the motor's equation. Raises `FlexcalError` for a motion without arm side."""
         arm = motion.arm
         if arm is None:
             raise FlexcalError(
@@ -65,7 +65,7 @@ class DriveSpring:
 
 
 def coupled_columns(model: RobotModel, motion: Motion, motors: Mapping[int, int]) -> Iterator[Column]:
-    """What springs between the motors and a coupling add to the motors' equations, whose numbers are `motors` by joint.
+    """Columns of springs between the motors and a coupling in the motors' equations, whose numbers are `motors` by joint.
 
     Motor m, which also turns joint j by the ratio r, stretches its spring by (q - θ)_m + r (q - θ)_j: `<m>.drive.stiffness_at_<j>` is
     what either motor feels of the other's twist, r times the stiffness before the coupling, and zero for springs behind it. What a motor

@@ -12,12 +12,12 @@ from flexcal.dynamics.signals import Motion
 from flexcal.model.robot import RobotModel, unknown_parallel
 
 Memory = dict[str, Any]
-"""What terms carry from one block of an experiment to the next; empty at its start."""
+"""State of the terms between blocks of an experiment; empty at its start."""
 
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """Torque (N,) per unit of the parameter `name` at one joint: the number of its equation in an `Observation`."""
+    """Torque (N,) per unit of the parameter `name` at one joint, given by the number of its equation in an `Observation`."""
 
     name: str
     joint: int
@@ -25,10 +25,10 @@ class Column:
 
 
 class DriveTerm(Protocol):
-    """A term of the torques, with one or more parameters of its own."""
+    """Term of the torques with one or more parameters of its own."""
 
     def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
-        """Its columns, in a stable order; a parameter that several joints feel has one for each.
+        """Columns of the term, in a stable order; a parameter that acts on several joints has one for each.
 
         `motion` continues what `memory` is of, which is brought up to its end.
         """
@@ -36,7 +36,7 @@ class DriveTerm(Protocol):
 
 
 class _PerJoint:
-    """One parameter a joint, which that joint alone feels."""
+    """Term with one parameter per joint, which acts on that joint alone."""
 
     key: ClassVar[str]
 
@@ -51,7 +51,7 @@ class _PerJoint:
 
 @dataclass(frozen=True)
 class RotorInertia(_PerJoint):
-    """`<joint>.rotor_inertia` · q̈."""
+    """Rotor inertia, `<joint>.rotor_inertia` · q̈."""
 
     key = "rotor_inertia"
 
@@ -61,7 +61,7 @@ class RotorInertia(_PerJoint):
 
 @dataclass(frozen=True)
 class Viscous(_PerJoint):
-    """`<joint>.viscous` · q̇."""
+    """Viscous friction, `<joint>.viscous` · q̇."""
 
     key = "viscous"
 
@@ -71,7 +71,7 @@ class Viscous(_PerJoint):
 
 @dataclass(frozen=True)
 class Coulomb(_PerJoint):
-    """`<joint>.coulomb` · sign q̇."""
+    """Coulomb friction, `<joint>.coulomb` · sign q̇."""
 
     key = "coulomb"
 
@@ -81,7 +81,7 @@ class Coulomb(_PerJoint):
 
 @dataclass(frozen=True)
 class TorqueOffset(_PerJoint):
-    """`<joint>.torque_offset`: Coulomb friction that differs by direction, and the offset of the torque measurement."""
+    """Torque offset `<joint>.torque_offset`: direction-dependent Coulomb friction and the offset of the torque measurement."""
 
     key = "torque_offset"
 
@@ -91,7 +91,7 @@ class TorqueOffset(_PerJoint):
 
 @dataclass(frozen=True)
 class Coupling:
-    """Motors that also turn another joint (`drives: coupling:`): motor m turns at s = q_m + ratio · q_j.
+    """Coupled motors that also turn another joint (`drives: coupling:`): motor m turns at s = q_m + ratio · q_j.
 
     `<m>.rotor_inertia_at_<j>` and `<m>.viscous_at_<j>` are what either joint feels of the other's motion, `<m>.coulomb_at_<j>` what both
     feel of sign ṡ. What each joint feels of its own motion stands in its own rotor inertia and viscous friction.
@@ -112,7 +112,7 @@ class Coupling:
 
 @dataclass(frozen=True)
 class JointSprings:
-    """Springs and cables parallel to joints, as far as `dynamics:` declares them without their size.
+    """Springs and cables parallel to joints, declared in `dynamics:` without a value.
 
     `<joint>.spring_stiffness` · (q - rest), or · q beside `<joint>.spring_torque` where the rest is not declared; `<joint>.cable_torque`.
     Both constants equal a torque offset, which absorbs them where it is among the terms. Behind an elastic drive they act on the arm.
@@ -135,4 +135,4 @@ CLASSIC: tuple[DriveTerm, ...] = (
     Coupling(),
     JointSprings(),
 )
-"""The terms that the structural rank counts."""
+"""Terms counted in the structural rank."""

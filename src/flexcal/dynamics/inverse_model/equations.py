@@ -13,11 +13,11 @@ from flexcal.model.robot import RobotModel
 
 
 class Equations(Protocol):
-    """One or several equations a sample: the torques of all joints, or a scalar that stands for all of them."""
+    """One or several equations per sample: the torques of all joints, or a scalar in their place."""
 
     @property
     def model(self) -> RobotModel:
-        """The robot."""
+        """Robot model."""
         ...
 
     @cached_property
@@ -27,7 +27,7 @@ class Equations(Protocol):
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """What messages call each equation."""
+        """Name of each equation in messages."""
         ...
 
     @property
@@ -37,30 +37,30 @@ class Equations(Protocol):
 
     @cached_property
     def column_indices(self) -> tuple[np.ndarray, ...]:
-        """For every equation the numbers of the parameters that stand in it, ascending."""
+        """Numbers of the parameters in each equation, ascending."""
         ...
 
     @cached_property
     def projection(self) -> tuple[np.ndarray, ...]:
-        """For every equation (reduced, columns): its columns from its reduced ones, W = W_reduced · projection."""
+        """Matrix (reduced, columns) of each equation from its reduced columns: W = W_reduced · projection."""
         ...
 
     @cached_property
     def widths(self) -> list[int]:
-        """For every equation the number of its reduced columns, and one for its right-hand side."""
+        """Number of reduced columns of each equation, and one for its right-hand side."""
         ...
 
     def reduced(self, motion: Motion, memory: Memory | None = None) -> np.ndarray:
-        """For every equation its reduced columns and, last, its right-hand side, below each other (Σ widths, N), at every sample.
+        """Reduced columns and, last, right-hand side of each equation, below each other (Σ widths, N), at every sample.
 
         The motion continues what `memory` is of, which is brought up to its end; it begins an experiment without.
         """
         ...
 
     def follow(self, motion: Motion, memory: Memory) -> None:
-        """Bring `memory` up to the end of a motion whose columns are not needed."""
+        """Advance `memory` to the end of a motion whose columns are not needed."""
         ...
 
     def values(self) -> np.ndarray:
-        """The model's values of all parameters (p,), zero where it knows none."""
+        """Model values of all parameters (p,), zero if unknown."""
         ...

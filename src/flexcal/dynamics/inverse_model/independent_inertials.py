@@ -19,7 +19,8 @@ _SAMPLES_PER_COLUMN = 3
 
 @dataclass(frozen=True, eq=False)
 class InertialColumns:
-    """Of one joint: it feels the inertials `felt` (f,), of which `kept` (k,) are enough: W = W_kept · `projection` (k, f).
+    """Inertial columns of one joint: of those that act on it, `felt` (f,), the independent ones `kept` (k,): W = W_kept · `projection`
+    (k, f).
 
     That holds at every state, to the 1e-9 of the largest column that rank is counted by.
     """
@@ -31,7 +32,7 @@ class InertialColumns:
 
 @lru_cache(maxsize=4)
 def inertial_columns(model: RobotModel) -> tuple[InertialColumns, ...]:
-    """For every joint, by rank-revealing QR of its columns at random states."""
+    """Independent columns of every joint, by rank-revealing QR of its columns at random states."""
     names = inertial_names(model)
     q, dq, ddq = random_states(model, _SAMPLES_PER_COLUMN * len(names))
     matrix = torque_regressor(model, q, dq, ddq)
@@ -49,7 +50,7 @@ def _beyond(model: RobotModel, joint: int, column: int) -> bool:
 
 
 def random_states(model: RobotModel, samples: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions, velocities and accelerations (samples, n) that no trajectory joins, the same in every run."""
+    """Random positions, velocities and accelerations (samples, n), independent of each other, the same in every run."""
     rng = np.random.default_rng(_SEED)
     q = rng.uniform(-np.pi, np.pi, (samples, model.n))
     dq, ddq = rng.uniform(-2.0, 2.0, (2, samples, model.n))
@@ -57,7 +58,7 @@ def random_states(model: RobotModel, samples: int) -> tuple[np.ndarray, np.ndarr
 
 
 def scale_by_kind(matrix: np.ndarray, names: Sequence[str]) -> np.ndarray:
-    """One scale for all parameters of a kind: a column that is only the URDF's rounding stays as small as it is."""
+    """Common scale of all parameters of a kind, which leaves columns that are only rounding of the URDF small."""
     kinds = [name.rpartition(".")[2].rstrip("xyz") for name in names]
     norms = np.linalg.norm(matrix, axis=0)
     largest = {kind: max(n for k, n in zip(kinds, norms, strict=True) if k == kind) for kind in set(kinds)}

@@ -12,7 +12,7 @@ from flexcal.model.robot import RobotModel
 
 @dataclass(frozen=True)
 class MotorAxis:
-    """The motor of the joint `name`, number `joint`.
+    """Motor axis of the joint `name`, number `joint`.
 
     It turns by the sum of ratio · q_j over (j, ratio) in `shares`, and joint j feels ratio times its torque.
     """
@@ -22,13 +22,13 @@ class MotorAxis:
     shares: tuple[tuple[int, float], ...]
 
     def of(self, values: np.ndarray) -> np.ndarray:
-        """Positions, velocities or accelerations of the joints (N, n) seen on this axis, (N,)."""
+        """Positions, velocities or accelerations (N,) of this axis from those of the joints (N, n)."""
         return sum((ratio * values[:, joint] for joint, ratio in self.shares), np.zeros(len(values)))
 
 
 @lru_cache(maxsize=4)
 def motor_axes(model: RobotModel) -> tuple[MotorAxis, ...]:
-    """One axis a joint, with what `drives: coupling:` declares."""
+    """Motor axes, one per joint, with the couplings in `drives: coupling:`."""
     axes = []
     for number, name in enumerate(model.joint_names):
         entries = [entry for entry in model.config.drives.coupling if entry.motor == name]
@@ -38,7 +38,7 @@ def motor_axes(model: RobotModel) -> tuple[MotorAxis, ...]:
 
 
 def motor_shares(model: RobotModel) -> np.ndarray:
-    """S (n, n) with the motors' positions S q, and the joints' torques Sᵀ τ from the motors' torques τ."""
+    """Coupling matrix S (n, n): motor positions are S q, and joint torques Sᵀ τ for motor torques τ."""
     shares = np.zeros((model.n, model.n))
     for axis in motor_axes(model):
         for joint, ratio in axis.shares:

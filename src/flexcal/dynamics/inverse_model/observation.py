@@ -1,4 +1,4 @@
-"""The observation matrix of a robot, joint by joint: link inertials and drive terms, rigid (Eq. 2.20) or flexible (Eq. 2.22)."""
+"""Observation matrix of a robot, joint by joint: link inertials and drive terms, rigid (Eq. 2.20) or flexible (Eq. 2.22)."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Observation:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """The joints' names, then those of the motors alone, then the bearings'."""
+        """Names of the joints, then of motors alone, then of bearings."""
         bearings = (bearing.name(self.model) for bearing in self.bearings)
         return (*self.model.joint_names, *(f"{motor}, motor" for motor in self.motors), *bearings)
 
@@ -58,24 +58,24 @@ class Observation:
 
     @property
     def motors(self) -> tuple[str, ...]:
-        """The joints whose motors have equations of their own, in the order of these."""
+        """Joints whose motors have equations of their own, in the order of these."""
         return tuple(self.model.joint_names[spring.joint] for spring in self.springs)
 
     @cached_property
     def _torques(self) -> list[int]:
-        """For every equation the joint whose motor torque is its right side."""
+        """Joint of each equation whose motor torque is its right-hand side."""
         return [*range(self.model.n), *(spring.joint for spring in self.springs)]
 
     @cached_property
     def column_indices(self) -> tuple[np.ndarray, ...]:
-        """For every equation the numbers of the columns that it can feel, ascending."""
+        """Numbers of the columns of each equation that can be nonzero, ascending."""
         return tuple(
             np.concatenate([links.felt, own]) for links, own in zip(self._links, self._drives, strict=True)
         )
 
     @cached_property
     def projection(self) -> tuple[np.ndarray, ...]:
-        """For every equation (reduced, columns): its columns from its reduced ones."""
+        """Matrix (reduced, columns) of each equation from its reduced columns."""
         projections = []
         for links, own in zip(self._links, self._drives, strict=True):
             kept, felt = links.projection.shape
@@ -86,7 +86,7 @@ class Observation:
 
     @cached_property
     def _links(self) -> tuple[InertialColumns, ...]:
-        """For every equation; a motor alone feels no link, and where bearings tilt none of the columns is left out."""
+        """Columns of the links of each equation; none for a motor alone, all with tilting bearings."""
         nothing = InertialColumns(np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros((0, 0)))
         motors = (nothing for _ in self.springs)
         if self._tilted is None:
@@ -98,7 +98,7 @@ class Observation:
 
     @cached_property
     def _tilted(self) -> TiltedBearings | None:
-        """The arm with its tilts, where there are any."""
+        """Arm with tilting bearings, if any."""
         tilting = sorted({bearing.joint for bearing in self.bearings})
         return TiltedBearings(self.model, tilting) if tilting else None
 
@@ -111,7 +111,7 @@ class Observation:
 
     @cached_property
     def _drives(self) -> list[np.ndarray]:
-        """For every equation the numbers of the drive columns that it feels, ascending."""
+        """Numbers of the nonzero drive columns of each equation, ascending."""
         number = {name: i for i, name in enumerate(self.names)}
         felt: list[set[int]] = [set() for _ in self.labels]
         for column in self._at_rest:
@@ -120,12 +120,12 @@ class Observation:
 
     @cached_property
     def widths(self) -> list[int]:
-        """For every equation the number of its reduced columns, and one for its torque."""
+        """Number of reduced columns of each equation, and one for its torque."""
         return [len(spread) + 1 for spread in self.projection]
 
     @cached_property
     def _places(self) -> tuple[np.ndarray, np.ndarray]:
-        """Rows of `reduced`: of the links' entries (coordinates, 10 n), -1 for those left out, and of every drive column.
+        """Row numbers in `reduced` of the links' entries (coordinates, 10 n), -1 for those left out, and of every drive column.
 
         Coordinates are the joints, or those of the tilted arm.
         """
@@ -151,7 +151,7 @@ class Observation:
         return links, np.array(drives, dtype=int)
 
     def reduced(self, motion: Motion, memory: Memory | None = None) -> np.ndarray:
-        """For every equation its reduced columns and, last, its torque, below each other (Σ widths, N), at every sample of the motion.
+        """Reduced columns and, last, torque of each equation, below each other (Σ widths, N), at every sample of the motion.
 
         The motion continues what `memory` is of, which is brought up to its end; it begins an experiment without. Raises `FlexcalError`
         where there are springs and the motion has no arm side.
@@ -171,14 +171,14 @@ class Observation:
         return rows
 
     def systems(self, motion: Motion, memory: Memory | None = None) -> list[np.ndarray]:
-        """For every equation all its columns and, last, its torque (columns + 1, N), where `reduced` leaves some out."""
+        """All columns of each equation and, last, its torque (columns + 1, N), where `reduced` leaves some out."""
         parts = np.split(self.reduced(motion, memory), np.cumsum(self.widths)[:-1])
         return [
             np.vstack([s.T @ part[:-1], part[-1]]) for s, part in zip(self.projection, parts, strict=True)
         ]
 
     def follow(self, motion: Motion, memory: Memory) -> None:
-        """Bring `memory` up to the end of a motion whose columns are not needed."""
+        """Advance `memory` to the end of a motion whose columns are not needed."""
         for _ in self._drive_columns(motion, memory):
             pass
 
@@ -198,7 +198,7 @@ class Observation:
             yield from bearing.columns(self.model, motion, equation)
 
     def _link_states(self, motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Positions, velocities and accelerations of the links: behind the springs, else as the motors."""
+        """Positions, velocities and accelerations of the links: after elastic drives, else those of the motors."""
         states = motion.q, motion.dq, motion.ddq
         if motion.arm is None or not self.springs:
             return states
@@ -208,7 +208,7 @@ class Observation:
         return q, dq, ddq
 
     def columns(self, motion: Motion) -> list[np.ndarray]:
-        """For every equation all its columns (columns, N) at every sample of the motion, none left out."""
+        """All columns of each equation (columns, N) at every sample of the motion."""
         if self._tilted is not None:
             return [system[:-1] for system in self.systems(motion)]
         links = torque_regressor(self.model, *self._link_states(motion))
@@ -222,11 +222,11 @@ class Observation:
         return values
 
     def values(self) -> np.ndarray:
-        """The model's values of all columns (p,), zero where it knows none."""
+        """Model values of all columns (p,), zero if unknown."""
         known = self.model.values
         return np.nan_to_num([known.get(name, 0.0) for name in self.names])
 
 
 def _all_of(felt: np.ndarray) -> InertialColumns:
-    """All columns that are felt, each its own."""
+    """Trivial reduction that keeps all nonzero columns."""
     return InertialColumns(felt, felt, np.eye(len(felt)))

@@ -15,7 +15,7 @@ WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 
 @dataclass(frozen=True)
 class SensorOffset:
-    """`force_sensor.fx_offset`…: what the declared force sensor reads of each component where nothing acts on it.
+    """Sensor offset `force_sensor.fx_offset`…: readings of each component of the declared force sensor without load.
 
     Sensors are rarely tared without a load. An offset along the axis of the last joint equals a torque offset, which absorbs it.
     """

@@ -1,4 +1,4 @@
-"""Columns of the links' inertials in the torques of an arm whose bearings tilt: about every joint, and about the bearings' axes."""
+"""Columns of the links' inertials in the torques of an arm with tilting bearings: about every joint, and about the bearings' axes."""
 
 from __future__ import annotations
 
@@ -52,11 +52,11 @@ class TiltedBearings:
                 self._geometry[number, 0] = model.geometry.errors[joint, 0]
 
     def __reduce__(self) -> tuple[type[TiltedBearings], tuple[RobotModel, tuple[int, ...]]]:
-        """The kernels' view is built anew where it arrives: other processes can be handed arms."""
+        """State for pickling; the kernels' view is rebuilt on arrival."""
         return TiltedBearings, (self.model, self._tilting)
 
     def felt(self, coordinate: tuple[int, int]) -> np.ndarray:
-        """Numbers of the inertials, of all links, that a coordinate feels: those of the links beyond its joint."""
+        """Numbers of the inertials, of all links, that act on a coordinate: those of the links beyond its joint."""
         beyond = [link for link in range(self.model.n) if coordinate[0] in self.model.path_to(link)]
         return np.concatenate(
             [len(LINK_PARAMETERS) * link + np.arange(len(LINK_PARAMETERS)) for link in beyond]
@@ -69,7 +69,7 @@ class TiltedBearings:
         places: np.ndarray,
         out: np.ndarray,
     ) -> None:
-        """Column c of coordinate k becomes row `places`[k, c] of `out` (rows, N), -1 for those that are not needed.
+        """Write the column c of coordinate k to row `places`[k, c] of `out` (rows, N); -1 for those not needed.
 
         `states` are the links' q, q̇, q̈ (N, n); the tilts are those of the motion's arm side.
         """

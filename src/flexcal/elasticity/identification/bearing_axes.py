@@ -12,7 +12,7 @@ from flexcal.model.parts import Bearings
 from flexcal.model.robot import RobotModel
 
 CERTAIN = 3.0
-"""Vuong's statistic from which a preference is no chance."""
+"""Vuong's statistic from which a preference is significant."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class ResponseBearings:
     def compare(
         cls, declared: Bearings | None, before: ResponseFit, after: ResponseFit, weighing: ResponseFit
     ) -> ResponseBearings:
-        """Two fits to the same responses, both weighed as that of the third (one of the two)."""
+        """Comparison of two fits to the same responses, both with the weights of a third (one of the two)."""
         first, second = (weighing.whiten(fit.residual.residual(fit.x)) for fit in (before, after))
         groups = weighing.problem.groups
         assert groups is not None
@@ -43,19 +43,19 @@ class ResponseBearings:
 
     @property
     def preferred(self) -> Bearings | None:
-        """The bearings that the responses clearly fit better."""
+        """Bearings that fit the responses significantly better."""
         if abs(self.statistic) < CERTAIN:
             return None
         return "before" if self.statistic > 0 else "after"
 
     @property
     def taken(self) -> Bearings:
-        """The declared ones; without a declaration the preferred, or as Eq. (1) has them."""
+        """Bearings to be used: the declared ones; without a declaration the preferred ones, or as in Eq. (1)."""
         return self.declared or self.preferred or "after"
 
     @property
     def contradicted(self) -> bool:
-        """Whether the responses clearly prefer other bearings than the declared ones."""
+        """Whether the responses significantly prefer other bearings than the declared ones."""
         return self.preferred not in (None, self.taken)
 
 
@@ -65,7 +65,8 @@ def with_fitting_bearings(
     first: ResponseFit,
     complete: Callable[[RobotModel, ResponseFit], tuple[RobotModel, ResponseFit]],
 ) -> tuple[RobotModel, ResponseFit, ResponseBearings | None]:
-    """What `complete` makes of a robot's `first` fit, or of a first fit with the other bearings where these are taken; and why.
+    """Fit completed by `complete` with the bearings to be used, from the robot's `first` fit or one with the other bearings; and the
+    comparison.
 
     Where completing the better one adds springs, bearings were not all that was missing: the other is then fitted with the same springs,
     from there, before they are compared. The last is None for a robot without bearings, or where one with the others has no fit.

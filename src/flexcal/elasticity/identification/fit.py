@@ -1,4 +1,4 @@
-"""One weighted fit of the linearised elastic robot to the frequency responses of all poses (Eqs. 26, 27)."""
+"""Weighted fit of the linearised elastic robot to the frequency responses of all poses (Eqs. 26, 27)."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 
 ROUNDS = 2
-"""Fits, each with model error and reference motion evaluated at the last optimum."""
+"""Number of fits, each with model error and reference motion evaluated at the last optimum."""
 
 FINE, COARSE = 1e-6, 1e-3
-"""Tolerances of the last fit, and of those before it."""
+"""Tolerances of the last fit, and of the preceding ones."""
 COARSE_ITERATIONS = 60
-"""Most iterations of the latter: a model that is wrong may go on for hundreds, to no end."""
+"""Largest number of iterations of the preceding fits: with a wrong model they may continue for hundreds without result."""
 
 
 @dataclass(frozen=True, eq=False)
 class ResponseData:
-    """Measured responses, and how they were measured and are weighed.
+    """Measured responses, with the conditions of measurement and their weights.
 
     With the `plan`, the reference motion is part of the prediction. `tolerances` are the standard deviations of what the model leaves out.
     `inertias_known` keeps link and payload inertias at the model's; with `hardening` that of the drives is estimated.
@@ -51,11 +51,11 @@ class ResponseData:
 
     @property
     def effects(self) -> bool:
-        """Whether the fit depends on anything that is evaluated at its start: model error, or effects of the experiment."""
+        """Whether the fit depends on terms evaluated at its start: model error, or effects of the experiment."""
         return self.tolerances.any or self.plan is not None
 
     def parameters(self, model: RobotModel) -> tuple[Parameters, np.ndarray]:
-        """Parameters of stage 1 and their joint prior covariance (p, p); raises `FlexcalError` where responses do not fit the robot."""
+        """Parameters of stage 1 and their joint prior covariance (p, p); raises `FlexcalError` for responses of another robot."""
         return model.posterior.prior(
             stiffness_parameters(
                 model,
@@ -69,7 +69,7 @@ class ResponseData:
 
 @dataclass(frozen=True, eq=False)
 class ResponseFit:
-    """The fit of one robot: `estimate` with the posterior covariance of `problem`.
+    """Result of a fit of one robot: `estimate` with the posterior covariance of `problem`.
 
     `effects` are those of the experiment in every pose, added to what `residual.model` predicts at rest; `error` what the model leaves out.
     """
@@ -86,7 +86,7 @@ class ResponseFit:
         return self.estimate.parameters.coordinates()
 
     def whiten(self, rows: np.ndarray) -> np.ndarray:
-        """Rows (m,) or (m, c) that the measurement's covariance has whitened, whitened by the model error too."""
+        """Rows (m,) or (m, c), whitened by the measurement's covariance, after whitening by the model error as well."""
         return rows if self.error is None else self.error.whiten(rows)
 
     def predicted(self) -> tuple[np.ndarray, ...]:
@@ -98,7 +98,7 @@ class ResponseFit:
 def fit_responses(
     model: RobotModel, data: ResponseData, x: np.ndarray, progress: Progress = silent
 ) -> ResponseFit:
-    """Fit from the coordinates `x` (p,), then once more with model error and experiment effects evaluated at the optimum."""
+    """Fit from the coordinates `x` (p,), repeated with model error and experiment effects evaluated at the optimum."""
     progress("fitting", 0.0)
     first = first_fit(model, data, x)
     progress("fitting", 1 / (ROUNDS + 1))
@@ -111,7 +111,7 @@ def first_fit(model: RobotModel, data: ResponseData, x: np.ndarray) -> ResponseF
 
 
 def final_fit(model: RobotModel, data: ResponseData, first: ResponseFit) -> ResponseFit:
-    """Fit from the optimum of `first`, at which model error and experiment effects are evaluated, where there are any."""
+    """Fit from the optimum of `first`, at which model error and experiment effects are evaluated, if there are any."""
     return _fit(model, data, first.x, FINE) if data.effects else first
 
 

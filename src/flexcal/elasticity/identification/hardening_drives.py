@@ -1,4 +1,4 @@
-"""Whether frequency responses ask for drives that harden: their poses load the drives differently, and so does the reference motion."""
+"""Score test for hardening drives: poses and reference motion load the drives differently."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flexcal.model.robot import RobotModel
 
 
 def with_hardening(model: RobotModel, data: ResponseData, fit: ResponseFit) -> ResponseData:
-    """`data` with the hardening of all drives to be estimated, where the residual of `fit`, without, asks for it; else as they are.
+    """Data with the hardening of all drives as parameters if the residual of `fit`, without them, requires it; else unchanged.
 
     Without a plan the torque of the drives is not known, and nothing is asked.
     """

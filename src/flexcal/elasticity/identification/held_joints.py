@@ -16,24 +16,24 @@ from flexcal.model.robot import RobotModel
 from flexcal.model.vibration import linearise
 
 DAMPING_RATIO = 0.1
-"""Damping ratio at the highest line of a spring to start from."""
+"""Initial damping ratio of a spring at the highest line."""
 
 NEARLY_RIGID = 1e3
 """Stiffness, relative to that with a mode at the highest line, at which a joint counts as rigid."""
 
 INDIFFERENT = 2.0
-"""χ² that a spring must be worth to stay beside others that are needed: with less, data do not tell it from a rigid joint."""
+"""Gain in χ² below which one of several springs is dropped: the data do not distinguish it from a rigid joint."""
 
 
 @dataclass(frozen=True)
 class CompliantHeldJoints:
-    """Rigid revolute joints that may give way, by index, each with a spring (N m/rad, N m s/rad) whose mode is at the highest line."""
+    """Rigid revolute joints that may be compliant, by index, each with a spring (N m/rad, N m s/rad) whose mode is at the highest line."""
 
     springs: dict[int, tuple[float, float]]
 
     @classmethod
     def of(cls, model: RobotModel, responses: Sequence[FrequencyResponse]) -> CompliantHeldJoints:
-        """Every rigid revolute joint of `model`; the inertia about its axis is the median over the poses of `responses`."""
+        """All rigid revolute joints of `model`; the inertia about each axis is the median over the poses of `responses`."""
         rigid = [
             i
             for i, joint in enumerate(model.joints)
@@ -57,11 +57,11 @@ class CompliantHeldJoints:
         )
 
     def only(self, joints: Sequence[int]) -> CompliantHeldJoints:
-        """Some of them."""
+        """Subset of the joints."""
         return CompliantHeldJoints({i: self.springs[i] for i in joints})
 
     def is_supported(self, model: RobotModel, data: ResponseData, fit: ResponseFit) -> bool:
-        """Whether the residual of `fit`, with all these joints rigid, holds what their compliances would add to the responses.
+        """Whether the residual of `fit`, with all these joints rigid, supports their compliances.
 
         Rao's score test by their compliances.
         """
@@ -88,7 +88,7 @@ class CompliantHeldJoints:
         return np.stack(columns, axis=1)
 
     def least_significant(self, model: RobotModel, data: ResponseData, fit: ResponseFit) -> int | None:
-        """The joint whose spring a `fit` of all of them misses least where it is rigid, if that hardly matters; None if all are needed."""
+        """Joint whose rigidity raises the misfit of `fit` least, if insignificantly; None if all springs are needed."""
         worth = {i: _worth(model, fit, i) for i in self.springs}
         least = min(worth, key=lambda i: worth[i])
         variance = max(1.0, fit.estimate.reduced_chi2) * data.tolerances.inflation(data.responses)
@@ -96,7 +96,7 @@ class CompliantHeldJoints:
 
 
 def _worth(model: RobotModel, fit: ResponseFit, joint: int) -> float:
-    """Rise of χ² where one joint becomes rigid and all other parameters are fitted again, priors of that joint's spring left out."""
+    """Rise of χ² if one joint becomes rigid and all other parameters are fitted again, without the priors of its spring."""
     name, parameters = model.joint_names[joint], fit.estimate.parameters
     own = [f"{name}.drive.stiffness", f"{name}.drive.damping", held_inertia_name(name)]
     numbers = [parameters.index(item) for item in own if item in parameters]

@@ -1,4 +1,4 @@
-"""Whether the fitted robot explains the measured responses, and the covariance of its parameters where it does not."""
+"""Lack-of-fit test of the fitted robot, and the covariance of its parameters under a misfit."""
 
 from __future__ import annotations
 
@@ -12,30 +12,31 @@ from flexcal.frequency.periodic import FrequencyResponse
 from flexcal.model.robot import MASS_AND_COM, RobotModel
 
 BAND_LINES = 8
-"""Neighbouring lines over which the residual is averaged."""
+"""Number of neighbouring lines over which the residual is averaged."""
 
 NOTABLE, SEVERE = 2.0, 5.0
-"""Mean square of the whitened residual over a band, 1 where noise and model error explain it, from which a misfit is reported, and from
-which the springs are not to be relied on."""
+"""Mean square of the whitened residual over a band, 1 if noise and model error explain it, from which a misfit is reported, and from
+which the springs are unreliable.
+"""
 
 SEVERE_CHI2 = 2.0
-"""Reduced χ² of all lines from which the springs are not to be relied on."""
+"""Reduced χ² of all lines from which the springs are unreliable."""
 
 DOUBTFUL_STIFFNESS = 0.1
-"""Relative 1σ of a stiffness at least where there is a misfit: drives that slip differ so much between small motion and load."""
+"""Least relative 1σ of a stiffness under a misfit: slipping drives differ so much between small motion and load."""
 DOUBTFUL_HARDENING = 0.03
-"""1σ of a hardening at least where there is a misfit."""
+"""Least 1σ of a hardening under a misfit."""
 
 FAR = 3.0
-"""Factor between a stiffness and its start from which it has hardly found the right mode, where the fit is poor too."""
+"""Ratio of a stiffness to its start from which, with a poor fit, it probably belongs to a wrong mode."""
 
 
 CERTAIN = 1e-3
-"""Chance of so large a move of masses and centres of mass where the model is right."""
+"""Significance level of the shift of masses and centres of mass."""
 
 
 def inertial_shift(fit: ResponseFit) -> float:
-    """How far masses and centres of mass moved, root mean square in standard deviations of what was known of them; 0 where by chance.
+    """Shift of masses and centres of mass, root mean square in prior standard deviations; 0 if not significant.
 
     Where the model is right the squared distance, in the metric of the prior covariance, is at most χ² distributed with as many degrees of
     freedom as there are of them. A larger one is a conflict of prior and data (Evans & Moshonov 2006).
@@ -55,7 +56,7 @@ def inertial_shift(fit: ResponseFit) -> float:
 
 
 def find_misfit(fit: ResponseFit, responses: Sequence[FrequencyResponse]) -> Misfit | None:
-    """Where the residual of `fit` exceeds what noise and model error explain; None where it does not."""
+    """Frequency band in which the residual of `fit` exceeds noise and model error; None without a misfit."""
     powers = _line_powers(fit)
     smooth = [_band_means(power) for power in powers]
     worst = int(np.argmax([means.max() for means in smooth]))
@@ -85,8 +86,7 @@ def find_misfit(fit: ResponseFit, responses: Sequence[FrequencyResponse]) -> Mis
 
 
 def implausible_springs(fit: ResponseFit) -> tuple[str, ...]:
-    """Names of the stiffnesses that ended clearly, by two standard deviations, more than a factor of `FAR` from the robot that the fit
-    started with."""
+    """Names of stiffnesses more than a factor of `FAR`, by two standard deviations, from the start of the fit."""
     robot, stds = fit.residual.model.robot, np.sqrt(np.diag(fit.estimate.covariance))
     return tuple(
         name
@@ -96,14 +96,14 @@ def implausible_springs(fit: ResponseFit) -> tuple[str, ...]:
 
 
 def _moved(robot: RobotModel, name: str, value: float) -> float:
-    """Distance of the logarithm of a stiffness from robot.yaml's; 0 for one that robot.yaml does not declare."""
+    """Change of the logarithm of a stiffness from robot.yaml's; 0 if it is not declared."""
     if robot.joint_index(name.split(".")[0]) in robot.springs.braked:
         return 0.0
     return abs(float(np.log(value / robot.value(name))))
 
 
 def misfit_std(fit: ResponseFit, misfit: Misfit) -> np.ndarray:
-    """Standard deviations (p,), in estimation coordinates, that the size of a misfit supports.
+    """Standard deviations (p,), in estimation coordinates, consistent with the size of a misfit.
 
     The sandwich over clusters of one octave of one pose, in which errors of the model are coherent, and no stiffness better known than to
     `DOUBTFUL_STIFFNESS`, no hardening than to `DOUBTFUL_HARDENING`. Where the misfit is severe, a stiffness is known no better than
@@ -137,13 +137,13 @@ def _line_powers(fit: ResponseFit) -> list[np.ndarray]:
 
 
 def _band_means(power: np.ndarray) -> np.ndarray:
-    """Moving mean over `BAND_LINES` lines, by the first of them."""
+    """Moving mean over `BAND_LINES` lines, indexed by the first of them."""
     width = min(BAND_LINES, len(power))
     return np.convolve(power, np.full(width, 1 / width), "valid")
 
 
 def _around(means: np.ndarray, at: int) -> tuple[int, int]:
-    """First and last place around `at` of the values above half of that there."""
+    """First and last index around `at` with values above half of that there."""
     low = means < 0.5 * means[at]
     before, after = np.flatnonzero(low[:at]), np.flatnonzero(low[at:])
     return (int(before[-1]) + 1 if len(before) else 0), (

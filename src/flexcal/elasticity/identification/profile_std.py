@@ -7,11 +7,11 @@ import numpy as np
 from flexcal.estimation import LOG_STD_LIMIT, Estimate, Problem, profile_cost_increase
 
 WELL_KNOWN = 0.1
-"""Posterior standard deviation of a log stiffness below which twice the value lies five standard deviations of the compliance away."""
+"""Posterior standard deviation of a log stiffness below which its double lies five standard deviations of the compliance away."""
 
 
 def profile_std_ratio(problem: Problem, fitted: Estimate) -> np.ndarray:
-    """By how much (p,) the profile is wider than the posterior's curvature, at least 1; `fitted` is the optimum of `problem`.
+    """Ratio (p,) of the width of the profile likelihood to the posterior's curvature, at least 1; `fitted` is the optimum of `problem`.
 
     A stiffness that counts as known to a factor of two is held at twice its value and all others are fitted again. The response is
     nearly linear in the compliance, which is half there: where the cost rises by d, its relative standard deviation is 0.5/√(2 d).

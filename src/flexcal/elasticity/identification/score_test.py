@@ -1,4 +1,4 @@
-"""Rao's score test: whether the residual of a fit holds what further parameters would add to the responses."""
+"""Rao's score test: whether the residual of a fit supports further parameters."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from flexcal.elasticity.identification.fit import ResponseData, ResponseFit
 
 
 def score_test_rejects(fit: ResponseFit, data: ResponseData, columns: np.ndarray) -> bool:
-    """Whether `fit` asks for parameters that would change its whitened residual by `columns` (m, k).
+    """Whether `fit` is rejected in favour of parameters that change its whitened residual by `columns` (m, k).
 
     With C the columns orthogonal to those of all fitted parameters, T = rᵀ C (Cᵀ C)⁻¹ Cᵀ r is χ² of k degrees of freedom, times the
     variance of what is left. The threshold is the Bayesian information criterion's, log(rows) a parameter.

@@ -17,7 +17,7 @@ from flexcal.progress import Progress, silent
 
 
 class Search(Protocol):
-    """Finds coordinates (p,) in the basin of the best fit."""
+    """Global search for coordinates (p,) in the basin of the best fit."""
 
     def find(
         self,
@@ -28,13 +28,13 @@ class Search(Protocol):
         rng: np.random.Generator,
         progress: Progress = silent,
     ) -> np.ndarray:
-        """Estimation coordinates (p,) to start the fit from; `prior` (p, p) is the covariance of what is known of them."""
+        """Initial estimation coordinates (p,) of the fit; `prior` (p, p) is the prior covariance of the parameters."""
         ...
 
 
 @dataclass(frozen=True)
 class TemperedWeighting:
-    """Every error counts the same, with the standard deviation `sigma`: a cost in which only gross differences matter."""
+    """Equal weights of all errors, with the standard deviation `sigma`: a cost sensitive to gross differences only."""
 
     sigma: float = 0.3
 
@@ -100,7 +100,7 @@ class MultiStart:
 
 @dataclass(frozen=True)
 class PopulationSearch:
-    """Differential evolution (Storn and Price 1997) over the springs alone, in the place of the paper's genetic algorithm.
+    """Differential evolution (Storn and Price 1997) over the springs alone, in place of the paper's genetic algorithm.
 
     Springs range over ×÷`factor` about robot.yaml, everything else stays at its start. The cost is the mean of
     |Ĝ - G|² / (|Ĝ_ii Ĝ_jj| + |G|²), smooth and bounded: no phase wraps in it.
@@ -167,7 +167,7 @@ def relative_difference(measured: np.ndarray, predicted: np.ndarray, scale: np.n
 
 
 def thin(responses: Sequence[FrequencyResponse], lines: int) -> list[FrequencyResponse]:
-    """The responses at about `lines` evenly spaced lines each."""
+    """Responses restricted to about `lines` evenly spaced lines each."""
     result = []
     for response in responses:
         step = max(1, round(len(response.frequencies_hz) / lines))

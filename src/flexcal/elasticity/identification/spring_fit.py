@@ -1,4 +1,4 @@
-"""Stage 1 (Neubauer et al. 2015, §4.2): from frequency responses to the stiffness and damping of drives and bearings."""
+"""Stage 1 (Neubauer et al. 2015, §4.2): stiffness and damping of drives and bearings from frequency responses."""
 
 from __future__ import annotations
 
@@ -60,11 +60,11 @@ class SpringFit:
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """Names of the sensors on the arm that recorded in any pose."""
+        """Names of the recorded sensors on the arm."""
         return tuple(dict.fromkeys(name for response in self.responses for name in response.sensors))
 
     def sensor_difference(self, name: str) -> float:
-        """Median over lines and poses of how far a sensor's readings are from those predicted, relative to their size."""
+        """Median over lines and poses of the relative difference between measured and predicted readings of a sensor."""
         return _median_difference(
             (response.sensor_response[:, [row := response.sensors.index(name)]], predicted[:, [row]])
             for response, predicted in zip(self.responses, self.sensed, strict=True)
@@ -73,25 +73,25 @@ class SpringFit:
 
     @property
     def motor_difference(self) -> float:
-        """The same of the motors' accelerations."""
+        """Median relative difference of the motors' accelerations."""
         return _median_difference(
             (response.response, predicted)
             for response, predicted in zip(self.responses, self.predicted, strict=True)
         )
 
     def robot(self, model: RobotModel) -> RobotModel:
-        """`model` with what was found: its springs, and the bearing axes that they belong to."""
+        """Model with the fitted springs, and the bearing axes that they belong to."""
         if self.bearings is not None:
             model = model.with_bearings(self.bearings.taken)
         return model.with_estimate(self.estimate)
 
     def quantity(self, name: str, truth: float | None = None) -> dict[str, float | bool | None]:
-        """One estimated quantity as every results file has it."""
+        """Estimated quantity as in results files."""
         return self.estimate.quantity(name, truth)
 
 
 def _median_difference(pairs: Iterable[tuple[np.ndarray, np.ndarray]]) -> float:
-    """Of measured and predicted rows (L, k, n): the difference of a row over its size, the median over lines, rows and pairs."""
+    """Median relative difference between measured and predicted rows (L, k, n), over lines, rows and pairs."""
     shares = [
         np.linalg.norm(measured - predicted, axis=2) / np.linalg.norm(predicted, axis=2)
         for measured, predicted in pairs
@@ -111,7 +111,7 @@ def fit_springs(
     tolerances: Tolerances | None = None,
     progress: Progress = silent,
 ) -> SpringFit:
-    """Fit the linearised elastic robot to the measured responses of all poses, and say how well each spring is known.
+    """Fit the linearised elastic robot to the measured responses of all poses, with the uncertainty of each spring.
 
     The cost is Eq. (26) on the log of the ratio Ĝ/G (linear where Ĝ is poorly known), by default weighed with the covariance of the
     measurement. A `search` (default: `MultiStart`) finds the basin; Levenberg-Marquardt with exact derivatives follows. With the
@@ -190,7 +190,7 @@ def _with_held_joints(
     rng: np.random.Generator,
     progress: Progress,
 ) -> tuple[RobotModel, ResponseFit | None]:
-    """The robot with springs at those of the `candidates` for which the data ask, and its fit; the same robot and None for none."""
+    """Robot with springs at those of the `candidates` that the data require, and its fit; the same robot and None for none."""
     values: dict[str, float] = {}
     while candidates.springs:
         wider = model.with_drive_springs(candidates.springs)
@@ -211,8 +211,9 @@ def _with_held_joints(
 def _searched_fit(
     model: RobotModel, data: ResponseData, search: Search, rng: np.random.Generator, progress: Progress
 ) -> ResponseFit:
-    """The fit of a robot with braked elastic joints: with rotors that stand still at the start and, where that leaves a misfit, with rotors
-    that move with the arm because position loops hold them; the better of both."""
+    """Fit of a robot with braked elastic joints: first with rotors at rest and, if that leaves a misfit, with rotors that move with the
+    arm because position loops hold them; the better of both.
+    """
     parameters, prior = data.parameters(model)
     x = search.find(
         model,
@@ -234,7 +235,7 @@ def _searched_fit(
 
 
 def _by_torque_constants(fit: ResponseFit) -> np.ndarray:
-    """Covariance (p, p) of the logarithms of stiffness and damping from the torque constants: one error for all springs of a joint."""
+    """Covariance (p, p) of the logarithms of stiffness and damping due to the torque constants: one error for all springs of a joint."""
     names = fit.estimate.parameters.names
     joints = [name.split(".")[0] if name.endswith((".stiffness", ".damping")) else "" for name in names]
     same = np.array([[own == other != "" for other in joints] for own in joints], dtype=float)
@@ -242,7 +243,7 @@ def _by_torque_constants(fit: ResponseFit) -> np.ndarray:
 
 
 def _widened(fit: ResponseFit, data: ResponseData) -> Estimate:
-    """The estimate with the covariance for measurements whose variance is `Tolerances.inflation` f times what weighs them.
+    """Estimate with the covariance for measurements whose variance is `Tolerances.inflation` times the assumed one.
 
     That is H + (f - 1) (H - H P H), with H the posterior and P = LᵀL the prior's information by its rows L, times the reduced χ² where it
     exceeds 1. What springs are known worse by after the sandwich, a misfit where there is one, and the profile likelihood is error of the

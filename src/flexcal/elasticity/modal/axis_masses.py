@@ -1,4 +1,4 @@
-"""Number of masses of an axis by evidence, or why none can be identified."""
+"""Selection of the number of masses of an axis by evidence."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from flexcal.frequency.arbitrary import LocalResponse
 
 MOST_MASSES = 3
 _NOT_PASSIVE = 0.1
-"""Share of the lines whose phase a motor driven by its own torque cannot have, from which this is none."""
+"""Share of lines with a phase impossible for a motor driven by its own torque, from which the response is not one."""
 _PHASE = np.radians(15.0)
 _WELL_KNOWN = 0.1
 _FIRST = "give the motor's own position, velocity or acceleration as the first --output"
 _MISSED = 0.3
-"""Relative misfit from which the parameters of a chain mean nothing."""
+"""Relative misfit from which the parameters of a chain are meaningless."""
 
 
 @dataclass(frozen=True, eq=False)
 class AxisMasses:
-    """`candidates` by number of masses, the `chosen` one, or the `reason` why there is none (a sentence's end)."""
+    """Candidates by number of masses, the `chosen` one, or the `reason` why there is none (a sentence's end)."""
 
     candidates: tuple[ChainFit, ...] = ()
     chosen: ChainFit | None = None
@@ -36,7 +36,7 @@ class AxisMasses:
 
 
 def identify_masses(fit: ModalFit, response: LocalResponse, masses: int | None = None) -> AxisMasses:
-    """Axes of one mass to as many as the pairs of antiresonance and resonance in the band allow, three at most, and the most evident one.
+    """Fit chains of one mass up to the number that antiresonance-resonance pairs in the band allow, three at most, and choose by evidence.
 
     `masses` asks for a number. None is identified for several inputs, and for an output that is not where the input acts.
     """
@@ -87,7 +87,7 @@ def identify_masses(fit: ModalFit, response: LocalResponse, masses: int | None =
 
 
 def misfit(chain: ChainFit, response: LocalResponse) -> float:
-    """Root mean square of the relative difference of a chain and the measured response beyond noise, at lines that are known well."""
+    """Root mean square relative difference of a chain and the measured response beyond noise, at well-determined lines."""
     measured, std = response.response[:, 0, 0], response.std[:, 0, 0]
     known = std < _WELL_KNOWN * np.abs(measured)
     if not known.any():
@@ -113,7 +113,7 @@ def _bare(fit: ModalFit) -> tuple[float, float] | None:
 
 
 def _is_opposite(response: LocalResponse) -> bool:
-    """Whether the motion takes energy from the drive with the wrong sign, and accelerates against it at most lines."""
+    """Whether the sign of the torque is reversed: the motion returns energy to the drive, and accelerates against it, at most lines."""
     measured, std = response.response[:, 0, 0], response.std[:, 0, 0]
     velocity = measured / (2j * np.pi * response.frequencies_hz)
     weight = np.abs(measured) / np.maximum(std, np.finfo(float).tiny)
@@ -121,7 +121,7 @@ def _is_opposite(response: LocalResponse) -> bool:
 
 
 def _wrong_phase(response: LocalResponse, fit: ModalFit) -> float:
-    """Share of the lines, known to 30 %, where the acceleration is not 0 to 180° ahead of the force, within 15° and a delay of a sample."""
+    """Share of the lines, known to 30 %, with an acceleration not 0 to 180° ahead of the force, within 15° and a delay of a sample."""
     measured, std = response.response[:, 0, 0], response.std[:, 0, 0]
     known = std < 0.3 * np.abs(measured)
     if not known.any():

@@ -24,7 +24,7 @@ from flexcal.elasticity.modal.record_least_squares import (
 from flexcal.elasticity.modal.resonance_intervals import LogValue, antiresonances, resonances
 
 _EXPLAINED = 1.5
-"""Mean square of the whitened errors, 1 expected, from which weights count the misfit as noise."""
+"""Mean square of the whitened errors, 1 expected, from which the weights treat the misfit as noise."""
 _REWEIGHTED = 2
 _FREE = 2.0
 """Prior standard deviation of the logarithms of damping and friction."""
@@ -33,7 +33,7 @@ _START_DAMPING = 0.02
 
 @dataclass(frozen=True, eq=False)
 class ChainFit:
-    """A chain of masses fitted to `data`, one output and one input; `prior` (p,) are the logarithms that damping and friction began at.
+    """Mass chain fitted to `data`, one output and one input; `prior` (p,) are the initial logarithms of damping and friction.
 
     criterion: Bayesian information criterion with the weights of the modal fit; smaller is better. mean_square: of the errors whitened with
     these weights, 1 expected.
@@ -63,7 +63,7 @@ class ChainFit:
         return sandwich(rows, errors, s.excited, projection, _information(at.size))
 
     def values(self) -> dict[str, LogValue]:
-        """Every parameter by name: inertia_1, stiffness_1, damping_1, …, viscous."""
+        """All parameters by name: inertia_1, stiffness_1, damping_1, …, viscous."""
         chain = self.chain
         std = np.sqrt(np.diag(self.uncertainty.covariance))
         names = [
@@ -84,7 +84,7 @@ class ChainFit:
 
 
 def pairs(fit: ModalFit) -> list[tuple[float, float]]:
-    """Antiresonance and the resonance above it (rad/s) of the first output to the first input, where they alternate."""
+    """Antiresonance-resonance pairs (rad/s) of the first output to the first input where they alternate, the resonance above."""
     poles = [r.frequency_hz.estimate for r in resonances(fit) if r.frequency_hz.known]
     zeros = [r.frequency_hz.estimate for r in antiresonances(fit, 0, 0) if r.frequency_hz.known]
     alternating, low = [], 0.0
@@ -97,7 +97,7 @@ def pairs(fit: ModalFit) -> list[tuple[float, float]]:
 
 
 def fit_chain(fit: ModalFit, masses: int, chosen: Sequence[tuple[float, float]]) -> ChainFit:
-    """Chain of `masses`, begun at the antiresonances and resonances `chosen` (rad/s), with the data and weights of the modal fit."""
+    """Fit a chain of `masses`, starting at the antiresonances and resonances `chosen` (rad/s), with data and weights of the modal fit."""
     data = _single(fit.data)
     zeros, poles = [z for z, _ in chosen], [p for _, p in chosen]
     unit = synthesise(1.0, poles, zeros) if chosen else MassChain(np.ones(1), np.zeros(0), np.zeros(0), 0.0)
@@ -138,7 +138,7 @@ def _single(data: BandData) -> BandData:
 
 
 def _reweighted(data: BandData, chain: MassChain) -> BandData:
-    """The data with the standard deviation of what the chain leaves."""
+    """Data with the standard deviation of the chain's residual."""
     whitened = _projection(data, chain)(_errors(data, chain, data.spectra.inputs))[:, 0, :, 0]
     half = whitened.shape[1] // 2
     errors = (whitened[:, :half] + 1j * whitened[:, half:])[:, :, None] / np.sqrt(2.0)
@@ -164,7 +164,7 @@ def _fitted(data: BandData, start: MassChain, prior: np.ndarray) -> tuple[MassCh
 
 
 def _errors(data: BandData, chain: MassChain, inputs: np.ndarray) -> np.ndarray:
-    """(R, 1, K, 1)"""
+    """Errors (R, 1, K, 1) of the chain."""
     s = data.spectra
     predicted = chain.response(s.frequencies_hz) * inputs[:, :, 0]
     return (s.outputs[:, :, 0] - predicted)[:, None, :, None]
@@ -197,7 +197,7 @@ def _chain(data: BandData, z: np.ndarray) -> MassChain:
 
 
 def _information(size: int) -> np.ndarray:
-    """Of the prior: delay 0 ± one time step; damping and friction within an order of magnitude, which matters where they do not show."""
+    """Information of the prior: delay 0 ± one time step; damping and friction within an order of magnitude, in case they have no effect."""
     masses = (size + 1) // 3
     result = np.zeros(size)
     result[2 * masses - 1 :] = 1.0 / _FREE**2

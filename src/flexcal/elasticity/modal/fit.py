@@ -1,4 +1,4 @@
-"""Maximum-likelihood fit of modal models to the spectra of whole records, their number of modes by evidence."""
+"""Maximum-likelihood fit of modal models to the spectra of whole records, with the number of modes by evidence."""
 
 from __future__ import annotations
 
@@ -30,20 +30,22 @@ _TRIED_FREQUENCIES = 25
 _CANDIDATES = 4
 _ROUNDS = 3
 _FOR_CHOICE, _FOR_FIT = 1000, 8000
-"""Bins of all records by which modes are chosen, and to which they are fitted, at most."""
+"""Largest number of bins of all records used to choose the modes, and for the final fit."""
 _FIRST = np.array([np.log(1e-3), 0.0])
-"""Log of β, the pole of friction relative to the band's end, and delay, to begin with."""
+"""Initial values of log β, the pole of friction relative to the band's end, and delay."""
 _SLOW_PRIOR = 0.05
-"""Information on log β, so that it is held where friction does not show."""
+"""Prior information on log β, which fixes it where friction has no effect."""
 HEAVILY_DAMPED = 0.6
-"""Damping from which a term is no mode but a correction of the smooth background."""
+"""Damping ratio from which a term is no mode but a correction of the smooth background."""
 _LOWEST_DAMPING, _HIGHEST_DAMPING = 1e-4, 0.95
 _NARROWEST = 0.05
-"""Half-width of a resonance, relative to the distance of the bins, below which it cannot be told from a disturbance in one bin."""
+"""Half-width of a resonance, relative to the bin spacing, below which it is not distinguishable from a disturbance in one bin."""
 _EVIDENT = 30.0
-"""Square of a mode's numerators over their standard deviation (2 per element) from which it is in the response, not in transients alone."""
+"""Squared ratio of a mode's numerators to their standard deviation (2 per element) from which it is in the response, not in transients
+alone.
+"""
 _REACH = 1.3
-"""Modes lie between the band's ends divided and multiplied by this."""
+"""Factor beyond the band's ends within which modes may lie."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,14 +58,14 @@ class ModalFit:
 
     @property
     def unknowns(self) -> int:
-        """Real numbers that were fitted, transients included."""
+        """Number of fitted real parameters, transients included."""
         records, _, n_y = self.data.spectra.outputs.shape
         modes = len(self.model.natural)
         return 2 * modes + 2 + self.model.numerators.size + records * n_y * (SMOOTH + 2 * modes)
 
     @property
     def criterion(self) -> float:
-        """Bayesian information criterion: smaller is better."""
+        """Bayesian information criterion; smaller is better."""
         return 2 * self.cost + self.unknowns * float(np.log(self.data.rows))
 
     @cached_property
@@ -73,7 +75,7 @@ class ModalFit:
 
     @property
     def is_evident(self) -> bool:
-        """Whether every mode shows in the response, not only in the transients of the records."""
+        """Whether every mode is significant in the response, not only in the transients of the records."""
         count = len(self.model.natural)
         covariance = self.uncertainty.likelihood
         first = 2 * count + 2
@@ -90,7 +92,7 @@ class ModalFit:
         return True
 
     def moved(self, parameters: np.ndarray) -> ModalModel:
-        """The model with other `parameters`."""
+        """Model with other `parameters`."""
         m, count = self.model, len(self.model.natural)
         return ModalModel(
             m.highest,
@@ -130,7 +132,7 @@ class ModalFit:
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedModes:
-    """The fit with the evident number of modes, and the response measured about it, free of leakage at resonances."""
+    """Fit with the selected number of modes, and the response measured about it, free of leakage at resonances."""
 
     fit: ModalFit
     response: LocalResponse
@@ -173,7 +175,7 @@ def identify_modes(
 
 
 def _cleaned(spectra: RecordSpectra, guess: LocalResponse | ModalModel) -> RecordSpectra:
-    """The spectra with the instruments as inputs, and outputs without what the rest of the inputs brings by a first guess of the response.
+    """Spectra with the instruments as inputs, and outputs less the effect of the inputs' remainder by an initial response.
 
     What a controller feeds back of the noise then is no error of the fit, which would look like modes.
     """
@@ -189,7 +191,7 @@ def _cleaned(spectra: RecordSpectra, guess: LocalResponse | ModalModel) -> Recor
 
 
 def refined_response(spectra: RecordSpectra, model: ModalModel, response: LocalResponse) -> LocalResponse:
-    """The local response with a model and its transients as the first guess: only what they leave is smoothed over frequency.
+    """Local response with a model and its transients as initial guess: only the remainder is smoothed over frequency.
 
     `response`: its scatter weights the transients' fit; the records may be others than those it was measured from.
     """
@@ -199,7 +201,7 @@ def refined_response(spectra: RecordSpectra, model: ModalModel, response: LocalR
 def _refined(
     spectra: RecordSpectra, model: ModalModel, sigma: np.ndarray
 ) -> tuple[LocalResponse, np.ndarray]:
-    """The refined response with weights by `sigma` (K, n_y), and the standard deviation (K, n_y) of the outputs about it."""
+    """Refined response with weights by `sigma` (K, n_y), and the standard deviation (K, n_y) of the outputs about it."""
     guessed = model.response(spectra.frequencies_hz)
     rest = spectra.outputs - np.einsum("kyu,rku->rky", guessed, spectra.inputs)
     data = BandData(spectra, sigma)
@@ -215,7 +217,7 @@ def _refined(
 def _coherence(
     spectra: RecordSpectra, local: LocalResponse, response: np.ndarray, scatter: np.ndarray
 ) -> np.ndarray:
-    """Multiple coherence (L, n_y): power that the response explains at the lines, pooled over the window, over the total."""
+    """Multiple coherence (L, n_y): share of the outputs' power at the lines, pooled over the window, explained by the response."""
     from flexcal.frequency.periodic import pool_noise
 
     at = np.searchsorted(spectra.frequencies_hz, local.frequencies_hz - 1e-9)
@@ -245,14 +247,14 @@ def _sigma(spectra: RecordSpectra, response: LocalResponse, shape: np.ndarray | 
 
 
 def _nonlinear(fit: ModalFit) -> np.ndarray:
-    """log f_m, log ζ_m, log β, delay over the time step."""
+    """Nonlinear parameters: log f_m, log ζ_m, log β, delay over the time step."""
     m = fit.model
     rest = [np.log(m.slow), m.delay / fit.data.spectra.time_step]
     return np.concatenate([np.log(m.natural), np.log(m.damping), rest])
 
 
 def _fitted(data: BandData, start: np.ndarray) -> ModalFit:
-    """The best fit near `start`: log f_m, log ζ_m, log β, delay over the time step."""
+    """Best fit near `start`: log f_m, log ζ_m, log β, delay over the time step."""
     count = len(start) // 2 - 1
     low = data.spectra.frequencies_hz[0] / data.spectra.frequencies_hz[-1]
     lower = [
@@ -315,8 +317,7 @@ def _reduced(data: BandData, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _with_another(fit: ModalFit, response: LocalResponse) -> ModalFit | None:
-    """The best fit with one more mode, begun where one more helps most; None where the data are too few for it, or it is but a
-    disturbance in single bins."""
+    """Best fit with one more mode, initialised where it helps most; None for too few data, or if it is a disturbance in single bins."""
     data, at, count = fit.data, _nonlinear(fit), len(fit.model.natural)
     if fit.unknowns + 8 * data.spectra.outputs.shape[0] > 0.7 * data.rows:
         return None
@@ -336,7 +337,7 @@ def _with_another(fit: ModalFit, response: LocalResponse) -> ModalFit | None:
 
 
 def _tried(data: BandData, response: LocalResponse) -> np.ndarray:
-    """Frequencies, relative to the band's end: a grid, and the peaks of the measured magnitudes."""
+    """Trial frequencies, relative to the band's end: a grid, and the peaks of the measured magnitudes."""
     end = data.spectra.frequencies_hz[-1]
     grid = np.geomspace(max(data.spectra.frequencies_hz[0], 0.02 * end), end, _TRIED_FREQUENCIES) / end
     magnitude = np.abs(response.response).max((1, 2))

@@ -1,4 +1,4 @@
-"""An axis as masses in a row, joined by springs and dampers and driven at the first one."""
+"""Chain of masses joined by springs and dampers and driven at the first one, as a model of an axis."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class MassChain:
 
 
 def synthesise(first: float, resonances: Sequence[float], antiresonances: Sequence[float]) -> MassChain:
-    """The undamped chain with these resonances and antiresonances (rad/s) and the first inertia `first`, by continued fractions (Cauer).
+    """Undamped chain with these resonances and antiresonances (rad/s) and the first inertia `first`, by continued fractions (Cauer).
 
     An antiresonance must lie below each resonance and above the one before; otherwise some inertia comes out negative.
     """

@@ -1,4 +1,4 @@
-"""Shape over frequency of the noise about a response, part of which the axis itself amplifies at its resonances."""
+"""Spectral shape of the noise about a response, part of which the axis itself amplifies at its resonances."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import numpy as np
 from flexcal.frequency.periodic import pool_noise
 
 _SHARES = np.concatenate([[0.0], np.geomspace(1e-3, 1e4, 22)])
-"""Power of disturbances of the input, against noise of the output, where the response has its median."""
+"""Candidate powers of input disturbances, relative to output noise, at the response's median."""
 _EVIDENT = 6.0
-"""Twice the log-likelihood that disturbances of the input must bring, beside noise that is locally flat."""
+"""Twice the log-likelihood gain required of input disturbances over locally flat noise."""
 _FEWEST = 5
-"""Bins from which the local level follows, at least."""
+"""Least number of bins for the local level."""
 
 
 def noise_shape(errors: np.ndarray, response: np.ndarray, excited: np.ndarray, window: int) -> np.ndarray:

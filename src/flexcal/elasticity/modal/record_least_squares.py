@@ -11,9 +11,9 @@ from flexcal.frequency.arbitrary import RecordSpectra
 from flexcal.frequency.periodic import pool_noise
 
 CLUSTERS = 8
-"""Records from which the scatter between them gives the covariance."""
+"""Number of records from which the scatter between them gives the covariance."""
 _POOLED = 24
-"""Phasors of all records that share a variance, so the degrees of freedom of a parameter that few bins decide, about."""
+"""Approximate number of phasors of all records that share a variance, and so degrees of freedom of a parameter that few bins determine."""
 _MOST_LEVERAGE = 0.8
 
 
@@ -37,13 +37,13 @@ class BandData:
 
     @property
     def rows(self) -> int:
-        """Real numbers that are fitted."""
+        """Number of fitted real values."""
         return 2 * self.spectra.outputs.size
 
 
 @dataclass(frozen=True, eq=False)
 class Projection:
-    """Projector (per output) that removes everything a transient of given poles can do, from whitened spectra.
+    """Projector (per output) that removes the transients of given poles from whitened spectra.
 
     `basis` (n_y, 2K, T): orthonormal columns.
     """
@@ -53,7 +53,7 @@ class Projection:
 
     @classmethod
     def of(cls, data: BandData, transient: np.ndarray) -> Projection:
-        """`transient` (n_y, K, T): what a transient is a real combination of."""
+        """Projection for `transient` (n_y, K, T), whose real combinations are the transients."""
         weight = np.sqrt(2.0) / data.sigma.T  # (n_y, K): σ² is that of both parts together
         stacked = stack(transient * weight[:, :, None])
         if not transient.shape[2]:
@@ -68,11 +68,11 @@ class Projection:
 
 
 SMOOTH = 5
-"""Terms of a transient beside those of the modes."""
+"""Number of terms of a transient besides those of the modes."""
 
 
 def transient_basis(data: BandData, slow: float, of: np.ndarray) -> np.ndarray:
-    """Spectra (n_y, K, T) of what the free motion at both ends of a record adds to the outputs, as accelerations.
+    """Basis (n_y, K, T) of the spectra of free motion at both ends of a record, as accelerations.
 
     Of every mode x² + c_1 x + c_0 (rows of `of`) a sampled decaying oscillation, of the rigid body an offset, a drift and a motion that
     friction stops, with the pole x = -`slow`, and two single samples.
@@ -93,7 +93,7 @@ def transient_basis(data: BandData, slow: float, of: np.ndarray) -> np.ndarray:
 
 
 def transients(data: BandData, basis: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """The transients (R, K, n_y) in `rest` (R, K, n_y), real combinations of `basis` (n_y, K, T), by weighted least squares."""
+    """Transients (R, K, n_y) in `rest` (R, K, n_y), real combinations of `basis` (n_y, K, T), by weighted least squares."""
     result = np.empty_like(rest)
     for y in range(rest.shape[2]):
         weight = 1.0 / data.sigma[:, y, None]
@@ -110,12 +110,12 @@ def transients(data: BandData, basis: np.ndarray, rest: np.ndarray) -> np.ndarra
 
 
 def stack(values: np.ndarray) -> np.ndarray:
-    """Real and imaginary part of (…, K, c) as rows (…, 2K, c)."""
+    """Real and imaginary parts of (…, K, c) as rows (…, 2K, c)."""
     return np.concatenate([np.real(values), np.imag(values)], axis=-2)
 
 
 def thinned(data: BandData, most: int) -> BandData:
-    """Every n-th bin, so that all records together have `most` at most; nothing where the excitation leaves bins out."""
+    """Every n-th bin, so that all records together have at most `most`; no thinning for an excitation with gaps."""
     records, bins, _ = data.spectra.inputs.shape
     every = max(1, records * bins // most)
     if every == 1 or not data.spectra.excited.all():
@@ -151,7 +151,7 @@ def pooled_covariance(errors: np.ndarray, excited: np.ndarray) -> np.ndarray:
 
 
 def _unshrunk(errors: np.ndarray, rows: np.ndarray, bread: np.ndarray, basis: np.ndarray) -> np.ndarray:
-    """Errors (R, n_y, 2K) over √(1 - h), with h the leverage of a bin: what the fit of parameters and transients took from it."""
+    """Errors (R, n_y, 2K) over √(1 - h), with h the leverage of a bin in the fit of parameters and transients."""
     own = np.einsum("rykp,pq,rykq->ryk", rows, bread, rows, optimize=True)
     leverage = own + (basis**2).sum(2)
     half = leverage.shape[2] // 2
@@ -161,7 +161,7 @@ def _unshrunk(errors: np.ndarray, rows: np.ndarray, bread: np.ndarray, basis: np
 
 @dataclass(frozen=True, eq=False)
 class FitCovariance:
-    """Covariance of parameters, that where weights and model are right (`likelihood`), and degrees of freedom for intervals."""
+    """Covariance of parameters, that for correct weights and model (`likelihood`), and degrees of freedom for intervals."""
 
     covariance: np.ndarray
     likelihood: np.ndarray
@@ -201,7 +201,7 @@ def sandwich(
 
 
 def _common(rows: np.ndarray, errors: np.ndarray, excited: np.ndarray) -> np.ndarray:
-    """Covariance of the scores by what all records leave alike: errors of the model, which repetitions do not average.
+    """Covariance of the scores due to residuals common to all records: model errors, which repetitions do not average.
 
     From complex rows (R, n_y, K, p) and errors (R, K, n_y): their mean over records beyond what their scatter explains.
     """

@@ -1,4 +1,4 @@
-"""Resonances and antiresonances of a modal fit, with intervals."""
+"""Resonances and antiresonances of a modal fit, with confidence intervals."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ _UNKNOWN = 0.3
 _LEVEL = 0.975
 _GRID = 4000
 _PROMINENT, _NEAR = 1.1, 0.35
-"""A peak stands out from the lowest magnitude so near (in log f) on either side by this factor."""
+"""Least ratio of a peak to the lowest magnitude on either side, within a neighbourhood in log f."""
 _SPACING = 1e-3
-"""Of three points (in log f) that slope and curvature of a peak are taken from."""
+"""Spacing (in log f) of three points for slope and curvature of a peak."""
 
 
 @dataclass(frozen=True)
 class LogValue:
-    """A positive value estimated as its logarithm, with the standard deviation `log_std` of that and its degrees of freedom."""
+    """Positive value estimated as its logarithm, with its standard deviation `log_std` and degrees of freedom."""
 
     estimate: float
     log_std: float
@@ -62,7 +62,7 @@ class Resonance:
 
 
 def resonances(fit: ModalFit) -> tuple[Resonance, ...]:
-    """The modes in the band that are no heavily damped background, by growing frequency."""
+    """Modes in the band, heavily damped background terms excluded, by increasing frequency."""
     model, uncertainty = fit.model, fit.uncertainty
     std, count = np.sqrt(np.diag(uncertainty.covariance)), len(fit.model.natural)
     return tuple(
@@ -76,7 +76,7 @@ def resonances(fit: ModalFit) -> tuple[Resonance, ...]:
 
 
 def antiresonances(fit: ModalFit, output: int, input: int) -> tuple[Resonance, ...]:
-    """Lightly damped zeros of an element in the band; the damping of a zero beyond the imaginary axis is negative and not determined."""
+    """Lightly damped zeros of an element in the band; the damping of a nonminimum-phase zero is negative and not determined."""
     uncertainty = fit.uncertainty
     zeros = fit.model.zeros(output, input)
     result = []
@@ -110,14 +110,14 @@ def antiresonances(fit: ModalFit, output: int, input: int) -> tuple[Resonance, .
 
 @dataclass(frozen=True)
 class Peak:
-    """A maximum of the magnitude of one element, as read off a plot: frequency (Hz), and the magnitude there."""
+    """Maximum of the magnitude of one element, as read off a plot: frequency (Hz) and magnitude."""
 
     frequency_hz: LogValue
     magnitude: float
 
 
 def peaks(fit: ModalFit, output: int, input: int) -> tuple[Peak, ...]:
-    """Maxima of |G| of the modal model in the band; with heavy damping they lie off the natural frequencies."""
+    """Maxima of |G| of the modal model in the band; with heavy damping they differ from the natural frequencies."""
     band, uncertainty = fit.data.spectra.frequencies_hz, fit.uncertainty
     grid = np.geomspace(band[0], band[-1], _GRID)
     scale = np.sqrt(np.diag(uncertainty.covariance))

@@ -1,4 +1,4 @@
-"""Effects of the experiment on a frequency response: reference motion, gaps that it opens, friction at its reversals."""
+"""Effects of the experiment on a frequency response: reference motion, gaps opened by it, friction at its reversals."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from flexcal.model.vibration import linearise
 
 @dataclass(frozen=True, eq=False)
 class ExperimentEffect:
-    """`shift` (L, E + S, E) is added to what the robot at rest would show; `by_friction` (L, E + S, E, 2 E) is its derivative by the
-    logarithm of the strength, then of the width, of the friction pulses of every motor.
+    """Change `shift` (L, E + S, E) of the response from that of the robot at rest; `by_friction` (L, E + S, E, 2 E) is its derivative by
+    the logarithm of the strength, then of the width, of the friction pulses of every motor.
     """
 
     shift: np.ndarray
@@ -23,7 +23,7 @@ class ExperimentEffect:
 
     @classmethod
     def none(cls, response: FrequencyResponse) -> ExperimentEffect:
-        """At rest."""
+        """Zero effect, of a robot at rest."""
         shape = response.stacked.shape
         return cls(np.zeros(shape, complex), np.zeros((*shape, 0), complex))
 
@@ -31,7 +31,7 @@ class ExperimentEffect:
 def experiment_effects(
     model: ResponseModel, x: np.ndarray, reference: ReferenceMotion
 ) -> list[ExperimentEffect]:
-    """Of every pose at the coordinates x (p,).
+    """Effects of every pose at the coordinates x (p,).
 
     What a motor's viscous coefficient in a pose exceeds that of robot.yaml by is taken for friction, where robot.yaml gives the joint
     a Coulomb friction.

@@ -1,4 +1,4 @@
-"""Covariance of the residual due to model errors: geometric errors, and friction that is not viscous."""
+"""Covariance of the residual due to model errors: geometric errors, and non-viscous friction."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from flexcal.model.vibration import (
 
 @dataclass(frozen=True)
 class Tolerances:
-    """Standard deviations of effects that the model lacks.
+    """Standard deviations of effects not included in the model.
 
     `length` (m) and `angle` (rad) of every geometric error, unknown before stage 2; `strength` and `width` of the friction pulses of a
     motor, relative, common to all poses and half as much in each; `friction`: other deviation of a motor's impedance from a viscous
@@ -52,16 +52,16 @@ class Tolerances:
 
     @classmethod
     def none(cls) -> Tolerances:
-        """The model is exact."""
+        """Zero tolerances of an exact model."""
         return cls(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, flatness=False)
 
     @property
     def any(self) -> bool:
-        """Whether anything is left out."""
+        """Whether any tolerance is nonzero."""
         return max(self.length, self.angle, self.strength, self.width, self.friction, self.backlash) > 0
 
     def inflation(self, responses: Sequence[FrequencyResponse]) -> float:
-        """Variance of the responses over what it would be with independent realisations."""
+        """Variance inflation of the responses relative to independent realisations."""
         shares = []
         for response in responses:
             distorted = np.mean(response.distortion_std**2) / np.mean(response.std**2)
@@ -79,13 +79,13 @@ class LowRank:
 
     @classmethod
     def of(cls, columns: np.ndarray) -> LowRank:
-        """From B (m, k) in whitened rows."""
+        """Whitening for B (m, k) in whitened rows."""
         factor, triangle = np.linalg.qr(columns)
         turn, size, _ = np.linalg.svd(triangle)
         return cls(factor @ turn, 1 - 1 / np.sqrt(1 + size**2), float(np.log1p(size**2).sum()))
 
     def whiten(self, rows: np.ndarray) -> np.ndarray:
-        """(1 + B Bᵀ)^(-1/2) times rows (m,) or (m, c)."""
+        """Product of (1 + B Bᵀ)^(-1/2) and rows (m,) or (m, c)."""
         inner = self.basis.T @ rows
         shrink = self.shrink if rows.ndim == 1 else self.shrink[:, None]
         return rows - self.basis @ (shrink * inner)
@@ -93,7 +93,7 @@ class LowRank:
 
 @dataclass(frozen=True, eq=False)
 class ModelError:
-    """Model errors of all poses: of each pose alone (friction), then common to all (geometry)."""
+    """Model errors of all poses: independent in each pose (friction), and common to all (geometry)."""
 
     poses: tuple[LowRank, ...]
     common: LowRank
@@ -107,7 +107,7 @@ class ModelError:
         effects: Sequence[ExperimentEffect],
         tolerances: Tolerances,
     ) -> ModelError:
-        """To first order about the coordinates x (p,)."""
+        """Model errors to first order about the coordinates x (p,)."""
         model = residual.model
         blocks, columns = [], []
         predictions = model.predict(x)
@@ -150,7 +150,7 @@ class ModelError:
         return cls(tuple(blocks), LowRank.of(np.concatenate(columns)))
 
     def whiten(self, rows: np.ndarray) -> np.ndarray:
-        """Rows (m,) or (m, c) that were whitened by the measurement alone, whitened by both."""
+        """Rows (m,) or (m, c), whitened by the measurement alone, after whitening by both."""
         parts, start = [], 0
         for block in self.poses:
             count = len(block.basis)

@@ -8,7 +8,7 @@ from flexcal.frequency.periodic import FrequencyResponse
 
 
 def pose_labels(responses: Sequence[FrequencyResponse]) -> tuple[str, ...]:
-    """A label for every response: its pose number in the plan, or its place where numbers repeat."""
+    """Label of every response: its pose number in the plan, or its index where numbers repeat."""
     numbers = [response.pose for response in responses]
     if len(set(numbers)) < len(numbers):
         numbers = range(len(responses))
@@ -21,7 +21,7 @@ def viscous_name(joint: str, pose: str) -> str:
 
 
 def backlash_name(joint: str) -> str:
-    """Name of the half gap of a drive as its frequency response shows it."""
+    """Name of the half gap of a drive as identified from frequency responses."""
     return f"{joint}.drive.half_gap"
 
 
@@ -31,5 +31,5 @@ def hardening_name(joint: str) -> str:
 
 
 def held_inertia_name(joint: str) -> str:
-    """Name of the inertia that moves with the arm of a joint whose motor is held."""
+    """Name of the inertia that moves with the arm at a joint with held motor."""
     return f"{joint}.held_inertia"

@@ -27,13 +27,13 @@ from flexcal.model.robot import (
 from flexcal.model.vibration import linearise, transfer_matrix
 
 HALF_GAP_STD = 1e-4
-"""Prior of a drive's half gap, 1σ in rad about the model's own: wide, for the softening of the drive differs from pose to pose."""
+"""Prior 1σ in rad of a drive's half gap about the model's own: wide, since the softening of the drive differs from pose to pose."""
 
 SENSOR_RANGE = 4.0
-"""Factor between readings of a sensor and those expected from which they are of another unit or place."""
+"""Factor between measured and expected readings of a sensor from which its unit or place is wrong."""
 
 HARDENING_STD = 0.3
-"""Prior of a drive's hardening, 1σ."""
+"""Prior 1σ of a drive's hardening."""
 
 
 def stiffness_parameters(
@@ -44,7 +44,7 @@ def stiffness_parameters(
     backlash: bool = False,
     hardening: bool = False,
 ) -> Parameters:
-    """Every parameter of stage 1 with its prior.
+    """All parameters of stage 1 with their priors.
 
     Springs, rotor inertias, viscous coefficients and masses are estimated as logarithms. The motor's viscous coefficient is free
     in every pose: friction under the reference motion acts like one that differs from pose to pose. One delay an axis has the
@@ -100,8 +100,9 @@ def stiffness_parameters(
 
 
 def held_inertias(model: RobotModel) -> list[Parameter]:
-    """Inertia, kg m², that moves with the arm of every braked joint beyond that of its links: none, or the rotor's where the position loop
-    holds the motor in place of a brake. Joints whose rotor inertia is not declared have none."""
+    """Inertia, kg m², that moves with the arm of every braked joint in addition to its links: none, or the rotor's if the position loop
+    holds the motor in place of a brake. Joints without a declared rotor inertia have none.
+    """
     items = []
     for joint in model.elastic:
         rotor = float(model.drives.rotor_inertia[joint.index])
@@ -111,7 +112,7 @@ def held_inertias(model: RobotModel) -> list[Parameter]:
 
 
 def apparent_viscous(response: FrequencyResponse) -> np.ndarray:
-    """Motor loss (axes,) N m s/rad seen at the lowest tenth of the lines: the real part of the impedance jω Ĝ⁻¹."""
+    """Motor damping (axes,) N m s/rad at the lowest tenth of the lines: the real part of the impedance jω Ĝ⁻¹."""
     low = slice(0, max(3, len(response.frequencies_hz) // 10))
     identity = np.broadcast_to(np.eye(response.response.shape[-1]), response.response[low].shape)
     impedance = 1j * response.omega[low, None, None] * np.linalg.solve(response.response[low], identity)
@@ -120,7 +121,7 @@ def apparent_viscous(response: FrequencyResponse) -> np.ndarray:
 
 
 def check_responses(model: RobotModel, responses: Sequence[FrequencyResponse]) -> None:
-    """Raises `FlexcalError` where there is nothing to fit or a response is of other joints than the elastic ones."""
+    """Raise `FlexcalError` if there is nothing to fit or a response is of other joints than the elastic ones."""
     elastic = [joint.name for joint in model.elastic]
     if not elastic:
         raise FlexcalError(
@@ -166,7 +167,7 @@ def check_responses(model: RobotModel, responses: Sequence[FrequencyResponse]) -
 
 
 def check_sensors(model: RobotModel, responses: Sequence[FrequencyResponse]) -> None:
-    """Raises `FlexcalError` where the readings of a sensor on the arm are of another size or sign than those of robot.yaml's robot.
+    """Raise `FlexcalError` if the size or sign of an arm-side sensor's readings contradicts robot.yaml.
 
     That is told from the lowest third of the lines, where the springs matter least, by the median line: modes that are elsewhere than in
     robot.yaml are no reason.
@@ -186,7 +187,7 @@ def check_sensors(model: RobotModel, responses: Sequence[FrequencyResponse]) -> 
 
 
 def _line_gains(model: RobotModel, name: str, response: FrequencyResponse) -> np.ndarray:
-    """Complex factor (lines,) between the readings and those expected, at the lowest third of the lines of a pose."""
+    """Complex ratio (lines,) of measured to expected readings at the lowest third of the lines of a pose."""
     low = slice(0, max(3, len(response.frequencies_hz) // 3))
     system = linearise(model, response.q_mean, response.payload, sensors=[model.sensors[name]])
     expected = transfer_matrix(system, response.frequencies_hz[low]).response[:, -1]

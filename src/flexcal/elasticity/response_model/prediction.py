@@ -1,4 +1,4 @@
-"""The frequency responses that the model predicts in every measured pose, and their derivatives by all parameters of stage 1."""
+"""Predicted frequency responses in every measured pose, and their derivatives by all parameters of stage 1."""
 
 from __future__ import annotations
 
@@ -21,12 +21,14 @@ from flexcal.model.robot import ArmSensor, RobotModel, mounting_names, sensitivi
 from flexcal.model.vibration import linearise, transfer_matrix
 
 _MOUNTING_STEP = 1e-6
-"""m or rad, of the difference quotients by errors of mounting, in which readings are linear but for the length of the direction."""
+"""Step, m or rad, of the difference quotients by mounting errors, in which readings are linear but for the length of the direction."""
 
 
 @dataclass(frozen=True, eq=False)
 class PredictedMeasurements:
-    """G (lines, E + S, E) in one pose, and ∂G (lines, E + S, E, c) by the parameters numbered `columns` (c,), in estimation coordinates."""
+    """Response G (lines, E + S, E) in one pose, and ∂G (lines, E + S, E, c) by the parameters numbered `columns` (c,), in estimation
+    coordinates.
+    """
 
     response: np.ndarray
     derivatives: np.ndarray
@@ -35,7 +37,7 @@ class PredictedMeasurements:
 
 @dataclass(frozen=True, eq=False)
 class PoseModel:
-    """One pose: lines (L,), where to linearise, and which parameter is which number of the robot.
+    """Model of one pose: lines (L,), rest position, and the mapping of parameter numbers to the robot's.
 
     `robot_names` maps names of the robot's own values to parameter numbers. `backlash` maps the axes with backlash to the numbers of their
     half gaps; `backlash_compliance` (phases, E) is the relative compliance that each adds along the reference motion, per rad. `hardening`
@@ -60,7 +62,7 @@ class PoseModel:
     mounting: np.ndarray
 
     def placed(self, natural: np.ndarray) -> tuple[ArmSensor, ...]:
-        """The sensors on the arm as they are mounted."""
+        """Sensors on the arm as mounted."""
         errors = self.mounting_errors(natural)
         return tuple(sensor.misplaced(e) for sensor, e in zip(self.sensors, errors, strict=True))
 
@@ -69,7 +71,7 @@ class PoseModel:
         return np.where(self.mounting >= 0, natural[self.mounting], 0.0)
 
     def measured(self, natural: np.ndarray) -> np.ndarray:
-        """What G is multiplied by (L, E + S, E): the delays of torques and readings, the sensitivities of sensors."""
+        """Measurement factor (L, E + S, E) of G: delays of torques and readings, sensitivities of sensors."""
         s = 2j * np.pi * self.frequencies_hz[:, None]
         torque = np.array([natural[number] if number >= 0 else 0.0 for number in self.delays])
         ones = np.ones((len(s), len(torque)))
@@ -77,7 +79,7 @@ class PoseModel:
         return rows[:, :, None] * np.exp(-s * torque)[:, None, :]
 
     def values(self, robot: RobotModel, natural: np.ndarray) -> tuple[dict[str, float], float | None]:
-        """The robot's own values and the payload (kg) in this pose for the parameters' natural values (p,)."""
+        """Values of the robot and payload (kg) in this pose for natural parameter values (p,)."""
         known = {name: float(natural[number]) for name, number in self.robot_names.items()}
         kept = self.stiffness_ratio(natural).mean(axis=0)
         for axis in self.changing:
@@ -91,16 +93,17 @@ class PoseModel:
 
     @property
     def changing(self) -> tuple[int, ...]:
-        """The axes whose drive changes its stiffness along the reference motion."""
+        """Axes whose drive stiffness changes along the reference motion."""
         return tuple(sorted({*self.backlash, *self.hardening}))
 
     def stiffness_ratio(self, natural: np.ndarray) -> np.ndarray:
-        """Stiffness and damping (phases, E) of every drive along the reference motion over those at no load with its gap closed."""
+        """Stiffness and damping (phases, E) of every drive along the reference motion relative to those at no load with closed gap."""
         return self._hardened(natural).ratio / self._softer(natural)
 
     def slopes(self, natural: np.ndarray) -> list[tuple[int, int, float]]:
-        """Axis, parameter number, and derivative of the logarithm of the drive's mean stiffness and damping by it or, for the
-        stiffness at no load, by its logarithm beyond its own: gaps, hardening."""
+        """Axis, parameter number, and derivative of the logarithm of the drive's mean stiffness and damping by gap, hardening or, beyond
+        its direct effect, the logarithm of the stiffness at no load.
+        """
         hardened, softer = self._hardened(natural), self._softer(natural)
         mean = np.mean(hardened.ratio / softer, axis=0)
         by_backlash = -np.mean(hardened.ratio * self.backlash_compliance / softer**2, axis=0) / mean
@@ -119,7 +122,7 @@ class PoseModel:
         return 1.0 + self.backlash_compliance * half_width
 
     def _hardened(self, natural: np.ndarray) -> HardenedStiffness:
-        """All drives harden, or none."""
+        """Whether the drives harden, all or none."""
         if self.torque is None or not self.hardening:
             none = np.zeros_like(self.backlash_compliance)
             return HardenedStiffness(none + 1.0, none, none)
@@ -129,7 +132,7 @@ class PoseModel:
 
 @dataclass(frozen=True, eq=False)
 class ResponseModel:
-    """Predicts every pose at estimation coordinates x (p,); what `parameters` do not hold stays at the value of `robot`.
+    """Predictor of every pose at estimation coordinates x (p,); values that are not `parameters` are those of `robot`.
 
     The linearisation point is the measured mean motor position; the rest position of the arm follows the parameters. The delay of
     an axis acts on its torque: column j of G is multiplied by exp(-jω τ_j). Gaps count as closed and drives as linear until
@@ -144,7 +147,7 @@ class ResponseModel:
     def of(
         cls, robot: RobotModel, responses: Sequence[FrequencyResponse], parameters: Parameters
     ) -> ResponseModel:
-        """For the poses and lines of measured responses; hardening is a parameter's or none."""
+        """Model for the poses and lines of measured responses, with or without hardening as parameters."""
         robot = replace(robot, springs=replace(robot.springs, hardening=np.zeros(robot.n)))
         labels = pose_labels(responses)
         own = {
@@ -203,7 +206,7 @@ class ResponseModel:
         return cls(robot, parameters, tuple(poses))
 
     def with_loaded_drives(self, x: np.ndarray, plan: MultisinePlan) -> ResponseModel:
-        """Gaps stand open and drives harden as the plan's torques have it at the coordinates x (p,)."""
+        """Model with gaps and hardening under the plan's torques at the coordinates x (p,)."""
         natural = self.parameters.natural(x)
         poses = []
         for pose in self.poses:

@@ -1,4 +1,4 @@
-"""From predicted and measured frequency responses to a whitened real residual (Eqs. 26, 27)."""
+"""Whitened real residual of predicted and measured frequency responses (Eqs. 26, 27)."""
 
 from __future__ import annotations
 
@@ -12,19 +12,20 @@ from flexcal.elasticity.response_model.weighting import Weighting
 from flexcal.frequency.periodic import FrequencyResponse, vec
 
 LOGARITHM_LIMIT = 0.1
-"""Largest relative standard deviation of an element whose logarithm is compared; near a zero log Ĝ is biased."""
+"""Largest relative standard deviation of an element for a logarithmic error; near a zero log Ĝ is biased."""
 
 LOGARITHM_CURVATURE = 0.3
-"""Largest second-order term of a logarithm, Δ²/2 at one standard deviation, relative to how well the element is known beside the others:
-what a sensor reads is known from the motors to a thousandth though friction scatters both by a twentieth."""
+"""Largest second-order term of a logarithm, Δ²/2 at one standard deviation, relative to the conditional accuracy of the element given
+the others: a sensor's reading may be known from the motors to a thousandth though friction scatters both by a twentieth.
+"""
 
 CLUSTER_LINES = 4
-"""Neighbouring lines of one pose that make one cluster of the sandwich covariance."""
+"""Neighbouring lines of one pose in one cluster of the sandwich covariance."""
 
 
 @dataclass(frozen=True, eq=False)
 class PoseResidual:
-    """Measured response of one pose (L lines, m outputs: n axes, then sensors), prepared.
+    """Residual of the measured response of one pose (L lines, m outputs: n axes, then sensors).
 
     `logarithmic` (L, m, n) tells the elements whose error is log(Ĝ/G); the error of the others is (Ĝ - G)/`scale`, with scale
     √|Ĝ_ii Ĝ_jj| so that a coupling near zero counts as what it is beside its axes, and for a sensor the size of its row. `factor`
@@ -39,7 +40,7 @@ class PoseResidual:
 
     @classmethod
     def of(cls, response: FrequencyResponse, weighting: Weighting) -> PoseResidual:
-        """Choose logarithmic or linear errors by their standard deviation, and weigh them."""
+        """Residual with logarithmic or linear errors chosen by their standard deviation, and weighted."""
         measured = response.stacked
         scale = element_scale(measured)
         relative = response.stacked_std / np.maximum(np.abs(measured), np.finfo(float).tiny)
@@ -51,7 +52,7 @@ class PoseResidual:
         return cls(measured, logarithmic, scale, _factor(response, weighting, measured, scale, logarithmic))
 
     def errors(self, predicted: np.ndarray) -> np.ndarray:
-        """Complex errors Δ (L, m, n): the phase of a logarithm is in (-π, π] because it is that of the ratio."""
+        """Complex errors Δ (L, m, n); the phase of a logarithm is in (-π, π] as it is that of the ratio."""
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.log(np.where(self.logarithmic, self.measured / predicted, 1.0))
         return np.where(self.logarithmic, ratio, (self.measured - predicted) / self.scale)
@@ -71,7 +72,7 @@ class PoseResidual:
 
 @dataclass(frozen=True, eq=False)
 class ResponseResidual:
-    """The residual of all poses as a function of the estimation coordinates."""
+    """Residual of all poses as a function of the estimation coordinates."""
 
     model: ResponseModel
     poses: tuple[PoseResidual, ...]
@@ -80,11 +81,11 @@ class ResponseResidual:
     def of(
         cls, model: ResponseModel, responses: Sequence[FrequencyResponse], weighting: Weighting
     ) -> ResponseResidual:
-        """For measured responses, in the order of the model's poses."""
+        """Residual for measured responses, in the order of the model's poses."""
         return cls(model, tuple(PoseResidual.of(response, weighting) for response in responses))
 
     def shifted(self, model: ResponseModel, shifts: Sequence[np.ndarray]) -> ResponseResidual:
-        """The same measurements against `model`, with known changes (L, m, n) added to what it predicts in every pose."""
+        """Residual against `model`, with known changes (L, m, n) added to its prediction in every pose."""
         poses = [replace(pose, shift=shift) for pose, shift in zip(self.poses, shifts, strict=True)]
         return ResponseResidual(model, tuple(poses))
 
@@ -116,7 +117,7 @@ class ResponseResidual:
 
 
 def element_scale(stacked: np.ndarray) -> np.ndarray:
-    """Size (L, m, n) to which an element of a response (L, m, n) compares: √|G_ii G_jj| of the n axes, that of its row of a sensor."""
+    """Reference size (L, m, n) of each element of a response (L, m, n): √|G_ii G_jj| of the n axes; for a sensor the size of its row."""
     axes = stacked.shape[2]
     diagonal = np.abs(np.diagonal(stacked[:, :axes], axis1=1, axis2=2))
     scale = np.sqrt(diagonal[:, :, None] * diagonal[:, None, :])
@@ -139,6 +140,6 @@ def _factor(
 
 
 def _real(white: np.ndarray) -> np.ndarray:
-    """(L, k, c) complex of unit variance to (2 L k, c) real of unit variance: √2 times real and imaginary part of each line."""
+    """Real rows (2 L k, c) of unit variance from complex (L, k, c): √2 times real and imaginary part of each line."""
     both = np.sqrt(2.0) * np.concatenate([np.real(white), np.imag(white)], axis=1)
     return both.reshape(-1, white.shape[-1])

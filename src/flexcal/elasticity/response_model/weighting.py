@@ -11,7 +11,7 @@ from flexcal.frequency.periodic import FrequencyResponse, vec
 
 
 class Weighting(Protocol):
-    """Turns the covariance of the errors of one pose into a factor of the weight."""
+    """Interface from the covariance of the errors of one pose to a factor of the weight."""
 
     def factor(self, response: FrequencyResponse, covariance: np.ndarray) -> np.ndarray:
         """F (L, m n, m n) with the cost Σ ‖F Δ‖² over complex errors Δ of vec G (column-major) of `covariance` (L, m n, m n), for the m
@@ -21,7 +21,7 @@ class Weighting(Protocol):
 
 @dataclass(frozen=True)
 class CovarianceWeighting:
-    """The inverse of the measured covariance, by its Cholesky factor: the default, and maximum likelihood where it is right."""
+    """Inverse of the measured covariance, by its Cholesky factor: the default, and maximum likelihood if the covariance is correct."""
 
     def factor(self, response: FrequencyResponse, covariance: np.ndarray) -> np.ndarray:
         std = np.sqrt(np.real(np.diagonal(covariance, axis1=1, axis2=2)))
@@ -68,7 +68,7 @@ class ResonanceWeighting:
 
 
 def extrema(curve: np.ndarray, prominence: float) -> list[int]:
-    """Positions of the alternating maxima and minima of `curve` (L,) that differ by more than `prominence` from one to the next."""
+    """Indices of the alternating maxima and minima of `curve` (L,) that differ by more than `prominence` from one to the next."""
     positions: list[int] = []
     low = high = 0
     rising: bool | None = None

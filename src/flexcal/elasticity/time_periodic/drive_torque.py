@@ -1,4 +1,4 @@
-"""The torque that drives carry in a frequency experiment, and how gaps and hardening change their stiffness by it."""
+"""Drive torques in a frequency experiment, and the resulting change of stiffness by gaps and hardening."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ from flexcal.model.statics import REFERENCE_TWIST, tangent_ratio, twist_by_harde
 from flexcal.model.vibration import ElasticArm, linearise, multisine_torque
 
 PHASES = 64
-"""Instants of the reference motion at which the torque is looked at."""
+"""Number of instants of the reference motion at which the torque is evaluated."""
 
 
 @dataclass(frozen=True, eq=False)
 class HardenedStiffness:
-    """Stiffness over that at no load along the reference motion, `ratio` (phases, E), and its derivatives by the hardening and by the
-    logarithm of the stiffness."""
+    """Stiffness along the reference motion relative to that at no load, `ratio` (phases, E), and its derivatives by the hardening and by
+    the logarithm of the stiffness.
+    """
 
     ratio: np.ndarray
     by_hardening: np.ndarray
@@ -37,7 +38,7 @@ class DriveTorque:
 
     @classmethod
     def of(cls, robot: RobotModel, q: np.ndarray, payload: float | None, plan: MultisinePlan) -> DriveTorque:
-        """For the mean motor position `q` (n,) rad and `payload` in kg."""
+        """Torque at the mean motor position `q` (n,) rad and `payload` in kg."""
         import pinocchio as pin
 
         arm = ElasticArm(robot, payload)
@@ -52,7 +53,7 @@ class DriveTorque:
         return cls(slow, size, np.array([joint.stiffness[2] for joint in robot.driven]))
 
     def backlash_compliance(self) -> np.ndarray:
-        """What a gap adds to the compliance of each drive along the reference motion, relative, per rad of half gap, (phases, E).
+        """Added compliance of each drive due to a gap along the reference motion, relative, per rad of half gap, (phases, E).
 
         A gap ± b twists by b sgn(torque), whose equivalent gain for a Gaussian torque is 2 b times the density of the torque at zero
         (Bussgang 1952), in series with the spring's 1/k.
@@ -61,7 +62,7 @@ class DriveTorque:
         return 2 * self.stiffness * density
 
     def hardened(self, stiffness: np.ndarray, hardening: np.ndarray) -> HardenedStiffness:
-        """Drives of some `stiffness` (E,) N m/rad at no load and `hardening` (E,) along the reference motion.
+        """Stiffness of drives of `stiffness` (E,) N m/rad at no load and `hardening` (E,) along the reference motion.
 
         The torque k θ (1 + h (θ/θ₁)²) of a twist with the mean θ̄ and Gaussian about it, 1σ s, has the equivalent stiffness
         k (1 + 3 h (θ̄² + s²)/θ₁²) (Bussgang 1952); θ̄ is the twist under the slow torque.

@@ -17,10 +17,10 @@ from flexcal.elasticity.time_periodic.sidebands import Sidebands
 from flexcal.model.vibration import Linearisation
 
 SIDEBANDS = 16
-"""Even multiples of the reference frequency that are balanced on either side of the excited line."""
+"""Number of even multiples of the reference frequency balanced on either side of the excited line."""
 
 WIDTH_PASSES = 3
-"""Passes in which the width of the pulses follows the motion that they damp."""
+"""Number of passes in which the width of the pulses is updated by the motion that they damp."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ class FrictionPulses:
     def of(
         cls, system: Linearisation, frequencies_hz: np.ndarray, motion: ReferenceMotion, strength: np.ndarray
     ) -> FrictionPulses:
-        """For lines (L,) Hz of a system whose viscous coefficients include `strength`."""
+        """Pulses for lines (L,) Hz of a system whose viscous coefficients include `strength`."""
         count = system.inputs
         omega = 2 * np.pi * motion.frequency_hz
         orders = 2 * np.arange(-SIDEBANDS, SIDEBANDS + 1)
@@ -64,7 +64,7 @@ class FrictionPulses:
         return pulses
 
     def coefficients(self) -> np.ndarray:
-        """N m s/rad (k, l, E) by which the velocity at order l makes torque at order k, the mean left out."""
+        """Coefficients, N m s/rad (k, l, E), of the torque at order k due to the velocity at order l, the mean excluded."""
         orders = self.sidebands.orders
         apart = orders[:, None] - orders[None, :]
         decay = np.exp(-0.5 * (apart[:, :, None] * self.omega * self.width) ** 2)

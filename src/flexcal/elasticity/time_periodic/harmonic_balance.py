@@ -1,4 +1,4 @@
-"""The frequency response of the robot along its slow motion: the arm's inertia changes, and gaps open at their phase.
+"""Frequency response along the slow reference motion, by harmonic balance: the arm's inertia changes, and gaps open in phase with it.
 
 About a periodic motion the linearised robot is linear time-periodic, M(t) δ̈ + D(t) δ̇ + K(t) δ = B τ. Its response at the excited
 frequency, by harmonic balance with the sidebands (Wereley 1990), differs from that at rest: resonances that wander are blunted, which a
@@ -19,13 +19,13 @@ from flexcal.model.robot import ArmSensor, RobotModel
 from flexcal.model.vibration import ElasticArm, drive_stretch, linearise, transfer_matrix
 
 ARM_SIDEBANDS, GAP_SIDEBANDS = 2, 6
-"""Multiples of the reference frequency that are balanced on either side of the excited line, without and with open gaps."""
+"""Multiples of the reference frequency balanced on either side of the excited line, without and with open gaps."""
 
 ARM_PHASES = 8
-"""Instants of the reference motion at which the arm's matrices are taken."""
+"""Number of instants of the reference motion at which the arm's matrices are evaluated."""
 
 ARM_HARMONICS = 2
-"""Highest harmonic of the arm's matrices: the next is an amplitude (rad) smaller."""
+"""Highest harmonic of the arm's matrices: the next is smaller by a factor of the amplitude (rad)."""
 
 
 def reference_shift(
@@ -37,7 +37,8 @@ def reference_shift(
     opening: np.ndarray | None = None,
     sensors: Sequence[ArmSensor] = (),
 ) -> np.ndarray:
-    """G under the reference motion less G at rest, (L, E + S, E), for motors about `q` (n,) with `payload` kg and `sensors` on the arm.
+    """Difference of G under the reference motion from G at rest, (L, E + S, E), for motors about `q` (n,) with `payload` kg and
+    `sensors` on the arm.
 
     Rows are rad/s² per N m, then the sensors' readings.
 
@@ -107,7 +108,7 @@ def _arm_changes(
 
 
 def _arm_matrices(arm: ElasticArm, state: ArmState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """M, ∂τ/∂q̇ and ∂τ/∂q (d, d) of the elastic coordinates in one state, springs left out."""
+    """Matrices M, ∂τ/∂q̇ and ∂τ/∂q (d, d) of the elastic coordinates in one state, springs excluded."""
     import pinocchio as pin
 
     by_q, by_v, _ = pin.computeRNEADerivatives(

@@ -1,4 +1,4 @@
-"""Readings of sensors on an arm that follows the slow reference motion: what they see of a displacement changes along it."""
+"""Readings of sensors on an arm in slow reference motion, whose output matrices change along it."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from flexcal.model.robot import ArmSensor
 from flexcal.model.vibration import ElasticArm, sensor_frame
 
 HARMONICS = 2
-"""Highest harmonic of the motion of a sensor: the next is an amplitude (rad) smaller."""
+"""Highest harmonic of the motion of a sensor: the next is smaller by a factor of the amplitude (rad)."""
 
 
 @dataclass(frozen=True, eq=False)
 class MovingSensor:
-    """Fourier coefficients over one cycle of the reference motion, from order -`HARMONICS`.
+    """Fourier coefficients of a sensor's output over one cycle of the reference motion, from order -`HARMONICS`.
 
     `columns` (orders, d, 3) are the displacements of the sensor's point by the elastic coordinates, `direction` (orders, 3) is that in
     which it measures, `tilt` (orders, d) what it reads by turning: of an accelerometer, the acceleration of its point less gravity times
@@ -31,7 +31,7 @@ class MovingSensor:
     def of(
         cls, arm: ElasticArm, sensor: ArmSensor, configurations: list[np.ndarray], frequency_hz: float
     ) -> MovingSensor:
-        """From the configurations (nq,) at equal instants of a cycle of the motion of `frequency_hz`."""
+        """Sensor for configurations (nq,) at equally spaced instants of a cycle of the motion of `frequency_hz`."""
         frames = [sensor_frame(arm, at, sensor) for at in configurations]
         point, direction, columns, turned = (np.array(part) for part in zip(*frames, strict=True))
         tilt = np.zeros(turned.shape[:2])
@@ -49,7 +49,7 @@ class MovingSensor:
         )
 
     def reading(self, moved: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """Reading (L, E) at the line of elastic coordinates that move by `moved` (L, bands, d, E) at the sidebands `s` (L, bands)."""
+        """Reading (L, E) at the line due to elastic coordinates displaced by `moved` (L, bands, d, E) at the sidebands `s` (L, bands)."""
         bands = s.shape[1]
         middle = bands // 2
         near = np.arange(max(0, middle - HARMONICS), min(bands, middle + HARMONICS + 1))
@@ -65,7 +65,7 @@ class MovingSensor:
 
 
 def harmonics(sampled: np.ndarray, highest: int) -> np.ndarray:
-    """Fourier coefficients (2 highest + 1, ...) over one cycle of what is `sampled` (phases, ...), from order -highest."""
+    """Fourier coefficients (2 highest + 1, ...) over one cycle of samples `sampled` (phases, ...), from order -highest."""
     angles = 2 * np.pi * np.arange(len(sampled)) / len(sampled)
     turn = np.exp(-1j * np.outer(np.arange(-highest, highest + 1), angles)) / len(sampled)
     return np.tensordot(turn, sampled, axes=1)

@@ -1,4 +1,4 @@
-"""The slow reference motion under the excitation."""
+"""Slow reference motion under the excitation."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class ArmState:
 
 @dataclass(frozen=True)
 class ReferenceMotion:
-    """All excited axes move by amplitude · sin(2π frequency_hz t), `amplitude` in rad, held by a controller of gains `kp`, `kd` (E,).
+    """Reference motion amplitude · sin(2π frequency_hz t) of all excited axes, `amplitude` in rad, with controller gains `kp`, `kd` (E,).
 
     `excitation` (E, L) N m are the cosine amplitudes of the multisine in each orthogonal experiment's share of an axis. At the
     sidebands the controller's torque belongs to the system; at the excited line it is part of the measured torque.
@@ -38,13 +38,13 @@ class ReferenceMotion:
 
     @classmethod
     def of(cls, plan: MultisinePlan) -> ReferenceMotion:
-        """The reference motion of a plan."""
+        """Reference motion of a plan."""
         axes = list(plan.joints)
         share = plan.amplitude / np.sqrt(len(axes))
         return cls(plan.reference_amplitude, plan.reference_frequency_hz, plan.kp[axes], plan.kd[axes], share)
 
     def states(self, robot: RobotModel, arm: ElasticArm, q: np.ndarray, phases: int) -> Iterator[ArmState]:
-        """The arm at `phases` instants of a cycle, following its motors rigidly about rest at `q` (n,) rad."""
+        """Arm states at `phases` instants of a cycle, following its motors rigidly about rest at `q` (n,) rad."""
         rest = static_equilibrium(robot, q, arm.payload)
         still = arm.configuration(np.asarray(q, dtype=float), rest.deflection[0])
         axes = arm.joint_velocity[[joint.index for joint in robot.driven]]

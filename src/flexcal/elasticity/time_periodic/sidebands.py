@@ -1,4 +1,4 @@
-"""The linearised robot at an excited line and at multiples of the reference frequency beside it, for harmonic balance (Wereley 1990)."""
+"""Linearised robot at an excited line and its sidebands at multiples of the reference frequency, for harmonic balance (Wereley 1990)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from flexcal.model.vibration import Linearisation
 
 @dataclass(frozen=True, eq=False)
 class Sidebands:
-    """Lines (L,) at the orders (k,) of the reference frequency Ω about each, position loop closed.
+    """Response at lines (L,) and orders (k,) of the reference frequency Ω about each, position loop closed.
 
     `s` (L, k) is the Laplace variable, `dynamics` (L, k, d, d) is M s² + D s + K with the controller, whose impedance at the line itself is
     `loop` (L, E, E) N m s/rad.
@@ -27,7 +27,7 @@ class Sidebands:
     def of(
         cls, system: Linearisation, frequencies_hz: np.ndarray, motion: ReferenceMotion, orders: np.ndarray
     ) -> Sidebands:
-        """`orders` (k,) are symmetric about 0."""
+        """Sidebands of `orders` (k,), symmetric about 0."""
         motors = range(system.inputs)
         s = 2j * np.pi * (frequencies_hz[:, None] + orders * motion.frequency_hz)
         at = s[:, :, None, None]
