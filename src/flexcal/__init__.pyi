@@ -1,4 +1,3 @@
-from .calibration.accuracy import repeatability
 from .calibration.fit import fit_geometry
 from .calibration.measurement import rigid_motion
 from .calibration.verification import prediction_errors
@@ -27,7 +26,16 @@ from .estimation import Estimate
 from .export import export_mjcf, export_urdf
 from .files.formats import read_yaml
 from .frequency.periodic import FrequencyResponse, frequency_response, frequency_responses
-from .jobs.accuracy import AccuracyMap, Verification, accuracy_map, verify
+from .jobs.accuracy import (
+    AccuracyMap,
+    Certificate,
+    Repeatability,
+    Verification,
+    accuracy_map,
+    certify,
+    repeatability,
+    verify,
+)
 from .jobs.calibration import Calibration, calibrate
 from .jobs.deployment import Compensation, Prediction, compensate, predict
 from .jobs.dynamics import DynamicsIdentification, identify_dynamics
@@ -71,6 +79,7 @@ __all__ = [
     "CalibratedRobot",
     "Calibration",
     "CellConfig",
+    "Certificate",
     "Compensation",
     "DesignedFrequency",
     "DesignedNextPoses",
@@ -95,6 +104,7 @@ __all__ = [
     "PowerModel",
     "Prediction",
     "Recording",
+    "Repeatability",
     "RobotModel",
     "StiffnessIdentification",
     "ToolTargets",
@@ -104,6 +114,7 @@ __all__ = [
     "VirtualCell",
     "accuracy_map",
     "calibrate",
+    "certify",
     "compensate",
     "design_frequency",
     "design_next_poses",

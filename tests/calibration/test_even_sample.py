@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexcal.calibration.accuracy import repeatability
+from flexcal.calibration.accuracy import visit_statistics
 from flexcal.calibration.accuracy.pose_repeatability import SAME_COMMAND
 from flexcal.calibration.fit import StratifiedSample
 from flexcal.data.poses import PoseSet
@@ -76,7 +76,7 @@ def test_commands_are_told_as_by_comparing_each_with_all_before() -> None:
             leaders.append(row)
         label[row] = alike[0] if alike else len(leaders) - 1
     expected = [np.flatnonzero(label == k) for k in range(len(leaders))]
-    found = repeatability(poses_of(q, np.arange(600)))
+    found = visit_statistics(poses_of(q, np.arange(600)))
     assert [pose.rows.tolist() for pose in found] == [rows.tolist() for rows in expected if len(rows) > 1]
 
 

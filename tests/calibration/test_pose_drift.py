@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.calibration.accuracy import PoseDrift, common_displacement, pose_drifts, repeatability
+from flexcal.calibration.accuracy import PoseDrift, common_displacement, pose_drifts, visit_statistics
 from flexcal.data.poses import PoseSet
 
 MM = 1e-3
@@ -27,7 +27,7 @@ def visits(points: np.ndarray, time: np.ndarray | None) -> PoseSet:
 
 def drifts(points: np.ndarray, time: np.ndarray | None) -> list[PoseDrift]:
     poses = visits(points, time)
-    return pose_drifts(poses, repeatability(poses))
+    return pose_drifts(poses, visit_statistics(poses))
 
 
 def test_a_pose_that_goes_sideways_and_repeats_worse() -> None:
@@ -83,7 +83,7 @@ def test_chance_is_as_often_as_it_says() -> None:
     points = 1e-5 * rng.normal(size=(23, 2000, 3)) @ mixed.T
     poses = visits(points, np.arange(23 * 2000.0))
     rows = np.arange(23 * 2000).reshape(23, 2000).T
-    pattern = repeatability(poses.subset(rows[0]))[0]
+    pattern = visit_statistics(poses.subset(rows[0]))[0]
     chances = np.array([d.chance for d in pose_drifts(poses, [replace(pattern, rows=own) for own in rows])])
     for level in (0.05, 0.3, 0.7):
         spread = np.sqrt(level * (1 - level) / 2000)

@@ -1,6 +1,7 @@
 """The verbs on objects: a script does what the command line does, without robot.yaml's estimates, and gets the same."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from flexcal import (
     TrajectoryRequest,
     accuracy_map,
     calibrate,
+    certify,
     compensate,
     design_frequency,
     design_next_poses,
@@ -26,9 +28,11 @@ from flexcal import (
     frequency_plan,
     predict,
     read_poses,
+    repeatability,
     verify,
 )
-from flexcal.jobs.accuracy import map_accuracy, verify_robot
+from flexcal.data.poses import write_poses, write_targets
+from flexcal.jobs.accuracy import certify_robot, map_accuracy, robot_repeatability, verify_robot
 from flexcal.jobs.calibration import calibrate_robot
 
 TERMS = ("kinematic", "gravity_compliance")
@@ -139,6 +143,57 @@ def test_map_is_that_of_the_command_line(
     np.testing.assert_allclose(found.predicted.p95, stored.predicted.p95, rtol=1e-9)
     inside = (found.predicted.position >= box[0]) & (found.predicted.position <= box[1])
     assert inside.all()
+
+
+def test_repeatability_is_that_of_the_command_line(
+    calibration: Calibration, nominal: RobotModel, unseen: PoseSet, ur5: Path, tmp_path: Path
+) -> None:
+    rows = np.tile(np.arange(len(unseen)), 3)
+    visits = unseen.subset(rows)
+    noise = 2e-5 * np.random.default_rng(0).standard_normal((len(rows), 3))
+    write_poses(tmp_path / "visits.csv", replace(visits, position=visits.position + noise))
+    calibration.write(tmp_path / "fit")
+    stored = robot_repeatability(
+        ur5 / "robot.yaml", [tmp_path / "visits.csv"], estimates=tmp_path / "fit", out=tmp_path / "out"
+    )
+    poses = read_poses(tmp_path / "visits.csv", nominal, require_motion=False)
+    found = repeatability(nominal, poses, calibrated=calibration.robot)
+    assert repr(numbers(found.document())) == repr(numbers(stored.document()))
+    assert {"nominal", "calibrated"} == set(found.errors) and "RP" in repr(found)
+    found.write(tmp_path / "again")
+    for folder in ("out", "again"):
+        assert {file.name for file in (tmp_path / folder).iterdir()} == {"results.json", "report.html"}
+    assert repeatability(nominal, poses).errors.keys() == {"nominal"}
+
+
+def test_certificate_is_that_of_the_command_line(
+    calibration: Calibration, nominal: RobotModel, unseen: PoseSet, ur5: Path, tmp_path: Path
+) -> None:
+    targets = ToolTargets(pose=unseen.pose, target=unseen.target, q=unseen.q)
+    commands = compensate(calibration.robot, targets).commands
+    assert commands.q is not None
+    shift = predict(calibration.robot, ToolTargets(unseen.pose, unseen.target, q=commands.q)).beside
+    write_targets(tmp_path / "targets.csv", targets)
+    write_poses(tmp_path / "after.csv", replace(unseen, q=commands.q, position=unseen.position - shift))
+    calibration.write(tmp_path / "fit")
+    stored = certify_robot(
+        ur5 / "robot.yaml",
+        tmp_path / "targets.csv",
+        ur5 / "random.csv",
+        tmp_path / "after.csv",
+        tmp_path / "stored.html",
+        estimates=tmp_path / "fit",
+    )
+    after = read_poses(tmp_path / "after.csv", nominal)
+    certificate = certify(calibration.robot, targets, unseen, after)
+    document = certificate.document()
+    assert document["files"] == {} and len(stored.document()["files"]) == 6
+    for key in ("before", "after", "after_refitted", "rms_mm", "targets"):
+        assert repr(document[key]) == repr(stored.document()[key]), key
+    page = certificate.report(tmp_path / "page.html", operator="A. Meier").read_text("utf-8")
+    assert "<td>A. Meier</td>" in page and "AP at 20 targets" in repr(certificate)
+    with refused("E-RUN-003", "before", "after"):
+        certify(calibration.robot, targets, after, unseen)
 
 
 def test_every_result_shows_itself(calibration: Calibration, unseen: PoseSet, tmp_path: Path) -> None:

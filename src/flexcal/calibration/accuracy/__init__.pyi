@@ -1,5 +1,5 @@
 from .pose_drift import VISITS_PER_SET, PoseDrift, common_displacement, pose_drifts
-from .pose_repeatability import CYCLES, PoseRepeatability, noise_repeatability, repeatability
+from .pose_repeatability import CYCLES, PoseRepeatability, noise_repeatability, visit_statistics
 from .source_contributions import error_sources
 from .working_volume import PredictedAccuracy, predicted_accuracy, random_poses_in
 
@@ -15,5 +15,5 @@ __all__ = [
     "pose_drifts",
     "predicted_accuracy",
     "random_poses_in",
-    "repeatability",
+    "visit_statistics",
 ]

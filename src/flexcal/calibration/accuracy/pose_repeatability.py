@@ -41,37 +41,11 @@ class PoseRepeatability:
         return float(np.linalg.norm(errors[self.rows].mean(axis=0)))
 
 
-def repeatability(poses: PoseSet) -> list[PoseRepeatability]:
-    """Pose repeatability (ISO 9283:1998, 7.2) of the poses that were visited twice or more.
+def visit_statistics(poses: PoseSet) -> list[PoseRepeatability]:
+    """Pose repeatability (ISO 9283:1998, 7.2) of the poses that were visited twice or more, in the order of their first visits.
 
-    Rows belong to one pose where joint positions, target, station and payload are the same, whatever number they have.
-
-    Parameters
-    ----------
-    poses : PoseSet
-        Measured points, with repeated visits.
-
-    Returns
-    -------
-    list of PoseRepeatability
-        In the order of the poses' first visits; `repeatability` is RP in m, `rows` are the rows of the visits.
-
-    Raises
-    ------
-    FlexcalError
-        For measured lengths, and where no pose was visited twice.
-
-    Examples
-    --------
-    Three visits to each of two poses of the virtual cell:
-
-    >>> import numpy as np
-    >>> from flexcal import PosePlan, RobotModel, VirtualCell, repeatability
-    >>> cell = VirtualCell(RobotModel.from_yaml("examples/tx90l/robot.yaml", estimates=False))
-    >>> q = np.array([[0, -0.5, 1.6, 0, 0.6, 0], [0.5, 0.2, 1.4, 0.3, 0.8, 0]])
-    >>> visited = repeatability(cell.measure(PosePlan(q=np.tile(q, (3, 1)))))
-    >>> [pose.rows.tolist() for pose in visited]
-    [[0, 2, 4], [1, 3, 5]]
+    Rows belong to one pose where joint positions, target, station and payload are the same, whatever number they have. Raises
+    `FlexcalError` for measured lengths, and where no pose was visited twice.
     """
     if poses.length is not None:
         raise FlexcalError(

@@ -37,12 +37,12 @@ class Repeatability:
     def run(self) -> None:
         """Evaluate the visits, and print AP and RP."""
         from flexcal.cli.tables.results import repeatability_table
-        from flexcal.jobs.accuracy import repeat_robot
+        from flexcal.jobs.accuracy import robot_repeatability
 
         require_robot_and_files(self.robot, self.poses, "POSES")
         console = Console(self.json)
         with console.progress() as progress:
-            document = repeat_robot(
+            document = robot_repeatability(
                 self.robot,
                 self.poses,
                 estimates=self.estimates,

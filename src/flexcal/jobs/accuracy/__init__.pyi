@@ -1,15 +1,19 @@
-from .certificate import certify_robot
-from .repeatability import repeat_robot
+from .certificate import Certificate, certify, certify_robot
+from .repeated_visits import Repeatability, repeatability, robot_repeatability
 from .verification import Verification, verify, verify_robot
 from .volume_map import AccuracyMap, accuracy_map, map_accuracy
 
 __all__ = [
     "AccuracyMap",
+    "Certificate",
+    "Repeatability",
     "Verification",
     "accuracy_map",
+    "certify",
     "certify_robot",
     "map_accuracy",
-    "repeat_robot",
+    "repeatability",
+    "robot_repeatability",
     "verify",
     "verify_robot",
 ]

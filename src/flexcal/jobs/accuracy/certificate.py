@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from datetime import date
 from importlib.metadata import version
 from pathlib import Path
@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration.accuracy import PoseRepeatability, repeatability
+from flexcal.calibration.accuracy import PoseRepeatability, visit_statistics
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.fit import StratifiedSample
+from flexcal.calibration.measurement import require_points
 from flexcal.calibration.verification import (
     ErrorCovariance,
     ErrorScale,
@@ -30,9 +31,10 @@ from flexcal.compensation import desired_pose
 from flexcal.data.poses import PoseSet, ToolTargets, read_targets
 from flexcal.errors import InputError
 from flexcal.files.formats import sha256_of
-from flexcal.jobs.accuracy.verification import verification_poses
+from flexcal.jobs.accuracy.verification import require_stations, verification_poses
 from flexcal.jobs.calibration import fitted_files, fitted_points
 from flexcal.jobs.inputs import CalibratedRobot, unmeasured_targets_remark
+from flexcal.jobs.pages import Result
 from flexcal.model.parts import vector_rotation
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import carried_mass, points_kinematics
@@ -78,27 +80,95 @@ class MeasuredTargets:
         return {"measurements": len(self.poses), "ap": self.accuracy.in_millimetres(), "rp": repeated}
 
 
-@dataclass(frozen=True, eq=False)
-class RobotCertificate:
-    """Errors before and after at the same targets; `refitted`: after, with instrument and point registered by best fit, as before.
+@dataclass(frozen=True, eq=False, repr=False)
+class Certificate(Result):
+    """Result of `certify`: pose accuracy at the same targets before and after compensation.
 
-    `before` are the robot's own errors, `declared` and `registered` the others of `UncalibratedRobot`. `verification` and `scale`: the
-    measurements after against what the calibration predicts, of a `sample` where there are very many. `command`: the command line.
+    Attributes
+    ----------
+    model : RobotModel
+        The calibrated robot.
+    before : MeasuredTargets
+        Before: the robot's own errors, with instrument and measured point registered by best fit; `accuracy` is AP.
+    after : MeasuredTargets
+        After, in the frame of the calibration.
+    declared : MeasuredTargets or None
+        Before, with instrument and point as robot.yaml declares them; None where it does not say enough.
+    registered : MeasuredTargets
+        Before, with the instrument alone registered by best fit.
+    refitted : MeasuredTargets
+        After, with instrument and point registered by best fit, as `before`.
+    unmatched_targets : int
+        Number of targets that were measured only before or only after.
+    verification : PredictionErrors
+        Errors of the calibrated robot at the points measured after.
+    scale : ErrorScale
+        Ratio of these to what the calibration predicts.
+    sample : StratifiedSample or None
+        Which of very many points these two are of.
+    uncalibrated : tuple of str
+        Remarks on points that the calibration did not measure.
+    fitted : tuple of str
+        Files or points among those after that the calibration was made from.
+    files : mapping of str
+        SHA-256 of the files by what they are, where the result was made from files.
+    command : str
+        Command line, where there was one.
     """
 
-    robot: CalibratedRobot
-    declared: MeasuredTargets | None
-    registered: MeasuredTargets
     before: MeasuredTargets
     after: MeasuredTargets
+    declared: MeasuredTargets | None
+    registered: MeasuredTargets
     refitted: MeasuredTargets
     unmatched_targets: int
     verification: PredictionErrors
     scale: ErrorScale
     sample: StratifiedSample | None
-    files: Mapping[str, str]
+    uncalibrated: tuple[str, ...]
     fitted: tuple[str, ...]
+    files: Mapping[str, str] = field(default_factory=dict)
     command: str = ""
+
+    @property
+    def headline(self) -> str:
+        """Pose accuracy AP before and after."""
+        return f"AP at {len(self.after.numbers)} targets: before {self.before.accuracy}; after {self.after.accuracy}"
+
+    def summary(self) -> str:
+        """Pose accuracy before and after, remarks and verdict."""
+        return "\n".join([self.headline, *self.remarks, self.trust.sentence])
+
+    def report(
+        self,
+        path: str | Path,
+        *,
+        robot_serial: str = "",
+        instrument: str = "",
+        instrument_serial: str = "",
+        operator: str = "",
+        date: str = "",
+    ) -> Path:
+        """Write the certificate as one HTML page, two sheets of A4.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write.
+        robot_serial, instrument, instrument_serial, operator, date : str
+            Particulars of the measurement; each that is empty is a line to fill in by hand.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
+        path = Path(path)
+        details = MeasurementDetails(robot_serial, instrument, instrument_serial, operator, date)
+        write_certificate(
+            path, CertificateStudy(self.document(), self.before.centres, self.after.centres, details)
+        )
+        return path
 
     @property
     def rms(self) -> dict[str, float]:
@@ -115,8 +185,8 @@ class RobotCertificate:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Remarks, one sentence each."""
-        remarks = list(unmeasured_targets_remark(self.robot, self.after.poses.targets))
+        """One sentence each."""
+        remarks = list(self.uncalibrated)
         if self.unmatched_targets:
             remarks.append(
                 f"targets that were measured only before or only after are not compared: {self.unmatched_targets}"
@@ -148,17 +218,18 @@ class RobotCertificate:
             s.poses.temperature for s in (self.before, self.after) if s.poses.temperature is not None
         ]
         every = np.concatenate(temperature) if temperature else None
-        model = self.robot.model
         poses = self.after.poses
         return {
-            "robot": model.name,
+            "robot": self.model.name,
             "date": date.today().isoformat(),
             "program": f"flexcal {version('flexcal')}",
             "targets": len(self.after.numbers),
             "points": list(poses.targets),
             "stations": list(poses.stations),
             "sigma_mm": float(np.median(poses.sigma)) / MILLIMETRE if poses.sigma_given else None,
-            "payload_kg": sorted({float(m) for m in carried_mass(model, poses.payload, len(poses)).round(3)}),
+            "payload_kg": sorted(
+                {float(m) for m in carried_mass(self.model, poses.payload, len(poses)).round(3)}
+            ),
             "temperature": None if every is None else [float(every.min()), float(every.max())],
             "before": self.before.block()
             | {
@@ -177,6 +248,62 @@ class RobotCertificate:
         }
 
 
+def certify(
+    robot: CalibratedRobot,
+    targets: ToolTargets,
+    before: PoseSet,
+    after: PoseSet,
+    *,
+    progress: Progress = silent,
+) -> Certificate:
+    """Compare measurements at nominal and at compensated commands with the targets of both.
+
+    Rows of `before` and `after` belong to the target of the same `pose` number. Before, instrument and measured point are registered
+    by best fit; after, they are where the calibration has them.
+
+    Parameters
+    ----------
+    robot : CalibratedRobot
+        `Calibration.robot`, or ``CalibratedRobot.from_yaml(path)``.
+    targets : ToolTargets
+        Targets that were given to `compensate`.
+    before : PoseSet
+        Points measured with the nominal commands.
+    after : PoseSet
+        Points measured with the compensated commands, outside the fit.
+    progress : Progress
+        Called with the stage and the share of it that is done.
+
+    Returns
+    -------
+    Certificate
+        Its `before` and `after`, `summary()`, and `report(path)`, the certificate.
+
+    Raises
+    ------
+    FlexcalError
+        Where fewer than four targets were measured before and after, a pose has no target, and where a station was not calibrated.
+
+    Examples
+    --------
+    Poses of a real UR5 at nominal commands, here before and after, as if nothing was compensated:
+
+    >>> from flexcal import RobotModel, ToolTargets, calibrate, certify, read_poses
+    >>> model = RobotModel.from_yaml("examples/ur5_tracker/robot.yaml", estimates=False)
+    >>> poses = read_poses("examples/ur5_tracker/grid.csv", model).subset(slice(None, None, 13))
+    >>> robot = calibrate(model, poses, terms=["kinematic"]).robot
+    >>> measured = read_poses("examples/ur5_tracker/random.csv", model)
+    >>> targets = ToolTargets(measured.pose, measured.target, q=measured.q)
+    >>> certificate = certify(robot, targets, before=measured, after=measured)
+    >>> len(certificate.before.numbers), certificate.trust.status
+    (20, 'bad')
+    """
+    for poses in (before, after):
+        require_points(poses)
+        require_stations(robot, poses)
+    return _compared(robot, targets, "the targets", {"before": before, "after": after}, progress)
+
+
 def certify_robot(
     robot_file: Path,
     targets: Path,
@@ -188,12 +315,10 @@ def certify_robot(
     particulars: MeasurementDetails = NOT_GIVEN,
     command: str = "",
     progress: Progress = silent,
-) -> RobotCertificate:
-    """Compare measurements at nominal and at compensated commands with the targets of both, and write the certificate to `out`.
+) -> Certificate:
+    """`certify` of the robot of a robot.yaml by files of targets and of measured poses; the certificate is written to `out`.
 
-    Rows of `before` and `after` belong to the target of the same `pose` number. Before, instrument and measured point are registered
-    by best fit; after, they are where the calibration has them. Raises `FlexcalError` where there is no calibration, files do
-    not fit, or fewer than four targets were measured before and after.
+    Raises `FlexcalError` where there is no calibration, files do not fit, and as `certify` does.
     """
     if out.suffix != ".html":
         raise InputError("E-RUN-001", f"{out} must end in .html; give another --out.")
@@ -204,28 +329,46 @@ def certify_robot(
         )
     calibrated = CalibratedRobot.from_yaml(robot_file, estimates)
     assert calibrated.stored is not None
-    model = calibrated.probable
     progress("reading", 0.0)
-    desired = read_targets(targets, model)
-    base, as_declared = (
-        desired_pose(model, nominal, desired).position
-        for nominal in (calibrated.with_points, calibrated.nominal)
-    )
-    sets = {file: verification_poses(calibrated, [file]) for file in (before, after)}
-    rows = {file: _rows(file, poses, targets, desired) for file, poses in sets.items()}
+    desired = read_targets(targets, calibrated.probable)
+    sets = {str(file): verification_poses(calibrated, [file]) for file in (before, after)}
     progress("reading", 1.0)
+    compared = _compared(calibrated, desired, str(targets), sets, progress)
+    files = _files(
+        [robot_file, calibrated.nominal.urdf],
+        {"estimates": calibrated.stored, "targets": targets, "before": before, "after": after},
+    )
+    fitted = fitted_files(calibrated, [after]) or compared.fitted
+    result = replace(compared, files=files, fitted=fitted, command=command)
+    result.report(out, **asdict(particulars))
+    return result
+
+
+def _compared(
+    robot: CalibratedRobot, desired: ToolTargets, origin: str, sets: dict[str, PoseSet], progress: Progress
+) -> Certificate:
+    """The targets, called `origin`, with the two `sets` of measured poses by their names: before, then after; `sets` is emptied."""
+    model, (first, last) = robot.probable, sets
     progress("comparing", 0.0)
+    base, as_declared = (
+        desired_pose(model, nominal, desired).position for nominal in (robot.with_points, robot.nominal)
+    )
+    rows = {file: _rows(file, poses, origin, desired) for file, poses in sets.items()}
     if desired.q is not None:
-        off = {file: np.abs(poses.q - desired.q[rows[file]]).max(axis=1) for file, poses in sets.items()}
-        if np.median(off[before]) > np.median(off[after]):
+        off = [
+            float(np.median(np.abs(poses.q - desired.q[rows[file]]).max(axis=1)))
+            for file, poses in sets.items()
+        ]
+        if off[0] > off[1]:
             raise InputError(
                 "E-RUN-003",
-                f"{before} was measured farther from the nominal commands in {targets} than {after}; are --before and --after swapped?",
+                f"{first} was measured farther from the nominal commands in {origin} than {last}; "
+                "are --before and --after swapped?",
             )
-    common = np.intersect1d(desired.pose[rows[before]], desired.pose[rows[after]])
-    every = np.union1d(desired.pose[rows[before]], desired.pose[rows[after]])
+    common = np.intersect1d(desired.pose[rows[first]], desired.pose[rows[last]])
+    every = np.union1d(desired.pose[rows[first]], desired.pose[rows[last]])
     visited = {}
-    for file in (before, after):
+    for file in (first, last):
         poses = sets.pop(file)
         kept = np.isin(desired.pose[rows[file]], common)
         points = base[rows[file][kept]]
@@ -236,40 +379,32 @@ def certify_robot(
             "E-RUN-004",
             f"{len(common)} targets were measured before and after; four or more that do not lie on a line are needed.",
         )
-    sample = StratifiedSample.of(visited[after][0])
+    (start, start_points), (end, end_points) = visited[first], visited[last]
+    sample = StratifiedSample.of(end)
     judged = slice(None) if sample is None else sample.rows
-    known, covariance = prediction_errors_with_covariance(model, visited[after][0].subset(judged))
-    there = _visited(visited[after][0], _placed(model, *visited[after]))
-    start = visited[before][0]
-    declared = as_declared[rows[before][np.isin(desired.pose[rows[before]], common)]]
-    placed = uncalibrated_model(calibrated.nominal, start).declared
-    result = RobotCertificate(
-        calibrated,
-        None if placed is None else _visited(start, _placed(placed, start, declared)),
-        _visited(start, _registered(start, declared)),
-        _visited(start, _best_fit(calibrated.with_points, *visited[before])),
-        there,
-        _visited(visited[after][0], _best_fit(calibrated.with_points, *visited[after])),
-        len(every) - len(common),
-        known,
-        error_scale(known, _measured_noise(there, covariance)),
-        sample,
-        _files(
-            [robot_file, calibrated.nominal.urdf],
-            {"estimates": calibrated.stored, "targets": targets, "before": before, "after": after},
-        ),
-        fitted_files(calibrated, [after]) or fitted_points(calibrated, visited[after][0]),
-        command,
-    )
+    known, covariance = prediction_errors_with_covariance(model, end.subset(judged))
+    there = _visited(end, _placed(model, end, end_points))
+    declared = as_declared[rows[first][np.isin(desired.pose[rows[first]], common)]]
+    placed = uncalibrated_model(robot.nominal, start).declared
     progress("comparing", 1.0)
-    write_certificate(
-        out, CertificateStudy(result.document(), result.before.centres, result.after.centres, particulars)
+    return Certificate(
+        model=robot.model,
+        before=_visited(start, _best_fit(robot.with_points, start, start_points)),
+        after=there,
+        declared=None if placed is None else _visited(start, _placed(placed, start, declared)),
+        registered=_visited(start, _registered(start, declared)),
+        refitted=_visited(end, _best_fit(robot.with_points, end, end_points)),
+        unmatched_targets=len(every) - len(common),
+        verification=known,
+        scale=error_scale(known, _measured_noise(there, covariance)),
+        sample=sample,
+        uncalibrated=unmeasured_targets_remark(robot, end.targets),
+        fitted=fitted_points(robot, end),
     )
-    return result
 
 
-def _rows(file: Path, poses: PoseSet, targets: Path, desired: ToolTargets) -> np.ndarray:
-    """Index of the target, out of `targets` (N,), of every measured row."""
+def _rows(file: str, poses: PoseSet, targets: str, desired: ToolTargets) -> np.ndarray:
+    """The row of the targets (N,) that every measured row belongs to."""
     order = np.argsort(desired.pose)
     place = np.searchsorted(desired.pose, poses.pose, sorter=order).clip(max=len(order) - 1)
     rows = order[place]
@@ -324,7 +459,7 @@ def _visited(poses: PoseSet, targets: np.ndarray) -> MeasuredTargets:
     errors = poses.position - targets
     numbers, own, counts = np.unique(poses.pose, return_inverse=True, return_counts=True)
     centres = np.array([np.bincount(own, coordinate) for coordinate in errors.T]).T / counts[:, None]
-    visits = repeatability(poses) if len(numbers) < len(poses) else None
+    visits = visit_statistics(poses) if len(numbers) < len(poses) else None
     return MeasuredTargets(poses, errors, numbers, centres, visits)
 
 

@@ -245,7 +245,7 @@ def verify(
     0.1 mm
     """
     require_points(poses)
-    _require_stations(robot, poses, "station" in refit)
+    require_stations(robot, poses, "station" in refit)
     measured = poses
     sample = StratifiedSample.of(measured)
     poses = measured if sample is None else measured.subset(sample.rows)
@@ -312,11 +312,12 @@ def verification_poses(
     """
     poses = read_poses(list(files), robot.model, require_motion=False)
     require_points(poses, " and ".join(str(file) for file in files))
-    _require_stations(robot, poses, placed_again)
+    require_stations(robot, poses, placed_again)
     return poses
 
 
-def _require_stations(robot: CalibratedRobot, poses: PoseSet, placed_again: bool) -> None:
+def require_stations(robot: CalibratedRobot, poses: PoseSet, placed_again: bool = False) -> None:
+    """Raise `FlexcalError` for points measured from a station that the calibration did not place, unless it is `placed_again`."""
     for station in poses.stations:
         if not placed_again and not is_station_identified(robot.model, station):
             raise FlexcalError(

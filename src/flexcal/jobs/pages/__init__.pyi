@@ -1,9 +1,10 @@
 from .comparison import compare_folders
 from .customer import customer_report
-from .report import report_folder, two_stage_study
+from .report import REPORT, report_folder, two_stage_study
 from .result import Identification, PlottedResult, ReportedResult, Result, TorqueIdentification, summary_row
 
 __all__ = [
+    "REPORT",
     "Identification",
     "PlottedResult",
     "ReportedResult",

@@ -17,7 +17,7 @@ from flexcal.calibration.accuracy import (
     common_displacement,
     noise_repeatability,
     pose_drifts,
-    repeatability,
+    visit_statistics,
 )
 from flexcal.calibration.measurement import predicted_positions
 from flexcal.calibration.verification import uncalibrated_model
@@ -30,27 +30,77 @@ from flexcal.jobs.inputs import (
     require_distinct_files,
     stored_estimates,
 )
-from flexcal.jobs.result_files import RunRecord, header, write_results
+from flexcal.jobs.pages import REPORT, PlottedResult
+from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, header, write_results
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
-from flexcal.report.layout import write_page
+from flexcal.report.layout import Page
 from flexcal.report.pages import RepeatabilityStudy, repeatability_page
 from flexcal.units import MILLIMETRE
 
 
-@dataclass(frozen=True, eq=False)
-class RobotRepeatability:
-    """The `visited` poses; `errors` (N, 3) m, measured minus commanded, by how the command is understood.
+@dataclass(frozen=True, eq=False, repr=False)
+class Repeatability(PlottedResult):
+    """Result of `repeatability`: pose accuracy and repeatability of ISO 9283:1998 from repeated visits.
 
-    "nominal": the nominal robot's own, with instrument and measured point registered by best fit; "calibrated": the calibrated one's.
-    `drifts` are those of the poses that were visited often enough while a clock ran. `record` says what this comes from.
+    Attributes
+    ----------
+    model : RobotModel
+        The nominal robot.
+    poses : PoseSet
+        All measured points.
+    visited : list of PoseRepeatability
+        The poses that were visited twice or more, in the order of their first visits: `rows` of their visits, `repeatability` RP, m,
+        `direction_variation` vAP, m.
+    errors : mapping of ndarray
+        Measured minus commanded (N, 3), m, by how the command is understood: "nominal", the nominal robot's own, with instrument and
+        measured point registered by best fit; "calibrated", the calibrated robot's.
+    drifts : list of PoseDrift
+        Drift of the poses that were visited often enough while a clock ran.
+    record : RunRecord
+        What the result comes from, where it was made from files.
     """
 
     poses: PoseSet
     visited: list[PoseRepeatability]
     errors: Mapping[str, np.ndarray]
     drifts: list[PoseDrift]
-    record: RunRecord
+    record: RunRecord = NOT_RECORDED
+
+    @property
+    def headline(self) -> str:
+        """Repeatability RP over the poses, and their number."""
+        rp = [pose.repeatability / MILLIMETRE for pose in self.visited]
+        return (
+            f"RP {np.mean(rp):.3f} mm on average, {np.max(rp):.3f} mm at most, of {len(rp)} poses that were visited "
+            f"{sum(len(pose.rows) for pose in self.visited)} times"
+        )
+
+    def summary(self) -> str:
+        """RP, AP as the nominal and the calibrated robot, and remarks."""
+        document = self.document()
+        accuracy = [
+            f"AP of the {kind} robot {spread['mean']:.3f} mm on average, {spread['max']:.3f} mm at most"
+            for kind in self.errors
+            if (spread := document[f"ap_{kind}_mm"]) is not None
+        ]
+        return "\n".join([self.headline, *accuracy, *self.remarks])
+
+    def write(self, folder: str | Path) -> None:
+        """Write results.json and report.html to a folder.
+
+        Parameters
+        ----------
+        folder : str or Path
+            The folder, which is created where it is missing.
+        """
+        write_results(Path(folder), self.document())
+        self.report(Path(folder) / REPORT)
+
+    def _page(self) -> Page:
+        return repeatability_page(
+            RepeatabilityStudy(self.model.name, self.poses, self.visited, self.document())
+        )
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -150,7 +200,65 @@ class RobotRepeatability:
         }
 
 
-def repeat_robot(
+def repeatability(
+    model: RobotModel,
+    poses: PoseSet,
+    *,
+    calibrated: CalibratedRobot | None = None,
+    progress: Progress = silent,
+) -> Repeatability:
+    """Determine pose accuracy and repeatability (ISO 9283:1998, 7.2) from repeated visits to the same commanded poses.
+
+    Rows belong to one pose where joint positions, target, station and payload are the same, whatever number they have. RP needs no
+    calibration.
+
+    Parameters
+    ----------
+    model : RobotModel
+        Nominal robot.
+    poses : PoseSet
+        Measured points, with repeated visits; with times, the drift of poses that were visited often is evaluated.
+    calibrated : CalibratedRobot, optional
+        The robot whose pose accuracy AP is determined besides; `Calibration.robot`, or ``CalibratedRobot.from_yaml(path)``.
+    progress : Progress
+        Called with the stage and the share of it that is done.
+
+    Returns
+    -------
+    Repeatability
+        Its `visited` poses with RP each, `summary()`, `report(path)` and `write(folder)`.
+
+    Raises
+    ------
+    FlexcalError
+        For measured lengths, and where no pose was visited twice.
+
+    Examples
+    --------
+    Three visits to each of two poses of the virtual cell:
+
+    >>> import numpy as np
+    >>> from flexcal import PosePlan, RobotModel, VirtualCell, repeatability
+    >>> model = RobotModel.from_yaml("examples/tx90l/robot.yaml", estimates=False)
+    >>> q = np.array([[0, -0.5, 1.6, 0, 0.6, 0], [0.5, 0.2, 1.4, 0.3, 0.8, 0]])
+    >>> measured = VirtualCell(model).measure(PosePlan(q=np.tile(q, (3, 1))))
+    >>> [pose.rows.tolist() for pose in repeatability(model, measured).visited]
+    [[0, 2, 4], [1, 3, 5]]
+    """
+    progress("visits", 0.0)
+    visited = visit_statistics(poses)
+    progress("visits", 0.5)
+    errors: dict[str, np.ndarray] = {}
+    before = uncalibrated_model(model, poses).errors(poses).robots_own
+    if before is not None:
+        errors["nominal"] = before
+    if calibrated is not None and all(is_station_identified(calibrated.model, s) for s in poses.stations):
+        errors["calibrated"] = poses.position - predicted_positions(calibrated.model, poses)
+    progress("visits", 1.0)
+    return Repeatability(model, poses, visited, errors, pose_drifts(poses, visited))
+
+
+def robot_repeatability(
     robot_file: Path,
     files: Sequence[Path],
     *,
@@ -158,39 +266,25 @@ def repeat_robot(
     out: Path | None = None,
     command: str = "",
     progress: Progress = silent,
-) -> RobotRepeatability:
-    """Pose accuracy and repeatability from the repeated visits in `files`; with `out`, results.json and report.html are left there.
+) -> Repeatability:
+    """`repeatability` of the robot of a robot.yaml by files of measured poses; with `out`, results.json and report.html are left there.
 
     `estimates` is an estimates.yaml, or a folder with one; without, that beside robot.yaml is used where it holds a calibration. Raises
-    `FlexcalError` where no pose was visited twice, or a file does not fit.
+    `FlexcalError` as reading and `repeatability` do.
     """
     require_distinct_files(files)
     nominal = RobotModel.from_yaml(robot_file, estimates=False)
     progress("reading", 0.0)
     poses = read_poses(list(files), nominal, require_motion=False)
     progress("reading", 1.0)
-    progress("visits", 0.0)
-    visited = repeatability(poses)
-    progress("visits", 0.5)
     calibrated = _calibrated(robot_file, estimates, nominal)
-    errors: dict[str, np.ndarray] = {}
-    before = uncalibrated_model(nominal, poses).errors(poses).robots_own
-    if before is not None:
-        errors["nominal"] = before
-    if calibrated is not None and all(is_station_identified(calibrated.model, s) for s in poses.stations):
-        errors["calibrated"] = poses.position - predicted_positions(calibrated.model, poses)
-    progress("visits", 1.0)
+    evaluated = repeatability(nominal, poses, calibrated=calibrated, progress=progress)
     stored = None if calibrated is None else calibrated.stored
     blocks = () if calibrated is None else tuple(calibrated.blocks)
     origin = provenance([robot_file, nominal.urdf, *files], None, stored, blocks)
-    result = RobotRepeatability(
-        poses, visited, errors, pose_drifts(poses, visited), RunRecord(origin, command)
-    )
+    result = replace(evaluated, record=RunRecord(origin, command))
     if out is not None:
-        document = result.document()
-        write_results(out, document)
-        study = RepeatabilityStudy(nominal.name, poses, visited, document)
-        write_page(out / "report.html", repeatability_page(study))
+        result.write(out)
     return result
 
 
