@@ -15,8 +15,8 @@ _KEPT_FIRST = ("Izz", "Ixx", "Ixy", "Ixz", "Iyz", "Iyy", "mc_x", "mc_y", "mc_z",
 """Order in which parameters of a link are preferably kept: mass and entries along the axis are regrouped first."""
 _SAMPLES_PER_PARAMETER = 3
 _TILT = 1e-10
-"""Tilts of bearings, rad, as small as real ones, so that the links' contribution in proportion to tilts and tilt accelerations, which is
-below noise and would bias the stiffness, does not count for the rank.
+"""Tilts of bearings, rad, at the random states: negligible, as real ones are, so that columns proportional to tilts and their
+accelerations do not raise the rank; they are below noise and would bias the stiffness.
 """
 
 

@@ -14,13 +14,14 @@ from flexcal.dynamics.regression import Batch, RegressionData, triangular
 from flexcal.model.parts import LINK_PARAMETERS, PSEUDO_INERTIA, Payload
 
 FRICTION_CHANGE = 0.2
-"""1σ of what warmth and load change of friction from one recording to another, relative to Coulomb and viscous friction; and of a torque
-offset, relative to the Coulomb friction of its joint."""
+"""Relative 1σ of the change of Coulomb and viscous friction between recordings, by warm-up and load; and of a torque offset, relative to
+the Coulomb friction of its joint.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class PayloadEquations:
-    """Equations of several recordings, of which `loaded` (one each) tells where the payload `attached` is held.
+    """Equations of several recordings; `loaded` (one each) tells whether the payload `attached` is held.
 
     Unknown are y and z of the `prior`, what friction is beyond the robot's own in the loaded recordings, and the payload's ten
     parameters φ in its frame, in this order. `data` are equations of links and drives, with the columns of an `FlexibilityCorrection` each.
@@ -33,7 +34,7 @@ class PayloadEquations:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Of all unknowns."""
+        """Names of all unknowns."""
         open_, known = self.prior.free.shape[1], self.prior.base_root.shape[1]
         return (
             *(f"open_{k}" for k in range(open_)),
@@ -44,16 +45,16 @@ class PayloadEquations:
 
     @property
     def payload(self) -> slice:
-        """Where the payload's ten are among the unknowns."""
+        """Indices of the payload's ten parameters among the unknowns."""
         return slice(len(self.names) - len(LINK_PARAMETERS), len(self.names))
 
     @cached_property
     def _rubbing(self) -> tuple[str, ...]:
-        """Names of the friction that may change."""
+        """Names of friction parameters that may change."""
         return tuple(name for name in self.data.names if name.rpartition(".")[2] in FRICTION)
 
     def prior_rows(self) -> np.ndarray:
-        """(k, unknowns): what is known beforehand, whitened."""
+        """Whitened rows (k, unknowns) of the prior."""
         first = self.prior.free.shape[1]
         width = self.prior.base_root.shape[1]
         rows = np.eye(len(self.names))[first : first + width]
@@ -68,7 +69,7 @@ class PayloadEquations:
 
     @cached_property
     def batches(self) -> list[list[Batch]]:
-        """The equations of every recording in parts that follow each other, of these unknowns."""
+        """Equations of every recording, in consecutive parts, for these unknowns."""
         joints = range(self.data.observation.model.n)
         maps = {loaded: [self._map(joint, loaded) for joint in joints] for loaded in set(self.loaded)}
         return [
@@ -80,7 +81,7 @@ class PayloadEquations:
         ]
 
     def system(self, noise: Sequence[float]) -> np.ndarray:
-        """R (unknowns + 1, ·) of all equations, each divided by its `noise` (N m, joints of one recording after the other)."""
+        """Factor R (unknowns + 1, ·) of all equations, each divided by its `noise` (N m, joints of one recording after the other)."""
         n, stack = self.data.observation.model.n, []
         for number, own in enumerate(self.batches):
             for joint in range(n):
@@ -89,7 +90,9 @@ class PayloadEquations:
         return triangular(np.vstack(stack))
 
     def coefficients(self, unknowns: np.ndarray, loaded: bool) -> np.ndarray:
-        """χ (p,) of all columns of `data` with which W χ are the torques that `unknowns` (u,) predict, with the payload or without."""
+        """Coefficients χ (p,) of all columns of `data` for which W χ are the torques predicted by `unknowns` (u,), with or without
+        payload.
+        """
         missed = np.append(-unknowns, 1.0)
         parameters = np.zeros(len(self.data.names))
         for joint, column_indices in enumerate(self.data.observation.column_indices):
@@ -97,7 +100,7 @@ class PayloadEquations:
         return parameters
 
     def _map(self, joint: int, loaded: bool) -> np.ndarray:
-        """(m + 1, unknowns + 1): from a joint's [W, Y] to its equations."""
+        """Matrix (m + 1, unknowns + 1) from a joint's [W, Y] to its equations."""
         names, column_indices = self.data.names, self.data.observation.column_indices[joint]
         base = {number: row for row, number in enumerate(self.data.base.identifiability.kept)}
         result = np.zeros((len(column_indices) + 1, len(self.names) + 1))
@@ -125,7 +128,7 @@ class PayloadEquations:
 
 
 def payload_to_link_frame(payload: Payload) -> np.ndarray:
-    """(10, 10): from a body's ten parameters in the payload's frame to those in the frame of the link that carries it."""
+    """Matrix (10, 10) from a body's ten parameters in the payload's frame to those in the frame of its link."""
     place = np.eye(4)
     place[:3, :3], place[:3, 3] = payload.rotation, payload.translation
     moved = place @ PSEUDO_INERTIA @ place.T

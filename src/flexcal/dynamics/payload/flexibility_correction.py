@@ -17,26 +17,26 @@ from flexcal.model.robot import GEOMETRY, SPRINGS, RobotModel, uncertain_inertia
 from flexcal.model.vibration import flexible_joint_torque, spring_load
 
 YIELD = "arm_yield"
-"""Name of the column of what the springs change, whose coefficient is one."""
+"""Name of the column of the torque change due to the springs, with unit coefficient."""
 _RATE_HZ = 50.0
-"""Instants a second at which it is evaluated, between which it is interpolated."""
+"""Rate at which the correction is evaluated, and interpolated in between."""
 _CUTOFF_HZ, _ORDER = 10.0, 4
-"""Of the low-pass, forwards and backwards, of the motion, whose noise deflections would differentiate twice more, and of the way from one
-flank of a gap to the other."""
+"""Cut-off and order of the low-pass, forwards and backwards, of the motion (deflections differentiate its noise twice more) and of the
+transition between flanks of a gap.
+"""
 _HIGHEST = 0.4
-"""The cut-off over the sampling rate, at most."""
+"""Largest ratio of the cut-off to the sampling rate."""
 _SHORTEST = 0.5
-"""Duration in s."""
+"""Shortest duration, s."""
 _PASSES = 4
-"""Orders of load over stiffness that deflections are right to."""
+"""Order in load over stiffness to which deflections are correct."""
 _STEP = 1e-2
-"""Of the central differences, in standard deviations' units of 1e-3 rad and m, and of the logarithm of a stiffness."""
+"""Step of the central differences, in units of 1e-3 rad and m, and of the logarithm of a stiffness."""
 _SMALL = 1e-3
 
 
 def uncertain_parameters(model: RobotModel) -> tuple[str, ...]:
-    """Geometric errors of the joints, and of an elastic robot stiffnesses, gaps and what weighs on them: masses and centres of mass of
-    links."""
+    """Uncertain parameters: geometric errors of the joints and, for an elastic robot, stiffnesses, gaps, masses and centres of mass."""
     springs = (f"{e.name}.{SPRINGS[c]}.stiffness" for e in model.elastic for c in sorted(e.components))
     weights = uncertain_inertials(model, range(model.n)) if model.elastic else ()
     backlashes = (f"{model.joint_names[i]}.backlash" for i in model.backlash_joints) if model.elastic else ()
@@ -49,7 +49,7 @@ def uncertain_parameters(model: RobotModel) -> tuple[str, ...]:
 
 
 def error_column(source: str) -> str:
-    """Name of the column of a source of error; links have columns by the source's own name."""
+    """Name of the column of an error source; columns of links have the source's own name."""
     return f"{source}.error"
 
 
@@ -72,7 +72,7 @@ class FlexibilityCorrection:
     def of(
         cls, model: RobotModel, experiment: Experiment, sources: Sequence[str], payload: float | None = None
     ) -> FlexibilityCorrection:
-        """Along a recording, of the `model` with `payload` (kg; None: the one that it has), which tells on which flanks drives rest.
+        """Correction along a recording, for `model` with `payload` (kg; None: its own), which determines the flanks of the drives.
 
         Stretches of less than half a second are left out; raises `FlexcalError` where there is no longer one.
         """
@@ -114,7 +114,7 @@ class FlexibilityCorrection:
 
     @cached_property
     def _curves(self) -> list[Any]:
-        """Of every stretch."""
+        """Correction curves of every stretch."""
         from scipy.interpolate import CubicSpline
 
         values = np.concatenate([self.shift[:, :, None], self.slopes], axis=2)
@@ -122,7 +122,7 @@ class FlexibilityCorrection:
         return [CubicSpline(self.time[start:end], values[start:end]) for start, end in edges]
 
     def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
-        """For every joint the shift, then the slopes."""
+        """Shift, then slopes, of every joint."""
         stretch = max(0, int(np.searchsorted(self.time[list(self.starts)], motion.time[0], side="right")) - 1)
         curves = self._curves[stretch]
         values = curves(np.clip(motion.time, curves.x[0], curves.x[-1]))
@@ -144,12 +144,12 @@ class _Course:
         return np.array([curve(self.time, nu=order) for order in range(3)])
 
     def between(self, flanks: np.ndarray) -> np.ndarray:
-        """From one flank, ±1, to the other as a low-pass goes."""
+        """Transition from one flank, ±1, to the other, low-passed."""
         return self(_low_passed(flanks, float(self.time[1] - self.time[0])))
 
 
 def _slow(experiment: Experiment) -> list[Motion]:
-    """What a low-pass leaves of every stretch of an experiment, every so many samples, the last one among them."""
+    """Low-passed values of every stretch of an experiment, decimated, the last sample included."""
     slow_parts, longest = [], 0.0
     for stretch in stretches(experiment.blocks()):
         whole = Motion.joined(stretch)

@@ -23,11 +23,11 @@ from flexcal.model.parts import LINK_PARAMETERS, Payload
 from flexcal.model.robot import MASS_AND_COM, MOMENTS, unit_of
 
 BODY = (*MASS_AND_COM, *MOMENTS)
-"""Of a payload in its frame: inertia about the centre of mass."""
+"""Names of a payload's parameters in its frame: inertia about the centre of mass."""
 _UNSEEN = 5e-3
-"""Mass over that of all links, below which errors of the model make a mass that is not there."""
+"""Mass relative to that of all links, below which model errors imitate a mass."""
 _ROUNDS = 4
-"""Fits, each weighted by the noise that the one before leaves."""
+"""Number of fits, each weighted by the noise of the previous residual."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class PayloadFit:
 
 @dataclass(frozen=True, eq=False)
 class _Solution:
-    """Of the payload's ten: `values` and their `covariance`, with its degrees of `freedom`.
+    """Solution for the payload's ten parameters: `values` and their `covariance`, with its degrees of `freedom`.
 
     All `unknowns` (u,) have `unknowns_root` (u, k) as the root of their plain covariance, which `root` (10, k) is a part of. `missing` says
     what the data do not tell, and `unseen` (10, d) along which directions.
@@ -134,7 +134,7 @@ def _own_error(data: RegressionData) -> float:
 
 
 def _body(payload: Payload, mass: float) -> np.ndarray:
-    """The declared body (10,), scaled to a mass."""
+    """Declared body (10,), scaled to a mass."""
     share = mass / payload.mass if payload.mass > 0 else 0.0
     return np.concatenate([[mass], payload.com, share * payload.moments])
 
@@ -144,7 +144,7 @@ def _declared(payload: Payload, mass: float) -> np.ndarray:
 
 
 def _solve(equations: PayloadEquations, noise: Sequence[float], start: np.ndarray) -> _Solution:
-    """Least squares; what it leaves open of the payload stays at `start` (10,)."""
+    """Least squares; undetermined directions of the payload stay at `start` (10,)."""
     names, own = equations.names, equations.payload
     prior = equations.prior_rows()
     data = equations.system(noise)
@@ -200,7 +200,7 @@ def _solve(equations: PayloadEquations, noise: Sequence[float], start: np.ndarra
 
 
 def _missed_shares(equations: PayloadEquations, unknowns: np.ndarray) -> tuple[float, np.ndarray]:
-    """‖errors‖ / ‖torques‖ of all equations, and of those of every joint (n,); 0 where there are no torques."""
+    """Relative residual ‖errors‖ / ‖torques‖ of all equations, and of those of every joint (n,); 0 without torques."""
     missed = np.append(-unknowns, 1.0)
     left, size = np.zeros((2, equations.data.observation.model.n))
     for batch in (batch for own in equations.batches for batch in own):
@@ -212,7 +212,7 @@ def _missed_shares(equations: PayloadEquations, unknowns: np.ndarray) -> tuple[f
 
 
 def _scale(system: np.ndarray, own: slice) -> np.ndarray:
-    """One over the size of each column; of the payload's over the largest of its kind, for some are but rounding."""
+    """Inverse size of each column; for the payload relative to the largest of its kind, since some are only rounding."""
     sizes = np.linalg.norm(system, axis=0)
     for kind in (slice(0, 1), slice(1, 4), slice(4, 10)):
         part = slice(own.start + kind.start, own.start + kind.stop)

@@ -12,22 +12,22 @@ from flexcal.model.parts import PSEUDO_INERTIA, Inertia, parallel_axis, pseudo_i
 from flexcal.model.robot import MOMENTS
 
 _FLOOR = 1e-3
-"""Share of the reference body's pseudo-inertia that a body's must not fall below."""
+"""Lower bound of a body's pseudo-inertia, relative to that of the reference body."""
 _FAINT = 100.0
-"""Relative standard deviation of a prior that only keeps the problem well posed."""
+"""Relative standard deviation of a weak prior that keeps the problem well posed."""
 _STEP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class NearestBody:
-    """Ten parameters of a body, and by how much they raise the weighted sum of squares above its minimum."""
+    """Ten parameters of a body, and the rise of the weighted sum of squares above its minimum."""
 
     parameters: np.ndarray
     rise: float
 
 
 def nearest_body(parameters: np.ndarray, root: np.ndarray, unseen: np.ndarray) -> NearestBody:
-    """The body of the least sum of squares about its minimum at `parameters` (10,), which they are already where a body has them.
+    """Physical body of least weighted sum of squares about `parameters` (10,); unchanged if they are those of a body.
 
     `root` (10, k) has root rootᵀ = the covariance; `unseen` (10, d) are directions that the sum of squares does not feel. Raises
     `FlexcalError` as `ConicFit.solve` does.
@@ -43,7 +43,7 @@ def nearest_body(parameters: np.ndarray, root: np.ndarray, unseen: np.ndarray) -
 
 
 def payload_from_link_frame(parameters: np.ndarray) -> np.ndarray:
-    """Mass, centre of mass and the six of the inertia about it (10,) from mass, first moments and inertia about the frame."""
+    """Mass, centre of mass and the six central moments (10,) from mass, first moments and inertia about the frame."""
     mass = parameters[0]
     com = parameters[1:4] / mass
     around = parallel_axis(mass, com)[np.triu_indices(3)]
@@ -51,7 +51,7 @@ def payload_from_link_frame(parameters: np.ndarray) -> np.ndarray:
 
 
 def link_frame_from_payload(body: np.ndarray) -> np.ndarray:
-    """The reverse of `payload_from_link_frame`."""
+    """Inverse of `payload_from_link_frame`."""
     mass, com = body[0], body[1:4]
     around = parallel_axis(mass, com)[np.triu_indices(3)]
     return np.concatenate([[mass], mass * com, body[4:] + around])
@@ -69,7 +69,7 @@ def body_covariance(parameters: np.ndarray, covariance: np.ndarray) -> np.ndarra
 
 
 def identified_moments(body: np.ndarray, half: np.ndarray) -> np.ndarray:
-    """Which of the six moments (6,) of a body (10,) are told by intervals of `half` their width (6,).
+    """Mask (6,) of the moments of a body (10,) determined by intervals of half width `half` (6,).
 
     The moments about the axes are where none of their intervals reaches zero, which every body's are above; a product then is where its
     interval is narrower than what any body's could be, the root of the product of the two moments. Without the first, none is.

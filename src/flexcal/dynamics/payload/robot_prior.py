@@ -13,9 +13,9 @@ from flexcal.model.robot import PARALLEL, declared_parameter
 
 FRICTION = ("viscous", "coulomb", "torque_offset")
 _STEP = 1e-4
-"""Of the central differences, in estimation coordinates."""
+"""Step of the central differences, in estimation coordinates."""
 _NOTHING = 1e-12
-"""A direction of the covariance with less than this share of the largest, scaled, is known exactly."""
+"""Scaled variance, relative to the largest, below which a direction of the covariance counts as known exactly."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,8 @@ class RobotPrior:
         estimate: Estimate | None,
         sources: tuple[str, ...] = (),
     ) -> RobotPrior:
-        """From the posterior of the observed model, in which `estimate` is the block `dynamics`; without it the base parameters are free.
+        """Prior from the posterior of the observed model, in which `estimate` is the block `dynamics`; without it the base parameters
+        are free.
 
         A base parameter that the recordings of `estimate` hid is free, with those that took its place; so is friction that was found beside
         terms which are not the classic ones of `observation`, and a drive's parameter that was not found at all. The `sources` of error
@@ -72,7 +73,7 @@ class RobotPrior:
 
 
 def _root(covariance: np.ndarray) -> np.ndarray:
-    """L (p, k) with L Lᵀ the covariance."""
+    """Square root L (p, k) with L Lᵀ the covariance."""
     std = np.sqrt(np.diag(covariance))
     scale = np.where(std > 0, std, 1.0)
     sizes, turns = np.linalg.eigh(covariance / np.outer(scale, scale))
@@ -83,7 +84,7 @@ def _root(covariance: np.ndarray) -> np.ndarray:
 def _jacobian(
     observation: Observation, base: BaseParameters, owned: list[str], names: list[str]
 ) -> np.ndarray:
-    """Derivative (r, k) of the base parameters by the named ones of those `owned`, in estimation coordinates; the others stay."""
+    """Derivative (r, k) of the base parameters by the named ones of those `owned`, in estimation coordinates; the others constant."""
     model = observation.model
     own = model.posterior.parameters.subset(owned)
     x = own.coordinates()
@@ -103,7 +104,7 @@ def _jacobian(
 
 
 def _free(estimate: Estimate, kept: tuple[str, ...]) -> np.ndarray:
-    """Directions (r, d) of the base parameters that an estimate leaves open."""
+    """Directions (r, d) of the base parameters that an estimate does not determine."""
     columns = []
     classic = all(_classic(name) for name in estimate.parameters.names)
     for entry in estimate.dropped:
@@ -124,6 +125,6 @@ def _free(estimate: Estimate, kept: tuple[str, ...]) -> np.ndarray:
 
 
 def _classic(name: str) -> bool:
-    """Whether a parameter is of a link, or of the classic terms of a drive."""
+    """Whether a parameter belongs to a link or to the classic terms of a drive."""
     key = name.rpartition(".")[2].partition("_at_")[0]
     return key in LINK_PARAMETERS or key.startswith("com_") or key in ("rotor_inertia", *FRICTION, *PARALLEL)

@@ -10,11 +10,11 @@ from flexcal.dynamics.payload.equations import PayloadEquations
 from flexcal.errors import FlexcalError
 
 _FIRST = 0.01
-"""Noise to begin with, relative to the torques."""
+"""Initial noise, relative to the torques."""
 
 
 def first_noise(equations: PayloadEquations) -> list[float]:
-    """Standard deviations, N m, one a joint and recording."""
+    """Initial standard deviations, N m, one per joint and recording."""
     return [
         s.floored(_FIRST * float(np.linalg.norm(s.triangle.right)) / np.sqrt(s.triangle.rows))
         for s in equations.data.subsystems
@@ -24,7 +24,7 @@ def first_noise(equations: PayloadEquations) -> list[float]:
 def residual_noise(
     equations: PayloadEquations, noise: Sequence[float], values: np.ndarray, root: np.ndarray
 ) -> list[float]:
-    """Standard deviations, N m, one a joint and recording, from the residuals at `values` (u,) by the freedom that these leave.
+    """Standard deviations, N m, one per joint and recording, from the residuals at `values` (u,) and their degrees of freedom.
 
     `root` (u, k) has root rootᵀ = the covariance by the `noise` before. Raises `FlexcalError` where hardly more rows are left than they
     determine unknowns.

@@ -16,9 +16,9 @@ from flexcal.dynamics.signals import Experiment, Window
 from flexcal.model.parts import LINK_PARAMETERS
 
 _SILENT = 1e-9
-"""A column smaller than this beside the largest of its kind is zero."""
+"""Size of a column, relative to the largest of its kind, below which it is zero."""
 _ALL_BATCHES = 512
-"""Batches of all experiments together, at most, unless there are more experiments."""
+"""Largest number of batches of all experiments together, unless there are more experiments."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,14 +35,14 @@ class Subsystem:
     undriven: bool = False
 
     def floored(self, sigma: float) -> float:
-        """A noise level (N m), at least 1e-12 of the torque: equations that are fitted exactly still need one."""
+        """Noise level (N m), at least 1e-12 of the torque, for exactly fitted equations."""
         size = float(np.linalg.norm(self.triangle.right)) / np.sqrt(self.triangle.rows)
         return max(sigma, 1e-12 * size) or 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class RegressionData:
-    """Everything that a linear estimator needs; `masked` are the rows left out because the robot stood still.
+    """Data of a linear estimator; `masked` is the number of rows left out because the robot stood still.
 
     `batches` are the same equations once more, experiment by experiment in parts that follow each other in time.
     """
@@ -60,7 +60,7 @@ class RegressionData:
 
     @property
     def silent(self) -> tuple[str, ...]:
-        """Names of the drives' columns that these equations leave at zero, or at rounding beside the largest of their kind."""
+        """Names of drive columns that are zero in these equations, or rounding relative to the largest of their kind."""
         size = np.zeros(len(self.names))
         for s in self.subsystems:
             size[s.column_indices] = np.hypot(
@@ -75,7 +75,7 @@ class RegressionData:
         return tuple(name for name, kind, norm in drives if norm <= _SILENT * largest[kind])
 
     def noise(self) -> list[tuple[float, int]]:
-        """σ̂ of every subsystem from its own fit, by its rows less its rank (Eq. 2.28), and that rank; NaN without more rows.
+        """Noise σ̂ of every subsystem from its own fit, by rows less rank (Eq. 2.28), and that rank; NaN without more rows.
 
         Base parameters alone are fitted, and a column counts by its size at all joints: at one of them it may be the URDF's rounding.
         """
@@ -91,7 +91,7 @@ class RegressionData:
         return levels
 
     def errors(self, parameters: np.ndarray) -> tuple[float, np.ndarray]:
-        """‖Y − W χ‖ / ‖Y‖ for `parameters` (p,): of all driven equations stacked, and of each of the observation's.
+        """Relative residual ‖Y − W χ‖ / ‖Y‖ for `parameters` (p,): of all driven equations stacked, and of each of the observation's.
 
         Where nobody drives, what the links ask stands for Y.
         """
@@ -113,7 +113,7 @@ class RegressionData:
     def of(
         cls, observation: Equations, base: BaseParameters, systems: Sequence[ExperimentSystem]
     ) -> RegressionData:
-        """The systems of several experiments together."""
+        """Systems of several experiments together."""
         subsystems = [
             Subsystem(
                 equation, number, column_indices, _merged(system, equation), equation in observation.undriven
@@ -134,7 +134,7 @@ def assemble_regression(
     mask_standstill: bool = True,
     windows: Sequence[Window] | None = None,
 ) -> RegressionData:
-    """The system of several experiments, in one pass over each.
+    """Regression system of several experiments, in one pass over each.
 
     `windows` (one an experiment) restrict the rows that are kept. With `mask_standstill` rows at which all joints stand still are left
     out. Raises `FlexcalError` as `experiment_system` does.

@@ -1,4 +1,4 @@
-"""Covariance of scores where the torque noise of a joint remembers itself for long, as a first-order autoregressive process."""
+"""Covariance of scores under torque noise of long memory, modelled as a first-order autoregressive process."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from scipy.linalg import cholesky, solve_triangular
 from flexcal.dynamics.regression.scores import Scores
 
 _BATCHES = 64
-"""Batches of an experiment, at most, in which memory is looked for: short memory is not what this is for."""
+"""Largest number of batches per experiment used to detect long memory."""
 _FEWEST = 12
-"""Contrasts between batches without which nothing is told about memory."""
+"""Least number of contrasts between batches to detect memory."""
 _SHARES = (1.0, 0.8, 0.5, 0.2)
-"""Shares of the variance of a batch that the process with memory has; the rest is white."""
+"""Candidate shares of the autoregressive process in the variance of a batch; the rest is white."""
 _LONGEST = 1 / 3
 """Longest memory, as share of the recording: longer ones are drift, which an offset absorbs."""
 _STEPS = 14
 _TAKEN = 1e-4
-"""Share of a contrast between batches below which the fit has taken it: nothing is left there to tell noise by."""
+"""Share of a contrast between batches left by the fit, below which it carries no information on the noise."""
 
 
 def autoregressive_covariance(experiments: Sequence[Scores], offsets: np.ndarray) -> tuple[np.ndarray, float]:
-    """Covariance (k, k) of the scores summed, and the longest time constant of a joint's noise, as a number of batches.
+    """Covariance (k, k) of the summed scores, and the longest time constant of a joint's noise, in batches.
 
     A column of `offsets` (k, joints) times a score is that of a joint's torque offset: the sum of its residuals in the batch. Its size over
     the root of its information is the noise at low frequency, less what the fit took from there. Level, share and time constant have a
@@ -55,7 +55,7 @@ def _merged(values: np.ndarray, count: int) -> np.ndarray:
 def _own(
     number: np.ndarray, sums: np.ndarray, rows: np.ndarray, level: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """Of one joint and experiment: batches with these numbers, sums (B,) of residuals, of regressors (B, k), and numbers of rows."""
+    """Batches of one joint and experiment with these numbers: sums (B,) of residuals, of regressors (B, k), and numbers of rows."""
     batches, size = rows.shape
     root = np.sqrt(level)
     residual, regressors = sums / root, rows / root[:, None]

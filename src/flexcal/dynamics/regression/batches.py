@@ -22,8 +22,8 @@ BATCHES = 128
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Rows that follow each other: `factors` has for every equation of the observation a matrix F with FᵀF = [W, Y]ᵀ[W, Y], by
-    reflections of its rows.
+    """Consecutive rows: `factors` has for every equation of the observation a matrix F with FᵀF = [W, Y]ᵀ[W, Y], by Householder
+    reflections.
 
     `number` counts the batches of the experiment, whatever is left out; a batch without rows does not exist.
     """
@@ -35,7 +35,7 @@ class Batch:
 
 @dataclass(frozen=True, eq=False)
 class ExperimentSystem:
-    """All that estimators need of one experiment; `masked` are the rows left out because the robot stood still.
+    """Equations of one experiment for the estimators; `masked` is the number of rows left out because the robot stood still.
 
     A batch without gaps has `batch_rows` rows. The rows lie within `duration` (s).
     """
@@ -56,7 +56,7 @@ def experiment_system(
     batches: int = BATCHES,
     weights: np.ndarray | None = None,
 ) -> ExperimentSystem:
-    """One pass over an experiment, in at most about so many `batches` of equal length.
+    """Equations of an experiment from one pass over it, in about `batches` batches of equal length at most.
 
     `weights` (equations, rows) are those of every equation's rows by their numbers; without, all count alike.
     Raises `FlexcalError` where no row is left, or a column comes out as not finite.
@@ -69,7 +69,7 @@ def experiment_system(
 
 
 def batch_length(experiment: Experiment, decimation: Decimation, batches: int) -> int:
-    """Rows of a batch without gaps, for at most about so many `batches`."""
+    """Rows of a batch without gaps, for at most about `batches` batches."""
     total = max(0, experiment.samples - 2 * decimation.support - 1) // decimation.factor + 1
     return -(-total // batches)
 
@@ -77,7 +77,7 @@ def batch_length(experiment: Experiment, decimation: Decimation, batches: int) -
 def batched(
     blocks: Iterable[RegressionBlock], name: str, length: int, *, mask_standstill: bool
 ) -> ExperimentSystem:
-    """The rows of the experiment `name` in batches of `length`; raises `FlexcalError` as `experiment_system` does."""
+    """Rows of the experiment `name` in batches of `length`; raises `FlexcalError` as `experiment_system` does."""
     batches: list[Batch] = []
     masked = 0
     current: _Growing | None = None
@@ -108,7 +108,7 @@ def batched(
 
 
 class _Growing:
-    """A batch to which rows come; it holds none of them."""
+    """Batch updated by rows without storing them."""
 
     def __init__(self, number: int, projection: tuple[np.ndarray, ...]) -> None:
         self.number = number
@@ -117,7 +117,7 @@ class _Growing:
         self._factors = [np.zeros((len(own) + 1, len(own) + 1)) for own in projection]
 
     def add(self, part: RegressionBlock) -> None:
-        """Spends the rows: what they are in is overwritten."""
+        """Update with rows, whose memory is overwritten."""
         self._rows += len(part)
         for factor, system in zip(self._factors, part.reduced, strict=True):
             update(factor, np.ascontiguousarray(system))
@@ -131,13 +131,13 @@ class _Growing:
 
 
 def reduced(systems: list[np.ndarray]) -> np.ndarray:
-    """R of systems [W, Y] (·, k + 1) stacked, or just the stack where that has no more rows than R would."""
+    """Factors R of stacked systems [W, Y] (·, k + 1), or the stack itself if it has no more rows."""
     stack = np.hstack([system.T for system in systems]).T
     return stack if len(stack) <= stack.shape[1] else triangular(stack)
 
 
 def _split(block: RegressionBlock, length: int) -> list[RegressionBlock]:
-    """By batch."""
+    """Splits by batch."""
     numbers = block.number // length
     if len(numbers) == 0 or numbers[0] == numbers[-1]:
         return [block] if len(numbers) else []

@@ -1,4 +1,4 @@
-"""The equations of one experiment, filtered and decimated, block by block (Eq. 2.26)."""
+"""Equations of one experiment, filtered and decimated, block by block (Eq. 2.26)."""
 
 from __future__ import annotations
 
@@ -13,12 +13,14 @@ from flexcal.dynamics.inverse_model import Equations, Memory
 from flexcal.dynamics.signals import Experiment, Motion, Window, slowest_speeds, stretches
 
 _BLOCK = 1000
-"""Samples, about, whose columns are in memory at once; they fit a processor's cache, of which a power of two would use little."""
+"""Approximate number of samples whose columns are in memory at once, sized for the processor's cache; not a power of two, which would
+use little of it.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class RegressionBlock:
-    """M equations of every kind (of each joint, and of motors alone) that follow each other.
+    """Block of M consecutive equations of every kind (of each joint, and of motors alone).
 
     `reduced` has for every kind the reduced columns of W and, last, Y transposed (·, M), and `projection` what gives W back, as an
     `Observation` has them. `number` (M,) counts the rows of the experiment, whatever is left out; `time` (M,) is s, and `still` (M,)
@@ -36,30 +38,30 @@ class RegressionBlock:
 
     @property
     def columns(self) -> list[np.ndarray]:
-        """For every kind W transposed (columns, M)."""
+        """Transposed W (columns, M) of every kind."""
         return [
             projection.T @ own[:-1] for projection, own in zip(self.projection, self.reduced, strict=True)
         ]
 
     @property
     def torque(self) -> np.ndarray:
-        """Y of all kinds (·, M)."""
+        """Torque Y (·, M) of all kinds."""
         return np.array([own[-1] for own in self.reduced])
 
     def predicted(self, column_indices: Sequence[np.ndarray], parameters: np.ndarray) -> np.ndarray:
-        """W χ of all kinds (·, M) for `parameters` (p,), of which `column_indices` are the numbers of each kind's own."""
+        """Predicted torque W χ (·, M) of all kinds for `parameters` (p,), with `column_indices` the numbers of each kind's own."""
         equations = zip(column_indices, self.projection, self.reduced, strict=True)
         return np.array([(projection @ parameters[felt]) @ own[:-1] for felt, projection, own in equations])
 
     def where(self, keep: np.ndarray) -> RegressionBlock:
-        """The rows that `keep` (M,) marks."""
+        """Rows of the mask `keep` (M,)."""
         if keep.all():
             return self
         reduced = [own[:, keep] for own in self.reduced]
         return RegressionBlock(self.number[keep], self.time[keep], self.still[keep], reduced, self.projection)
 
     def weighted(self, weights: np.ndarray) -> RegressionBlock:
-        """The rows of every kind times the root of their `weights` (·, M)."""
+        """Rows of every kind times the root of their `weights` (·, M)."""
         reduced = [own * root for own, root in zip(self.reduced, np.sqrt(weights), strict=True)]
         return RegressionBlock(self.number, self.time, self.still, reduced, self.projection)
 
@@ -67,7 +69,7 @@ class RegressionBlock:
 def regression_blocks(
     observation: Equations, experiment: Experiment, decimation: Decimation, window: Window
 ) -> Iterator[RegressionBlock]:
-    """The rows inside `window`: torques and every column of W through the same decimation, friction evaluated before it.
+    """Rows inside `window`: torques and every column of W through the same decimation, friction evaluated before it.
 
     No row reaches across a gap of the experiment. Memory does not grow with the recording. A pass with the same arguments gives the same
     blocks again.
@@ -96,7 +98,7 @@ def _stretch_rows(
     memory: Memory,
     first: int,
 ) -> Iterator[RegressionBlock]:
-    """The rows of motions without gaps, from the number `first` on; friction remembers what was before."""
+    """Rows of motions without gaps, from the number `first` on; friction keeps its state."""
     ends = np.cumsum(observation.widths)
     stream = DecimationStream(decimation)
     centres = _Centres(decimation, first)
@@ -120,7 +122,7 @@ def _stretch_rows(
 
 
 class _Centres:
-    """Time and standstill of the samples that decimated rows stand for, until their rows are complete.
+    """Times and standstill of the samples at the centres of decimated rows, until their rows are complete.
 
     A row stands still where the robot does anywhere in the main lobe of its filter, one row to either side: what friction is at rest, no
     sign of a velocity tells, and the row holds a part of it.
@@ -152,7 +154,7 @@ class _Centres:
 
 
 def _pieces(motions: Iterable[Motion], size: int) -> Iterator[tuple[int, Motion]]:
-    """Parts of `size` samples (the last one shorter), each with the number of its first sample."""
+    """Pieces of `size` samples (the last one shorter), each with the number of its first sample."""
     start, pending = 0, None
     for motion in motions:
         whole = motion if pending is None else Motion.joined([pending, motion])

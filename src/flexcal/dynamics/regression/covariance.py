@@ -15,9 +15,9 @@ from flexcal.dynamics.regression.batches import Batch
 from flexcal.dynamics.regression.scores import Scores
 
 _LEVERAGE = 0.9
-"""A direction that one window determines to this share, or more, leaves no residual there that would tell its error."""
+"""Leverage of one window on a direction from which its residual carries no information on the error."""
 _WITHIN = 0.5
-"""Longest time constant of noise that windows allow for, as share of their length."""
+"""Longest time constant of noise covered by windows, as share of their length."""
 _SHORT = 6.0
 """Time constant, in batches, below which windows are long enough."""
 
@@ -39,7 +39,7 @@ def batch_covariance(
     root: np.ndarray,
     variance: float,
 ) -> BatchCovariance:
-    """(WᵀW)⁻¹ M (WᵀW)⁻¹ of least squares, with M the covariance of Wᵀρ as the batches show it: `score_covariance`.
+    """Sandwich covariance (WᵀW)⁻¹ M (WᵀW)⁻¹ of least squares, with M the covariance of Wᵀρ estimated from batches: `score_covariance`.
 
     `parameters` (p,) are the estimate; `kept` the numbers of the estimated ones among them; `root` (k, k) has root · rootᵀ = (WᵀW)⁻¹ of the
     system weighted by `noise` (one a subsystem), whose mean squared error is `variance`.
@@ -52,7 +52,7 @@ def batch_covariance(
 
 
 def offset_scores(observation: Equations, kept: Sequence[int], root: np.ndarray) -> np.ndarray | None:
-    """Columns (k, ·) that times a score in coordinates of `root` (k, k) give those of the joints' torque offsets; None without offsets."""
+    """Columns (k, ·) that map a score in coordinates of `root` (k, k) to those of the joints' torque offsets; None without offsets."""
     if not isinstance(observation, Observation):
         return None
     offsets = [i for i, number in enumerate(kept) if observation.names[number].endswith(".torque_offset")]
@@ -60,7 +60,7 @@ def offset_scores(observation: Equations, kept: Sequence[int], root: np.ndarray)
 
 
 def parameter_rows(matrix: np.ndarray, kept: Sequence[int], column_indices: np.ndarray) -> np.ndarray:
-    """The rows (m, k) of a matrix (k, k) that belong to `column_indices`, of which `kept` have one; zero for the others."""
+    """Rows (m, k) of a matrix (k, k) for `column_indices`, of which `kept` have one; zero for the others."""
     rows_of = np.zeros((len(column_indices), matrix.shape[1]))
     _, at, rows = np.intersect1d(column_indices, kept, return_indices=True)
     rows_of[at] = matrix[rows]
@@ -76,7 +76,7 @@ def score_covariance(
     variance: float,
     offsets: np.ndarray | None = None,
 ) -> BatchCovariance:
-    """root · M · rootᵀ with M the covariance of the scores Qᵀρ as the batches show it (Newey & West 1987).
+    """Covariance root · M · rootᵀ with M the covariance of the scores Qᵀρ estimated from batches (Newey & West 1987).
 
     A joint's columns (width) of a batch times `seen` (width, k) give its part of Q, with QᵀQ = 1 over all joints and batches, and times
     `missed` (width,) the errors ρ, both divided by the subsystem's `noise`. M sums the outer squares of the scores of all windows of ℓ
@@ -104,7 +104,7 @@ def covariance_of_scores(
     offsets: np.ndarray | None = None,
     known: np.ndarray | None = None,
 ) -> BatchCovariance:
-    """That of `score_covariance`, of scores; `known` (k, k) is the information of a prior, in their coordinates.
+    """Covariance of given scores as of `score_covariance`; `known` (k, k) is the information of a prior, in their coordinates.
 
     Without a prior QᵀQ = 1 of all batches; with it that and the prior's share are one.
     """
@@ -136,7 +136,7 @@ def mixed_covariance(spread: np.ndarray, nominal: np.ndarray, std: np.ndarray, f
 
 
 def _correlation(covariance: np.ndarray) -> np.ndarray:
-    """Correlations; zero of a parameter without variance, which a prior alone tells."""
+    """Correlation matrix; zero for a parameter without variance, which only a prior determines."""
     std = np.sqrt(np.diag(covariance))
     std = np.where(std > 0, std, 1.0)
     return covariance / np.outer(std, std)
@@ -158,7 +158,7 @@ def _scores(
 
 
 def _first_autocorrelation(experiments: Sequence[Scores]) -> float:
-    """Of the scores from batch to batch, at most 0.97."""
+    """Lag-one autocorrelation of the scores between batches, at most 0.97."""
     product = sum(float(np.sum(e.score[1:] * e.score[:-1])) for e in experiments)
     size = sum(float(np.sum(e.score**2)) for e in experiments)
     return min(product / size, 0.97) if size > 0 else 0.0
@@ -171,7 +171,7 @@ def _bandwidth(r: float, batches: int) -> int:
 
 
 def _seen_share(r: float, window: int) -> float:
-    """What Bartlett's weights leave of the variance of the sum of first-order autoregressive scores, at most 1."""
+    """Share of the variance of the sum of first-order autoregressive scores captured by Bartlett's weights, at most 1."""
     if r <= 0:
         return 1.0
     lag = np.arange(1, window)
@@ -179,7 +179,7 @@ def _seen_share(r: float, window: int) -> float:
 
 
 def _windows(experiment: Scores, window: int, variance: float) -> np.ndarray:
-    """The squares of the corrected scores of all windows, those that begin before the first batch or end after the last included."""
+    """Squared corrected scores of all windows, including those that begin before the first batch or end after the last."""
     size = experiment.score.shape[1]
     score = _moving_sum(experiment.score, window)
     information = _moving_sum(experiment.information, window)

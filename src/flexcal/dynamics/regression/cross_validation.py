@@ -14,15 +14,16 @@ from flexcal.errors import FlexcalError
 
 FOLDS = 10
 _RANK = 1e-9
-"""A singular value below this, of columns of unit length, is taken as zero."""
+"""Singular value, for columns of unit length, below which it is zero."""
 _NEW = 1e-6
-"""A column that others leave less than this share of tells nothing new."""
+"""Share of a column not explained by others, below which it adds nothing."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fold:
-    """`train` (·, p + 1) stands for [W, Y] outside the block of that `number`, each joint by its own noise; `test` for those of the
-    block, in N m."""
+    """Fold of cross-validation: `train` (·, p + 1) represents [W, Y] outside the block of that `number`, each joint by its own noise;
+    `test` that of the block, in N m.
+    """
 
     number: int
     train: np.ndarray
@@ -36,7 +37,7 @@ def folds(
     weigh_by: Sequence[int],
     purge_rows: int,
 ) -> list[Fold]:
-    """Blocks of about as many rows that follow each other; `purge_rows` to either side of a block train nothing when it is the test.
+    """Consecutive blocks of about equal size; `purge_rows` on either side of a block are excluded from training when it is the test.
 
     `column_indices` are the numbers of every joint's columns among all `columns`. The noise of a joint is what its columns among `weigh_by`
     leave of its torques outside the block. Raises `FlexcalError` where no block leaves others to learn from.
@@ -66,7 +67,9 @@ def folds(
 def prediction_errors(
     folds: Sequence[Fold], fixed: Sequence[int], groups: Sequence[Sequence[int]]
 ) -> list[float]:
-    """‖Y - W χ‖ / ‖Y‖ over the blocks, each predicted by the others, with the columns `fixed` and those of one of the `groups`."""
+    """Relative error ‖Y - W χ‖ / ‖Y‖ over the blocks, each predicted by the others, with the columns `fixed` and those of one of the
+    `groups`.
+    """
     missed, size = np.zeros(len(groups)), 0.0
     for fold in folds:
         norms = np.linalg.norm(fold.train, axis=0)
@@ -84,8 +87,9 @@ def prediction_errors(
 
 
 def solutions(folds: Sequence[Fold], kept: Sequence[int], start: np.ndarray) -> list[np.ndarray]:
-    """For every block the parameters (p,) that least squares finds outside of it; those that are not `kept`, and directions that are not
-    seen there, stay as in `start` (p,)."""
+    """Least-squares parameters (p,) outside of every block; those that are not `kept`, and undetermined directions, stay as in `start`
+    (p,).
+    """
     parameters = []
     for fold in folds:
         train = fold.train[:, kept]
@@ -99,7 +103,7 @@ def solutions(folds: Sequence[Fold], kept: Sequence[int], start: np.ndarray) -> 
 
 
 def fold_numbers(systems: Sequence[ExperimentSystem]) -> list[dict[int, int]]:
-    """For every system the block in which each of its batches lies, by the batch's number."""
+    """Block number of each batch of every system, by the batch's number."""
     total = sum(batch.rows for system in systems for batch in system.batches)
     done, numbers = 0, []
     for system in systems:
@@ -113,7 +117,7 @@ def fold_numbers(systems: Sequence[ExperimentSystem]) -> list[dict[int, int]]:
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """Rows of one fold that are alike in whether they lie near the fold before or after, of the same recording."""
+    """Rows of one fold with the same adjacency to the fold before or after, of the same recording."""
 
     fold: int
     near_before: bool

@@ -1,4 +1,4 @@
-"""Cut-off of the low-pass by cross-validation: the one whose motion predicts the torques of left-out blocks best."""
+"""Selection of the low-pass cut-off by cross-validation of the predicted torques."""
 
 from __future__ import annotations
 
@@ -17,33 +17,33 @@ from flexcal.model.robot import RobotModel
 
 BLOCKS = 10
 _RATIO = 1.25
-"""Of neighbouring cut-offs; at first every other one is tried."""
+"""Ratio of neighbouring cut-offs; at first every other one is tried."""
 _LOWEST_HZ = 1.0
 _OVER = 5.0
-"""Samples a second, at least, over the largest cut-off that is tried."""
+"""Least ratio of the sampling rate to the largest cut-off tried."""
 _ROWS_HZ = 100.0
-"""Rows a second, and cut-off in Hz, at most: no robot's accelerations are signal above."""
+"""Largest row rate, and largest cut-off in Hz: no robot's accelerations have signal above."""
 _SPAN = 2.0
-"""s, at most, by which the motion is continued at its ends."""
+"""Longest extrapolation, s, of the motion at its ends."""
 _ORDER = 4
 _BORDER = 3
 """Rows at either end of a block that share samples with others."""
 _FEWEST = 10
-"""Rows of a block, at least, without those."""
+"""Least number of rows of a block without those."""
 _MORE = 3.0
-"""Equations over the unknowns, at least."""
+"""Least ratio of equations to unknowns."""
 _SURE = 2.0
-"""Standard errors, over the blocks, of the squared error that another cut-off must save."""
+"""Gain in squared error, in standard errors over the blocks, required of another cut-off."""
 _RISEN = 1.5
-"""Times the smallest squared error, at which lower cut-offs are not tried any more."""
+"""Ratio to the smallest squared error at which lower cut-offs are no longer tried."""
 _ALIKE = 0.03
-"""Share of the smallest squared error by which that of the cut-off may be larger whose signs are taken for the true ones."""
+"""Relative rise of the squared error up to which a cut-off counts as equal, for the signs of velocities."""
 _RANK = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class ContinuousSamples:
-    """Samples without gaps, every `time_step` (s): positions `q` (N, n) and `torque` (N, n) of motors and from outside, N m.
+    """Samples without gaps, every `time_step` (s): positions `q` (N, n) and `torque` (N, n) of motors plus external, N m.
 
     `payload` is kg, None where the log does not say.
     """
@@ -56,8 +56,9 @@ class ContinuousSamples:
 
 @dataclass(frozen=True)
 class CutoffChoice:
-    """The cut-off with the smallest error of prediction in left-out blocks, Hz, and its relative error there; `proposed_error` is that of
-    the cut-off that was proposed from the spectrum."""
+    """Cut-off with the smallest prediction error in left-out blocks, Hz, and its relative error; `proposed_error` is that of the cut-off
+    proposed from the spectrum.
+    """
 
     cutoff_hz: float
     error: float
@@ -65,7 +66,7 @@ class CutoffChoice:
 
 
 def pieces(recordings: Iterable[Recording], samples: int, proposed_hz: float) -> Iterator[ContinuousSamples]:
-    """The first so many `samples` of a log between its gaps, at no less than the rate that cut-offs up to the proposed one need."""
+    """First `samples` samples of a log between its gaps, at no less than the rate needed for cut-offs up to the proposed one."""
     left = samples
     for group in between_gaps(recordings):
         if left <= 0:
@@ -86,7 +87,7 @@ def pieces(recordings: Iterable[Recording], samples: int, proposed_hz: float) ->
 def choose_cutoff(
     model: RobotModel, loads: Sequence[Sequence[ContinuousSamples]], proposed_hz: float
 ) -> CutoffChoice | None:
-    """Of cut-offs from the proposed one down, for classic friction; None where the logs are too short for that, or it need not be lowered.
+    """Best cut-off from the proposed one down, for classic friction; None for logs that are too short, or without need of a lower one.
 
     Every one of the `loads`, recordings with the same load, has parameters of its own. The rows are those of the proposed cut-off, at most
     100 a second, whichever is tried. Ten blocks of time are predicted from the others, every joint weighted by its error at the proposed
@@ -135,7 +136,7 @@ class _Losses:
                 self.blocks(beside)
 
     def blocks(self, number: int) -> np.ndarray:
-        """Of all blocks of all tables (B,)."""
+        """Squared errors of all blocks of all tables (B,)."""
         if number not in self._losses:
             signs_of = number if self._signs_of is None else self._signs_of
             cutoff, signs = (self._highest / _RATIO**n for n in (number, signs_of))
@@ -144,7 +145,7 @@ class _Losses:
         return self._losses[number]
 
     def total(self, number: int) -> float:
-        """Of all blocks together."""
+        """Squared error of all blocks together."""
         return float(self.blocks(number).sum())
 
     @property
@@ -154,25 +155,25 @@ class _Losses:
 
     @property
     def lower_is_better(self) -> bool:
-        """Whether the best one saves twice the standard error of the saving."""
+        """Whether the best one gains more than twice the standard error of the gain."""
         saved = self.blocks(0) - self.blocks(self._lowest)
         return bool(saved.sum() > _SURE * _standard_error(saved))
 
     @property
     def highest_alike(self) -> int:
-        """The number of the highest cut-off whose squared error is nearly the smallest."""
+        """Number of the highest cut-off whose squared error is nearly the smallest."""
         most = (1 + _ALIKE) * self.total(self._lowest)
         return min(number for number in self._losses if self.total(number) <= most)
 
     @property
     def highest_good(self) -> int:
-        """The number of the highest cut-off that is within a standard error of the best one."""
+        """Number of the highest cut-off within a standard error of the best one."""
         lost = {number: blocks - self.blocks(self._lowest) for number, blocks in self._losses.items()}
         return min(number for number, more in lost.items() if more.sum() <= _standard_error(more))
 
 
 def _standard_error(blocks: np.ndarray) -> float:
-    """Of the sum of blocks (B,)."""
+    """Standard error of the sum of blocks (B,)."""
     return float(blocks.std(ddof=1)) * math.sqrt(len(blocks))
 
 
@@ -223,7 +224,7 @@ class _Tables:
         return errors
 
     def _products(self, cutoff_hz: float, signs_hz: float) -> tuple[np.ndarray, np.ndarray]:
-        """[W, Y]ᵀ [W, Y] (10, n, p + 1, p + 1) of every block and joint: of its inner rows, and of all."""
+        """Products [W, Y]ᵀ [W, Y] (10, n, p + 1, p + 1) of every block and joint: of its inner rows, and of all."""
         table = np.concatenate([self._rows(f, cutoff_hz, signs_hz) for f in self._filters], axis=1)
         edges = np.linspace(0, table.shape[1], BLOCKS + 1).astype(int)
         width = table.shape[2]
@@ -236,7 +237,7 @@ class _Tables:
         return inner, whole
 
     def _rows(self, filters: _Filters, cutoff_hz: float, signs_hz: float) -> np.ndarray:
-        """[W, Y] (n, M, p + 1) of the base parameters; signs of velocities are taken before decimation."""
+        """Rows [W, Y] (n, M, p + 1) of the base parameters; signs of velocities are taken before decimation."""
         motion = filters.motion(cutoff_hz)
         signs = filters.signs(signs_hz)
         names, kept = self._observation.names, self._kept
@@ -256,7 +257,7 @@ class _Tables:
 
 
 class _Filters:
-    """A piece in the frequency domain: low-pass, differences and decimation are products there."""
+    """Samples in the frequency domain, where low-pass, differences and decimation are products."""
 
     def __init__(self, piece: ContinuousSamples, highest_hz: float) -> None:
         self._step, count = piece.time_step, len(piece.q)
@@ -295,7 +296,7 @@ class _Filters:
         return np.fft.irfft(lines * self._thin[:, None], self._length, axis=0)[self._at]
 
     def _continued(self, values: np.ndarray) -> np.ndarray:
-        """Turned about its ends by half a turn."""
+        """Signal continued by point reflection at its ends."""
         beyond = self._beyond
         before, after = 2 * values[0] - values[beyond:0:-1], 2 * values[-1] - values[-2 : -beyond - 2 : -1]
         rest = self._length - len(values) - 2 * beyond

@@ -9,7 +9,7 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """Of one experiment, batch by batch (zero for one without rows), in coordinates in which the information of all is one.
+    """Scores of one experiment, batch by batch (zero for one without rows), in coordinates of unit total information.
 
     `score` (B, k) is the estimating function, `information` (B, k, k) the batch's share; `batches` have rows.
     """
@@ -19,9 +19,9 @@ class Scores:
     batches: int
 
     def of(self, onward: np.ndarray) -> Scores:
-        """The scores times a matrix `onward` (k, k), and their information."""
+        """Scores times a matrix `onward` (k, k), and their information."""
         return Scores(self.score @ onward.T, onward @ self.information @ onward.T, self.batches)
 
     def after(self, step: np.ndarray) -> Scores:
-        """Those after the parameters moved by `step` (k,)."""
+        """Scores after a step `step` (k,) of the parameters."""
         return Scores(self.score - self.information @ step, self.information, self.batches)

@@ -10,7 +10,7 @@ import numpy as np
 from flexcal.kernels import update
 
 _TOLERANCE = 1e-9
-"""A singular value of comparable columns below this is taken as zero."""
+"""Singular value of columns of comparable size below which it is zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,18 +25,18 @@ class TriangularFactor:
 
     @classmethod
     def of(cls, matrix: np.ndarray, right: np.ndarray) -> TriangularFactor:
-        """Of W (rows, k) and Y (rows,)."""
+        """Factor of W (rows, k) and Y (rows,)."""
         return cls(triangular(np.column_stack([matrix, right])), len(right))
 
     @classmethod
     def padded(cls, factor: np.ndarray, rows: int) -> TriangularFactor:
-        """Of a factor (·, k + 1) with no more than k + 1 rows, which stands for so many `rows`."""
+        """Factor from a matrix (·, k + 1) of at most k + 1 rows, which represents `rows` rows."""
         size = factor.shape[1]
         return cls(np.vstack([factor, np.zeros((size - len(factor), size))]), rows)
 
     @classmethod
     def empty(cls, columns: int) -> TriangularFactor:
-        """Of no rows."""
+        """Factor of no rows."""
         return cls(np.zeros((columns + 1, columns + 1)), 0)
 
     def __add__(self, other: TriangularFactor) -> TriangularFactor:
@@ -44,24 +44,24 @@ class TriangularFactor:
 
     @property
     def matrix(self) -> np.ndarray:
-        """(k + 1, k) that stands for W."""
+        """Matrix (k + 1, k) in place of W."""
         return self.factor[:, :-1]
 
     @property
     def right(self) -> np.ndarray:
-        """(k + 1,) that stands for Y."""
+        """Vector (k + 1,) in place of Y."""
         return self.factor[:, -1]
 
     def residual(self, parameters: np.ndarray) -> float:
-        """‖Y − W · parameters‖ for `parameters` (k,)."""
+        """Norm of the residual, ‖Y − W · parameters‖, for `parameters` (k,)."""
         return float(np.linalg.norm(self.right - self.matrix @ parameters))
 
     def part(self, columns: np.ndarray) -> TriangularFactor:
-        """With the numbered `columns` of W alone."""
+        """Factor for the numbered `columns` of W alone."""
         return TriangularFactor(self.factor[:, [*columns, -1]], self.rows)
 
     def noise(self, scale: np.ndarray | None = None) -> tuple[float, int]:
-        """σ̂ of Eq. 2.28 of this system alone, and its rank; NaN without more rows than that.
+        """Noise σ̂ of Eq. 2.28 of this system alone, and its rank; NaN without more rows than that.
 
         `scale` (k,) makes the columns compare; without it each gets unit length.
         """
@@ -79,7 +79,7 @@ class TriangularFactor:
 def stacked(
     triangles: Iterable[TriangularFactor], column_indices: Iterable[np.ndarray], columns: int
 ) -> TriangularFactor:
-    """One system of all `columns` from triangles that know only their `column_indices` of them."""
+    """Factor for all `columns` from factors of their `column_indices` each."""
     total = TriangularFactor.empty(columns)
     for triangle, numbers in zip(triangles, column_indices, strict=True):
         total = total + TriangularFactor(widened(triangle.factor, numbers, columns), triangle.rows)
@@ -87,7 +87,7 @@ def stacked(
 
 
 def widened(system: np.ndarray, column_indices: np.ndarray, columns: int) -> np.ndarray:
-    """[W, Y] (·, columns + 1) of all `columns` from a system (·, k + 1) that knows only its `column_indices` of them."""
+    """System [W, Y] (·, columns + 1) of all `columns` from a system (·, k + 1) of its `column_indices`."""
     wide = np.zeros((len(system), columns + 1))
     wide[:, column_indices] = system[:, :-1]
     wide[:, -1] = system[:, -1]
@@ -95,7 +95,7 @@ def widened(system: np.ndarray, column_indices: np.ndarray, columns: int) -> np.
 
 
 def triangular(matrix: np.ndarray) -> np.ndarray:
-    """R (k, k) of the QR of a matrix (·, k), by Householder reflections; the last rows are zero, to rounding, where it has fewer."""
+    """Triangular factor R (k, k) of a matrix (·, k), by Householder reflections; the last rows are zero, to rounding, if it has fewer."""
     columns = np.array(matrix.T, dtype=float, order="C")
     factor = np.zeros((len(columns), len(columns)))
     update(factor, columns)

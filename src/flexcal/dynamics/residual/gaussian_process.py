@@ -12,19 +12,19 @@ import numpy as np
 from flexcal.errors import FlexcalError
 
 _SHAPED_BY = 300
-"""Points, at most, that lengths and variances are read from; every step of that costs their third power."""
+"""Largest number of points for fitting lengths and variances, of cubic cost per step."""
 _STARTS: tuple[Any, ...] = ((1.0, 1.0, 1.0), (0.1, 3.0, 3.0))
-"""Lengths, in standard deviations of the inputs, to begin with: something smooth, and a ripple over the first of them."""
+"""Initial lengths, in standard deviations of the inputs: a smooth function, and a ripple along the first input."""
 _LENGTHS = (0.03, 100.0)
 _SHARES = (1e-6, 100.0)
-"""Bounds of the variances, over the mean square of the values."""
+"""Bounds of the variances relative to the mean square of the values."""
 _TOGETHER = 4096
-"""Points that are predicted at once."""
+"""Number of points predicted at once."""
 
 
 @dataclass(frozen=True, eq=False)
 class GaussianProcess:
-    """A function of three variables, seen at `inputs` (m, 3) as `values` (m,) with a noise of variance `noise`.
+    """Gaussian process of three variables, observed at `inputs` (m, 3) as `values` (m,) with a noise of variance `noise`.
 
     Before it is seen, its mean is zero and its covariance `amplitude` · exp(-½ Σ ((x - x')/lengths)²), `lengths` (3,) in the units of
     the inputs (Rasmussen and Williams 2006, chapter 2).
@@ -38,7 +38,7 @@ class GaussianProcess:
 
     @classmethod
     def fitted(cls, inputs: np.ndarray, values: np.ndarray) -> GaussianProcess:
-        """With the lengths and variances that make the `values` (m,) at `inputs` (m, 3) likeliest, of those two starts lead to.
+        """Process with the lengths and variances of maximum likelihood for `values` (m,) at `inputs` (m, 3), out of two starts.
 
         Raises `FlexcalError` without scikit-learn.
         """
@@ -66,7 +66,7 @@ class GaussianProcess:
         return cls(inputs, values, scale * lengths, amplitude * size**2, noise * size**2)
 
     def predict(self, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mean of the function (N,) and standard deviation (N,) of a value, noise and all, at `inputs` (N, 3)."""
+        """Mean of the function (N,) and standard deviation (N,) of a value, noise included, at `inputs` (N, 3)."""
         from scipy.linalg import solve_triangular
 
         factor, weights = self._solution
@@ -80,7 +80,7 @@ class GaussianProcess:
 
     @cached_property
     def _solution(self) -> tuple[np.ndarray, np.ndarray]:
-        """L of the covariance of the values, and what their means weigh."""
+        """Cholesky factor L of the covariance of the values, and the weights of the means."""
         from scipy.linalg import cho_factor, cho_solve
 
         covariance = self._covariance(self.inputs) + self.noise * np.eye(len(self.inputs))
@@ -88,14 +88,14 @@ class GaussianProcess:
         return factor, cho_solve((factor, True), self.values)
 
     def _covariance(self, inputs: np.ndarray) -> np.ndarray:
-        """Between points (N, 3) and those seen (N, m)."""
+        """Covariance (N, m) between points (N, 3) and the observed ones."""
         left, right = inputs / self.lengths, self.inputs / self.lengths
         squares = np.sum(left**2, axis=1)[:, None] + np.sum(right**2, axis=1) - 2.0 * left @ right.T
         return self.amplitude * np.exp(-0.5 * np.maximum(squares, 0.0))
 
 
 def require_scikit_learn() -> None:
-    """Raises `FlexcalError` where scikit-learn is not installed."""
+    """Raise `FlexcalError` if scikit-learn is not installed."""
     from importlib.util import find_spec
 
     if find_spec("sklearn") is None:

@@ -29,7 +29,7 @@ class LearnedMotor:
 
 @dataclass(frozen=True, eq=False)
 class LearnedResidual:
-    """One a motor, in the order of the joints, `shares` (n, n) as `motor_shares` has them.
+    """Learned processes, one per motor, in the order of the joints, `shares` (n, n) as of `motor_shares`.
 
     It is not part of the parameters, and holds for the estimate alone that it was learned with (Nguyen-Tuong and Peters 2010).
     """
@@ -39,12 +39,13 @@ class LearnedResidual:
 
     @property
     def learned(self) -> tuple[str, ...]:
-        """The motors that it changes anything for."""
+        """Motors with a learned process."""
         return tuple(motor.name for motor in self.motors if motor.learned)
 
     def torque(self, q: np.ndarray, dq: np.ndarray, predicted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What to add to the torques `predicted` (N, n), N m, by the estimate at `q`, `dq` (N, n), and the standard deviation (N, n) of
-        what is measured then, noise and all. Raises `FlexcalError` where the shapes differ or do not fit the motors."""
+        """Correction of the torques `predicted` (N, n), N m, by the estimate at `q`, `dq` (N, n), and the standard deviation (N, n) of
+        measured ones, noise included. Raises `FlexcalError` for shapes that differ or do not fit the motors.
+        """
         shapes = {values.shape for values in (q, dq, predicted)}
         if len(shapes) > 1 or q.shape[1:] != (len(self.motors),):
             raise FlexcalError(
@@ -57,7 +58,7 @@ class LearnedResidual:
     def of_motors(
         self, position: np.ndarray, velocity: np.ndarray, predicted: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """`torque` from positions, speeds and predicted torques on the axes of the motors (N, n)."""
+        """Same as `torque` from positions, speeds and predicted torques on the axes of the motors (N, n)."""
         mean, variance = np.zeros_like(predicted), np.zeros_like(predicted)
         for k, motor in enumerate(self.motors):
             inputs = motor_inputs(position, velocity, predicted, k)
@@ -67,5 +68,5 @@ class LearnedResidual:
 
 
 def motor_inputs(position: np.ndarray, velocity: np.ndarray, predicted: np.ndarray, motor: int) -> np.ndarray:
-    """(N, 3) that the process of one motor is a function of, out of those of all motors (N, n)."""
+    """Inputs (N, 3) of the process of one motor, out of those of all motors (N, n)."""
     return np.stack([position[:, motor], velocity[:, motor], predicted[:, motor]], axis=1)

@@ -19,19 +19,19 @@ from flexcal.estimation import Estimate
 from flexcal.progress import Progress, silent
 
 _ROWS = 1000
-"""Rows, at most, that a process is made of; they lie evenly in all that was recorded."""
+"""Largest number of rows of a process, evenly spread over the recordings."""
 _FEWEST = 100
-"""Rows, at least."""
+"""Least number of rows."""
 _WORTH = 0.01
-"""A process is worth having if the cross-validated error of its motor falls by this share of itself."""
+"""Least relative reduction of a motor's cross-validated error for a process to be used."""
 _EXACT = 1e-9
-"""Share of a motor's torque below which what is missed is rounding."""
+"""Residual relative to a motor's torque below which it is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class CrossValidatedErrors:
-    """Root mean square torques of the motors (n,) in blocks of time, N m: as `measured`, what the `physical` parameters from the other
-    blocks miss, and what these miss `together` with the processes learned there.
+    """Root mean square torques of the motors (n,) in blocks of time, N m: `measured`, residual of the `physical` parameters from the
+    other blocks, and residual `together` with the processes learned there.
 
     `overall` are both errors of all joints, ‖·‖ / ‖Y‖, each motor with its process where that is worth having and else without.
     """
@@ -48,7 +48,7 @@ def learn_residual(
     estimate: Estimate,
     progress: Progress = silent,
 ) -> tuple[LearnedResidual, CrossValidatedErrors]:
-    """What `estimate` misses in the rows of its fit, of which `systems` are the equations; the estimate stays as it is.
+    """Learn the residual of `estimate` in the rows of its fit, with the equations `systems`; the estimate is not changed.
 
     Of ten blocks of time each is predicted from the others, less those within a filter's length: by physical parameters (the estimate's,
     moved by what `weighted_least_squares` moves without the block) and the processes. A motor whose error there does not fall by a
@@ -95,7 +95,7 @@ def learn_residual(
 def _without_blocks(
     recorded: RecordedRows, systems: Sequence[ExperimentSystem], estimate: Estimate
 ) -> tuple[np.ndarray, list[int]]:
-    """Parameters (1 + blocks, p): the estimate's, and as they would be without each of the blocks of those numbers."""
+    """Parameters (1 + blocks, p): the estimate's, and those without each of the numbered blocks."""
     observation, base = recorded.observation, recorded.base
     kept = list(base.identifiability.kept)
     blocks = folds(systems, observation.column_indices, len(observation.names), kept, _reach(recorded))
@@ -108,7 +108,7 @@ def _without_blocks(
 def _thinned(
     recorded: RecordedRows, systems: Sequence[ExperimentSystem], parameters: np.ndarray
 ) -> tuple[MotorStates, np.ndarray]:
-    """Rows that lie evenly in all that were recorded, and the block of each (M,)."""
+    """Rows evenly spread over the recordings, and the block of each (M,)."""
     total = sum(batch.rows for system in systems for batch in system.batches)
     every = -(-total // _ROWS)
 
@@ -131,7 +131,7 @@ def _reach(recorded: RecordedRows) -> int:
 
 
 def _near(states: MotorStates, test: np.ndarray, reach: int) -> np.ndarray:
-    """Which rows (M,) are tested, or share samples with one that is."""
+    """Mask (M,) of rows that are tested, or share samples with one that is."""
     near = np.zeros(len(states), dtype=bool)
     for experiment in np.unique(states.experiment[test]):
         own = states.experiment == experiment

@@ -16,7 +16,7 @@ from flexcal.model.robot import RobotModel
 
 @dataclass(frozen=True, eq=False)
 class MotorStates:
-    """M rows; `number` (M,) counts those of the `experiment` (M,) that each is of, whatever is left out.
+    """States of M rows; `number` (M,) counts the rows of each one's `experiment` (M,), whatever is left out.
 
     `position` and `velocity` (M, n) are those of the motors' axes, `torque` (M, n) what the motors gave and `predicted` (M, K, n) what
     each of K estimates asks of them, all through the same decimation.
@@ -33,18 +33,18 @@ class MotorStates:
         return len(self.number)
 
     def where(self, keep: np.ndarray) -> MotorStates:
-        """The rows that `keep` (M,) marks."""
+        """Rows of the mask `keep` (M,)."""
         return MotorStates(*(getattr(self, field.name)[keep] for field in fields(self)))
 
     @classmethod
     def joined(cls, parts: Iterable[MotorStates]) -> MotorStates:
-        """One after the other."""
+        """Concatenated states."""
         states = list(parts)
         return cls(*(np.concatenate([getattr(part, field.name) for part in states]) for field in fields(cls)))
 
 
 def motor_states(recorded: RecordedRows, parameters: np.ndarray) -> Iterator[MotorStates]:
-    """All rows, in one pass and block by block, with what estimates of `parameters` (K, p) ask."""
+    """States of all rows, in one pass and block by block, with the torques predicted by `parameters` (K, p)."""
     observation = recorded.observation
     wide = replace(observation, terms=(*observation.terms, _AxisStates()))
     beyond = np.zeros((len(parameters), len(wide.names) - len(observation.names)))
@@ -68,7 +68,7 @@ def motor_states(recorded: RecordedRows, parameters: np.ndarray) -> Iterator[Mot
 
 @dataclass(frozen=True)
 class _AxisStates:
-    """The position s and the speed ṡ of every motor's axis, in columns of the motor's own joint."""
+    """Position s and speed ṡ of every motor's axis, in columns of the motor's own joint."""
 
     def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
         for axis in motor_axes(model):

@@ -1,4 +1,4 @@
-"""The file `learned_residual.npz`, and its link to the estimates.
+"""File `learned_residual.npz`, and its link to the estimates.
 
 `names` (n,), `shares` (n, n), `inputs` (n, m, 3), `values` (n, m), `lengths` (n, 3), `amplitude`, `noise`, `inflation` (n,) are those of
 `LearnedResidual`; `dynamics` is the SHA-256 of the block that it was learned with.
@@ -32,13 +32,15 @@ _FORMS = {
 
 
 def require_residual_path(path: Path) -> None:
-    """Raise `InputError` where a file stands at `path` that no flexcal wrote."""
+    """Raise `InputError` if another program's file stands at `path`."""
     refuse_irregular(path)
     refuse_foreign(path, _FORMS.keys())
 
 
 def write_learned_residual(path: Path, learned: LearnedResidual, estimates: Path) -> None:
-    """Write it to `path`, atomically, for the block `dynamics` of the file `estimates`; raises `InputError` where it cannot be written."""
+    """Write the learned residual to `path`, atomically, for the block `dynamics` of the file `estimates`; raises `InputError` if not
+    possible.
+    """
     processes = [motor.process for motor in learned.motors]
     with atomic_path(path) as temporary, temporary.open("wb") as stream:
         np.savez(

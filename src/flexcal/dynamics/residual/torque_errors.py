@@ -11,13 +11,14 @@ from flexcal.dynamics.residual.learned_torque import LearnedResidual
 from flexcal.dynamics.residual.motor_states import motor_states
 
 _NORMAL = 1.959964
-"""Half a 95 % interval, in standard deviations."""
+"""Half width of a 95 % interval, in standard deviations."""
 
 
 @dataclass(frozen=True, eq=False)
 class LearnedTorqueErrors:
-    """Norms of the joints' torques (n,), N m: as `measured`, what the `physical` parameters miss, and what is missed with the learned
-    torque added; and the share of rows `inside` (n,) the 95 % intervals of what is predicted then."""
+    """Norms of the joints' torques (n,), N m: `measured`, residual of the `physical` parameters, and residual with the learned torque;
+    and the share of rows `inside` (n,) the 95 % prediction intervals.
+    """
 
     measured: np.ndarray
     physical: np.ndarray
@@ -26,7 +27,7 @@ class LearnedTorqueErrors:
 
     @property
     def overall(self) -> tuple[float, float]:
-        """‖·‖ / ‖Y‖ of all joints, without and with what was learned."""
+        """Relative error of all joints, without and with the learned torque."""
         total = np.linalg.norm(self.measured)
         return float(np.linalg.norm(self.physical) / total), float(np.linalg.norm(self.together) / total)
 
@@ -34,7 +35,7 @@ class LearnedTorqueErrors:
 def residual_errors(
     learned: LearnedResidual, recorded: RecordedRows, parameters: np.ndarray
 ) -> LearnedTorqueErrors:
-    """In one pass over the recorded rows, by the estimate of `parameters` (p,)."""
+    """Errors from one pass over the recorded rows, for the estimate of `parameters` (p,)."""
     squares, inside, count = np.zeros((3, len(learned.motors))), np.zeros(len(learned.motors)), 0
     for states in motor_states(recorded, parameters[None]):
         predicted = states.predicted[:, 0]

@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class ArmSide:
-    """`q`, `dq`, `ddq` (N, n) in rad, m and s, of all joints; where a joint is rigid nobody looks at them.
+    """Arm-side motion `q`, `dq`, `ddq` (N, n) in rad, m and s, of all joints; values of rigid joints are not used.
 
     `tilts` are the tilts of the bearings about x and about y, each with its derivatives, where they were measured.
     """
@@ -30,7 +30,7 @@ class ArmSide:
 
     @classmethod
     def joined(cls, parts: Sequence[ArmSide | None]) -> ArmSide | None:
-        """Parts that follow each other as one; None where any is missing."""
+        """Concatenation of consecutive parts; None if any is missing."""
         known = [part for part in parts if part is not None]
         if len(known) < len(parts):
             return None

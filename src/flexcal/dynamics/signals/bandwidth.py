@@ -10,22 +10,24 @@ import numpy as np
 from flexcal.data.recordings import Recording
 
 _SEGMENT = 8.0
-"""Of the recording, s, that one spectrum is taken of."""
+"""Length, s, of the segments of the spectrum."""
 _SHARE = 0.99
 _NOISE_ABOVE = 0.7
-"""Share of half the sampling rate above which the positions are taken for noise."""
+"""Share of half the sampling rate above which the positions are assumed to be noise."""
 
 
 @dataclass(frozen=True)
 class MotionBandwidth:
-    """Below `frequency_hz` lies 99 % of the power of all joints' velocities (0 where nothing moves); `rate_hz` is the sampling rate."""
+    """Bandwidth `frequency_hz`, below which lies 99 % of the power of all joints' velocities (0 at rest); `rate_hz` is the sampling
+    rate.
+    """
 
     frequency_hz: float
     rate_hz: float
 
 
 def motion_bandwidth(recordings: Iterable[Recording]) -> MotionBandwidth:
-    """Of recordings that follow each other, as blocks of one log, in memory that does not grow with them.
+    """Bandwidth of consecutive recordings, as blocks of one log, in constant memory.
 
     Position spectra of segments of 8 s (of all, where there is less) with a Hann window, averaged, less the level that they have at the
     highest frequencies, times ω².
@@ -47,7 +49,7 @@ def motion_bandwidth(recordings: Iterable[Recording]) -> MotionBandwidth:
 
 
 def _segments(recordings: Iterable[Recording]) -> Iterator[tuple[float, np.ndarray]]:
-    """Positions of an even number of samples without gaps, all of one length, with their time step; the last ones may be left out."""
+    """Position segments of equal even length without gaps, with their time step; a remainder may be left out."""
     pending, longest = np.zeros((0, 0)), np.zeros((0, 0))
     step, whole = 0.0, False
     for recording in recordings:

@@ -12,11 +12,11 @@ import numpy as np
 from flexcal.dynamics.signals.motion import AT_REST, Motion
 
 _STANDSTILL = 0.01
-"""A joint stands still below this share of its largest speed in the recording, and where it is at rest."""
+"""Share of its largest speed in the recording below which a joint stands still, as it does at rest."""
 
 
 class Experiment(Protocol):
-    """One recording; it can be gone through again and again."""
+    """Recording that can be iterated repeatedly."""
 
     @property
     def name(self) -> str:
@@ -25,27 +25,27 @@ class Experiment(Protocol):
 
     @property
     def samples(self) -> int:
-        """How many there are."""
+        """Number of samples."""
         ...
 
     @property
     def top_speed(self) -> np.ndarray:
-        """The largest |q̇| of every joint (n,)."""
+        """Largest |q̇| of every joint (n,)."""
         ...
 
     @property
     def cutoff_hz(self) -> float:
-        """Of the low-pass that its positions went through, infinite where they went through none."""
+        """Cut-off of the low-pass of its positions, infinite without one."""
         ...
 
     def blocks(self) -> Iterator[Motion]:
-        """The motion in parts that follow each other."""
+        """Motion in consecutive parts."""
         ...
 
 
 @dataclass(frozen=True)
 class Window:
-    """Rows from `start` to before `end`, s on the recording's clock."""
+    """Time window from `start` to before `end`, s on the recording's clock."""
 
     start: float = -math.inf
     end: float = math.inf

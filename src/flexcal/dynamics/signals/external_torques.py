@@ -11,7 +11,7 @@ from flexcal.model.torques import declared_torque, wrench_torque
 
 
 def external_torque(model: RobotModel, recording: Recording) -> np.ndarray | None:
-    """τ_ext (N, n), N m, that acts on the joints beside the motors; None where nothing is measured or known.
+    """External torque τ_ext (N, n), N m, on the joints in addition to the motors; None if nothing is measured or known.
 
     It is the sum of the wrench at the force sensor (Jᵀ w, on the arm side where that was measured) and of springs and cables whose size
     robot.yaml declares. Columns `tau_ext` are not used: most are the controller's own estimate, from its model of the robot. Raises
@@ -46,6 +46,6 @@ def _wrench(model: RobotModel, recording: Recording) -> np.ndarray:
 
 
 def _behind(model: RobotModel, motors: np.ndarray, arm: np.ndarray) -> np.ndarray:
-    """Positions (N, n) of the arm: behind the drives of elastic joints, else of the motors."""
+    """Positions (N, n) on the arm side of elastic joints, else of the motors."""
     elastic = np.isin(np.arange(model.n), [joint.index for joint in model.elastic])
     return np.where(elastic, arm, motors)

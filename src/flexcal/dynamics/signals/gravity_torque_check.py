@@ -11,22 +11,22 @@ from flexcal.model.robot import RobotModel
 from flexcal.model.statics import gravity_torque
 
 _POSES = 200
-"""Samples of a block whose weight is looked at."""
+"""Number of samples of a block at which gravity torques are evaluated."""
 _TOO_WEAK = 1 / 20
-"""Torques that follow less than this share of the weight are of the motors' side: gears begin beyond, currents in A do not reach it."""
+"""Ratio of torques to gravity torques below which they are motor-side: gear ratios begin beyond, currents in A do not reach it."""
 _HEAVY = 1 / 10
-"""Share of the heaviest joint's weight that a joint must carry to tell which way it pulls."""
+"""Least gravity torque of a joint, relative to the largest, for a check of its sign."""
 _AGAINST = -1 / 2
-"""Correlation below which torques pull the way that the weight does; friction brings it near zero, but not beyond."""
+"""Correlation with gravity torques below which the sign is reversed; friction brings it near zero, but not below."""
 _LIVELY = 2.0
-"""Torques of more than so many times the weight are those of accelerations, which may well go against it: they tell nothing of the sign."""
+"""Ratio of torques to gravity torques above which accelerations dominate and say nothing about the sign."""
 _SMALL = 1 / 8
-"""Of the weight's; friction may add that to torques of motors."""
+"""Torque relative to gravity torque that friction may add to motor-side torques."""
 
 
 @dataclass(frozen=True, eq=False)
 class GravityTorqueCheck:
-    """Sums over samples `weight_squares` (n,) and `torque_squares` (n,) of the squares, (N m)², and `cross_products` (n,) of the products.
+    """Sums over samples, per joint (n,): `weight_squares` and `torque_squares`, (N m)², and `cross_products` of both.
 
     The weight is that of the links, and of what a log says that they hold; zero at joints with a declared spring, which may balance it.
     """
@@ -37,12 +37,12 @@ class GravityTorqueCheck:
 
     @classmethod
     def empty(cls, joints: int) -> GravityTorqueCheck:
-        """Of no samples."""
+        """Check without samples."""
         return cls(*np.zeros((3, joints)))
 
     @classmethod
     def of(cls, recording: Recording, model: RobotModel) -> GravityTorqueCheck:
-        """Of some samples, evenly spread."""
+        """Check of evenly spread samples."""
         some = slice(None, None, max(1, len(recording) // _POSES))
         payload = None if recording.payload is None else recording.payload[some]
         weight, torque = gravity_torque(model, recording.q[some], payload), recording.torque[some]
@@ -61,12 +61,12 @@ class GravityTorqueCheck:
 
     @property
     def heaviest(self) -> int:
-        """The joint whose weight is largest."""
+        """Joint with the largest gravity torque."""
         return int(np.argmax(self.weight_squares))
 
     @property
     def share(self) -> float:
-        """Of its weight that the torques of the heaviest joint follow; 1 where nothing weighs."""
+        """Ratio of the torques of that joint to its gravity torque; 1 without gravity torques."""
         k = self.heaviest
         return (
             float(abs(self.cross_products[k]) / self.weight_squares[k]) if self.weight_squares[k] > 0 else 1.0
@@ -74,7 +74,7 @@ class GravityTorqueCheck:
 
     @property
     def reversed(self) -> int | None:
-        """The first joint of some weight whose torques do not hold it but pull it down; None where there is none."""
+        """First joint of sufficient gravity torque whose torques have the opposite sign; None if there is none."""
         heavy = self.weight_squares > _HEAVY**2 * self.weight_squares.max()
         told = self.torque_squares < _LIVELY**2 * self.weight_squares
         against = self.cross_products < _AGAINST * np.sqrt(self.weight_squares * self.torque_squares)
@@ -82,6 +82,6 @@ class GravityTorqueCheck:
 
     @property
     def on_motor_side(self) -> bool:
-        """Whether the torques are too weak for joints, and too small for friction to be the reason."""
+        """Whether the torques are too weak for joint torques, and too small for friction to be the reason."""
         k = self.heaviest
         return self.share < _TOO_WEAK and bool(self.torque_squares[k] < _SMALL**2 * self.weight_squares[k])

@@ -20,7 +20,7 @@ from flexcal.errors import FlexcalError, InputError
 from flexcal.model.robot import RobotModel
 
 _ROWS = 20_000
-"""Rows of the file that are in memory at once."""
+"""Number of rows of the file in memory at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +141,7 @@ class JointLog:
         return self.spans[0][0], self.spans[-1][1]
 
     def last(self, share: float) -> float:
-        """The time from which on the last `share` of the recorded time lies, s; gaps do not count."""
+        """Time from which the last `share` of the recorded time begins, s; gaps do not count."""
         left = share * sum(end - start for start, end in self.spans)
         for start, end in reversed(self.spans):
             if left <= end - start:
@@ -150,7 +150,7 @@ class JointLog:
         return self.span[0]
 
     def blocks(self) -> Iterator[Motion]:
-        """The filtered motion in parts that follow each other."""
+        """Filtered motion in consecutive parts."""
         seen = 0
         with self.filtered.open("rb") as stream:
             for start in self.starts:
@@ -161,15 +161,15 @@ class JointLog:
                     self.watch(min(1.0, seen / max(1, self.samples)))
 
     def settled(self, motion: Motion) -> Motion:
-        """A motion of this log, with the joints that never move at rest."""
+        """Motion of this log with the joints that never move set to rest."""
         moves = np.isnan(self.rest)
         q = np.where(moves, motion.q, self.rest)
         return replace(motion, q=q, dq=moves * motion.dq, ddq=moves * motion.ddq)
 
 
 def log_blocks(path: Path, model: RobotModel) -> Iterator[Recording]:
-    """The recording of a log in parts that follow each other, or come after a gap, as their `time_base` says, its external torque that of
-    everything that acts beside the motors.
+    """Recording of a log in parts that are consecutive or follow a gap, by their `time_base`, with the external torque of all loads
+    besides the motors.
 
     Raises `InputError` as `read_recording_blocks` does.
     """

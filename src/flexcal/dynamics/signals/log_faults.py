@@ -14,20 +14,20 @@ from flexcal.model.robot import RobotModel
 from flexcal.units import DEGREE
 
 MOVES = 1e-3
-"""rad or m from end to end, at least, of a joint that moves."""
+"""Least range, rad or m, of a moving joint."""
 _TOGETHER = 20
-"""Samples over which measured rates are compared with differences of positions."""
+"""Number of samples over which measured velocities are compared with differences of positions."""
 _CONTRADICTS = 0.3
-"""How far, relative to the motion, a rate may be from its position: delays of drives reach a tenth."""
+"""Largest difference, relative to the motion, of a velocity from its position's: delays of drives reach a tenth."""
 _ROUNDING = 1e-9
-"""Of the largest, what is nothing."""
+"""Size relative to the largest below which a value is zero."""
 _SLOW = 0.02
-"""Of the fastest joint's rate, below which that of a joint may be nothing but noise."""
+"""Share of the fastest joint's velocity below which a joint's may be noise only."""
 
 
 class LogFaults:
-    """Takes a log block by block, and raises `InputError` at its end for torques and positions that end at a sensor's limit, for a torque
-    that never changes while the robot moves, and for velocities that are not those of the positions.
+    """Detector of faults in a log read block by block; at its end raises `InputError` for saturated torques or positions, for a constant
+    torque while the robot moves, and for velocities that contradict the positions.
 
     Limits are looked for at the joints, and in the columns that a matrix of `signals:` mixes to joints.
     """
@@ -40,7 +40,7 @@ class LogFaults:
         self._step = 0.0
 
     def add(self, recording: Recording) -> None:
-        """The block that follows."""
+        """Add the next block."""
         self._step = recording.time_step
         self._torques.add(recording.torque, recording.time_step)
         self._positions.add(recording.q, recording.time_step)
@@ -48,7 +48,7 @@ class LogFaults:
             self._compare(recording.q, recording.velocity)
 
     def check(self) -> None:
-        """Raises `InputError` for the first fault that the whole log shows."""
+        """Raise `InputError` for the first fault of the whole log."""
         moves = max(self._positions.seen[name].span for name in self._model.joint_names) >= MOVES
         widest = max(torque.span for torque in self._torques.seen.values())
         for name, torque in self._torques.seen.items():
@@ -107,7 +107,7 @@ class LogFaults:
 
 
 class _Sensors:
-    """The ends of a quantity of all joints, and of the columns that its `signal` mixes, by the names of both."""
+    """Extremes of a quantity of all joints, and of the columns mixed by its `signal`, by the names of both."""
 
     def __init__(self, model: RobotModel, signal: Signal | None) -> None:
         self._back, self._names = np.eye(model.n), list(model.joint_names)

@@ -14,23 +14,25 @@ from flexcal.dynamics.signals.arm_side import ArmSide
 from flexcal.errors import FlexcalError
 
 TorqueLog = Literal["held", "instantaneous", "mean"]
-"""What a logged torque is over its sample."""
+"""Meaning of a logged torque over its sample."""
 
 AT_REST = 1e-3
-"""rad/s or m/s, below which a joint is at rest: there it is noise that seems to move it."""
+"""Speed, rad/s or m/s, below which a joint is at rest and its motion noise."""
 _REVERSES = 0.1
-"""rad/s² or m/s², from which it is not at rest but reverses: it is that slow for less than 20 ms then, and friction changes sign."""
+"""Acceleration, rad/s² or m/s², from which a slow joint reverses rather than rests: it is that slow for less than 20 ms, and friction
+changes sign.
+"""
 _BORDER_PERIODS = 3.0
-"""What is cut from either end, in periods of the cut-off: the filter's transient falls to a tenth in each."""
+"""Length cut from either end, in periods of the cut-off: the filter's transient falls to a tenth in each."""
 _APART = 1.5
-"""Steps from one sample to the next, at least, across a gap."""
+"""Steps between samples above which there is a gap."""
 BESIDE = 2
-"""Samples on either side that differences of fourth order take."""
+"""Number of samples on either side used by differences of fourth order."""
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """`q`, `dq`, `ddq` (N, n) in rad, m and s, the motor `torque` (N, n) referred to the joint, at `time` (N,), s.
+    """Motion `q`, `dq`, `ddq` (N, n) in rad, m and s, and the motor `torque` (N, n) referred to the joint, at `time` (N,), s.
 
     Positions are the motors', referred to the joint; `arm` has those behind elastic drives, where they were measured. `external` (N, n)
     is the torque that acts on the joints from outside, τ_ext of Eq. 2.20; None for none.
@@ -54,26 +56,26 @@ class Motion:
 
     @property
     def samples(self) -> int:
-        """Of the whole experiment: this motion is all of it."""
+        """Number of samples of the whole experiment, which is this motion."""
         return len(self)
 
     @property
     def top_speed(self) -> np.ndarray:
-        """The largest |q̇| of every joint (n,)."""
+        """Largest |q̇| of every joint (n,)."""
         return np.abs(self.dq).max(axis=0)
 
     @property
     def cutoff_hz(self) -> float:
-        """Infinite: as a whole experiment it is taken as it is."""
+        """Infinite: a motion is used unfiltered."""
         return np.inf
 
     @property
     def net(self) -> np.ndarray:
-        """τ + τ_ext (N, n), the right-hand side of Eq. 2.20."""
+        """Net torque τ + τ_ext (N, n), the right-hand side of Eq. 2.20."""
         return self.torque if self.external is None else self.torque + self.external
 
     def tilt(self, component: int, order: int) -> np.ndarray:
-        """Tilts (N, n) of the bearings about x (`component` 0) or y (1), rad, or their derivative by time of that order.
+        """Tilts (N, n) of the bearings about x (`component` 0) or y (1), rad, or their time derivative of that order.
 
         Raises `FlexcalError` where they were not measured.
         """
@@ -83,7 +85,7 @@ class Motion:
         return (side.q, side.dq, side.ddq)[order]
 
     def blocks(self) -> Iterator[Motion]:
-        """The experiment in parts that follow each other: here one."""
+        """Experiment as a single part."""
         yield self
 
     def part(self, start: int, stop: int) -> Motion:
@@ -95,7 +97,7 @@ class Motion:
 
     @classmethod
     def joined(cls, parts: Iterable[Motion]) -> Motion:
-        """Motions that follow each other as one."""
+        """Concatenation of consecutive motions."""
         motions = list(parts)
         columns = zip(*((m.time, m.q, m.dq, m.ddq, m.torque) for m in motions), strict=True)
         outside = [m.external for m in motions if m.external is not None]
@@ -107,13 +109,14 @@ class Motion:
 
     @classmethod
     def of(cls, recording: Recording, cutoff_hz: float, torque: TorqueLog = "instantaneous") -> Motion:
-        """All of a recording as `filtered_motion` gives it; raises `FlexcalError` as that does."""
+        """Whole motion of a recording by `filtered_motion`; raises `FlexcalError` as that does."""
         return cls.joined(filtered_motion([recording], cutoff_hz, torque))
 
 
 @dataclass(frozen=True, eq=False)
 class FilteredPositions:
-    """N samples from `start` (s) on, `time_step` (s) apart: `torque` (N, n), and `q` (N + 4, n), which begins two samples before.
+    """Filtered positions: N samples from `start` (s) on, `time_step` (s) apart: `torque` (N, n), and `q` (N + 4, n), which begins two
+    samples before.
 
     Where the arm side was measured too, its positions follow those of the motors, and the tilts about x and y
     these: `q` (N + 4, 2 n or 4 n). `external` is (N, n), or (N, 0).
@@ -137,7 +140,7 @@ class FilteredPositions:
         )
 
     def motion(self) -> Motion:
-        """With velocities and accelerations by central differences; that of a joint at rest is zero: friction would take its sign."""
+        """Motion with velocities and accelerations by central differences; zero for a joint at rest, whose sign friction would take."""
         time = self.start + self.time_step * np.arange(len(self))
         n = self.torque.shape[1]
         q, dq, ddq = differences(self.q, self.time_step)
@@ -158,14 +161,14 @@ class FilteredPositions:
 def filtered_motion(
     recordings: Iterable[Recording], cutoff_hz: float, torque: TorqueLog = "instantaneous"
 ) -> Iterator[Motion]:
-    """The motions of `filtered_positions`; raises `FlexcalError` as that does."""
+    """Motions of `filtered_positions`; raises `FlexcalError` as that does."""
     return (part.motion() for part in filtered_positions(recordings, cutoff_hz, torque))
 
 
 def filtered_positions(
     recordings: Iterable[Recording], cutoff_hz: float, torque: TorqueLog = "instantaneous"
 ) -> Iterator[FilteredPositions]:
-    """Positions through a zero-phase low-pass; the torque at the same instants.
+    """Positions through a zero-phase low-pass, and the torque at the same instants.
 
     A logged `torque` that is held until the next sample, or is the mean until then, belongs to the middle of that step: the torque at a
     sample is the mean of its own and the one before. Half a sample of delay between torque and twist would count as K T/2 of damping.
@@ -188,7 +191,7 @@ def filtered_positions(
 
 
 def stretches(motions: Iterable[Motion]) -> Iterator[Iterator[Motion]]:
-    """The parts of a motion, those together between which there is no gap."""
+    """Parts of a motion grouped into stretches without gap."""
     last, step, number = -np.inf, np.inf, 0
 
     def stretch(motion: Motion) -> int:
@@ -203,7 +206,7 @@ def stretches(motions: Iterable[Motion]) -> Iterator[Iterator[Motion]]:
 
 
 def between_gaps(recordings: Iterable[Recording]) -> Iterator[Iterator[Recording]]:
-    """The recordings of a log in groups without gaps; each group is used up before the next is asked for."""
+    """Recordings of a log in groups without gaps; each group is consumed before the next is requested."""
     number = 0
 
     def stretch(recording: Recording) -> int:
@@ -237,7 +240,7 @@ def _filtered(
 
 
 def _columns(recordings: Iterable[Recording], torque: TorqueLog) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Positions (motor side, then arm side where measured) and the torques that act at the same instants: motors, then from outside."""
+    """Positions (motor side, then arm side if measured) and the torques at the same instants: motors, then external."""
     last = None
     for recording in recordings:
         sides = [recording.q, recording.arm, recording.tilt_x, recording.tilt_y]
@@ -254,7 +257,7 @@ def _columns(recordings: Iterable[Recording], torque: TorqueLog) -> Iterator[tup
 def smoothed(
     blocks: Iterable[tuple[np.ndarray, np.ndarray]], low_pass: LowPass
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Filtered values (M + 4, k) that begin two samples before and end two after what goes with them as it was (M, m), for all samples.
+    """Filtered values (M + 4, k), from two samples before to two after, with unfiltered ones (M, m), for all samples.
 
     A block is values (N, k) and what goes with them (N, m). The last part is longer than the support of the filter. Raises
     `FlexcalError` as `LowPass.before` does.
@@ -280,7 +283,7 @@ def smoothed(
 
 
 def differences(x: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of values (N + 4, k) every `step` h (s) the inner ones, and their first and second central differences, (N, k) each.
+    """Inner values and their first and second central differences, (N, k) each, of values (N + 4, k) every `step` h (s).
 
     They are of fourth order: of a frequency ω they are too small by (ωh)⁴/30 and (ωh)⁴/90, where the difference of first differences lacks
     (ωh)²/3, which all stiffnesses would lack with the accelerations.
@@ -293,7 +296,7 @@ def differences(x: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray, np.
 
 
 def _extended(blocks: Iterable[np.ndarray], low_pass: LowPass) -> Iterator[np.ndarray]:
-    """The blocks, with what filter and differences need before the first and after the last sample."""
+    """Blocks with the samples that filter and differences need before the first and after the last."""
     begun = False
     end = np.zeros((0, 0))
     for values in blocks:

@@ -1,4 +1,4 @@
-"""One period of a periodic experiment as its Fourier series (Swevers 1997): averaging, filtering and differentiation are exact there."""
+"""Fourier series of one period of a periodic experiment (Swevers 1997), for exact averaging, filtering and differentiation."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from flexcal.errors import FlexcalError
 from flexcal.frequency.periodic import torque_hold
 
 _FOLLOWS, _FOLLOWS_SHARE = 0.1, 0.2
-"""A motion farther than this from its planned one, in rad or m and in its range, is another motion: loops of weak gains lag."""
+"""Distance from the planned motion, in rad or m and relative to its range, above which it is another motion: loops of weak gains lag."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +26,7 @@ class PeriodicMotion:
 
     @classmethod
     def of(cls, recording: Recording, plan: TrajectoryPlan, number: int, cutoff_hz: float) -> PeriodicMotion:
-        """The mean of the periods of trajectory `number` after the settling ones, up to `cutoff_hz`; the torque as it acts, with its hold.
+        """Mean of the periods of trajectory `number` after the settling ones, up to `cutoff_hz`; the torque as applied, with its hold.
 
         What follows the last period, such as coming to rest, is left out. Raises `FlexcalError` where the recording is not as long or as
         fast as planned, or of another motion.
@@ -63,7 +63,7 @@ class PeriodicMotion:
 
     @property
     def lines(self) -> int:
-        """Number of lines, that at zero among them."""
+        """Number of lines, zero frequency included."""
         return len(self.position)
 
     def states(self, samples: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -81,6 +81,6 @@ class PeriodicMotion:
 
 
 def real_rows(coefficients: np.ndarray) -> np.ndarray:
-    """(K + 1, …) complex coefficients to (2 K + 1, …) real ones: the mean, then √2 times real and imaginary parts."""
+    """Real coefficients (2 K + 1, …) from complex ones (K + 1, …): the mean, then √2 times real and imaginary parts."""
     above = np.sqrt(2.0) * coefficients[1:]
     return np.concatenate([np.real(coefficients[:1]), np.real(above), np.imag(above)])

@@ -1,4 +1,4 @@
-"""Periodic motion, cut into its periods (Swevers 1997)."""
+"""Periodic motion cut into its periods (Swevers 1997)."""
 
 from __future__ import annotations
 
@@ -13,20 +13,22 @@ from flexcal.dynamics.signals.motion import Motion, stretches
 from flexcal.errors import FlexcalError
 
 FEWEST = 4
-"""Periods whose scatter tells a noise level: three degrees of freedom at each line."""
+"""Least number of periods for a noise level from their scatter: three degrees of freedom at each line."""
 _SAME = 1e-4
-"""Mean squared difference of positions a period apart, over twice their variance: 1 % of the amplitude."""
+"""Mean squared difference of positions a period apart, relative to twice their variance: 1 % of the amplitude."""
 _AWAY = 1e-2
-"""What that must have reached before: a slow motion is like itself a sample later."""
+"""Level that this must reach before: a slow motion resembles itself a sample later."""
 _MOMENT = 0.05
-"""s of rest that a period may begin or end with."""
+"""Rest, s, that a period may begin or end with."""
 _STANDS_OUT = 40.0
-"""Power of a line over its variance; F(2, 6) exceeds it three times in ten thousand, F(2, 8) less often."""
+"""Ratio of a line's power to its variance from which it is significant; F(2, 6) exceeds it three times in ten thousand, F(2, 8) less
+often.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class RepeatedMotion:
-    """`periods` of as many samples that follow each other, their positions through a low-pass at `cutoff_hz` (infinite for none)."""
+    """Consecutive `periods` of equal length, their positions through a low-pass at `cutoff_hz` (infinite for none)."""
 
     periods: tuple[Motion, ...]
     cutoff_hz: float
@@ -42,7 +44,7 @@ class RepeatedMotion:
 
     @cached_property
     def smooth(self) -> tuple[Motion, ...]:
-        """The periods, of their positions those lines that stand out of the scatter between them; the torques are as they are.
+        """Periods whose positions have only the significant lines; the torques are unchanged.
 
         What the other lines hold is noise, of which high derivatives have much, and it would bend the parameters. What the low-pass took
         from those that stand out is given back; above its cut-off there is nothing to give back. Derivatives are those of the lines.
@@ -64,7 +66,7 @@ class RepeatedMotion:
 
     @classmethod
     def of(cls, experiment: Experiment, window: Window) -> RepeatedMotion:
-        """All whole periods of an experiment inside the window, from where the robot begins to move there.
+        """All whole periods of an experiment inside the window, from the start of motion there.
 
         Of a recording with gaps, those of the longest stretch. The period is the shortest lag after which positions are the same to 1 %
         of their amplitude. Raises `FlexcalError` for a motion that does not repeat, or does so less than four times.
@@ -88,7 +90,7 @@ class RepeatedMotion:
 
 
 def _moving(whole: Motion, window: Window, slowest: np.ndarray) -> Motion:
-    """What lies in a window, without the rest of the robot before and after its motion but for a moment."""
+    """Part of a window without the rest before and after the motion, but for a moment."""
     start, end = np.searchsorted(whole.time, [window.start, window.end])
     moves = start + np.flatnonzero((np.abs(whole.dq[start:end]) > slowest).any(axis=1))
     if not len(moves):
@@ -98,7 +100,7 @@ def _moving(whole: Motion, window: Window, slowest: np.ndarray) -> Motion:
 
 
 def _standing_out(periods: np.ndarray) -> np.ndarray:
-    """Which lines (N/2 + 1, n) of the average of (P, N, n) noise alone would not make as large."""
+    """Mask (N/2 + 1, n) of significant lines of the average of (P, N, n)."""
     lines = np.fft.rfft(periods, axis=1)
     mean, freedom = lines.mean(axis=0), len(lines) - 1
     variance = np.sum(np.abs(lines - mean) ** 2, axis=0) / (freedom * len(lines))
@@ -108,7 +110,7 @@ def _standing_out(periods: np.ndarray) -> np.ndarray:
 
 
 def _period(q: np.ndarray) -> int:
-    """Samples, 0 where `q` (N, n) does not repeat."""
+    """Period in samples, 0 if `q` (N, n) does not repeat."""
     moved = q - q.mean(axis=0) if len(q) else q
     power = float(np.sum(moved**2))
     if power == 0:

@@ -7,36 +7,38 @@ from dataclasses import dataclass
 import numpy as np
 
 _SAMPLES = 5
-"""Equal values in a row that are no chance."""
+"""Number of successive equal values beyond chance."""
 _FINEST = 0.02
-"""Share of the steps between samples that may be finer than the resolution, where time stamps were repaired."""
+"""Share of the steps between samples that may be finer than the resolution, for repaired time stamps."""
 _USUAL = 5.0
-"""How many times longer than the mean run of equal values they must be: slow sensors repeat every value."""
+"""Least ratio of such a run to the mean run of equal values: slow sensors repeat every value."""
 _APPROACH = 5e-3
-"""s over which the speed before the extreme is looked at."""
+"""Time, s, over which the speed before the extreme is evaluated."""
 _FAST = 0.05
-"""Share of the top speed at which no robot runs into a stop unless it is its encoder's."""
+"""Share of the top speed at which no robot reaches a stop, unless it is its encoder's."""
 _HARD = 2.0
-"""How many times the usual changes of speed within `_APPROACH` such a stop is, at least; real robots reach a third of that."""
+"""Least ratio of such a stop to the usual changes of speed within `_APPROACH`; real robots reach a third of that."""
 _USUALLY = 0.99
 """Share of the samples of a block that count as usual."""
 _EVERY = 4
-"""Which samples of a block are enough to say what is usual."""
+"""Stride of the samples of a block used to determine the usual ones."""
 _STEPS = 8.0
-"""Steps of its resolution by which the signal leaves its extreme within half the stay; a peak that is quantised leaves it by four."""
+"""Steps of its resolution by which the signal leaves its extreme within half the stay; a quantised peak leaves it by four."""
 _OVERSHOOT = 0.1
-"""Of the large steps between samples, how far from its extreme a signal may stay."""
+"""Distance of a stay from the extreme of the signal, relative to the large steps between samples."""
 _RIPPLE = 3
-"""Samples on either side of a stay in which the interpolation onto even instants oscillates."""
+"""Samples on either side of a stay in which interpolation onto a uniform grid oscillates."""
 _ROUNDING = 1e-12
-"""Relative difference of values that are the same."""
+"""Relative difference of values that count as equal."""
 _LARGE = 0.5
-"""Share of the largest size that an extreme must have: torque zero is a brake."""
+"""Least size of an extreme relative to the largest: torque zero is a brake."""
 
 
 @dataclass(frozen=True)
 class SaturatedRun:
-    """At most so many `samples` in a row at `value`, entered or left at up to `speed` (1/s); half of them further out it is `drop` away."""
+    """Run of up to `samples` equal values at `value`, entered or left at up to `speed` (1/s); half of them further out it is `drop`
+    away.
+    """
 
     value: float
     samples: int
@@ -44,7 +46,7 @@ class SaturatedRun:
     drop: float
 
     def merged(self, other: SaturatedRun) -> SaturatedRun:
-        """With that of another part of the signal at the same value."""
+        """Run combined with one at the same value in another part of the signal."""
         return SaturatedRun(
             self.value,
             max(self.samples, other.samples),
@@ -54,7 +56,7 @@ class SaturatedRun:
 
 
 class SaturationDetector:
-    """Takes one signal block by block; runs across the border of two blocks count as two."""
+    """Detector of saturation in one signal, block by block; runs across the border of two blocks count as two."""
 
     def __init__(self) -> None:
         self._ends: dict[int, SaturatedRun] = {}
@@ -63,7 +65,7 @@ class SaturationDetector:
         self._resolution = np.inf
 
     def add(self, values: np.ndarray, time_step: float) -> None:
-        """The block (N,) that follows, with samples every `time_step`, s."""
+        """Add the next block (N,), with samples every `time_step`, s."""
         reach = max(1, round(_APPROACH / time_step))
         speed = (values[reach:] - values[:-reach]) / (reach * time_step)
         change = np.abs(speed[reach:] - speed[:-reach])
@@ -88,18 +90,18 @@ class SaturationDetector:
 
     @property
     def span(self) -> float:
-        """From the smallest value to the largest."""
+        """Range from the smallest to the largest value."""
         return self._ends[1].value - self._ends[-1].value
 
     @property
     def stay(self) -> SaturatedRun | None:
-        """The longest stay at an extreme that is no chance, and not near zero."""
+        """Longest significant run at an extreme not near zero."""
         size = max(abs(end.value) for end in self._ends.values())
         return next((end for end in self._long() if abs(end.value) >= _LARGE * size), None)
 
     @property
     def cut(self) -> SaturatedRun | None:
-        """The longest stay at an extreme into or out of which the signal runs too fast to have stopped by itself."""
+        """Longest run at an extreme that the signal enters or leaves too fast to have stopped by itself."""
         fast = max(_FAST * self._top_speed, _HARD * self._usual_change)
         return next((end for end in self._long() if end.speed > fast), None)
 
@@ -112,7 +114,7 @@ class SaturationDetector:
 def _plateau(
     values: np.ndarray, sign: int, same: np.ndarray, overshoot: float, speed: np.ndarray, reach: int
 ) -> SaturatedRun:
-    """The longest stay at the largest (`sign` 1) or smallest value, with the highest speed at any.
+    """Longest run at the largest (`sign` 1) or smallest value, with the highest speed at any.
 
     `same` (N - 1,) are the samples followed by their like, `speed` is that over `reach` samples from each on. Where time stamps were
     repaired, the interpolation overshoots the ends of a stay by up to `overshoot`.

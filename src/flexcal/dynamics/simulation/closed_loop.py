@@ -1,4 +1,4 @@
-"""A simulated robot under its position controller, step by step."""
+"""Simulated robot under its position controller, step by step."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from flexcal.dynamics.simulation.rigid_robot import RigidRobotSimulator
 from flexcal.errors import FlexcalError
 
 _STEP = 1.0
-"""Longest step of the simulation, over 1/ω of an unknown controller's loop or the period of a declared one."""
+"""Longest step of the simulation, relative to 1/ω of an unknown controller's loop or the period of a declared one."""
 _LOST = 1.0
-"""rad or m from the path, beyond which the simulated robot does not follow it."""
+"""Distance from the path, rad or m, beyond which the simulated robot does not follow it."""
 
 
 @dataclass(frozen=True, eq=False)
 class LoopReference:
-    """What the loop is to do at an instant: path, its derivatives, and the torque that acts beside the feedback, each (n,).
+    """Reference of the loop at an instant: path, its derivatives, and the feed-forward torque, each (n,).
 
     That is what acts from outside and, with a declared controller, the torque given beforehand.
     """
@@ -30,7 +30,7 @@ class LoopReference:
     torque: np.ndarray
 
     def until(self, later: LoopReference, share: float) -> LoopReference:
-        """On the way to a later one."""
+        """References on the way to a later one."""
         span, left = later.time - self.time, 1.0 - share
         push = left * self.push + share * later.push
         bend = 0.5 * span**2 * share * left * push
@@ -44,7 +44,7 @@ class LoopReference:
 
 
 class ClosedLoop:
-    """Steps of u + kp e + kd ė, e the path less the motion, linearly implicit in it (Euler): stable for any gains.
+    """Closed loop with torque u + kp e + kd ė, e the path less the motion, by linearly implicit Euler steps: stable for any gains.
 
     With the controller that robot.yaml declares u is the torque that is given: the measured one makes this the controller with the
     command r that it must have had, kp (r - q) + kd (ṙ - q̇) = u. Without, u is what acts from outside alone, and the gains are those
@@ -62,7 +62,7 @@ class ClosedLoop:
         self._last: LoopReference | None = None
 
     def reach(self, target: LoopReference) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """q, q̇ and q̈ (n,) at the time of a target, `step` after that of the last one.
+        """State q, q̇ and q̈ (n,) at the time of a target, `step` after that of the last one.
 
         Raises `FlexcalError` where the mass matrix is not positive definite or the robot leaves the path.
         """

@@ -16,18 +16,18 @@ from flexcal.dynamics.simulation.closed_loop import ClosedLoop, LoopReference
 from flexcal.dynamics.simulation.rigid_robot import RigidRobotSimulator
 
 _PATH = 0.1
-"""Cut-off of the path that is tracked, over the rate of the rows: noise enters it by so much less of their band."""
+"""Cut-off of the tracked path relative to the row rate, which keeps noise out of it."""
 _TAIL = 1e-5
-"""What the impulse response of that low-pass is cut off at, relative to its start: parts between gaps need to be no longer than it."""
+"""Level, relative to its start, at which the impulse response of that low-pass is cut off; sets the least length of parts between gaps."""
 _LOOP = 0.5
-"""Natural frequency of the loop of an unknown controller, over the rate of the rows."""
+"""Natural frequency of the loop of an unknown controller, relative to the row rate."""
 _FINE = 0.2
-"""Over 1/ω of an unknown controller's loop, what steps of the simulation are joined to; those of a declared one to its period."""
+"""Step, relative to 1/ω of an unknown controller's loop, to which simulation steps are combined; to the period of a declared one."""
 
 
 @dataclass(frozen=True)
 class _Part:
-    """Without gaps from `first` to `last`, s; the path is tracked through `low_pass`, None where the part is too short for it."""
+    """Part without gaps from `first` to `last`, s; the path is tracked through `low_pass`, None if the part is too short for it."""
 
     first: float
     last: float
@@ -36,7 +36,7 @@ class _Part:
 
 @dataclass(frozen=True, eq=False)
 class SimulatedExperiment:
-    """The motion of a robot with `parameters` (p,) that tracks a recording; torques, times and standstill are those of the recording.
+    """Simulated motion of a robot with `parameters` (p,) tracking a recording; torques, times and standstill are those of the recording.
 
     The path to track is the recorded one through one more low-pass, at a tenth of the rate of the rows that `decimation` makes of it; the
     torque that a declared controller is given beforehand is the measured one, through the same, and so is τ_ext. Without a controller
@@ -52,32 +52,32 @@ class SimulatedExperiment:
 
     @property
     def name(self) -> str:
-        """That of the recording."""
+        """Name of the recording."""
         return self.experiment.name
 
     @property
     def samples(self) -> int:
-        """Those of the recording."""
+        """Number of samples of the recording."""
         return self.experiment.samples
 
     @property
     def top_speed(self) -> np.ndarray:
-        """Those of the recording (n,)."""
+        """Largest speeds of the recording (n,)."""
         return self.experiment.top_speed
 
     @property
     def cutoff_hz(self) -> float:
-        """That of the recording."""
+        """Cut-off of the recording."""
         return self.experiment.cutoff_hz
 
     def blocks(self) -> Iterator[Motion]:
-        """The simulated motion in parts that follow each other, with the measured torques, the external ones among them."""
+        """Simulated motion in consecutive parts, with the measured torques, external ones included."""
         robot = RigidRobotSimulator(self.observation, self.parameters, self.name)
         for stretch, part in zip(stretches(self.experiment.blocks()), self._parts, strict=True):
             yield from stretch if part.low_pass is None else self._simulated(stretch, robot, part.low_pass)
 
     def reliable(self, time: np.ndarray) -> np.ndarray:
-        """Which instants `time` (N,), s, lie in a simulated part, a period of its path's cut-off or more from either end.
+        """Mask of instants `time` (N,), s, inside a simulated part, a period of its path's cut-off or more from either end.
 
         Beyond an end the low-pass takes the path to go on turned by half a turn, with the noise of the last sample and no acceleration.
         """
@@ -90,7 +90,7 @@ class SimulatedExperiment:
 
     @cached_property
     def _parts(self) -> tuple[_Part, ...]:
-        """Those between gaps, in one pass."""
+        """Parts between gaps, in one pass."""
         parts = []
         for stretch in stretches(self.experiment.blocks()):
             first, last, samples = math.inf, 0.0, 0
@@ -108,7 +108,7 @@ class SimulatedExperiment:
     def _simulated(
         self, motions: Iterator[Motion], robot: RigidRobotSimulator, low_pass: LowPass
     ) -> Iterator[Motion]:
-        """The same of motions without gaps; friction of the `robot` remembers those before."""
+        """Simulated parts of motions without gaps; friction of the `robot` keeps its state."""
         n, rests = self.observation.model.n, self.top_speed == 0
         first = next(motions)
         step = float(first.time[1] - first.time[0])

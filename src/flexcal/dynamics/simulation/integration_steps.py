@@ -11,18 +11,18 @@ from flexcal.dynamics.inverse_model import Memory, Observation
 from flexcal.dynamics.signals import Experiment, Motion, Window, stretches
 
 _STEP = 2e-3
-"""s, at most, unless samples are farther apart."""
+"""Longest step, s, unless samples are farther apart."""
 _TOGETHER = 400
-"""Steps that are in memory at once."""
+"""Number of steps in memory at once."""
 _PUSH = 1e-3
-"""rad/s², by which accelerations are moved to see inertia: torques are linear in them, but for friction by load."""
+"""Step in acceleration, rad/s², for the mass matrix: torques are linear in it, but for load-dependent friction."""
 _SHIFT = 1e-6
-"""rad and rad/s, by which states are moved to see what the torques make of it."""
+"""Step in state, rad and rad/s, for derivatives of the torques."""
 
 
 @dataclass(frozen=True, eq=False)
 class IntegrationSteps:
-    """Steps of `length` h (s) that follow each other, each with what holds in its middle, in the mean of its samples.
+    """Consecutive steps of `length` h (s), each with midpoint values as means of its samples.
 
     Samples are `spacing` (s) apart. `torque` (N, n), the external one included, and `state` (N, 2, n), q and q̇; `columns` (N, n, p) are W
     with the measured accelerations of `middle`, and `inertia` (N, n, n, p) its derivative by each: M = inertia χ. `still` (N,) marks steps
@@ -66,7 +66,7 @@ class IntegrationSteps:
 def discretise_motion(
     observation: Observation, experiment: Experiment, window: Window, slowest: np.ndarray
 ) -> Iterator[IntegrationSteps]:
-    """The steps of an experiment inside a window, some at a time; a robot slower than `slowest` (n,) at all joints stands.
+    """Steps of an experiment inside a window, some at a time; a robot slower than `slowest` (n,) at all joints stands still.
 
     Friction that remembers does so from the start of the experiment on.
     """
@@ -95,7 +95,7 @@ def discretise_motion(
 
 
 def columns(observation: Observation, motion: Motion, memory: Memory) -> np.ndarray:
-    """W (N, n, p) of all columns."""
+    """Observation matrix W (N, n, p) of all columns."""
     regressor = np.zeros((len(motion), observation.model.n, len(observation.names)))
     systems = observation.systems(motion, memory)
     for joint, (system, column_indices) in enumerate(zip(systems, observation.column_indices, strict=True)):
@@ -144,6 +144,6 @@ def _steps(
 
 
 def _means(values: np.ndarray, stride: int) -> np.ndarray:
-    """Of every step, from sample to sample by the trapezoidal rule."""
+    """Mean over each step by the trapezoidal rule."""
     pairs = 0.5 * (values[1:] + values[:-1])
     return pairs.reshape(-1, stride, *values.shape[1:]).mean(axis=1)

@@ -1,4 +1,4 @@
-"""A rigid robot with its drives, ready for simulation."""
+"""Rigid robot with its drives, ready for simulation."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flexcal.model.parts import LINK_PARAMETERS
 from flexcal.model.vibration import ElasticArm
 
 _PINOCCHIO = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]
-"""Pinocchio's order of the ten parameters, which has Iyy before Ixz; it takes those that no body has, too."""
+"""Pinocchio's order of the ten parameters, with Iyy before Ixz; it also accepts nonphysical ones."""
 
 
 class RigidRobotSimulator:
@@ -45,7 +45,7 @@ class RigidRobotSimulator:
         self._below = np.tril_indices(self.model.n, -1)
 
     def mass_matrix(self, q: np.ndarray) -> np.ndarray:
-        """Of links and drives (n, n); raises `FlexcalError` where it is not positive definite."""
+        """Mass matrix (n, n) of links and drives; raises `FlexcalError` if it is not positive definite."""
         import pinocchio as pin
         from scipy.linalg.lapack import dpotrf  # pyright: ignore[reportAttributeAccessIssue]
 
@@ -63,7 +63,7 @@ class RigidRobotSimulator:
     def torque(
         self, time: float, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, before: np.ndarray
     ) -> np.ndarray:
-        """Of links and drives (n,); a friction that depends on the load takes it at the acceleration `before`."""
+        """Torque (n,) of links and drives; load-dependent friction uses the acceleration `before`."""
         import pinocchio as pin
 
         links = pin.rnea(self._arm.model, self._arm.data, self._at(q), dq, ddq)

@@ -12,8 +12,9 @@ from flexcal.errors import FlexcalError
 
 @dataclass(frozen=True, eq=False)
 class StateTransition:
-    """`predicted` (2 n,) is [q, q̇] at the end of a step; `by_state` (2 n, 2 n), `by_parameters` (2 n, p) and `by_torque` (2 n, n) are
-    its derivatives."""
+    """State transition: `predicted` (2 n,) is [q, q̇] at the end of a step; `by_state` (2 n, 2 n), `by_parameters` (2 n, p) and
+    `by_torque` (2 n, n) are its derivatives.
+    """
 
     predicted: np.ndarray
     by_state: np.ndarray
@@ -23,7 +24,7 @@ class StateTransition:
 
 @dataclass(frozen=True, eq=False)
 class StateTransitions:
-    """The models of all `steps` with the mass matrix and the slopes of the torques of the parameters `about` (p,).
+    """Transitions of all `steps` with the mass matrix and the slopes of the torques of the parameters `about` (p,).
 
     W has the `accelerations` (N, n), rad/s²: the measured ones, smoothed, as their noise biases inertias towards zero. Whatever they
     are, q̈ does not depend on them where `about` is the truth. `corrections` (2, N, n), rad/s², make of the acceleration in the mean of a
@@ -38,7 +39,7 @@ class StateTransitions:
 
     @classmethod
     def of(cls, steps: IntegrationSteps, about: np.ndarray, reach: int) -> StateTransitions:
-        """With accelerations smoothed over so many samples: `reach`, to either side."""
+        """Transitions with accelerations smoothed over `reach` samples to either side."""
         width = max(1, round(reach * steps.spacing / steps.length))
         weights = np.hanning(2 * width + 1)[1:-1]
         sums = np.array(
@@ -49,7 +50,7 @@ class StateTransitions:
         return cls(steps, about, steps.slopes(about), smooth, _corrections(smooth, steps))
 
     def step(self, k: int, state: np.ndarray, parameters: np.ndarray) -> StateTransition:
-        """Step `k` from `state` (2 n,) with `parameters` (p,); raises `FlexcalError` where M is not positive definite."""
+        """Step `k` from `state` (2 n,) with `parameters` (p,); raises `FlexcalError` if M is not positive definite."""
         steps, h = self.steps, self.steps.length
         n = len(state) // 2
         q, dq = state[:n], state[n:]
@@ -78,8 +79,9 @@ class StateTransitions:
 
 
 def _corrections(accelerations: np.ndarray, steps: IntegrationSteps) -> np.ndarray:
-    """Of the trapezoidal mean over samples, which exceeds that of the motion by a″/12 times the square of their spacing, and of a position
-    that a constant acceleration would move: a changing one moves it by a′h/6 less. Both would count as (ωh)²/12 of the inertia."""
+    """Corrections of the trapezoidal mean over samples, which exceeds that of the motion by a″/12 times the square of their spacing, and
+    of a position under constant acceleration: a changing one moves it by a′h/6 less. Both would count as (ωh)²/12 of the inertia.
+    """
     if len(accelerations) < 3:
         return np.zeros((2, *accelerations.shape))
     rate = np.gradient(accelerations, steps.length, axis=0)
