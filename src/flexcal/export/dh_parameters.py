@@ -23,12 +23,13 @@ from flexcal.model.robot import RobotModel
 
 NEARLY_PARALLEL = np.deg2rad(1.0)
 _COINCIDENT = 1e-3
-"""m: of nominally parallel axes closer than this the common normal has no direction to speak of."""
+"""Distance, m, of nominally parallel axes below which their common normal is undefined."""
 
 
 @dataclass(frozen=True, eq=False)
 class Axes:
-    """A target's chain with its joints at zero: indices of the `joints` (m,), a point (m, 3) and the direction (m, 3) of every axis.
+    """Axes of a target's chain with its joints at zero: indices of the `joints` (m,), a point (m, 3) and the direction (m, 3) of every
+    axis.
 
     `tool` (4, 4) is the target's frame; all in the robot's base frame.
     """
@@ -41,7 +42,7 @@ class Axes:
 
 @dataclass(frozen=True, eq=False)
 class DhChain:
-    """The chain as `base` (4, 4) · Π Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta) · `tool` (4, 4); arrays (m,) in rad and m.
+    """Denavit-Hartenberg chain `base` (4, 4) · Π Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta) · `tool` (4, 4); arrays (m,) in rad and m.
 
     Position q of a revolute joint adds to its theta, of a prismatic one to its d. `x` (m, 3): where the common normals point with the
     joints at zero. The last joint has a = alpha = beta = 0, and d to the foot of the tool, or as the chain that this one is made like:
@@ -72,7 +73,7 @@ def chain_axes(model: RobotModel, point: str, chain: tuple[int, ...]) -> Axes:
 
 
 def dh_chain(axes: Axes, *, hayati: bool, like: DhChain | None = None) -> DhChain:
-    """The parameters of a chain; of the choices that they leave, those of the chain `like` (default: the smallest angles).
+    """Parameters of a chain; where they are not unique, those of the chain `like` (default: the smallest angles).
 
     Consecutive axes within 1° of parallel (in `like`, where given) keep d, for their common normal is far away or nowhere; with `hayati`
     they get beta, without, the tilt about y is left out. Where they coincide in `like`, theta stays too, and what they are apart
@@ -111,7 +112,7 @@ def dh_chain(axes: Axes, *, hayati: bool, like: DhChain | None = None) -> DhChai
 
 
 def slides_moved(axes: Axes, nominal: Axes, kinds: Sequence[str]) -> Axes:
-    """The chain with the axes of prismatic joints, which may lie anywhere, moved to where they lie `nominal`ly from what follows them.
+    """Chain with the axes of prismatic joints, whose position is free, moved to their `nominal` place relative to the following ones.
 
     So theta of a slide that is parallel to the next axis does not turn with hundredths of a millimetre.
     """
@@ -135,7 +136,7 @@ def link_transform(a: float, alpha: float, beta: float) -> np.ndarray:
 
 
 def _first_frame(point: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """The frame of the first axis: at its point nearest the base, x as near as it goes to an axis of the base; the base itself on z."""
+    """Frame of the first axis: at its point nearest the base, x nearest to an axis of the base; the base itself on z."""
     normals = normals_to(direction)
     x = normals[0]
     return transform(
@@ -155,14 +156,14 @@ def _angle_between(one: np.ndarray, other: np.ndarray) -> float:
 
 
 def _foot(origin: np.ndarray, z: np.ndarray, point: np.ndarray, direction: np.ndarray) -> float:
-    """Where on the line `origin` + d z the common normal with another line begins: its d."""
+    """Coordinate d of the foot of the common normal on the line `origin` + d z."""
     cosine = z @ direction
     between = point - origin
     return float((between @ z - cosine * (between @ direction)) / (1 - cosine * cosine))
 
 
 def _unit(across: np.ndarray, z: np.ndarray, preferred: np.ndarray) -> np.ndarray:
-    """The direction of `across` normal to z, or its opposite, whichever is nearer to `preferred`; that itself where there is none."""
+    """Direction of `across` normal to z, or its opposite, nearer to `preferred`; that itself if undefined."""
     normal = across - (across @ z) * z
     length = np.linalg.norm(normal)
     if length < 1e-12:

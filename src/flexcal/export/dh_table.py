@@ -34,9 +34,9 @@ UNITS = {
 }  # fmt: skip
 COLUMNS = ("joint", "type", "parameter", "unit", "nominal", "calibrated", "difference", "std", "determined")
 _MOSTLY = 0.7
-"""Of a standard deviation: half of the variance."""
+"""Share of a standard deviation that corresponds to half of the variance."""
 _LARGE = {"rad": math.radians(5.0), "m": 0.05}
-"""Changes from which on URDF and controller rather have different tables."""
+"""Change from which URDF and controller probably have different tables."""
 _ORDER = {
     "standard": ("theta", "d", "a", "alpha", "beta"),
     "modified": ("alpha", "a", "beta", "theta", "d"),
@@ -141,7 +141,7 @@ def render_dh(
 def dh_transforms(
     text: str, convention: Convention, column: str = "calibrated"
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """Forward kinematics that a table's `text` says by itself: positions (N, m) of its joints, rad or m, to frames (N, 4, 4)."""
+    """Forward kinematics of a table's `text`: positions (N, m) of its joints, rad or m, to frames (N, 4, 4)."""
     rows: dict[tuple[str, str], dict[str, float]] = {}
     for row in csv.DictReader(line for line in text.splitlines() if not line.startswith("#")):
         rows.setdefault((row["joint"], row["type"]), {})[row["parameter"]] = float(row[column])
@@ -199,7 +199,7 @@ def _std(
 def _undetermined(
     std: list[dict[str, float] | None], unseen: list[dict[str, float] | None]
 ) -> list[dict[str, float]]:
-    """Of every row the parameters whose standard deviation is mostly what the measured points leave open, with that."""
+    """Parameters of every row whose standard deviation is mostly due to what the measured points leave undetermined, with that."""
     return [
         {key: open_[key] for key in row if open_[key] > _MOSTLY * row[key] and open_[key] > 0}
         if row and open_
@@ -209,14 +209,14 @@ def _undetermined(
 
 
 def _known(std: dict[str, float] | None, undetermined: dict[str, float]) -> dict[str, float | None] | None:
-    """Standard deviations, None for what is not determined."""
+    """Standard deviations, None for undetermined parameters."""
     return (
         None if std is None else {key: None if key in undetermined else value for key, value in std.items()}
     )
 
 
 def _large(old: list[Row], new: list[Row]) -> list[str]:
-    """Parameters of joints that moved by more than a calibration should move them."""
+    """Parameters of joints that changed by more than a calibration should change them."""
     return [
         f"{key} of {name} by {abs(change):.3g} {UNITS[key]}"
         for (name, _, was), (_, _, now) in zip(old[1:-1], new[1:-1], strict=True)

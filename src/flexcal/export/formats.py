@@ -1,4 +1,4 @@
-"""The file formats that a calibrated robot is exported to; nothing is imported for a format before it is rendered."""
+"""File formats for the export of a calibrated robot; their modules are imported when needed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Format:
-    """A format by its `name` on the command line, what is exported in a line, and the name of an `example` file."""
+    """Export format: `name` on the command line, one-line description, and the name of an `example` file."""
 
     name: str
     summary: str
@@ -22,7 +22,7 @@ class Format:
 
 @dataclass(frozen=True)
 class PlainFormat(Format):
-    """A format without options of its own: the calibrated robot and the nominal one determine the file.
+    """Format without options of its own: the calibrated robot and the nominal one determine the file.
 
     `details` is the help page; `following` says what to do with the file `{out}`.
     """
@@ -120,7 +120,7 @@ Joints with placements, springs, backlash and drives, points, payload, stations,
         "read {out} in your own program; docs/file-formats.md describes its content",
     ),
 )
-"""In the order in which the help page lists them."""
+"""Formats in the order of the help page."""
 
 
 def render(name: str, model: RobotModel, nominal: RobotModel) -> RenderedModel:

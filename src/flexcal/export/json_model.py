@@ -124,7 +124,7 @@ def _placement(position: np.ndarray, rotation: np.ndarray) -> dict[str, Any]:
 
 
 def _quantity(model: RobotModel, name: str) -> dict[str, Any]:
-    """Value, unit and standard deviation of a parameter; null where it is not known, or was not estimated."""
+    """Value, unit and standard deviation of a parameter; null if unknown or not estimated."""
     value = model.value(name)
     std = None
     posterior = model.posterior

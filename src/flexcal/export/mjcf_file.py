@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _TIME_STEP = 0.25e-3
 _PASSES = 30
 _AT_REST = 1e-12
-"""rad: a correction of the springs after which the arm counts as at rest."""
+"""Correction of the springs, rad, at which the arm counts as at rest."""
 
 
 def export_mjcf(model: RobotModel, path: str | Path) -> ExportedFile:
@@ -110,7 +110,7 @@ def render_mjcf(model: RobotModel) -> RenderedModel:
 
 
 def mjcf_tool(model: RobotModel, text: str) -> ToolMap:
-    """Where MuJoCo, reading the MJCF `text`, puts the first point of `model` at rest with the motors held: Newton on the springs."""
+    """Position of the first point of `model` at rest in MuJoCo, from the MJCF `text` with the motors held: Newton on the springs."""
 
     def positions(q: np.ndarray) -> np.ndarray:
         import mujoco

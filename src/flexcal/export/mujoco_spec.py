@@ -32,7 +32,7 @@ def mjcf_spec(
     free: Collection[int] | None = None,
     payload: float | None = None,
 ) -> mujoco.MjSpec:
-    """The robot as an `MjSpec`, with every identified value in it.
+    """Robot as an `MjSpec`, with all identified values.
 
     `q` (n,) rad or m: where the joints that are not in `free` are locked (default: all joints are free); `payload` kg at the declared
     payload's centre of mass (default: the declared mass). MuJoCo joints are named `<joint>` (motor side), `<joint>.drive` (twist

@@ -14,19 +14,19 @@ from flexcal.model.robot import RobotModel, propagated_covariance_root
 
 _STEPS = 8
 _SMALL = 1e-8
-"""m and rad: a step after which there is no other."""
+"""Step, m and rad, at which the iteration has converged."""
 _SOME = 300
 _UNSEEN = 1e-6
-"""Of the largest column: what rounding leaves of an offset that base and tool can do as well."""
+"""Size relative to the largest column below which an offset is equivalent to base and tool."""
 _MADE_WITHIN = {"revolute": 5e-4, "prismatic": 3e-4}
-"""rad and m: how well the zero of a joint is known without any calibration."""
+"""Standard deviation, rad and m, of the zero of a joint without any calibration."""
 _REST = 1e-4
-"""Weight, relative to a tool error, of moving base and tool by as much: what offsets can do as well, offsets do."""
+"""Weight of base and tool relative to a tool error of their size: offsets are preferred where equivalent."""
 
 
 @dataclass(frozen=True, eq=False)
 class OffsetFit:
-    """`offsets` (n,), rad or m, that are added to q of the nominal robot, and their standard deviations `std` (n,), zero where unknown.
+    """Fit of `offsets` (n,), rad or m, added to q of the nominal robot, with standard deviations `std` (n,), zero where unknown.
 
     `determined` (n,): False for those that the measured points do not tell, which are zero. `base` (6,): position, m, and
     rotation vector, rad, of the nominal robot's base in that of the real one; `tool` (3,) m is added to the target in its frame.
@@ -63,8 +63,9 @@ def fit_offsets(
 
 
 def undetermined_offsets(nominal: RobotModel, points: Sequence[str], *, base: bool) -> tuple[int, ...]:
-    """Joints whose zero is no matter of measured `points`: as well could each point sit elsewhere on the tool, or, with `base`, the base
-    elsewhere before the instrument."""
+    """Joints whose zero the measured `points` do not determine, because each point could sit elsewhere on the tool or, with `base`, the
+    base elsewhere relative to the instrument.
+    """
     rng = np.random.default_rng(2)
     free = np.ones(nominal.n + 9, dtype=bool)
     seen = np.zeros(nominal.n, dtype=bool)
@@ -82,7 +83,7 @@ def undetermined_offsets(nominal: RobotModel, points: Sequence[str], *, base: bo
 def _fit(
     model: RobotModel, nominal: RobotModel, point: str, fixed: np.ndarray, *, keep_frames: bool
 ) -> OffsetFit:
-    """The fit without the offsets that are `fixed` (n,) at zero."""
+    """Fit without the offsets `fixed` (n,) at zero."""
     q, _ = random_poses(model, point, np.random.default_rng(1))
     wanted, flank = tool_positions(model, q, point=point)
     n = model.n
@@ -114,7 +115,7 @@ def offset_tool(nominal: RobotModel, q: np.ndarray, parameters: np.ndarray, poin
 def error_after_offsets(
     nominal: RobotModel, q: np.ndarray, moved: np.ndarray, point: str, *, keep_frames: bool
 ) -> np.ndarray:
-    """What the best offsets, to first order, leave of tool displacements `moved` (N, 3) at `q` (N, n)."""
+    """Remaining tool displacements `moved` (N, 3) at `q` (N, n) after the best offsets, to first order."""
     none, free = np.zeros(nominal.n + 9), _free(nominal.n, frames=not keep_frames)
     columns = _columns(nominal, q, none, point, free)
     absorbed = columns @ _least_squares(columns, moved.ravel())
@@ -122,7 +123,7 @@ def error_after_offsets(
 
 
 def _free(n: int, *, frames: bool) -> np.ndarray:
-    """Which parameters of `offset_tool` are fitted, (n + 9,): all of them, or the offsets alone without `frames`."""
+    """Mask (n + 9,) of the fitted parameters of `offset_tool`: all, or the offsets alone without `frames`."""
     return (np.arange(n + 9) < n) | frames
 
 
@@ -166,7 +167,7 @@ def _columns(
 
 
 def _least_squares(rows: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """The shortest solution, by way of the triangle that QR leaves of tall rows."""
+    """Minimum-norm solution, by QR of tall rows."""
     orthogonal, triangle = np.linalg.qr(rows)
     return np.linalg.lstsq(triangle, orthogonal.T @ right, rcond=None)[0]
 

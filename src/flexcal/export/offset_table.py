@@ -19,7 +19,7 @@ from flexcal.units import DEGREE, MILLIMETRE
 
 COLUMNS = ("joint", "parameter", "unit", "value", "std", "value_deg", "motor_deg", "determined")
 _LARGE = 5 * DEGREE
-"""An offset from which on it is rather another zero in the URDF than an error."""
+"""Offset above which it is rather a different zero in the URDF than an error."""
 
 
 def render_offsets(

@@ -20,22 +20,22 @@ TRANSMISSION = "transmission error"
 HARDENING = "hardening of drives"
 GEOMETRY = "axis misalignments and lengths"
 AT_REST = (DEFLECTION, BACKLASH, GRAVITY_COMPLIANCE, LATERAL_COMPLIANCE, TRANSMISSION)
-"""The terms beyond rigid geometry, which hardly any format has a place for."""
+"""Terms beyond rigid geometry, which hardly any format can represent."""
 _CALIBRATED = (GRAVITY_COMPLIANCE, LATERAL_COMPLIANCE, TRANSMISSION)
-"""Those that a calibration fits beside the geometry, which makes up for them where it is fitted alone."""
+"""Terms that a calibration fits beside the geometry, which compensates for them if fitted alone."""
 
 SAMPLES = 2000
 _AGREED = 1e-9
-"""mm: agreement better than this is not told."""
+"""Agreement, mm, below which nothing is reported."""
 _TRIES = 4
 _LEAST_REACHED = 50
 _STROKE = 1.0
-"""m either way, of a prismatic joint without limits."""
+"""Assumed stroke, ± m, of a prismatic joint without limits."""
 _TURNS = 4 * np.pi
-"""rad: a revolute joint with a longer range counts as one without limits."""
+"""Range, rad, above which a revolute joint counts as one without limits."""
 
 ToolMap = Callable[[np.ndarray], np.ndarray]
-"""Joint positions (N, n), rad or m, to positions (N, 3), m."""
+"""Function from joint positions (N, n), rad or m, to positions (N, 3), m."""
 
 
 @dataclass(frozen=True)
@@ -48,12 +48,12 @@ class PositionErrors:
 
     @classmethod
     def of(cls, errors: np.ndarray) -> PositionErrors:
-        """Of differences of positions (N, 3), m."""
+        """Errors from differences of positions (N, 3), m."""
         distance = np.linalg.norm(errors, axis=1)
         return cls(float(distance.mean()), float(np.percentile(distance, 95)), float(distance.max()))
 
     def in_millimetres(self) -> dict[str, float]:
-        """As documents have them."""
+        """Errors as in documents."""
         return {
             "mean_mm": self.mean / MILLIMETRE,
             "p95_mm": self.p95 / MILLIMETRE,
@@ -71,7 +71,7 @@ class UnrepresentedTerm:
 
 @dataclass(frozen=True)
 class ExportErrors:
-    """What is lost: term by term, and the whole `error` between the robot at rest and the file as written, over poses `within` a space.
+    """Export errors: term by term, and the whole `error` between the robot at rest and the file as written, over poses `within` a space.
 
     `error` is None for a robot without points, which has no tool to be off; `payload` is what the robot carries, kg.
     """
@@ -84,7 +84,7 @@ class ExportErrors:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """As people read it."""
+        """Errors in sentences."""
         if not self.terms:
             if self.error is None:
                 return ("Nothing is lost.",)
@@ -117,7 +117,7 @@ def measure_export_error(
     point: str | None = None,
     absorb: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
 ) -> ExportErrors:
-    """Loss of a file that puts the target where `tool` says and has no place for `terms`; only those that `model` has count.
+    """Error of a file that puts the target at `tool` and lacks `terms`; only those that `model` has count.
 
     The robot carries its declared payload. `absorb` takes joint positions (N, n) and what a term moves the tool by (N, 3), and returns
     what the file's own freedom leaves of it; by default all of it.
@@ -140,13 +140,13 @@ def measure_export_error(
 def tool_positions(
     model: RobotModel, q: np.ndarray, *, point: str | None = None, flank: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where a target of the robot at rest is (N, 3), m, with everything that is known, and the flanks (N, n) of its backlash."""
+    """Target positions (N, 3), m, of the robot at rest with all known terms, and the flanks (N, n) of its backlash."""
     rest = static_equilibrium(model, q, flank=flank)
     return point_kinematics(model, q, rest.deflection, point=point, jacobians=False).position, rest.flank
 
 
 def random_poses(model: RobotModel, point: str | None, rng: np.random.Generator) -> tuple[np.ndarray, str]:
-    """Random joint positions (N, n) that put the target into the declared working volume, or all over the joint range without one.
+    """Random joint positions (N, n) with the target in the declared working volume, or over the whole joint range without one.
 
     The second value says which. Where fewer than 50 of the tries reach the volume, it is the joint range, too.
     """
@@ -167,7 +167,7 @@ def random_poses(model: RobotModel, point: str | None, rng: np.random.Generator)
 
 
 def _leave_out(model: RobotModel, term: str) -> RobotModel:
-    """The robot without a term; the robot itself where it has none of it."""
+    """Robot without a term; unchanged if it does not have it."""
     geometry, springs, drives = model.geometry, model.springs, model.drives
     if term == GEOMETRY:
         if not any(part.any() for part in (geometry.errors[:, 1:], geometry.tool, geometry.point_error)):

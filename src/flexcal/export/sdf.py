@@ -67,7 +67,7 @@ def render_sdf(model: RobotModel, nominal: RobotModel) -> RenderedModel:
 
 
 def sdf_tool(model: RobotModel, text: str) -> ToolMap:
-    """Where the SDF `text` by itself puts the first point of `model`."""
+    """Position of the first point of `model` from the SDF `text` alone."""
     body = ET.fromstring(text).find("model")
     assert body is not None
     joints = {

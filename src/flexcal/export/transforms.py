@@ -24,7 +24,7 @@ def xyz_rpy(placement: np.ndarray) -> dict[str, float]:
 
 
 def from_xyz_rpy(numbers: dict[str, float]) -> np.ndarray:
-    """The placement (4, 4) that six numbers say."""
+    """Placement (4, 4) of six numbers."""
     values = np.array([numbers[key] for key in XYZ_RPY], dtype=float)
     return transform(values[:3], rpy_rotation(values[3:]))
 

@@ -101,7 +101,7 @@ def _yaml(placements: list[np.ndarray]) -> str:
 
 
 def _base_of_description(model: RobotModel) -> np.ndarray:
-    """base_link_inertia in the URDF's root, (4, 4): the first joint's parent where that is it, else that turned by 180° about z."""
+    """Frame base_link_inertia in the URDF's root, (4, 4): the first joint's parent if it is that, else turned by 180° about z."""
     first = next(
         e for e in read_elements(model.urdf).all("joint") if e.attributes.get("name") == model.joints[0].name
     )
@@ -124,7 +124,7 @@ def _seen_from(root: np.ndarray, axes: Axes) -> Axes:
 
 
 def _flange_reach(nominal: RobotModel, root: np.ndarray, chain: DhChain) -> float:
-    """d of the last joint that ends at the flange of the nominal robot."""
+    """Length d of the last joint, which ends at the flange of the nominal robot."""
     frames = read_urdf(nominal.urdf, nominal.config.locked).frames
     at = np.linalg.inv(root)
     for joint in nominal.joints:

@@ -70,7 +70,7 @@ def render_urdf(model: RobotModel) -> RenderedModel:
 
 
 def urdf_tool(model: RobotModel, text: str) -> ToolMap:
-    """Where Pinocchio puts the first point of `model` that reads the URDF `text`."""
+    """Position of the first point of `model` in Pinocchio, from the URDF `text`."""
     import pinocchio as pin
 
     from flexcal.model.urdf import locked_joints
@@ -94,7 +94,7 @@ def urdf_tool(model: RobotModel, text: str) -> ToolMap:
 
 
 def _remarks(model: RobotModel, bodiless: tuple[str, ...]) -> tuple[str, ...]:
-    """One sentence for each thing of the dynamics that the file lacks."""
+    """Remarks on parts of the dynamics that the file lacks, one sentence each."""
     sentences = [*bodiless_remark(bodiless)]
     if any(f"{name}.rotor_inertia" in model.posterior.parameters for name in model.joint_names):
         sentences.append(

@@ -15,7 +15,7 @@ _MOMENTS = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (
 
 
 def write_inertials(model: RobotModel, root: ET.Element) -> tuple[str, ...]:
-    """Give every link of the URDF `root` the inertia that `model` has; links that no body can be keep theirs, and are returned.
+    """Set the inertia of every link of the URDF `root` to that of `model`; nonphysical links keep theirs, and are returned.
 
     Only what differs from the URDF is touched. What hangs on a link by fixed or locked joints is part of it: its own inertials go.
     """
@@ -33,7 +33,7 @@ def write_inertials(model: RobotModel, root: ET.Element) -> tuple[str, ...]:
 
 
 def bodiless_links(model: RobotModel, nominal: Sequence[Inertia]) -> tuple[str, ...]:
-    """Links that were identified with inertials which no body has, beside their `nominal` ones."""
+    """Links with identified nonphysical inertials, beside their `nominal` ones."""
     return tuple(
         joint.link
         for joint, ours, theirs in zip(model.joints, model.inertias, nominal, strict=True)
@@ -42,7 +42,7 @@ def bodiless_links(model: RobotModel, nominal: Sequence[Inertia]) -> tuple[str, 
 
 
 def bodiless_remark(links: tuple[str, ...]) -> tuple[str, ...]:
-    """One sentence on links whose identified inertials are not written, if there are any."""
+    """Remark on links whose identified inertials are not written, if any."""
     if not links:
         return ()
     return (
@@ -59,7 +59,7 @@ def _same(one: Inertia, other: Inertia) -> bool:
 
 
 def _rigid_body(root: ET.Element, name: str, locked: Container[str]) -> Iterator[ET.Element]:
-    """A link, and those that fixed and locked joints hang on it."""
+    """Link with those attached by fixed and locked joints."""
     links = {link.get("name"): link for link in root.findall("link")}
     hung: dict[str | None, list[str]] = {}
     for joint in root.findall("joint"):

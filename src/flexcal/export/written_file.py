@@ -16,7 +16,7 @@ from flexcal.model.robot import RobotModel
 
 @dataclass(frozen=True, eq=False)
 class RenderedModel:
-    """A robot as `text`, and `tool`: where that text, read back, puts the target.
+    """Rendered robot: `text`, and `tool`, the target's position when that text is read back.
 
     `unrepresented` are the terms that the format has no place for; `absorb` as `measure_export_error` takes it; `about` says in sentences
     what stands in the file, for its header; `remarks` what a reader of it must know besides; `table` is what to show of it.
@@ -35,7 +35,7 @@ class RenderedModel:
 
 @dataclass(frozen=True, eq=False)
 class ExportedFile:
-    """The written file, its loss, and remarks; `table` are its rows."""
+    """Written file, its representation error, and remarks; `table` are its rows."""
 
     path: Path
     loss: ExportErrors
@@ -47,12 +47,14 @@ class ExportedFile:
 
     @property
     def lost(self) -> tuple[str, ...]:
-        """Names of the terms that the file does not carry."""
+        """Names of the terms that the file does not represent."""
         return tuple(term.name for term in self.loss.terms)
 
 
 def write_rendered(model: RobotModel, path: str | Path, rendered: RenderedModel) -> ExportedFile:
-    """Measure what `rendered` lost of `model`, and write it with that in its header; raises `InputError` where it cannot be written."""
+    """Measure the representation error of `rendered` against `model`, and write it with that in its header; raises `InputError` if not
+    possible.
+    """
     loss = measure_export_error(
         model, rendered.tool, rendered.unrepresented, point=rendered.point, absorb=rendered.absorb
     )

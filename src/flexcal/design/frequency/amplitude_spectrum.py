@@ -13,15 +13,16 @@ from flexcal.design.frequency.spring_precision import spring_criterion
 from flexcal.model.robot import RobotModel
 
 LEAST, MOST = 0.4, 4.0
-"""Amplitude of any line over that of the flat spectrum, before all are lowered for the gaps: below, the response's logarithm would be
-biased at that line; above, friction would no longer be the disturbance that was predicted."""
+"""Bounds of the amplitude of any line relative to the flat spectrum, before all are lowered for the gaps: below, the response's
+logarithm would be biased at that line; above, friction would exceed the predicted disturbance.
+"""
 ROOM = 2.0
-"""Largest root mean square of an axis' torque over that of the flat plan: 8 % of its effort, with peaks of a quarter."""
+"""Largest root mean square of an axis' torque relative to the flat plan: 8 % of its effort, with peaks of a quarter."""
 ITERATIONS = 20
 
 
 def optimal_amplitudes(model: RobotModel, planned: PlannedResponses) -> MultisinePlan:
-    """The plan, whose spectrum is flat, with amplitudes that make `spring_criterion` small in its poses.
+    """Plan with amplitudes that minimise `spring_criterion` in its poses, from a plan with a flat spectrum.
 
     No axis gets more than `ROOM` times its torque, and no gap is strained beyond what `backlash_load` allows. The multiplicative algorithm
     for optimal designs (Silvey, Titterington & Torsney 1978): the power of a line grows with the root of what more of it would gain over
@@ -52,6 +53,6 @@ def optimal_amplitudes(model: RobotModel, planned: PlannedResponses) -> Multisin
 
 
 def _feasible(power: np.ndarray, allowed: np.ndarray, load: np.ndarray) -> np.ndarray:
-    """Amplitudes (E, L): the power lowered, axis by axis to what is `allowed` (E, 1), then on all alike until every gap stays closed."""
+    """Amplitudes (E, L) with the power reduced to `allowed` (E, 1) axis by axis, then on all alike until every gap stays closed."""
     amplitude = np.sqrt(power * np.minimum(1.0, allowed / power.sum(axis=1, keepdims=True)))
     return min(1.0, amplitude_share(load, amplitude)) * amplitude

@@ -13,17 +13,19 @@ from flexcal.model.statics import static_equilibrium
 from flexcal.model.vibration import linearise, periodic_torque, strain_power
 
 CREST = 3.0
-"""Peak of a multisine's torque over its root mean square."""
+"""Assumed crest factor of a multisine's torque."""
 SELDOM = 2.0
-"""Standard deviations of a drive's torque that gravity must exceed all along the reference motion: its gap opens seldom, and little."""
+"""Least ratio of gravity torque to the standard deviation of a drive's torque along the reference motion: its gap opens seldom, and
+little.
+"""
 LOWEST = 0.2
-"""Share of the excitation below which too little would be left to measure with."""
+"""Least share of the excitation sufficient for a measurement."""
 INSTANTS = 16
-"""Instants of the reference motion at which the torque of the drives is looked at."""
+"""Number of instants of the reference motion at which the drive torques are evaluated."""
 
 
 def static_amplitude_share(model: RobotModel, plan: MultisinePlan) -> float:
-    """The share of the excitation at which its peaks in every pose stay below what gravity puts on the drives with backlash.
+    """Share of the excitation at which its peaks in every pose stay below the gravity torque of drives with backlash.
 
     The reference motion is left out, as in the paper. Above 1 where there is room.
     """
@@ -36,7 +38,7 @@ def static_amplitude_share(model: RobotModel, plan: MultisinePlan) -> float:
 
 
 def backlash_load(model: RobotModel, q: np.ndarray, plan: MultisinePlan) -> np.ndarray:
-    """What 1 N² m² of amplitude² of each line adds to the square of how far every gap is strained at `q` (n,), (drives, E, L).
+    """Derivative (drives, E, L) of the squared relative load of each gap at `q` (n,) by the squared amplitude of each line, per N² m².
 
     Where the sum over the lines is 1, gravity just exceeds three standard deviations of the drive's torque at rest, or two all along the
     reference motion, whichever takes more. Of the drives with backlash, in their order.
@@ -62,7 +64,7 @@ def backlash_load(model: RobotModel, q: np.ndarray, plan: MultisinePlan) -> np.n
 
 
 def amplitude_share(load: np.ndarray, amplitude: np.ndarray) -> float:
-    """The share of `amplitude` (E, L) N m that strains no gap beyond its limit; `load` (..., E, L) is that of `backlash_load`.
+    """Share of `amplitude` (E, L) N m that loads no gap beyond its limit; `load` (..., E, L) is that of `backlash_load`.
 
     0 where the reference motion alone opens a gap; inf without backlash.
     """
@@ -71,7 +73,7 @@ def amplitude_share(load: np.ndarray, amplitude: np.ndarray) -> float:
 
 
 def within_preload(model: RobotModel, plan: MultisinePlan) -> MultisinePlan:
-    """The plan, its amplitudes lowered on all axes alike until no gap is strained beyond its limit in any pose.
+    """Plan with amplitudes reduced equally on all axes until no gap is loaded beyond its limit in any pose.
 
     Raises `FlexcalError` where next to nothing would be left, naming the pose.
     """
@@ -86,7 +88,7 @@ def within_preload(model: RobotModel, plan: MultisinePlan) -> MultisinePlan:
 
 
 def _loose(model: RobotModel, plan: MultisinePlan) -> list[int]:
-    """The numbers of the excited axes that have backlash."""
+    """Indices of the excited axes with backlash."""
     return [k for k, joint in enumerate(plan.joints) if joint in model.backlash_joints]
 
 

@@ -18,7 +18,7 @@ _TRIES = 400
 
 
 class FrequencyPoseCandidates:
-    """Where a robot can be excited as `plan` says: within its limits with room for the motion, touching nothing, every gap closed.
+    """Feasible poses for exciting a robot by `plan`: within its limits with room for the motion, without contact, every gap closed.
 
     The robot is checked for collisions at the middle and at both ends of the reference motion. Raises `FlexcalError` that names the joint
     whose range is too small for the motion.
@@ -38,7 +38,7 @@ class FrequencyPoseCandidates:
                 )
 
     def random(self, count: int, rng: np.random.Generator, progress: Progress = silent) -> np.ndarray:
-        """`count` poses (count, n) rad, uniform; raises `FlexcalError`, with what each check threw out, where too few are found."""
+        """Uniform random poses (count, n), rad; raises `FlexcalError`, with the number rejected by each check, if too few are found."""
         accepted: list[np.ndarray] = []
         lost = {"gravity preload": 0, "collision": 0}
         drawn = 0
@@ -58,13 +58,13 @@ class FrequencyPoseCandidates:
             "lower the excitation or the reference motion, or hold a heavier payload.",
         )
 
-    def near(self, q: np.ndarray, count: int, spread: float, rng: np.random.Generator) -> np.ndarray:
-        """Of `count` poses about each of `q` (P, n), with the standard deviation `spread` (rad) in every joint, those that can be used."""
-        moved = np.repeat(q, count, axis=0) + spread * rng.standard_normal((count * len(q), self.model.n))
+    def near(self, q: np.ndarray, count: int, std: float, rng: np.random.Generator) -> np.ndarray:
+        """Feasible ones of `count` poses about each of `q` (P, n), with the standard deviation `std` (rad) in every joint."""
+        moved = np.repeat(q, count, axis=0) + std * rng.standard_normal((count * len(q), self.model.n))
         return self.kept(np.clip(moved, self.lower, self.upper))
 
     def kept(self, q: np.ndarray, lost: dict[str, int] | None = None) -> np.ndarray:
-        """Those of `q` (samples, n) that pass all checks; what each throws out is added to `lost`."""
+        """Poses of `q` (samples, n) that pass all checks; the numbers rejected are added to `lost`."""
         lost = {"gravity preload": 0, "collision": 0} if lost is None else lost
         swing = np.isin(np.arange(self.model.n), self.plan.joints) * self.plan.reference_amplitude
         ends = np.outer([0.0, 1.0, -1.0], swing)

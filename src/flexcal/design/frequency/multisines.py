@@ -14,17 +14,18 @@ from flexcal.units import DEGREE
 
 BAND_HZ = (3.0, 80.0)
 REFERENCE_HZ = 2.125
-"""What the frequency of the reference motion is near."""
+"""Approximate frequency of the reference motion."""
 EXCITATION = 0.04
 """Largest root mean square of the excitation of an axis in one experiment, relative to its drive's effort."""
 DROOP = 2 * DEGREE
-"""How far an excited axis may stray from its reference: under gravity, which the soft loop holds imperfectly, and by the excitation."""
+"""Largest deviation of an excited axis from its reference, due to gravity under soft position control and to the excitation."""
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """How long is measured in a pose: `periods` of 1/`base_frequency_hz` s in every recording, the first `settle_periods` of them dropped,
-    and `realisations`, each with as many experiments of both signs as axes are excited."""
+    """Schedule of a pose: `periods` of 1/`base_frequency_hz` s in every recording, the first `settle_periods` of them dropped, and
+    `realisations`, each with as many experiments of both signs as axes are excited.
+    """
 
     base_frequency_hz: float = 0.25
     periods: int = 4
@@ -33,7 +34,7 @@ class Schedule:
 
 
 PLAIN = Schedule()
-"""The paper's: 384 s a pose with three axes."""
+"""Schedule of the paper: 384 s per pose with three axes."""
 
 
 def flat_multisine(

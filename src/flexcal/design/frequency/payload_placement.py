@@ -17,7 +17,7 @@ from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 
 DIRECTIONS = 8
-"""Places on the ring that are tried, the declared one first."""
+"""Number of places on the ring that are tried, the declared one first."""
 _EVERY = 4
 
 

@@ -19,11 +19,11 @@ from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 
 SCREEN = 4
-"""One line in so many is evaluated to compare candidates."""
+"""Stride of the lines evaluated to compare candidates."""
 REFINED = (0.3, 0.12)
-"""Spread (rad) of the further candidates about the chosen poses, round by round."""
+"""Standard deviation (rad) of the further candidates about the chosen poses, round by round."""
 NEIGHBOURS = 8
-"""Further candidates about each chosen pose in a round, as far as they can be excited."""
+"""Number of further candidates about each chosen pose in a round, if feasible."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ def choose_frequency_poses(
     checker: CollisionChecker | None = None,
     progress: Progress = silent,
 ) -> FrequencyPoseSelection:
-    """The `count` of so many random `candidates` that determine all springs best together, excited as `plan` says; by exchange.
+    """Choose `count` of the random `candidates` that jointly determine all springs best under the excitation of `plan`, by exchange.
 
     Then, twice, further candidates are drawn about the chosen poses, and the exchange goes on.
 
@@ -60,9 +60,9 @@ def choose_frequency_poses(
     pool = excitable.random(max(candidates, count), rng, progress)
     screened = response_sensitivity(model, pool, plan, parameters, sensors, every=SCREEN, progress=progress)
     drawn, chosen = len(pool), exchange(screened, count, criterion, progress=progress).chosen
-    for number, spread in enumerate(REFINED):
+    for number, std in enumerate(REFINED):
         progress("refining", number / len(REFINED))
-        near = excitable.near(pool[chosen], NEIGHBOURS, spread, rng)
+        near = excitable.near(pool[chosen], NEIGHBOURS, std, rng)
         more = response_sensitivity(model, near, plan, parameters, sensors, every=SCREEN)
         pool = np.concatenate([pool, near])
         rows = np.concatenate([screened.jacobian, more.jacobian])

@@ -22,9 +22,9 @@ from flexcal.estimation import Parameters, Sensitivity
 from flexcal.model.robot import RobotModel
 
 FEWEST, MOST = 3, 24
-"""Realisations: fewer leave no covariance, more bring next to nothing."""
+"""Bounds of the number of realisations: fewer give no covariance, more hardly any gain."""
 MOST_PERIODS = 16
-"""Kept periods of a recording."""
+"""Largest number of kept periods of a recording."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class PlannedResponses:
     def of(
         cls, model: RobotModel, plan: MultisinePlan, sensors: ResponseSensors = COMMON_SENSORS
     ) -> PlannedResponses:
-        """Of a robot as it is known."""
+        """Planned responses of the present robot model."""
         parameters = response_parameters(model, plan)
         responses = (
             pose_response(model, q, plan, parameters, friction_disturbance(model, q, plan), sensors)
@@ -50,7 +50,7 @@ class PlannedResponses:
 
     @cached_property
     def sensitivity(self) -> Sensitivity:
-        """Every pose of the plan as a candidate."""
+        """Sensitivity of every pose of the plan as a candidate."""
         rows = np.array([response.rows(self.plan) for response in self.responses])
         return Sensitivity(rows, self.parameters, self.prior_information)
 
@@ -59,7 +59,8 @@ class PlannedResponses:
         return spring_std(self.sensitivity)
 
     def reaching(self, wanted: float) -> PlannedResponses:
-        """With the realisations and periods of the shortest experiment in which every stiffness has the `wanted` standard deviation.
+        """Plan with the realisations and periods of the shortest experiment that reaches the `wanted` standard deviation of every
+        stiffness.
 
         Kept periods come in twos, after which the reference motion repeats. Raises `FlexcalError` that says what is reached where the
         distortion that realisations share, or what is not known of the links, leaves more.

@@ -40,7 +40,7 @@ from flexcal.progress import Progress, silent
 
 @dataclass(frozen=True, eq=False)
 class PoseResponse:
-    """The response of one pose as the design needs it: E axes on L lines, and S sensors on the arm.
+    """Response of one pose for the design: E axes on L lines, and S sensors on the arm.
 
     `response` (L, E + S, E); `derivatives` (L, E + S, E, p) by the parameters that all poses share, `nuisance` (L, E + S, E, k) by the
     pose's own, each in units of its prior; `friction` and `sensors` make the noise, of sensors on the arm by the `orders` (S) of the
@@ -55,7 +55,7 @@ class PoseResponse:
     orders: tuple[int, ...] = ()
 
     def rows(self, plan: MultisinePlan) -> np.ndarray:
-        """R (p, p), upper triangular: RᵀR is the information about the shared parameters, that about the nuisances taken off.
+        """Factor R (p, p), upper triangular: RᵀR is the information about the shared parameters with the nuisances eliminated.
 
         In the triangular factor of [nuisance | shared] over the nuisances' priors [1 | 0], the last block is a root of the Schur
         complement S = A - B D⁻¹ Bᵀ.
@@ -78,7 +78,7 @@ class PoseResponse:
         return np.sqrt(2.0) * np.vstack([np.real(white), np.imag(white)])
 
     def gains(self, plan: MultisinePlan, gradient: np.ndarray) -> np.ndarray:
-        """What a criterion with the derivative `gradient` (p, p) by the information gains per N² m² more of amplitude², (E, L)."""
+        """Derivative (E, L), per N² m² of squared amplitude, of a criterion with the derivative `gradient` (p, p) by the information."""
         own = self.nuisance.shape[-1]
         white = self.whitened(plan)
         inner = np.eye(own) + white[:, :own].T @ white[:, :own]
@@ -87,19 +87,19 @@ class PoseResponse:
         return gain.reshape(2, *self.response.shape).sum(axis=(0, 2)).T / plan.amplitude**2
 
     def error(self, plan: MultisinePlan) -> np.ndarray:
-        """The covariance (L, E + S, E + S) of `equation_error`."""
+        """Covariance (L, E + S, E + S) of `equation_error`."""
         return equation_error(plan, self.response, self.friction, self.sensors, self.orders)
 
     def relative_error(self, plan: MultisinePlan) -> np.ndarray:
-        """Standard deviation (L, E) of every motor's own response, relative to it."""
+        """Relative standard deviation (L, E) of every motor's own response."""
         own = self.error(plan)[:, : self.response.shape[2], : self.response.shape[2]]
         variance = np.real(np.diagonal(own, axis1=1, axis2=2)) / plan.amplitude.T**2
         return np.sqrt(variance) / np.abs(np.diagonal(self.response, axis1=1, axis2=2))
 
 
 def response_parameters(model: RobotModel, plan: MultisinePlan) -> Parameters:
-    """What the responses of all poses share: springs, rotors, inertials of links and payload, a delay an axis, geometric errors, and of
-    every sensor on the arm its sensitivity, delay and errors of mounting.
+    """Parameters common to the responses of all poses: springs, rotors, inertials of links and payload, a delay per axis, geometric
+    errors, and of every sensor on the arm its sensitivity, delay and mounting errors.
 
     Priors are those that robot.yaml declares; `prior_of_parameters` takes what was estimated before instead.
     """
@@ -147,7 +147,7 @@ def response_sensitivity(
 
 
 def prior_of_parameters(model: RobotModel, parameters: Parameters) -> np.ndarray:
-    """Information (p, p) of the robot's posterior, and of the parameters' priors where nothing was estimated."""
+    """Information (p, p) of the robot's posterior, and of the parameters' priors if not estimated."""
     prior = model.posterior.prior(parameters)[1]
     scale = np.sqrt(np.diag(prior))
     information = np.linalg.inv(prior / np.outer(scale, scale)) / np.outer(scale, scale)
@@ -210,12 +210,12 @@ def pose_response(
 
 
 def friction_disturbance(model: RobotModel, q: np.ndarray, plan: MultisinePlan) -> FrictionDisturbance:
-    """What friction does in the pose `q` (n,) under all lines of `plan`."""
+    """Disturbance by friction in the pose `q` (n,) under all lines of `plan`."""
     return FrictionDisturbance.of(model, linearise(model, q, plan.payload), plan)
 
 
 def thinned(plan: MultisinePlan, step: int) -> MultisinePlan:
-    """The plan with every `step`-th line only, their power raised so that a band tells as much."""
+    """Plan with every `step`-th line only, the power raised to give a band equal information."""
     kept = plan.amplitude[:, ::step] * np.sqrt(len(plan.lines) / len(plan.lines[::step]))
     return replace(plan, lines=plan.lines[::step], amplitude=kept)
 

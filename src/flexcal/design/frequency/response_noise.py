@@ -13,11 +13,11 @@ from flexcal.model.robot import SHARED_DISTORTION, RobotModel
 from flexcal.model.vibration import Linearisation, closed_loop_motion
 
 DRAWS = 3
-"""Realisations of the multisine on which friction is evaluated."""
+"""Number of realisations of the multisine in which friction is evaluated."""
 PASSES = 3
-"""Evaluations of the motors' motion, each damped by the friction that the one before met."""
+"""Number of evaluations of the motors' motion, each damped by the friction of the previous one."""
 POOLED = 15
-"""Neighbouring lines over which the disturbance is averaged: it has no structure of its own over frequency."""
+"""Number of neighbouring lines over which the disturbance is averaged: it has no fine structure over frequency."""
 _SAMPLES_PER_LINE = 8
 
 
@@ -34,12 +34,12 @@ class ResponseSensors:
 
 
 COMMON_SENSORS = ResponseSensors()
-"""Encoders of 18 bits and a torque reading good to 1 N m, where nothing better is known."""
+"""Typical sensors: encoders of 18 bits and a torque reading of 1 N m, as default."""
 
 
 @dataclass(frozen=True, eq=False)
 class FrictionDisturbance:
-    """What Coulomb friction does under a multisine and a reference motion.
+    """Disturbance by Coulomb friction under a multisine and a reference motion.
 
     `viscous` (E,) N m s/rad is its mean effect on each motor; `power` (L, E) N² m² is E|D|² of the deviation from it in one experiment of
     one realisation, both signs subtracted, as cosine phasors.
@@ -82,7 +82,7 @@ class FrictionDisturbance:
         return cls(viscous, pooled)
 
     def thinned(self, step: int) -> FrictionDisturbance:
-        """At every `step`-th line only."""
+        """Disturbance at every `step`-th line only."""
         return FrictionDisturbance(self.viscous, self.power[::step])
 
 

@@ -8,11 +8,11 @@ from flexcal.design.optimality import TraceOptimal
 from flexcal.estimation import Parameters, Sensitivity
 
 DAMPING_WEIGHT = 0.01
-"""What a damping's variance counts for beside a stiffness's, both relative: it is wanted ten times less well."""
+"""Weight of a damping's variance relative to a stiffness's, both relative: a tenfold standard deviation suffices."""
 
 
 def spring_criterion(parameters: Parameters) -> TraceOptimal:
-    """A-optimal in the logarithms of the springs: summed variance of the stiffnesses, and of the dampings with little weight."""
+    """A-optimality in the logarithms of the springs: summed variance of the stiffnesses, and of the dampings with little weight."""
     weight = np.zeros(len(parameters))
     for number, name in enumerate(parameters.names):
         key = name.rpartition(".")[2]
@@ -32,6 +32,6 @@ def spring_std(sensitivity: Sensitivity, chosen: np.ndarray | None = None) -> di
 
 
 def largest_stiffness_std(sensitivity: Sensitivity, chosen: np.ndarray | None = None) -> tuple[str, float]:
-    """The stiffness that is predicted to be known worst, and its relative standard deviation."""
+    """Stiffness with the largest predicted relative standard deviation, and that deviation."""
     std = {n: s for n, s in spring_std(sensitivity, chosen).items() if n.endswith(".stiffness")}
     return max(std.items(), key=lambda item: item[1])

@@ -1,4 +1,4 @@
-"""The least singular value and the condition number of an observation matrix as smooth criteria of M = WᵀW."""
+"""Least singular value and condition number of an observation matrix as smooth criteria of M = WᵀW."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 _POWER = 8.0
-"""Extreme eigenvalues count as norms of this order, so that close ones are moved together: searches end sooner, and higher."""
+"""Order of the norms that approximate extreme eigenvalues: close ones are moved together, so that searches end sooner, and higher."""
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class SmoothMinimumEigenvalue:
     uses_prior: bool = True
 
     def merit(self, information: np.ndarray) -> float:
-        """-inf where M is singular."""
+        """Merit of M; -inf if M is singular."""
         values = np.linalg.eigvalsh(information)
         return -_extreme(values, -_POWER)[0] if values[0] > 0 else -np.inf
 
@@ -36,7 +36,7 @@ class ConditionNumberCriterion:
     uses_prior: bool = False
 
     def merit(self, information: np.ndarray) -> float:
-        """-inf where M is singular."""
+        """Merit of M; -inf if M is singular."""
         values = np.linalg.eigvalsh(_scaled(information)[0])
         return -_extreme(values, -_POWER)[0] - _extreme(values, _POWER)[0] if values[0] > 0 else -np.inf
 
@@ -50,13 +50,15 @@ class ConditionNumberCriterion:
 
 
 def condition_number(information: np.ndarray) -> float:
-    """cond(W) of W with columns of unit norm from M = WᵀW (p, p); inf where M is singular."""
+    """Condition number cond(W) of W with columns of unit norm from M = WᵀW (p, p); inf if M is singular."""
     values = np.linalg.eigvalsh(_scaled(information)[0])
     return float(np.sqrt(values[-1] / values[0])) if values[0] > 0 else np.inf
 
 
 def _extreme(values: np.ndarray, power: float) -> tuple[float, np.ndarray]:
-    """½ |1/power| log Σ λ^power: of the largest for a positive one, minus that of the least for a negative; and its slopes."""
+    """Smooth extreme ½ |1/power| log Σ λ^power: of the largest for a positive power, minus that of the least for a negative; and its
+    slopes.
+    """
     logs = power * np.log(values)
     total = np.logaddexp.reduce(logs)
     return float(0.5 * total / abs(power)), 0.5 * np.sign(power) * np.exp(logs - total) / values

@@ -23,12 +23,12 @@ class Criterion(Protocol):
 
     @property
     def name(self) -> str:
-        """How reports call it."""
+        """Name in reports."""
         ...
 
     @property
     def uses_prior(self) -> bool:
-        """Whether the prior information counts; the classical indices judge the measurements alone."""
+        """Whether the prior information counts; the classical indices assess the measurements alone."""
         ...
 
     def merit(self, information: np.ndarray) -> float:
@@ -42,7 +42,7 @@ class Criterion(Protocol):
 
 @dataclass(frozen=True)
 class DOptimal:
-    """log det M / p: the volume of the confidence ellipsoid, whatever the units and the basis."""
+    """D-optimality log det M / p: the volume of the confidence ellipsoid, independent of units and basis."""
 
     name: str = "D"
     uses_prior: bool = True
@@ -57,7 +57,7 @@ class DOptimal:
 
 @dataclass(frozen=True, eq=False)
 class TraceOptimal:
-    """-½ log tr(W M⁻¹): A-optimal for W = 1, c-optimal for W = JᵀJ of the predicted quantities J (m).
+    """Trace criterion -½ log tr(W M⁻¹): A-optimal for W = 1, c-optimal for W = JᵀJ of the predicted quantities J (m).
 
     `trace` itself is the summed variance of these quantities.
     """
@@ -86,7 +86,7 @@ class TraceOptimal:
 
 @dataclass(frozen=True)
 class SpectralCriterion:
-    """A merit of the eigenvalues of M alone; `name` is E, O1, O2, O3, O4 or O5. All but E are in singular values of Θ."""
+    """Criterion of the eigenvalues of M alone; `name` is E, O1, O2, O3, O4 or O5. All but E are in singular values of Θ."""
 
     name: str
     uses_prior: bool = False
@@ -180,7 +180,7 @@ def observability(
 
 
 def _inverse(information: np.ndarray) -> np.ndarray:
-    """Inverse of a positive matrix through its Cholesky factor; raises `FlexcalError` where there is none."""
+    """Inverse of a positive definite matrix by its Cholesky factor; raises `FlexcalError` if there is none."""
     try:
         factor = np.linalg.cholesky(information)
     except np.linalg.LinAlgError as problem:

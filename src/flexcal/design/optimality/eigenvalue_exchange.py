@@ -17,11 +17,11 @@ from flexcal.estimation import Sensitivity
 from flexcal.progress import Progress, silent
 
 SCREENED = 16
-"""Candidates whose eigenvalues are found exactly in every step, at most."""
+"""Largest number of candidates whose eigenvalues are computed exactly in every step."""
 FIRST = 4
-"""Of these, how many before all others: the score bounds the merit, so that those below the best of them are settled."""
+"""Number of these computed first: the score bounds the merit, so that those below the best of them are settled."""
 LONGEST = 4
-"""Members that an excursion exchanges at once, at most."""
+"""Largest number of members exchanged at once in an excursion."""
 _ENOUGH = 1e-9
 
 
@@ -40,11 +40,11 @@ class _Pool:
             self.information = self.information + sensitivity.prior_information
 
     def product(self, candidate: int) -> np.ndarray:
-        """ΘᵢᵀΘᵢ (p, p)."""
+        """Information ΘᵢᵀΘᵢ (p, p) of a candidate."""
         return self.jacobian[candidate].T @ self.jacobian[candidate]
 
     def best_addition(self, information: np.ndarray, banned: list[int]) -> tuple[int, float]:
-        """The candidate whose addition to `information` gives the best merit, and that merit."""
+        """Candidate whose addition to `information` gives the best merit, and that merit."""
         values, vectors = np.linalg.eigh(information)
         low = self._low(values, vectors)
         score = self._diagonal_merit(self.flat, values[:low], vectors[:, :low], 1.0)
@@ -61,7 +61,7 @@ class _Pool:
         return int(few[best]), float(merits[best])
 
     def _low(self, values: np.ndarray, vectors: np.ndarray) -> int:
-        """How many of the lowest eigenvectors settle the score: where only the least entry counts, none above what the lowest reaches."""
+        """Number of the lowest eigenvectors that determine the score: where only the least entry counts, none above the lowest's reach."""
         if self.criterion.name not in ("E", "O3"):
             return len(values)
         lowest = (self.flat @ vectors[:, 0]).reshape(-1, self.rows)
@@ -69,13 +69,13 @@ class _Pool:
         return max(1, int(np.searchsorted(values, reached)))
 
     def _exact(self, information: np.ndarray, candidates: np.ndarray) -> np.ndarray:
-        """The merit with each of some `candidates` added."""
+        """Merit with each of some `candidates` added."""
         rows = self.jacobian[candidates]
         eigenvalues = np.linalg.eigvalsh(information + np.swapaxes(rows, 1, 2) @ rows)
         return self.criterion.of_eigenvalues(eigenvalues)
 
     def worst_member(self, information: np.ndarray, chosen: list[int]) -> tuple[int, float]:
-        """The place in `chosen` of the member that is missed least, and the merit without it."""
+        """Index in `chosen` of the member whose removal costs least, and the merit without it."""
         values, vectors = np.linalg.eigh(information)
         score = self._diagonal_merit(self.jacobian[chosen].reshape(-1, self.size), values, vectors, -1.0)
         few = np.argpartition(-score, min(SCREENED, len(chosen) - 1))[:SCREENED]
@@ -105,7 +105,7 @@ def spectral_exchange(
     passes: int = 20,
     progress: Progress = silent,
 ) -> Selection:
-    """As `exchange`, for E and O2-O5: excursions, then exchanges member by member, until both fail. O1 is D in other words.
+    """As `exchange`, for E and O2-O5: excursions, then exchanges member by member, until both fail. O1 is equivalent to D.
 
     Without `start` (which here must hold `count` indices) it begins twice, at the greedy and at the exchanged A-optimal set, since a set
     too small has σ_min = 0 and σ_min has many local optima; the better result counts.
@@ -129,7 +129,7 @@ def spectral_exchange(
 
 
 def _starts(sensitivity: Sensitivity, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """The greedy and the exchanged A-optimal set."""
+    """Start sets: the greedy and the exchanged A-optimal one."""
     smooth = TraceOptimal(np.eye(sensitivity.jacobian.shape[2]), "A", uses_prior=False)
     first = greedy(sensitivity, count, smooth).chosen
     return first, rank_exchange(sensitivity, count, smooth, start=first).chosen

@@ -23,7 +23,7 @@ def exchange(
     passes: int = 20,
     progress: Progress = silent,
 ) -> Selection:
-    """The `count` candidates of best merit that exchanges find; every candidate serves once.
+    """Choose the `count` candidates of best merit by exchange; every candidate serves once.
 
     Without `start` (at most `count` indices) the set grows greedily. Then every member in turn is taken out and the best candidate put
     in, until a pass changes nothing or `passes` are done. The result is a local optimum. Raises `FlexcalError` when `count` exceeds

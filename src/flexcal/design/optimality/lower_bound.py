@@ -9,13 +9,13 @@ from flexcal.design.optimality.rank_updates import greedy
 from flexcal.estimation import Sensitivity
 
 LOOKED_AT = 2000
-"""Candidates among which a good design is sought."""
+"""Number of candidates searched for a good design."""
 SPREAD = 4
-"""Candidates in that design, per parameter: so many that their weights come near the best."""
+"""Number of candidates in that design per parameter: sufficient for weights near the best."""
 
 
 def trace_lower_bound(sensitivity: Sensitivity, criterion: TraceOptimal, counts: np.ndarray) -> np.ndarray:
-    """Numbers (K,) that tr(W M'⁻¹) of no set of `counts` (K,) candidates is below, M' their information with the prior P.
+    """Lower bounds (K,) of tr(W M'⁻¹) for any set of `counts` (K,) candidates, M' their information with the prior P.
 
     tr(W M⁻¹) is convex in M and goes with 1/t as M with t, so that for every M', M and t > 0 it is at least 2 φ/t - tr(S M')/t², with φ
     its value and S = M⁻¹ W M⁻¹ at M; the best t is tr(S M')/φ, and tr(S M') is at most tr(S P) + count · maxᵢ tr(S ΘᵢᵀΘᵢ). Whatever M,

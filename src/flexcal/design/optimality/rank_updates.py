@@ -18,18 +18,18 @@ from flexcal.estimation import Sensitivity
 from flexcal.progress import Progress, silent
 
 POOL_REGULARISATION = 1e-5
-"""Information of the whole pool, per candidate, that is added so that a set smaller than the parameters has a merit."""
+"""Information of the whole pool, per candidate, added so that a set smaller than the parameters has a merit."""
 
 SELECTION_STAGE = "choosing"
-"""The stage that exchanges tell of."""
+"""Name of the progress stage of exchanges."""
 
 REBUILT = 8
-"""Additions to a growing set after which its inverse is found anew: early on it loses digits with every update."""
+"""Number of additions to a growing set after which its inverse is recomputed: early on every update loses digits."""
 
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """The `chosen` candidates (count,), in the order of choice, the `merit` of the set, and of every pass of exchanges."""
+    """Selected candidates `chosen` (count,), in the order of choice, the `merit` of the set, and of every pass of exchanges."""
 
     chosen: np.ndarray
     merit: float
@@ -45,7 +45,7 @@ def rank_exchange(
     passes: int = 20,
     progress: Progress = silent,
 ) -> Selection:
-    """`exchange` by a criterion that low-rank updates can follow; its arguments, result and errors are those of `exchange`."""
+    """Exchange for criteria with low-rank updates; arguments, result and errors as of `exchange`."""
     check_selection(sensitivity, count, criterion, start)
     state = RankUpdates(sensitivity, criterion)
     chosen = [] if start is None else [int(i) for i in start]
@@ -66,7 +66,7 @@ def rank_exchange(
 
 
 def greedy(sensitivity: Sensitivity, count: int, criterion: DOptimal | TraceOptimal) -> Selection:
-    """The nested sets that grow by the best candidate each; the first k of `chosen` are the set of k."""
+    """Greedy selection: nested sets grown by the best candidate each; the first k of `chosen` are the set of k."""
     check_selection(sensitivity, count, criterion, None, determine=False)
     state = RankUpdates(sensitivity, criterion)
     history: list[float] = []
@@ -105,7 +105,7 @@ class RankUpdates:
         self.rebuild([])
 
     def rebuild(self, chosen: Sequence[int]) -> None:
-        """Start again from a set, without the rounding of past updates."""
+        """Recompute from a set, without the rounding of past updates."""
         members = self._block(list(chosen)).reshape(-1, self.size)
         information = self._start + members.T @ members
         factor = np.linalg.cholesky(information)
@@ -124,31 +124,31 @@ class RankUpdates:
 
     @property
     def merit(self) -> float:
-        """As the criterion says, of the set as it is now."""
+        """Merit of the current set."""
         return self.log_det / self.size if self.trace_weight is None else -0.5 * float(np.log(self.trace))
 
     def gains(self) -> np.ndarray:
-        """What adding each candidate (candidates,) would do: growth of log det M, or decline of the trace."""
+        """Gains (candidates,) of adding each candidate: growth of log det M, or decline of the trace."""
         lead = np.moveaxis(self.blocks, 0, -1) + np.eye(self.rows)[:, :, None]
         if self.trace_weight is None:
             return np.log(_determinants(lead))
         return _solved_traces(lead, np.moveaxis(self.weighted_blocks, 0, -1))
 
     def add(self, candidate: int) -> None:
-        """Put a candidate in."""
+        """Add a candidate."""
         self._update(candidate, 1.0)
 
     def remove(self, candidate: int) -> None:
-        """Take a candidate out that is in."""
+        """Remove a member."""
         self._update(candidate, -1.0)
 
     def copy_state(self) -> tuple[np.ndarray | float, ...]:
-        """What `restore` needs to come back here."""
+        """Copy of the state, for `restore`."""
         state = (self.inverse, self.weighted_inverse, self.log_det, self.blocks)
         return state if self.trace_weight is None else (*state, self.trace, self.weighted_blocks)
 
     def restore(self, state: tuple) -> None:
-        """Come back to a state of `copy_state`."""
+        """Restore a state of `copy_state`."""
         self.inverse, self.weighted_inverse, self.log_det, self.blocks = state[:4]
         if self.trace_weight is not None:
             self.trace, self.weighted_blocks = state[4:]
@@ -197,7 +197,7 @@ def _grow(state: RankUpdates, count: int, chosen: list[int]) -> list[int]:
 
 
 def _exchange_once(state: RankUpdates, chosen: list[int]) -> int:
-    """Replace each member by the best candidate; the number of members that changed."""
+    """Replace each member by the best candidate; returns the number of members that changed."""
     changed = 0
     for place, member in enumerate(list(chosen)):
         before = state.copy_state()
@@ -229,7 +229,7 @@ def check_selection(
     *,
     determine: bool = True,
 ) -> None:
-    """Raise `FlexcalError` where `count` or `start` do not fit the candidates, or cannot determine the parameters."""
+    """Raise `FlexcalError` if `count` or `start` do not fit the candidates, or cannot determine the parameters."""
     candidates, rows, size = sensitivity.jacobian.shape
     if not 0 < count <= candidates:
         raise FlexcalError(

@@ -16,12 +16,12 @@ from flexcal.estimation import Sensitivity
 from flexcal.progress import Progress, silent
 
 SHORT = 1000
-"""Candidates among which is exchanged."""
+"""Number of candidates on the shortlist."""
 MANY = 5000
-"""Candidates above which a shortlist pays."""
+"""Number of candidates above which a shortlist pays."""
 ROUNDS = 6
 _POWER = 9
-"""Of an eigenvalue, one over which weighs its eigenvector: the derivative of (Σ λ⁻⁸)^(-1/8), nearly the least eigenvalue."""
+"""Exponent of the weight of an eigenvector, one over its eigenvalue: the derivative of (Σ λ⁻⁸)^(-1/8), nearly the least eigenvalue."""
 _LIGHT = 1e-3
 """Relative weight below which an eigenvector is left out."""
 
@@ -29,7 +29,7 @@ _LIGHT = 1e-3
 def exchange_on_shortlist(
     sensitivity: Sensitivity, count: int, criterion: Criterion, *, progress: Progress = silent
 ) -> Selection:
-    """As `exchange`, from any number of candidates; above 5000 the exchange sees 1000 at a time.
+    """Exchange from any number of candidates, as `exchange`; above 5000 it considers 1000 at a time.
 
     It begins among candidates drawn at random (always the same ones), then goes on among those that promise most beside the set found,
     until that set stays or after six rounds. Raises `FlexcalError` as `exchange` does.
@@ -58,7 +58,7 @@ def exchange_on_shortlist(
 
 
 def predicted_gains(sensitivity: Sensitivity, chosen: np.ndarray, criterion: Criterion) -> np.ndarray:
-    """What each candidate (candidates,) would add to the merit of the `chosen` ones, to first order and up to a factor."""
+    """Gain (candidates,) in the merit of the `chosen` ones by adding each candidate, to first order and up to a factor."""
     size = len(sensitivity.parameters)
     rows = sensitivity.jacobian[chosen].reshape(-1, size)
     information = rows.T @ rows

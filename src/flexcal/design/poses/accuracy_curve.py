@@ -15,7 +15,7 @@ from flexcal.progress import Progress, silent
 
 @dataclass(frozen=True, eq=False)
 class PoseCurve:
-    """Root mean square tool error (K,), m, predicted after measuring `counts` (K,) poses: `chosen` one by one, and at `random`.
+    """Predicted root mean square tool error (K,), m, after measuring `counts` (K,) poses: `chosen` one by one, and at `random`.
 
     `random` is the median over sets drawn from the same candidates. Both are from tracker noise alone.
     """
@@ -25,7 +25,7 @@ class PoseCurve:
     random: np.ndarray
 
     def enough(self, excess: float = 0.1) -> int:
-        """The first count after which the chosen error falls by less than `excess` (relative) when the poses are doubled.
+        """First count after which the chosen error falls by less than `excess` (relative) when the number of poses is doubled.
 
         Noise alone falls by √½ with every doubling, so what is compared is the excess over that law. The last count if none does.
         """
@@ -43,7 +43,7 @@ def pose_curve(
     random_sets: int = 15,
     progress: Progress = silent,
 ) -> PoseCurve:
-    """The curve for `counts`, by default from the fewest that determine the parameters to four times as many as were chosen.
+    """Accuracy curve for `counts`, by default from the fewest that determine the parameters to four times the chosen number.
 
     The chosen sets are nested (each adds the best candidate), so they lie slightly above what an exchange for that count reaches.
     """

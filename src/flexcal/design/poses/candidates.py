@@ -24,7 +24,7 @@ def random_candidates(
     preload: bool = False,
     progress: Progress = silent,
 ) -> np.ndarray:
-    """`count` configurations (count, n), uniform over the joint ranges where nothing collides and the target is seen.
+    """Uniform random configurations (count, n) over the joint ranges, free of collision and with the target visible.
 
     With `preload`, only those where gravity surely settles the flank of every backlash. The target too stays above the floor. Only the
     poses are checked, not the ways between them. Raises `FlexcalError`, with what each check threw out, when too few are left.
@@ -64,7 +64,7 @@ def random_candidates(
 
 
 def above_floor(checker: CollisionChecker, q: np.ndarray, point: str | None = None) -> np.ndarray:
-    """Whether the target is above the floor, by the checker's margin, at each configuration of `q` (samples, n), as (samples,) of bool."""
+    """Mask (samples,) of configurations `q` (samples, n) with the target above the floor, by the checker's margin."""
     if checker.floor is None:
         return np.ones(len(q), dtype=bool)
     position = point_kinematics(checker.model, q, point=point, jacobians=False).position

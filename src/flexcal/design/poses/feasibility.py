@@ -22,12 +22,12 @@ from flexcal.model.statics import gravity_torque
 from flexcal.progress import Progress, silent
 
 WORKING_POSES = 300
-"""Random poses over the whole workspace for which c-optimal design predicts the tool error, unless others are given."""
+"""Number of random poses over the whole workspace for the tool error of c-optimal design, unless others are given."""
 
 
 @dataclass(frozen=True, eq=False)
 class PoseCandidates:
-    """Poses that can be measured as `setup` says.
+    """Candidate poses that can be measured with `setup`.
 
     `base` holds the rows of all poses of the `pool`; `tool_error_weight` (rank, rank), m², turns a covariance into the mean square of the
     tool error over the working poses. `hidden` are the numbers of a given pool's poses that the instrument does not see.
@@ -52,7 +52,7 @@ def pose_candidates(
     checker: CollisionChecker | None = None,
     progress: Progress = silent,
 ) -> PoseCandidates:
-    """Random poses, so many, or those of a pool, with gravity surely preloading every backlash; at least `least` of them.
+    """Random poses, or those of a pool, with gravity surely preloading every backlash; at least `least` of them.
 
     Random ones keep to the joint limits, collide with nothing (`checker`, by default with 10 mm of margin and a floor at the base) and
     show the target to the instrument. Those of a pool are taken to be free of collision; in those left out the flank is not sure, or
@@ -92,7 +92,7 @@ def tool_error_weight(
 def _usable(
     checker: CollisionChecker, given: PosePool, seen: np.ndarray, least: int, setup: MeasuringSetup
 ) -> PosePool:
-    """The poses of a pool that can be measured, of those `seen` (a mask); raises `FlexcalError` where they are fewer than `least`."""
+    """Poses of a pool, among those of the mask `seen`, that can be measured; raises `FlexcalError` if fewer than `least`."""
     if not seen.any():
         raise FlexcalError(
             "E-DESIGN-022",

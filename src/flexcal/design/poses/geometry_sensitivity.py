@@ -17,7 +17,7 @@ from flexcal.units import MILLIMETRE
 
 @dataclass(frozen=True)
 class GeometricTolerances:
-    """How large geometric errors are, 1σ: lengths (m), angles and half gaps (rad), and the place of the instrument (m)."""
+    """Prior standard deviations (1σ) of geometric errors: lengths (m), angles and half gaps (rad), and the place of the instrument (m)."""
 
     length: float = 0.3 * MILLIMETRE
     angle: float = 0.5e-3
@@ -25,9 +25,9 @@ class GeometricTolerances:
 
 
 BLOCK = 512
-"""Poses whose rows are found together: what they need stays in the processor's cache."""
+"""Number of poses whose rows are computed together, sized for the processor's cache."""
 TYPICAL = GeometricTolerances()
-"""A well-made industrial robot, and an instrument whose place was measured with a tape."""
+"""Tolerances of a well-made industrial robot, and an instrument whose place was measured with a tape."""
 
 
 def geometry_jacobian(
@@ -78,7 +78,7 @@ def pose_sensitivity(
 
 
 def measuring_noise(model: RobotModel, q: np.ndarray, setup: MeasuringSetup = STANDARD) -> np.ndarray:
-    """1σ (samples,), m, of the coordinates that the instrument measures at `q` (samples, n)."""
+    """Standard deviation (samples,), m, of the measured coordinates at `q` (samples, n)."""
     origin = station_position(model, setup.station)
     position = point_kinematics(model, q, point=setup.point, jacobians=False).position
     apart = np.full(len(q), 2 * model.reach) if origin is None else np.linalg.norm(position - origin, axis=1)
@@ -93,7 +93,7 @@ def _tolerance(name: str, tolerances: GeometricTolerances) -> float:
 
 @dataclass(frozen=True, eq=False)
 class BaseSensitivity:
-    """A sensitivity in the parameter combinations that the candidates can tell apart, each in units of the kept parameter's tolerance.
+    """Sensitivity in the parameter combinations that the candidates separate, each in units of the kept parameter's tolerance.
 
     `sensitivity` has jacobian (candidates, 3, rank) and the prior of the combinations; `identifiability` says what was kept and what
     absorbed the rest; `scale` (rank,) are the tolerances (rad, m). Only in such units do σ_min and O1-O5 mean anything.
@@ -104,7 +104,7 @@ class BaseSensitivity:
     scale: np.ndarray
 
     def columns(self, jacobian: np.ndarray) -> np.ndarray:
-        """Columns (..., rank) of a `jacobian` (..., p) by all parameters that belong to these combinations, scaled alike."""
+        """Columns (..., rank) of a `jacobian` (..., p) by all parameters for these combinations, with the same scales."""
         return jacobian[..., list(self.identifiability.kept)] * self.scale
 
 
@@ -134,7 +134,7 @@ def base_sensitivity(full: Sensitivity) -> BaseSensitivity:
 
 
 def _triangle(jacobian: np.ndarray) -> np.ndarray:
-    """The rows of a `jacobian` (candidates, r, p) where they are few, else an R (p, p) with the same RᵀR, found block by block."""
+    """Rows of a `jacobian` (candidates, r, p) if they are few, else a factor R (p, p) with the same RᵀR, computed block by block."""
     if len(jacobian) <= 16 * BLOCK:
         return jacobian.reshape(-1, jacobian.shape[2])
     factor = np.zeros((0, jacobian.shape[2]))

@@ -9,21 +9,21 @@ from flexcal.model.robot import RobotModel
 from flexcal.model.statics import certain_flank, gravity_torque
 
 LEAST_TORQUE = 10.0
-"""N m of gravity below which a backlash does not count as preloaded."""
+"""Gravity torque, N m, below which a backlash does not count as preloaded."""
 LEAST_SHARE = 0.05
 """Share of the largest gravity torque of the joint below which a backlash does not count as preloaded."""
 
 BLOCK = 512
-"""Poses whose torques are judged together: what they need stays in the processor's cache."""
+"""Number of poses whose torques are evaluated together, sized for the processor's cache."""
 
 
 def preload_joints(model: RobotModel) -> tuple[int, ...]:
-    """The revolute joints that are declared to have backlash."""
+    """Revolute joints declared to have backlash."""
     return tuple(i for i in model.backlash_joints if model.joints[i].kind == "revolute")
 
 
 def preloaded(model: RobotModel, q: np.ndarray, payload: float | None = None) -> np.ndarray:
-    """Whether the flank of every backlash is certain at `q` (samples, n), as (samples,) of bool.
+    """Mask (samples,) of configurations `q` (samples, n) with a certain flank of every backlash.
 
     The sign of its torque must be certain; and the torque must exceed 10 N m and 5 % of its largest over the joint ranges.
     """

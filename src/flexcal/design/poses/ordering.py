@@ -1,4 +1,4 @@
-"""Order of poses with short, collision-free joint moves where there are any."""
+"""Order of poses with short joint moves, free of collision where possible."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from flexcal.design.scene import CollisionChecker
 from flexcal.model.kinematics import link_frames
 
 UNLIMITED = 1.0
-"""Speed, rad/s or m/s, of a joint whose URDF limits none."""
+"""Speed, rad/s or m/s, of a joint without a limit in the URDF."""
 ROUNDS = 50
-"""Ways tried, at most, each without the moves that were found to touch something."""
+"""Largest number of paths tried, each without the moves found to collide."""
 _EVEN = 64
-"""Configurations of a move between which its bodies' travel is measured."""
+"""Number of configurations of a move between which its bodies' travel is measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class MeasurementOrder:
 def measurement_order(
     checker: CollisionChecker, q: np.ndarray, *, point: str | None = None
 ) -> MeasurementOrder:
-    """Short tour through the poses `q` (N, n) with any start: first the fewest blocked moves, then the shortest time.
+    """Short path through the poses `q` (N, n) with any start: first the fewest blocked moves, then the shortest time.
 
     A move is as long as its slowest joint at full speed needs. Only the moves of a way are checked for collision; those that touch
     something are made dear, and the way is improved again, until it has no new ones.
@@ -67,7 +67,7 @@ def move_seconds(checker: CollisionChecker, q: np.ndarray) -> np.ndarray:
 def move_collides(
     checker: CollisionChecker, start: np.ndarray, end: np.ndarray, *, point: str | None = None
 ) -> bool:
-    """Whether the straight move of the joints from `start` (n,) to `end` (n,) touches something, or takes the target through the floor.
+    """Whether the straight joint move from `start` (n,) to `end` (n,) collides, or takes the target through the floor.
 
     Checked so densely that no joint's origin and no target travels farther than twice the checker's margin in between.
     """

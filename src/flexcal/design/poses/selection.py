@@ -59,7 +59,7 @@ class PoseDesign:
     def of(
         cls, candidates: PoseCandidates, criterion: Criterion, selection: Selection, rng: np.random.Generator
     ) -> PoseDesign:
-        """The design that takes this `selection` of the candidates; `rng` draws the plan's seed."""
+        """Design with this `selection` of the candidates; `rng` draws the plan's seed."""
         chosen = candidates.pool.q[selection.chosen]
         loose = list(preload_joints(candidates.model))
         return cls(
@@ -75,7 +75,7 @@ class PoseDesign:
         )
 
     def in_order(self, order: np.ndarray) -> PoseDesign:
-        """The same poses in this order (N,)."""
+        """Design with the same poses in this order (N,)."""
         return replace(
             self,
             plan=replace(self.plan, q=self.plan.q[order]),
@@ -85,12 +85,12 @@ class PoseDesign:
 
     @property
     def identifiability(self) -> Identifiability:
-        """Rank of the candidates' kinematic Jacobian, and what absorbed the dropped parameters."""
+        """Rank of the candidates' kinematic Jacobian, and the parameters that absorb the dropped ones."""
         return self.base.identifiability
 
     @property
     def numbers(self) -> np.ndarray:
-        """The numbers (N,) of the chosen poses among the candidates, in the order of the plan."""
+        """Numbers (N,) of the chosen poses among the candidates, in the order of the plan."""
         return self.candidates.pose[self.selection.chosen]
 
     @property
@@ -103,13 +103,13 @@ class PoseDesign:
 
     @property
     def least_possible(self) -> float:
-        """A tool error, m, that no choice of as many of the candidates could predict less than (see `trace_lower_bound`)."""
+        """Lower bound of the tool error, m, for any choice of as many candidates (see `trace_lower_bound`)."""
         trace = TraceOptimal(self.tool_error_weight, "c")
         return float(trace_lower_bound(self.base.sensitivity, trace, np.array([len(self.plan)]))[0] ** 0.5)
 
     @property
     def criteria(self) -> dict[CriterionName, float]:
-        """What every criterion says of the chosen poses.
+        """Values of all criteria for the chosen poses.
 
         `c` is the tool error (m); `A` the sum of the parameters' variances in units of their tolerances and `D` log det M / p, both with
         the tolerances as prior; `E` (σ_min of ΘᵀΘ) and O1-O5 are of the measurements alone.
@@ -179,7 +179,7 @@ def choose_poses(
     criterion: CriterionName = "c",
     progress: Progress = silent,
 ) -> PoseDesign:
-    """As `select_poses`, from candidates that have been found; `rng` draws the plan's seed."""
+    """As `select_poses`, from given candidates; `rng` draws the plan's seed."""
     rank = candidates.base.identifiability.rank
     if 3 * count < rank:
         raise FlexcalError(
@@ -193,7 +193,9 @@ def choose_poses(
 
 
 def fewest_poses(candidates: PoseCandidates, most: int, wanted: float) -> int:
-    """How many candidates, chosen one by one, predict a tool error of at most `wanted` (m); raises `FlexcalError` where `most` do not."""
+    """Least number of candidates, chosen one by one, with a predicted tool error of at most `wanted` (m); raises `FlexcalError` if
+    `most` do not suffice.
+    """
     weight, sensitivity = candidates.tool_error_weight, candidates.base.sensitivity
     order = greedy(sensitivity, most, TraceOptimal(weight, "c")).chosen
     least = -(-candidates.base.identifiability.rank // 3)
@@ -254,7 +256,7 @@ def random_poses(
 
 
 def criterion_named(name: CriterionName, weight: np.ndarray) -> Criterion:
-    """The criterion a user names; `weight` (rank, rank) is for `c`. Raises `FlexcalError` for an unknown name."""
+    """Criterion by name; `weight` (rank, rank) is for `c`. Raises `FlexcalError` for an unknown name."""
     match name:
         case "c":
             return TraceOptimal(weight, "c")

@@ -17,12 +17,12 @@ from flexcal.estimation import Sensitivity
 from flexcal.model.robot import RobotModel
 
 AVERAGING = 0.2
-"""Above what no choice of as many poses could be below, relative: from there on more poses do little but average."""
+"""Excess of the predicted error over its lower bound for as many poses, relative, from which more poses do little but average."""
 
 
 @dataclass(frozen=True, eq=False)
 class NextPoses:
-    """The K poses of `design`, the best first, each the best after those before it and the `measured` ones (their number).
+    """Next K poses of `design`, the best first, each the best after those before it and the `measured` ones (their number).
 
     `tool_error` (K + 1,), m, is predicted after none, one, ... of them; `possible` (K + 1,) is what no choice of as many poses in all
     could be below. The `base` of the design counts the measured poses as known before.
@@ -34,7 +34,7 @@ class NextPoses:
     possible: np.ndarray
 
     def enough(self, wanted: float | None = None) -> int | None:
-        """After how many of these poses to stop: the tool error is at most `wanted` (m), or more only average; None for never."""
+        """Number of these poses after which to stop: the tool error is at most `wanted` (m), or more only average; None for never."""
         limit = (1 + AVERAGING) * self.possible if wanted is None else wanted
         good = np.flatnonzero(self.tool_error <= limit)
         return int(good[0]) if len(good) else None
@@ -48,7 +48,7 @@ def select_next_poses(
     rng: np.random.Generator,
     criterion: CriterionName = "c",
 ) -> NextPoses:
-    """The `count` candidates that, one after the other, add most to what the `measured` poses and the tolerances tell.
+    """Choose the `count` candidates that, one after the other, add most to the information of `measured` poses and tolerances.
 
     `criterion` is c, A or D. Where the measured poses say how noisy they are, the next ones are taken to be as noisy.
 
@@ -79,7 +79,9 @@ def select_next_poses(
 
 
 def measured_information(candidates: PoseCandidates, measured: PoseSet) -> tuple[np.ndarray, float]:
-    """Information (rank, rank) of measured poses on the combinations that the candidates tell apart, and their noise by the setup's."""
+    """Information (rank, rank) of measured poses on the combinations that the candidates separate, and their noise relative to the
+    setup's.
+    """
     _check(candidates.model, measured, candidates.setup)
     information, noisier = np.zeros(2 * (len(candidates.base.scale),)), []
     for first in range(0, len(measured), BLOCK):
@@ -91,7 +93,7 @@ def measured_information(candidates: PoseCandidates, measured: PoseSet) -> tuple
 
 
 def _rows(candidates: PoseCandidates, measured: PoseSet) -> tuple[np.ndarray, np.ndarray]:
-    """Whitened rows (N, 3, rank) and noise by the setup's (N, 3)."""
+    """Whitened rows (N, 3, rank) and noise relative to the setup's (N, 3)."""
     model, setup = candidates.model, candidates.setup
     payload = np.full(len(measured), np.nan) if measured.payload is None else measured.payload
     rows = np.zeros((len(measured), 3, len(candidates.base.scale)))

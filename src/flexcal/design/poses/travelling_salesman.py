@@ -1,18 +1,18 @@
-"""Short tour through all poses: nearest neighbour, then 2-opt (Croes 1958) and or-opt (Or 1976)."""
+"""Shortest path through all poses: nearest neighbour, then 2-opt (Croes 1958) and or-opt (Or 1976)."""
 
 from __future__ import annotations
 
 import numpy as np
 
 STARTS = 12
-"""Nearest-neighbour ways that are improved; the shortest counts."""
+"""Number of nearest-neighbour paths that are improved; the shortest counts."""
 LONGEST = 3
-"""Places that or-opt moves together, at most."""
+"""Largest number of places that or-opt moves together."""
 _ENOUGH = 1e-9
 
 
 def shortest_path(cost: np.ndarray, start: np.ndarray | None = None) -> np.ndarray:
-    """The order (N,) of a short open way, either end free; `cost` (N, N) of moves is symmetric. With `start`, that order improved."""
+    """Order (N,) of a short open path, either end free; `cost` (N, N) of moves is symmetric. With `start`, that order improved."""
     count = len(cost)
     if count < 3:
         return np.arange(count)
@@ -51,7 +51,7 @@ def _improved(cost: np.ndarray, way: np.ndarray) -> np.ndarray:
 
 
 def _two_opt(cost: np.ndarray, way: np.ndarray) -> np.ndarray:
-    """Turn the stretch around that shortens the closed way most, while one does."""
+    """Reverse the segment that shortens the closed path most, while one does."""
     way = way.copy()
     upper = np.triu(np.ones((len(way), len(way)), dtype=bool), 1)
     while True:
@@ -66,7 +66,7 @@ def _two_opt(cost: np.ndarray, way: np.ndarray) -> np.ndarray:
 
 
 def _or_opt(cost: np.ndarray, way: np.ndarray) -> np.ndarray:
-    """Put up to three places that follow each other elsewhere, either way round, while that shortens the closed way."""
+    """Move up to three consecutive places elsewhere, in either direction, while that shortens the closed path."""
     tried = 0
     while tried < len(way):
         for size in range(1, min(LONGEST, len(way) - 2) + 1):

@@ -12,14 +12,14 @@ from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import joint_ranges, reach_points
 
 TRIES = 12
-"""Starts from which a point is tried to be reached."""
+"""Number of starts from which a point is tried."""
 BOX_POINTS = 300
-"""Points drawn in a box."""
+"""Number of points drawn in a box."""
 
 
 @dataclass(frozen=True, eq=False)
 class WorkingVolume:
-    """Configurations `q` (W, n) in which the target stands at `points` (W, 3), m, base frame.
+    """Configurations `q` (W, n) with the target at `points` (W, 3), m, base frame.
 
     `reached` is the share of the points asked for that the robot reaches; `box` its corners (2, 3), None where points were given.
     """
@@ -38,7 +38,7 @@ def working_box(
     *,
     point: str | None = None,
 ) -> WorkingVolume:
-    """Of 300 random points between the corners `lower` and `upper` (3,), m, base frame, those that it reaches, in random orientations.
+    """Reachable ones of 300 random points between the corners `lower` and `upper` (3,), m, base frame, in random orientations.
 
     Raises `FlexcalError` where a lower corner is not below the upper one, and where the robot reaches none of them.
     """
@@ -61,7 +61,7 @@ def working_box(
 def working_points(
     checker: CollisionChecker, points: np.ndarray, rng: np.random.Generator, *, point: str | None = None
 ) -> WorkingVolume:
-    """The given `points` (W, 3), m, base frame, each in a random orientation. Raises `FlexcalError` for one out of reach."""
+    """Given `points` (W, 3), m, base frame, each in a random orientation. Raises `FlexcalError` for one out of reach."""
     q, reached = _configurations(checker, points, rng, point)
     if not reached.all():
         first = int(np.argmin(reached))
@@ -76,7 +76,7 @@ def working_points(
 def _configurations(
     checker: CollisionChecker, wanted: np.ndarray, rng: np.random.Generator, point: str | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A configuration (W, n) for each point (W, 3), and whether one was found (W,)."""
+    """Configurations (W, n) for the points (W, 3), and a mask (W,) of those found."""
     model = checker.model
     lower, upper = joint_ranges(model)
     q = np.zeros((len(wanted), model.n))

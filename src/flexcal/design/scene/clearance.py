@@ -10,7 +10,7 @@ from flexcal.design.scene.collision import CollisionChecker
 
 
 class Clearance:
-    """Distances, less their margins and `beyond`, of all pairs of shapes that a checker compares, wherever they are below `within`, m.
+    """Distances, less margins and `beyond`, of all pairs of shapes compared by a checker, where below `within`, m.
 
     What is farther is not computed again until the joints have moved so much that it could be near: no point of a body moves farther
     than its distance from the axis times the angle.
@@ -43,11 +43,11 @@ class Clearance:
         return len(self._reach) > 0
 
     def wider(self, further: float) -> Clearance:
-        """The same with margins that are larger by `further`, m, and nothing remembered."""
+        """Clearance with margins larger by `further`, m, and an empty cache."""
         return Clearance(self.checker, self.within, self.beyond + further)
 
     def near(self, q: np.ndarray, least: float = -np.inf) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Instants (k,), distances (k,), negative where too near, and derivatives (k, n) by the joints, of what is below `within`.
+        """Instants (k,), distances (k,), negative inside the margin, and derivatives (k, n) by the joints, of pairs below `within`.
 
         `q` (N, n). Nothing more is looked at once a distance is below `least`. A derivative is along the line between the nearest
         points; it jumps where these do.
@@ -93,7 +93,7 @@ class Clearance:
 
 
 def _reaches(checker: CollisionChecker) -> np.ndarray:
-    """How far (n,) what a joint turns can lie from its axis, m; 1 for a prismatic joint, whose bodies move by as much as it does."""
+    """Largest distance (n,) of a joint's bodies from its axis, m; 1 for a prismatic joint, whose bodies move by its displacement."""
     joints = checker.model.joints
     reach = np.zeros(len(joints))
     for shape in checker.shapes:

@@ -72,7 +72,7 @@ class CollisionChecker:
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
-        """Every shape but the floor, the base's and the obstacles' included."""
+        """All shapes but the floor, including those of base and obstacles."""
         place = {self.kinematics.getJointId(name): i for i, name in enumerate(self.model.joint_names)} | {
             0: -1
         }
@@ -90,7 +90,7 @@ class CollisionChecker:
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
-        """Names of the shapes that are compared."""
+        """Names of the compared shapes."""
         return tuple(self._names((p.first, p.second)) for p in self.geometry.collisionPairs)
 
     @property
@@ -99,7 +99,7 @@ class CollisionChecker:
         return np.array([request.security_margin for request in self._checked.collisionRequests])
 
     def collides(self, q: np.ndarray) -> np.ndarray:
-        """Whether each configuration of `q` (samples, n) collides, as (samples,) of bool."""
+        """Mask (samples,) of colliding configurations `q` (samples, n)."""
         import pinocchio as pin
 
         q = joint_batch(self.model, q)
@@ -114,7 +114,7 @@ class CollisionChecker:
         )
 
     def colliding(self, q: np.ndarray) -> tuple[tuple[str, str], ...]:
-        """Names of the shapes that touch at one configuration `q` (n,)."""
+        """Names of colliding shapes at one configuration `q` (n,)."""
         touching = self._touching(self.configurations(joint_batch(self.model, q))[0])
         return tuple(names for names, touches in zip(self.pairs, touching, strict=True) if touches)
 
@@ -170,7 +170,7 @@ class CollisionChecker:
         return objects[pair[0]].name, objects[pair[1]].name
 
     def configurations(self, q: np.ndarray) -> np.ndarray:
-        """Pinocchio's configurations (samples, nq): an unbounded joint is a cosine and a sine there."""
+        """Pinocchio's configurations (samples, nq), in which an unbounded joint is a cosine and a sine."""
         result = np.empty((len(q), self.kinematics.nq))
         for i, name in enumerate(self.model.joint_names):
             joint = self.kinematics.joints[self.kinematics.getJointId(name)]

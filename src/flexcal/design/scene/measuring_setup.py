@@ -11,7 +11,7 @@ from flexcal.model.robot import AcceptanceConfig, RobotModel
 
 @dataclass(frozen=True)
 class TrackerNoise:
-    """Standard deviation an axis of a laser tracker: `constant` (m) + `proportional` (m per m of distance)."""
+    """Standard deviation per axis of a laser tracker: `constant` (m) + `proportional` (m per m of distance)."""
 
     constant: float = 15e-6
     proportional: float = 6e-6
@@ -23,7 +23,7 @@ class TrackerNoise:
 
 @dataclass(frozen=True)
 class MeasuringSetup:
-    """How poses are measured: target point, instrument and payload.
+    """Measuring setup: target point, instrument and payload.
 
     Parameters
     ----------
@@ -68,4 +68,4 @@ class MeasuringSetup:
 
 
 STANDARD = MeasuringSetup()
-"""The first point, seen from the first station by a laser tracker, with the declared payload."""
+"""Standard setup: the first point, seen from the first station by a laser tracker, with the declared payload."""

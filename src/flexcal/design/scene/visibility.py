@@ -11,13 +11,13 @@ from flexcal.model.kinematics import link_frames, point_kinematics
 from flexcal.model.robot import RobotModel
 
 BEAM_RADIUS = 0.01
-"""m, of the line of sight."""
+"""Radius of the line of sight, m."""
 TARGET_CLEARANCE = 0.03
-"""m before the target at which the line of sight ends: the reflector sits on something."""
+"""Distance before the target, m, at which the line of sight ends: the reflector has a mount."""
 
 
 def station_position(model: RobotModel, station: str | None = None) -> np.ndarray | None:
-    """Where the instrument stands in the base frame (3,), m; None where robot.yaml does not say. The first station without a name.
+    """Position (3,), m, of the instrument in the base frame; None if robot.yaml gives none. The first station without a name.
 
     Raises `FlexcalError` for an unknown name.
     """
@@ -32,7 +32,7 @@ def station_position(model: RobotModel, station: str | None = None) -> np.ndarra
 
 
 def visible(checker: CollisionChecker, q: np.ndarray, setup: MeasuringSetup = STANDARD) -> np.ndarray:
-    """Whether the instrument sees the target at each configuration of `q` (samples, n), as (samples,) of bool.
+    """Mask (samples,) of configurations `q` (samples, n) at which the instrument sees the target.
 
     The line of sight is a cylinder; it is only asked for where the station declares `line_of_sight`. Obstacles block it too. A robot.yaml
     without the station's place sees everything. Raises `FlexcalError` for an unknown point or station.

@@ -22,12 +22,13 @@ from flexcal.model.robot import RobotModel, declared_parameter, uncertain_inerti
 TrajectoryCriterion = Literal["compound", "condition", "D", "E", "A", "posterior", "c"]
 _STEP = 1e-4
 _SEEN = 1e-6
-"""Share of an unknown that may lie in what torques and prior leave open."""
+"""Largest share of an unknown that may lie in the null space of torques and prior."""
 _FAINT = 1e-9
-"""Information on a scaled base parameter that stands for nothing, so that what a joint at rest hides does not stop a search."""
+"""Negligible information on a scaled base parameter, so that one unidentifiable at a resting joint does not stop a search."""
 CONDITIONING = 0.3
-"""Weight of -log cond(W) in the compound criterion, beside log det a parameter: for a tenth more standard deviation of each, condition
-numbers of 5 in place of 15 to 90."""
+"""Weight of -log cond(W) in the compound criterion, relative to log det per parameter: for a tenth more standard deviation of each,
+condition numbers of 5 in place of 15 to 90.
+"""
 _CONDITION = ConditionNumberCriterion()
 
 
@@ -40,7 +41,7 @@ class Unknowns:
     prior: np.ndarray
 
     def information(self, base: np.ndarray) -> np.ndarray:
-        """(p, p) from that on the base columns (r, r), with the prior."""
+        """Information (p, p) from that on the base columns (r, r), with the prior."""
         return self.directions.T @ base @ self.directions + self.prior
 
 
@@ -78,11 +79,11 @@ class ExcitationCriterion:
         return self.instants * by_total
 
     def about(self, wanted: Sequence[str]) -> ExcitationCriterion:
-        """The same of some of the unknowns only, the others eliminated (Ds-optimality)."""
+        """Criterion for some of the unknowns only, the others eliminated (Ds-optimality)."""
         return replace(self, criterion=MarginalD(np.isin(self.unknowns.names, list(wanted))))
 
     def after(self, information: np.ndarray) -> ExcitationCriterion:
-        """The goal of the next motion."""
+        """Criterion for the next motion."""
         return replace(self, gathered=self.total(information))
 
 
@@ -114,7 +115,7 @@ def excitation_criterion(
     sizes: np.ndarray,
     instants: float,
 ) -> ExcitationCriterion:
-    """The goal of the first motion. `sizes` (r,) of the base columns are what D, E and A count them in.
+    """Criterion for the first motion; `sizes` (r,) of the base columns are the units of D, E and A.
 
     condition, D, E and A are of the base parameters without prior; posterior (D) and c (the variances of the parameters `of`, which get
     no prior) of masses, centres of mass and drives with that of robot.yaml; compound is posterior and condition. Raises `InputError` for
@@ -154,7 +155,7 @@ def excitation_criterion(
 
 
 def declared_unknowns(columns: BaseRegressor, free: tuple[str, ...] = ()) -> Unknowns:
-    """What robot.yaml's prior is about, in units of its standard deviations, then friction and the parameters `free`, without one."""
+    """Unknowns with robot.yaml's prior, in units of its standard deviations, then friction and the parameters `free`, without one."""
     model = columns.model
     names = uncertain_inertials(model, range(model.n))
     names += [
@@ -175,7 +176,7 @@ def declared_unknowns(columns: BaseRegressor, free: tuple[str, ...] = ()) -> Unk
 
 
 def _has_prior(model: RobotModel, name: str) -> bool:
-    """Whether robot.yaml's prior is about it; friction and torque offsets have none, and may have no value."""
+    """Whether robot.yaml's prior covers the parameter; friction and torque offsets have none, and may have no value."""
     return name.rpartition(".")[2] not in DRIVE[1:] and bool(
         np.isfinite(declared_parameter(model, name).prior_std)
     )

@@ -1,4 +1,4 @@
-"""The optimisation problem of an exciting trajectory: information of motor torques within all limits of joints, drives, point, bodies."""
+"""Optimisation problem of an exciting trajectory: information of motor torques within all limits of joints, drives, point, bodies."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from flexcal.design.trajectories.regressor_columns import BaseRegressor
 from flexcal.model.kinematics import point_kinematics
 
 NEAR = 0.05
-"""Metres beyond the margin from which on a pair of shapes is watched."""
+"""Distance beyond the margin, m, below which a pair of shapes is monitored."""
 _SLACK = 2e-4
-"""Metres that bodies keep beyond the margin at the instants of a grid, for what happens between them."""
+"""Distance beyond the margin, m, that bodies keep at the instants of a grid, for the motion in between."""
 _EDGE = 1e-3
-"""Share of a limit that is kept free where it was passed between the instants."""
+"""Share of a limit kept free where it was passed between the instants."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class ExcitationProblem:
     clearance: Clearance
 
     def information(self, motion: np.ndarray) -> np.ndarray:
-        """Mean over the instants of what one adds, (r, r)."""
+        """Mean information (r, r) of an instant."""
         return self._information(self.columns.write(motion))
 
     def _information(self, columns: np.ndarray) -> np.ndarray:
@@ -114,11 +114,11 @@ class ExcitationProblem:
 
     @property
     def _drive_share(self) -> np.ndarray:
-        """What Coulomb friction leaves of the motor torques (n,)."""
+        """Motor torques (n,) available after Coulomb friction."""
         return self.limits.torque - np.nan_to_num(self.columns.model.drives.coulomb)
 
     def uses(self, motion: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Share (4, N, n) of what is allowed that positions, velocities, accelerations and motor torques take, between -1 and 1."""
+        """Fraction (4, N, n) of the limits of positions, velocities, accelerations and motor torques, between -1 and 1."""
         return np.array([*self._linear_uses(motion), self._torque_use(columns)])
 
     def _linear_uses(self, motion: np.ndarray) -> np.ndarray:
@@ -130,7 +130,7 @@ class ExcitationProblem:
         return np.einsum("jrn,r->nj", columns, self.columns.smooth_values) / self._drive_share
 
     def excess(self, x: np.ndarray) -> LimitViolation | None:
-        """By how much a motion passes the limits at its worst instants; None where it keeps them."""
+        """Limit violation of a motion at its worst instants; None if it keeps all limits."""
         motion = self.space.motion(x)
         uses = [np.abs(use).max(axis=0) for use in self.uses(motion, self.columns.write(motion))]
         point = _Point.of(self.columns, self.limits, motion).constraints.max(initial=-1.0)
@@ -146,7 +146,7 @@ class ExcitationProblem:
         return self.excess(x) is None
 
     def tightened(self, excess: LimitViolation) -> ExcitationProblem:
-        """With limits that are smaller by what was too much, and a little more."""
+        """Problem with limits reduced by the violation, and a little more."""
         limits, shrink = self.limits, (1 - _EDGE) / excess.uses
         middle, half = (limits.upper + limits.lower) / 2, self._half * shrink[0]
         box, inset = limits.box, np.array([[1.0], [-1.0]]) * (excess.point + _EDGE)
@@ -164,7 +164,7 @@ class ExcitationProblem:
         return replace(self, limits=smaller, clearance=self.clearance.wider(margin))
 
     def standing(self, q: np.ndarray) -> np.ndarray:
-        """How far (N, 3) a robot at rest at `q` (N, n) is beyond its positions and torques, the box, and touching, negative within."""
+        """Excess (N, 3) of a robot at rest at `q` (N, n) over its positions and torques, the box, and collision, negative within."""
         still = np.array([q, 0 * q, 0 * q])
         uses = self.uses(still, self.columns.write(still))
         point = _Point.of(self.columns, self.limits, still)
@@ -174,7 +174,7 @@ class ExcitationProblem:
         return np.column_stack([joints, box, touching])
 
     def standing_limit(self, q: np.ndarray) -> str:
-        """The limit that a robot at rest at `q` (n,) passes most, in words."""
+        """Limit that a robot at rest at `q` (n,) exceeds most, in words."""
         model = self.columns.model
         joints, box, touching = self.standing(q[None])[0]
         if touching > max(joints, box):
@@ -195,7 +195,7 @@ class ExcitationProblem:
         )
 
     def finer(self, factor: int) -> ExcitationProblem:
-        """The same on a grid of instants that is finer by this factor."""
+        """Problem on a grid of instants finer by this factor."""
         return replace(self, space=self.space.finer(factor), clearance=self.clearance.wider(0.0))
 
 

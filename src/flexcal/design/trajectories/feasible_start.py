@@ -9,7 +9,7 @@ from flexcal.errors import FlexcalError, InputError
 from flexcal.model.kinematics import low_discrepancy_configurations
 
 FINER = 10
-"""How much finer the grid is on which limits are to hold than that of the search."""
+"""Ratio of the grid on which limits must hold to that of the search."""
 _PLACES = 400
 _TRIES = 30
 _HALVINGS = 14
@@ -17,7 +17,7 @@ _FIRST_SWING = 0.5
 
 
 def feasible_postures(program: ExcitationProblem) -> np.ndarray:
-    """Configurations (k, n) in which the robot can stand: no limit of torque or box is passed and nothing touches.
+    """Configurations (k, n) of rest within all limits of torque and box and without collision.
 
     Raises `FlexcalError` that names what stands in the way least where there is none.
     """
@@ -36,7 +36,7 @@ def feasible_postures(program: ExcitationProblem) -> np.ndarray:
 
 
 def require_holding_torque(program: ExcitationProblem, q: np.ndarray) -> None:
-    """Raise `InputError` that names the limit which a robot at rest in `q` (n,) passes."""
+    """Raise `InputError` that names the limit exceeded by a robot at rest in `q` (n,)."""
     if not program.standing(q[None]).max() < 0:
         raise InputError(
             "E-DESIGN-044",

@@ -11,16 +11,18 @@ import numpy as np
 
 _MEMORY = 15
 _DECREASE = 1e-4
-"""Share of the decrease that the slope promises with which a step is content."""
+"""Share of the decrease predicted by the slope that a step must achieve."""
 _SHORTEST = 1e-6
 _FLAT = 1e-4
-"""A decrease of f smaller than this over `_PATIENCE` steps ends a round."""
+"""Decrease of f over `_PATIENCE` steps below which a round ends."""
 _PATIENCE = 8
 
 
 @dataclass(frozen=True, eq=False)
 class BarrierValue:
-    """`value`, inf outside the limits, the `gradient` (k,) and `curved`: the barrier's Hessian's inverse times a vector, about."""
+    """Value of the barrier function, inf outside the limits, the `gradient` (k,) and `curved`: the approximate inverse Hessian of the
+    barrier times a vector.
+    """
 
     value: float
     gradient: Callable[[], np.ndarray]
@@ -28,15 +30,15 @@ class BarrierValue:
 
 
 class BarrierProblem(Protocol):
-    """A function with limits."""
+    """Function to be minimised within limits."""
 
     def evaluate(self, x: np.ndarray, barrier: float) -> BarrierValue:
-        """f(x) - `barrier` Σ log(room that the limits leave)."""
+        """Barrier function f(x) - `barrier` Σ log(slack of the limits)."""
         ...
 
 
 def minimise(program: BarrierProblem, x: np.ndarray, barriers: list[float], steps: int) -> np.ndarray:
-    """From an `x` within the limits to a better one within them; at most `steps` steps with each of the falling `barriers`."""
+    """Minimise from a feasible `x`; at most `steps` steps with each of the falling `barriers`."""
     for barrier in barriers:
         x = _descend(program, x, barrier, steps)
     return x

@@ -1,4 +1,4 @@
-"""Limits of a motion: joints, drives and target point, each used to a fraction between -1 and 1."""
+"""Limits of a motion: joints, drives and target point, with the used fraction of each between -1 and 1."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class MotionLimits:
 
     @classmethod
     def of(cls, model: RobotModel, share: float = 1.0) -> MotionLimits:
-        """Those of the URDF and of robot.yaml's `limits:`; `share` is how much of velocity, acceleration and torque may be used.
+        """Limits of the URDF and of robot.yaml's `limits:`; `share` is the usable part of velocity, acceleration and torque.
 
         Raises `FlexcalError` for limits that cross and `InputError` for lists that do not fit the robot.
         """

@@ -1,4 +1,4 @@
-"""Motions of all joints that are linear in their coordinates: periodic, from rest to rest, or of some joints only."""
+"""Motions of all joints linear in their coordinates: periodic, from rest to rest, or of some joints only."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class MotionSpace:
         return cls(kind, size, period, instants, free, fixed, scale, start is None)
 
     def moving(self, joints: Sequence[int]) -> MotionSpace:
-        """Motions of these joints only; the others stand at their place."""
+        """Motions of these joints only; the others stay at their place."""
         swings = self.scale[1:] if self.placed else self.scale
         standing = np.isin(np.arange(self.joints), list(joints), invert=True)
         still = np.where(standing, 0.0, swings)
@@ -74,7 +74,7 @@ class MotionSpace:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Of the coordinates."""
+        """Shape of the coordinates."""
         return self.free.shape[1], self.joints
 
     @cached_property
@@ -91,23 +91,23 @@ class MotionSpace:
         return q / self.scale[0]
 
     def still(self, x: np.ndarray) -> np.ndarray:
-        """The coordinates of no motion at the place of the motion `x`, flat."""
+        """Flat coordinates of rest at the place of the motion `x`."""
         place = np.zeros(self.shape)
         if self.placed:
             place[0] = x.reshape(self.shape)[0]
         return place.ravel()
 
     def coefficients(self, x: np.ndarray) -> np.ndarray:
-        """(c, n)."""
+        """Coefficients (c, n) of the paths."""
         return self.fixed + self.free @ (self.scale * x.reshape(self.shape))
 
     def motion(self, x: np.ndarray) -> np.ndarray:
-        """q, q̇, q̈ (3, instants, n)."""
+        """Motion q, q̇, q̈ (3, instants, n)."""
         linear, constant = self._maps
         return linear @ (self.scale * x.reshape(self.shape)) + constant
 
     def by_coordinates(self, by_motion: np.ndarray) -> np.ndarray:
-        """Derivative by the coordinates, flat, from that by the motion (3, instants, n)."""
+        """Derivative by the flat coordinates, from that by the motion (3, instants, n)."""
         return (self.scale * np.sum(self._maps[0].transpose(0, 2, 1) @ by_motion, axis=0)).ravel()
 
     def solver(self, weights: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
@@ -127,7 +127,7 @@ class MotionSpace:
         return solve
 
     def finer(self, factor: int) -> MotionSpace:
-        """The same motions at more instants."""
+        """Same motions at more instants."""
         return replace(self, instants=factor * self.instants)
 
 
@@ -137,5 +137,5 @@ def _basis(kind: Kind, time: np.ndarray, period: float, size: int) -> np.ndarray
 
 
 def _null_space(rows: np.ndarray) -> np.ndarray:
-    """Orthonormal columns that all rows are normal to."""
+    """Orthonormal basis of the null space, in columns."""
     return np.linalg.svd(rows)[2][np.linalg.matrix_rank(rows) :].T

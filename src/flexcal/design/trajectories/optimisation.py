@@ -34,22 +34,22 @@ from flexcal.progress import Progress, silent
 
 SETTLE_PERIODS = 1
 RATE_HZ = 1000.0
-"""Of the log where robot.yaml declares no controller."""
+"""Sampling rate of the log if robot.yaml declares no controller."""
 TORQUE_ERROR = 1e-3
-"""1σ of an instant's torque, relative to the joint's effort, and how many of these a second are independent."""
+"""Standard deviation (1σ) of an instant's torque relative to the joint's effort, and number of independent ones per second."""
 INDEPENDENT_HZ = 40.0
 _INSTANTS_A_HARMONIC = 20
 _INSTANTS_HZ = 20.0
-"""Least number of instants a second: with fewer, a fast arm passes through itself between two of them, and the repair costs more."""
+"""Least number of instants per second: with fewer, a fast arm passes through itself between two of them, and the repair costs more."""
 _SCREENING, _REFINING = (0.3,), (0.1, 0.03, 0.01)
 _REPAIRS = 12
 _SHRINKING, _SMALLEST = 0.97, 0.05
-"""A motion that passes a limit is made smaller in such steps, and given up when it is smaller than that."""
+"""Factor by which a motion beyond a limit is reduced, and the size below which it is given up."""
 
 
 @dataclass(frozen=True, eq=False)
 class TrajectoryDesign:
-    """A `plan`, and for each of its trajectories the information (r, r) on the base `columns` after it, all before it included.
+    """Design of a `plan`: for each of its trajectories the information (r, r) on the base `columns` after it, all before it included.
 
     `limits` are those that it keeps, `goal` is what it was designed for, `merits` how much of that there is after each trajectory.
     `clearance` is the least distance of bodies beyond their margins, m, up to 0.05; None where the URDF has no shapes that could collide.
@@ -65,7 +65,9 @@ class TrajectoryDesign:
     clearance: float | None
 
     def shares(self, motion: np.ndarray) -> dict[str, np.ndarray]:
-        """Shares (N, n) of the limits that q, q̇, q̈ (3, N, n) take; motor torques are with friction, what has no limit is left out."""
+        """Fractions (N, n) of the limits used by q, q̇, q̈ (3, N, n); motor torques are with friction, quantities without limit are left
+        out.
+        """
         q, dq, ddq = motion
         limits = self.limits
         half, middle = (limits.upper - limits.lower) / 2, (limits.upper + limits.lower) / 2
@@ -76,14 +78,14 @@ class TrajectoryDesign:
         return taken | {"torque": torque / limits.torque}
 
     def largest_shares(self) -> dict[str, float]:
-        """The largest share of each over all trajectories, at instants 0.1 % of a period apart."""
+        """Largest fraction of each limit over all trajectories, at instants 0.1 % of a period apart."""
         plan = self.plan
         time = np.arange(1000) / (1000 * plan.base_frequency_hz)
         each = [self.shares(np.array(plan.motion(number, time))) for number in range(len(plan))]
         return {key: max(float(np.abs(shares[key]).max()) for shares in each) for key in each[0]}
 
     def prior_gain(self) -> dict[str, float]:
-        """Standard deviation after all trajectories over that of robot.yaml's prior, of everything that this knows."""
+        """Ratio of the standard deviation after all trajectories to that of robot.yaml's prior, of everything in that prior."""
         unknowns = declared_unknowns(self.columns)
         known = np.diag(unknowns.prior) > 0
         covariance = np.linalg.pinv(unknowns.information(self.information[-1]), hermitian=True)
@@ -246,7 +248,7 @@ def _designed(
     number: int,
     count: int,
 ) -> np.ndarray:
-    """Coordinates of one trajectory: from the most promising start, and from the next ones where its repair cost more than lies between."""
+    """Coordinates of one trajectory, from the most promising start, and from further ones if its repair was too costly."""
     if begin is None:
         places = feasible_postures(program)
     else:
@@ -274,7 +276,7 @@ def _merit(program: ExcitationProblem, x: np.ndarray) -> float:
 
 
 def _kept(program: ExcitationProblem, x: np.ndarray, inside: np.ndarray, steps: int) -> np.ndarray:
-    """`x` changed so that all limits hold on the finer grid: the coarse one gets tighter where they did not.
+    """Coordinates changed so that all limits hold on the finer grid: limits on the coarse one are tightened where violated.
 
     `inside` keeps them.
     """
@@ -293,8 +295,7 @@ def _kept(program: ExcitationProblem, x: np.ndarray, inside: np.ndarray, steps: 
 def _smaller(
     program: ExcitationProblem, x: np.ndarray, inside: np.ndarray, keeps: Callable[[np.ndarray], bool]
 ) -> np.ndarray:
-    """Of the motions between `x` and the same place without a swing, and between `x` and `inside`, the best of the first two that keep
-    the limits."""
+    """Reduced motion: the best of the first two feasible ones between `x` and rest at its place, and between `x` and `inside`."""
     motions = [inside]
     for towards in (program.space.still(x), inside):
         share = 1.0

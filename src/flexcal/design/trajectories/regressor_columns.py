@@ -20,14 +20,14 @@ from flexcal.model.torques import (
 DRIVE = ("rotor_inertia", "viscous", "coulomb", "torque_offset")
 """Columns of every drive: acceleration, velocity, its sign, one."""
 REVERSAL = 0.02
-"""Share of a joint's velocity limit below which the sign of the velocity is rounded, so that it has a derivative."""
+"""Share of a joint's velocity limit below which the sign of the velocity is smoothed, so that it has a derivative."""
 _SAMPLES_PER_COLUMN = 3
 _SEED = 1991
 
 
 @dataclass(frozen=True, eq=False)
 class BaseRegressor:
-    """The observation matrix of a rigid robot with classic friction (Eq. 2.20), its base columns only (Gautier 1991).
+    """Base columns of the observation matrix of a rigid robot with classic friction (Eq. 2.20; Gautier 1991).
 
     `payload` is what the robot holds, kg; None takes the declared one. `identifiability` says which of all columns (`names`) are kept and
     what the others add to them.
@@ -39,7 +39,7 @@ class BaseRegressor:
 
     @classmethod
     def of(cls, model: RobotModel, payload: float | None = None) -> BaseRegressor:
-        """By rank-revealing QR at random states, the same in every run."""
+        """Base columns by rank-revealing QR at random states, the same in every run."""
         names = column_names(model)
         samples = _SAMPLES_PER_COLUMN * len(names)
         rng = np.random.default_rng(_SEED)
@@ -67,7 +67,7 @@ class BaseRegressor:
 
     @cached_property
     def values(self) -> np.ndarray:
-        """The model's values of all columns (p,), what it holds included and unknown friction zero."""
+        """Model values of all columns (p,), unknown friction zero."""
         bodies = carried_inertias(self.model, self.payload)
         loaded = replace(self.model, links=Links.of(bodies))
         own = self.model.drives
@@ -89,7 +89,7 @@ class BaseRegressor:
 
     @cached_property
     def _places(self) -> np.ndarray:
-        """(n, 10 n): row of the joints' columns below each other where a link's column is, -1 for those left out."""
+        """Row numbers (n, 10 n) of the links' columns below the joints' columns, -1 for those left out."""
         places = np.full((self.model.n, 10 * self.model.n), -1)
         for row, column in enumerate(self.identifiability.kept):
             if column < places.shape[1]:
@@ -142,7 +142,7 @@ class BaseRegressor:
 
 
 _KEPT_FIRST = ("Izz", "Ixx", "Ixy", "Ixz", "Iyz", "Iyy", "mc_x", "mc_y", "mc_z", "mass")
-"""Of a link, in the order in which a person keeps them: the mass and what lies along the axis are regrouped first."""
+"""Order in which parameters of a link are preferably kept: mass and entries along the axis are regrouped first."""
 
 
 def column_names(model: RobotModel) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""What the design of a motion needs of a model: stated limits and masses, and friction where none is known."""
+"""Requirements of the design of a motion on a model: stated limits and masses, and friction assumed where unknown."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _NAMED = 3
 
 
 def require_stated_limits(model: RobotModel) -> None:
-    """Raise `InputError` that asks for the velocities and efforts that the URDF lacks (a 0 says nothing), and where no link has a mass."""
+    """Raise `InputError` that asks for velocities and efforts missing in the URDF (a 0 counts as missing), and if no link has a mass."""
     for key, unit in (("velocity", "rad/s or m/s"), ("effort", "N m or N")):
         lacking = [joint.name for joint in model.joints if not getattr(joint, key) > 0]
         if lacking:
@@ -37,11 +37,11 @@ def _listed(names: list[str]) -> str:
 
 
 COULOMB, VISCOUS = 0.1, 0.2
-"""Shares of a joint's effort: Coulomb friction, and viscous friction at the velocity limit"""
+"""Assumed shares of a joint's effort: Coulomb friction, and viscous friction at the velocity limit."""
 
 
 def with_assumed_friction(model: RobotModel) -> tuple[RobotModel, tuple[str, ...]]:
-    """The model with these values where it has none, and the names of those joints."""
+    """Model with assumed friction where it has none, and the names of those joints."""
     effort, velocity = np.array([(joint.effort, joint.velocity) for joint in model.joints]).T
     unknown = np.isnan(model.drives.coulomb) | np.isnan(model.drives.viscous)
     filled = replace(

@@ -1,4 +1,4 @@
-"""An exciting trajectory as timed joint positions from rest to rest, as a robot's controller takes them."""
+"""Exciting trajectory as timed joint positions from rest to rest, as a robot's controller takes them."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from flexcal.data.plans import TimedPositions
 from flexcal.design.trajectories.optimisation import TrajectoryDesign
 
 _LONGEST = 8
-"""Periods that a run-up may take."""
+"""Largest number of periods of a run-up."""
 _AT_REST = 1e-6
-"""Share of its largest velocity below which a motion rests."""
+"""Share of its largest velocity below which a motion is at rest."""
 
 
 @dataclass(frozen=True, eq=False)
 class TimedMotion:
-    """The `positions` of a trajectory; it is in its periodic motion from `run_up` s on, and before that on the same path, slower.
+    """Timed `positions` of a trajectory, periodic from `run_up` s on, and before that on the same path, slower.
 
     `largest_shares` are those of all its instants, of the limits that the design may use.
     """
@@ -65,7 +65,7 @@ def _sampled(
 
 
 def _phase(time: np.ndarray, ramp: float, steady: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Time along the periodic motion, 0 after the run-up, its rate and the change of that (N,), at `time` (N,), s."""
+    """Phase time of the periodic motion, 0 after the run-up, its rate and the derivative of that (N,), at `time` (N,), s."""
     if ramp == 0:
         return time, np.ones_like(time), np.zeros_like(time)
     length = 2 * ramp + steady

@@ -12,15 +12,15 @@ SequenceName = Literal["links", "axes", "kinds"]
 
 @dataclass(frozen=True)
 class Stage:
-    """One trajectory of a sequence: the joints that move, the others stand, and the names of base parameters that it is about."""
+    """One trajectory of a sequence: the moving joints, and the names of the base parameters to be determined."""
 
     moving: tuple[int, ...]
     wanted: tuple[str, ...]
 
 
 def sequence(columns: BaseRegressor, name: SequenceName) -> tuple[Stage, ...]:
-    """links: from the last to the first, each with those beyond it moving; axes: the outer half, then all for the inner one;
-    kinds: inertias, then moments of gravity, then friction, all joints moving. A stage that is about nothing is left out.
+    """Sequence of stages. links: from the last to the first, each with those beyond it moving; axes: the outer half, then all for the
+    inner one; kinds: inertias, then moments of gravity, then friction, all joints moving. Stages without parameters are left out.
     """
     model = columns.model
     everything = tuple(range(model.n))

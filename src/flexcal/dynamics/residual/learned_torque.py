@@ -23,7 +23,7 @@ class LearnedMotor:
 
     @property
     def learned(self) -> bool:
-        """Whether cross-validation found anything; else its mean is zero, and its standard deviation the error without it."""
+        """Whether cross-validation supports the process; else its mean is zero, and its standard deviation the error without it."""
         return self.process.amplitude > 0
 
 
