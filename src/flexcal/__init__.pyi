@@ -23,7 +23,7 @@ from .dynamics.estimators import (
 from .dynamics.residual import read_learned_residual
 from .errors import FlexcalError, InputError
 from .estimation import Estimate
-from .export import export_mjcf, export_urdf
+from .export import export_urdf
 from .files.formats import read_yaml
 from .frequency.periodic import FrequencyResponse, frequency_response, frequency_responses
 from .jobs.accuracy import (
@@ -37,7 +37,7 @@ from .jobs.accuracy import (
     verify,
 )
 from .jobs.calibration import Calibration, calibrate
-from .jobs.deployment import Compensation, Prediction, compensate, predict
+from .jobs.deployment import Compensation, Prediction, compensate, export_robot, predict
 from .jobs.dynamics import DynamicsIdentification, identify_dynamics
 from .jobs.experiments import (
     DesignedFrequency,
@@ -122,7 +122,7 @@ __all__ = [
     "design_trajectories",
     "draw_truth",
     "exciting_plan",
-    "export_mjcf",
+    "export_robot",
     "export_urdf",
     "fit_geometry",
     "frequency_plan",

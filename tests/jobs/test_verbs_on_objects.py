@@ -25,15 +25,18 @@ from flexcal import (
     design_next_poses,
     design_poses,
     design_trajectories,
+    export_robot,
     frequency_plan,
     predict,
     read_poses,
     repeatability,
     verify,
 )
+from flexcal.cli.main import main
 from flexcal.data.poses import write_poses, write_targets
 from flexcal.jobs.accuracy import certify_robot, map_accuracy, robot_repeatability, verify_robot
 from flexcal.jobs.calibration import calibrate_robot
+from flexcal.jobs.deployment import export_stored_robot
 
 TERMS = ("kinematic", "gravity_compliance")
 
@@ -194,6 +197,37 @@ def test_certificate_is_that_of_the_command_line(
     assert "<td>A. Meier</td>" in page and "AP at 20 targets" in repr(certificate)
     with refused("E-RUN-003", "before", "after"):
         certify(calibration.robot, targets, after, unseen)
+
+
+@pytest.mark.parametrize(
+    ("format", "options"),
+    [("urdf", {}), ("json", {}), ("mdh", {"four_parameters": True}), ("offsets", {"keep_frames": True})],
+)
+def test_exports_are_those_of_the_command_line(
+    calibration: Calibration, ur5: Path, tmp_path: Path, format: str, options: dict[str, bool]
+) -> None:
+    calibration.write(tmp_path / "fit")
+    arguments = [f"--{name.replace('_', '-')}" for name in options]
+    fit = ["--estimates", str(tmp_path / "fit"), "--out", str(tmp_path / "by_command")]
+    assert main(["export", format, str(ur5 / "robot.yaml"), *fit, *arguments]) == 0
+    exported = export_robot(calibration.robot, tmp_path / "by_script", format, **options)
+    again = export_stored_robot(
+        ur5 / "robot.yaml", tmp_path / "again", format, estimates=tmp_path / "fit", **options
+    )
+    assert (tmp_path / "again").read_bytes() == (tmp_path / "by_command").read_bytes()
+    ours, theirs = exported.document(), again.document()
+    assert ours["calibrated"] and ours.keys() == theirs.keys()
+    assert ours["tool_error"].keys() == theirs["tool_error"].keys()
+    for key in ("mean_mm", "p95_mm", "max_mm", "poses"):
+        assert ours["tool_error"][key] == pytest.approx(theirs["tool_error"][key], rel=1e-6, abs=1e-9)
+    assert exported.lost == again.lost and "of ur5: by_script" in repr(exported) and exported.summary()
+
+
+def test_exports_that_are_none(calibration: Calibration, tmp_path: Path) -> None:
+    with refused("E-RUN-099", "collada", "urdf"):
+        export_robot(calibration.robot, tmp_path / "x", "collada")
+    with refused("E-RUN-100", "keep_frames", "offsets"):
+        export_robot(calibration.robot, tmp_path / "x", "urdf", keep_frames=True)
 
 
 def test_every_result_shows_itself(calibration: Calibration, unseen: PoseSet, tmp_path: Path) -> None:

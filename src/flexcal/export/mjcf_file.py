@@ -53,7 +53,8 @@ def export_mjcf(model: RobotModel, path: str | Path) -> ExportedFile:
     Examples
     --------
     >>> import tempfile
-    >>> from flexcal import RobotModel, export_mjcf
+    >>> from flexcal import RobotModel
+    >>> from flexcal.export import export_mjcf
     >>> model = RobotModel.from_yaml("examples/ur5_tracker/robot.yaml", estimates=False)
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     export_mjcf(model, f"{folder}/ur5.xml").lost

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from tyro.conf import arg
 
@@ -71,9 +71,9 @@ def _plain_export(format: PlainFormat) -> type[Export]:
     @dataclass(frozen=True)
     class PlainExport(Export):
         def write(self) -> ExportedRobot:
-            from flexcal.jobs.deployment import export_robot
+            from flexcal.jobs.deployment import export_stored_robot
 
-            return export_robot(self.robot, self.out, format.name, estimates=self.estimates)
+            return export_stored_robot(self.robot, self.out, format.name, estimates=self.estimates)
 
         def following(self, document: dict[str, Any]) -> str:
             return format.following.format(out=self.out)
@@ -97,18 +97,18 @@ class ExportDh(Export):
     common normal.
     """
 
-    convention: ClassVar[Literal["standard", "modified"]] = "standard"
+    format: ClassVar[str] = "dh"
     point: Point = None
     four_parameters: bool = False
     """Never use beta, for controllers with four parameters per joint; the tilt of nominally parallel axes about y is left out."""
 
     def write(self) -> ExportedRobot:
-        from flexcal.jobs.deployment import export_dh
+        from flexcal.jobs.deployment import export_stored_robot
 
-        return export_dh(
+        return export_stored_robot(
             self.robot,
             self.out,
-            self.convention,
+            self.format,
             point=self.point,
             four_parameters=self.four_parameters,
             estimates=self.estimates,
@@ -134,7 +134,7 @@ class ExportMdh(ExportDh):
     common normal.
     """
 
-    convention: ClassVar[Literal["standard", "modified"]] = "modified"
+    format: ClassVar[str] = "mdh"
 
 
 @dataclass(frozen=True)
@@ -150,10 +150,15 @@ class ExportOffsets(Export):
     """Leave base and tool as they are nominally, and fit the offsets alone."""
 
     def write(self) -> ExportedRobot:
-        from flexcal.jobs.deployment import export_offsets
+        from flexcal.jobs.deployment import export_stored_robot
 
-        return export_offsets(
-            self.robot, self.out, point=self.point, keep_frames=self.keep_frames, estimates=self.estimates
+        return export_stored_robot(
+            self.robot,
+            self.out,
+            "offsets",
+            point=self.point,
+            keep_frames=self.keep_frames,
+            estimates=self.estimates,
         )
 
     def following(self, document: dict[str, Any]) -> str:

@@ -1,5 +1,5 @@
 from .compensation import Compensation, compensate, compensate_robot
-from .export import ExportedRobot, export_dh, export_offsets, export_robot
+from .export import ExportedRobot, export_robot, export_stored_robot
 from .prediction import Prediction, predict, predict_robot
 
 __all__ = [
@@ -8,9 +8,8 @@ __all__ = [
     "Prediction",
     "compensate",
     "compensate_robot",
-    "export_dh",
-    "export_offsets",
     "export_robot",
+    "export_stored_robot",
     "predict",
     "predict_robot",
 ]

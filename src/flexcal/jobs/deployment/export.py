@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from flexcal.calibration.fit import probable_robots
-from flexcal.errors import InputError
+from flexcal.errors import FlexcalError, InputError
 from flexcal.export import (
+    FORMATS,
     Convention,
     ExportedFile,
     RenderedModel,
@@ -20,38 +20,43 @@ from flexcal.export import (
     write_rendered,
 )
 from flexcal.files.formats import read_estimates
-from flexcal.jobs.inputs import measured_points, stored_estimates
+from flexcal.jobs.inputs import CalibratedRobot, stored_estimates
+from flexcal.jobs.pages import Result
 from flexcal.model.robot import RobotModel, with_blocks
 
-
-@dataclass(frozen=True, eq=False)
-class Exportable:
-    """The `nominal` robot and the calibrated `model`; the posterior of `unseen` has only what the `measured` points leave undetermined."""
-
-    nominal: RobotModel
-    model: RobotModel
-    unseen: RobotModel | None
-    measured: tuple[str, ...]
-
-    @property
-    def undetermined(self) -> tuple[int, ...]:
-        """Joints whose zero positions the measured points do not determine; with an instrument's own frame the base is free."""
-        if not self.measured:
-            return ()
-        registered = bool(self.model.stations.pose[:, 3:].any())
-        return undetermined_offsets(self.nominal, self.measured, base=registered)
+_CONVENTIONS: dict[str, Convention] = {"dh": "standard", "mdh": "modified"}
+_OPTIONS = {"point": ("dh", "mdh", "offsets"), "four_parameters": ("dh", "mdh"), "keep_frames": ("offsets",)}
+"""Formats that take an option."""
 
 
-Render = Callable[[Exportable], RenderedModel]
-"""Function from a robot to the text of a file."""
+@dataclass(frozen=True, eq=False, repr=False)
+class ExportedRobot(Result):
+    """Result of `export_robot`: the `export`ed file with its loss.
 
-
-@dataclass(frozen=True)
-class ExportedRobot:
-    """Exported file; `calibrated` is False without a calibration: the joints are then those of the nominal robot."""
+    `model` is the robot as exported; `calibrated` is False where there is no calibration: the joints are then those of the nominal robot.
+    """
 
     export: ExportedFile
     calibrated: bool
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.export.path
+
+    @property
+    def lost(self) -> tuple[str, ...]:
+        """Names of the terms that the file does not carry."""
+        return self.export.lost
+
+    @property
+    def headline(self) -> str:
+        """The file, and what it does not carry."""
+        return f"{self.path.name}, without {', '.join(self.lost) or 'any loss'}"
+
+    def summary(self) -> str:
+        """The file, its loss in millimetres, and remarks."""
+        return str(self.export)
 
     def document(self) -> dict[str, Any]:
         """The JSON document."""
@@ -71,61 +76,91 @@ class ExportedRobot:
         }
 
 
-def export_robot(robot_file: Path, out: Path, format: str, *, estimates: Path | None = None) -> ExportedRobot:
-    """Write the robot with its estimates in a plain format; `estimates` is a file or folder in place of that beside robot.yaml.
-
-    Raises `FlexcalError`, as every export here, as reading and the format's rendering do, and where `out` is one of the robot's own files.
-    """
-    return _export(robot_file, out, estimates, lambda robot_: render(format, robot_.model, robot_.nominal))
-
-
-def export_dh(
-    robot_file: Path,
-    out: Path,
-    convention: Convention,
+def export_robot(
+    robot: CalibratedRobot,
+    path: str | Path,
+    format: str,
     *,
     point: str | None = None,
     four_parameters: bool = False,
-    estimates: Path | None = None,
+    keep_frames: bool = False,
 ) -> ExportedRobot:
-    """Write the Denavit-Hartenberg table of the chain to a point; see `render_dh`."""
+    """Write a calibrated robot in a file format of other programs, and measure the error due to the terms that the format lacks.
 
-    def rendered(robot_: Exportable) -> RenderedModel:
-        return render_dh(
-            robot_.model,
-            robot_.nominal,
-            convention,
+    Parameters
+    ----------
+    robot : CalibratedRobot
+        `Calibration.robot`, or ``CalibratedRobot.from_yaml(path)``.
+    path : str or Path
+        File to write.
+    format : {"urdf", "mjcf", "sdf", "dh", "mdh", "offsets", "kinematics", "json"}
+        URDF, MJCF, SDFormat, Denavit-Hartenberg table, standard or modified, joint offsets, kinematics of Universal Robots, or everything.
+    point : str, optional
+        Point at the end of the chain, of tables and offsets; the first by default.
+    four_parameters : bool
+        Whether a table is without the Hayati parameter beta of nominally parallel axes.
+    keep_frames : bool
+        Whether base and tool stay nominal where offsets are fitted.
+
+    Returns
+    -------
+    ExportedRobot
+        Its `path`, `lost`, `document()` with the content of tables, and `summary()`.
+
+    Raises
+    ------
+    FlexcalError
+        For an unknown format or point, an option that the format does not take, a robot that the format cannot describe, and where the
+        file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from flexcal import RobotModel, calibrate, export_robot, read_poses
+    >>> model = RobotModel.from_yaml("examples/ur5_tracker/robot.yaml", estimates=False)
+    >>> poses = read_poses("examples/ur5_tracker/grid.csv", model).subset(slice(None, None, 13))
+    >>> robot = calibrate(model, poses, terms=["kinematic"]).robot
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     exported = export_robot(robot, f"{folder}/dh.csv", "mdh")
+    >>> exported.lost
+    ()
+    """
+    _check_options(format, {"point": point, "four_parameters": four_parameters, "keep_frames": keep_frames})
+    nominal, measured = robot.nominal, robot.measured
+    probable, unseen = probable_robots(robot.model, measured) if measured else (robot.model, None)
+    rendered: RenderedModel
+    if format in _CONVENTIONS:
+        rendered = render_dh(
+            probable,
+            nominal,
+            _CONVENTIONS[format],
             point=point,
             four_parameters=four_parameters,
-            unseen=robot_.unseen,
+            unseen=unseen,
         )
+    elif format == "offsets":
+        rendered = render_offsets(
+            probable, nominal, point=point, keep_frames=keep_frames, undetermined=_undetermined(robot)
+        )
+    else:
+        rendered = render(format, probable, nominal)
+    return ExportedRobot(probable, write_rendered(probable, path, rendered), "calibration" in robot.blocks)
 
-    return _export(robot_file, out, estimates, rendered)
 
-
-def export_offsets(
+def export_stored_robot(
     robot_file: Path,
     out: Path,
+    format: str,
     *,
     point: str | None = None,
+    four_parameters: bool = False,
     keep_frames: bool = False,
     estimates: Path | None = None,
 ) -> ExportedRobot:
-    """Write the best joint offsets of the chain to a point; see `render_offsets`."""
+    """`export_robot` of the robot of a robot.yaml, as far as it was identified; `estimates` is a file or folder in place of that beside it.
 
-    def rendered(robot_: Exportable) -> RenderedModel:
-        return render_offsets(
-            robot_.model,
-            robot_.nominal,
-            point=point,
-            keep_frames=keep_frames,
-            undetermined=robot_.undetermined,
-        )
-
-    return _export(robot_file, out, estimates, rendered)
-
-
-def _export(robot_file: Path, out: Path, estimates: Path | None, rendered: Render) -> ExportedRobot:
+    Raises `FlexcalError` as reading and `export_robot` do, and where `out` is one of the robot's own files.
+    """
     nominal = RobotModel.from_yaml(robot_file, estimates=False)
     path = stored_estimates(nominal, estimates)
     for own, what in ((nominal.urdf, "nominal URDF"), (robot_file, "robot.yaml"), (path, "estimates file")):
@@ -141,7 +176,31 @@ def _export(robot_file: Path, out: Path, estimates: Path | None, rendered: Rende
     stored = path.exists()
     blocks = read_estimates(path) if stored else {}
     model = with_blocks(nominal, blocks, path) if stored else nominal
-    measured = measured_points(nominal, blocks)
-    probable, unseen = probable_robots(model, measured) if measured else (model, None)
-    exportable = Exportable(nominal, probable, unseen, measured)
-    return ExportedRobot(write_rendered(probable, out, rendered(exportable)), "calibration" in blocks)
+    return export_robot(
+        CalibratedRobot(nominal, model, blocks, path if stored else None),
+        out,
+        format,
+        point=point,
+        four_parameters=four_parameters,
+        keep_frames=keep_frames,
+    )
+
+
+def _check_options(format: str, options: dict[str, object]) -> None:
+    names = [each.name for each in FORMATS]
+    if format not in names:
+        raise FlexcalError("E-RUN-099", f"the format '{format}' is unknown; give one of {', '.join(names)}.")
+    for option, value in options.items():
+        if value and format not in _OPTIONS[option]:
+            raise FlexcalError(
+                "E-RUN-100",
+                f"the format '{format}' takes no {option}, which {', '.join(_OPTIONS[option])} do; leave it out.",
+            )
+
+
+def _undetermined(robot: CalibratedRobot) -> tuple[int, ...]:
+    """Joints whose zeros the measured points do not tell; before an instrument with a frame of its own the base is anywhere."""
+    if not robot.measured:
+        return ()
+    registered = bool(robot.probable.stations.pose[:, 3:].any())
+    return undetermined_offsets(robot.nominal, robot.measured, base=registered)
