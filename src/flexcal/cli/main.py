@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _told(problem: BaseException, stopping: StopSignal) -> tuple[str, int]:
-    """What to say of an exception on a line, and the exit status; raises it again where it is none that is expected."""
+    """Message of an exception in one line, and the exit status; unexpected exceptions are raised again."""
     if stopping.number is not None:  # an extension module that is interrupted raises what it likes
         return sentence(stopping.sentence), stopping.status
     error = _user_error(problem)

@@ -1,4 +1,4 @@
-"""A symmetric matrix that is linear in the parameters and must be positive definite."""
+"""Linear matrix inequality: a symmetric matrix, linear in the parameters, that must be positive definite."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Cone:
-    """X = Σ χ_i basis_i, i in `column_indices` (k,), `basis` (k, m, m), which must stay above `floor` times its `reference` (m, m).
+    """Cone constraint X = Σ χ_i basis_i, i in `column_indices` (k,), `basis` (k, m, m), which must stay above `floor` times its
+    `reference` (m, m).
 
     Everything is told relative to the reference L Lᵀ, as E = L⁻¹ X L⁻ᵀ, so that no unit and no size of link counts more than another.
     A prior with the standard deviation `std` takes E for 1; inf is none.
@@ -23,7 +24,7 @@ class Cone:
 
     @property
     def size(self) -> int:
-        """m."""
+        """Size m of the matrix."""
         return len(self.reference)
 
     def rows(self) -> tuple[np.ndarray, np.ndarray]:

@@ -11,12 +11,13 @@ from flexcal.errors import FlexcalError
 from flexcal.estimation.conic_constraint import Cone
 
 _TOLERANCE, _RELATIVE_TOLERANCE = 0.05, 1e-3
-"""How far the prior may move base parameters from the optimum of the data: in standard deviations, and as a share of what
-feasibility moves them."""
+"""Largest shift of base parameters from the data's optimum by the prior: in standard deviations, and relative to the shift by
+feasibility.
+"""
 _RESOLUTION, _FINEST = 1e-9, 1e-4
-"""What the solver can resolve of the size of the problem, and the smallest unit that it bears: data without noise ask for less."""
+"""Resolution of the solver relative to the size of the problem, and the smallest unit it supports: noise-free data ask for less."""
 _SLACK = 1e-5
-"""By how much of its reference the solver may miss the floor of a cone."""
+"""Violation of a cone's floor by the solver, relative to its reference, that is tolerated."""
 _SOLVED = ("Solved", "AlmostSolved")
 
 

@@ -1,4 +1,4 @@
-"""The result of every identification."""
+"""Result of an identification."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from flexcal.estimation.student_t import student_quantile
 NORMAL_QUANTILE = 1.959963984540054
 
 _NOISE_UNKNOWN = 0.1
-"""What chi2 may exceed its expectation by, relative, because the noise level is hardly better known."""
+"""Relative excess of chi2 over its expectation that is tolerated, because the noise level is hardly better known."""
 
 
 @dataclass(frozen=True)
 class Dropped:
-    """A parameter that is not identifiable: it keeps its start value and is absorbed by the kept ones.
+    """Parameter that is not identifiable: it keeps its start value and is absorbed by the kept ones.
 
     A kept parameter with (name, coefficient) in `absorbed_by` estimates kept + coefficient · (dropped − its start value),
     all in estimation coordinates. Nothing in `absorbed_by`: the data do not depend on it.
@@ -102,8 +102,9 @@ class Estimate:
 
     @property
     def unexplained(self) -> bool:
-        """Whether chi2 is more than noise explains: chance, three standard deviations of its distribution, and 10 % for noise that is
-        itself known to 5 %."""
+        """Whether chi2 exceeds the noise: by three standard deviations of its distribution, and 10 % for noise that is itself known to 5
+        %.
+        """
         if self.degrees_of_freedom <= 0:
             return False
         return self.reduced_chi2 > 1.0 + max(_NOISE_UNKNOWN, 3.0 * math.sqrt(2.0 / self.degrees_of_freedom))
@@ -155,7 +156,7 @@ class Estimate:
         return item.natural(centre - half), item.natural(centre + half)
 
     def quantity(self, name: str, truth: float | None = None) -> dict[str, float | bool | None]:
-        """Value, standard deviation and interval of a parameter as every results file has it.
+        """Value, standard deviation and interval of a parameter as in every results file.
 
         Parameters
         ----------

@@ -7,11 +7,11 @@ from functools import cache
 import numpy as np
 
 _DEGREE = 14
-"""Of the Chebyshev series for the quantile, in each of two ratios of standard deviations; it is then right to 2e-6 of the quantile."""
+"""Degree of the Chebyshev series for the quantile, in each of two ratios of standard deviations; accurate to 2e-6 of the quantile."""
 _KNOWN = 1e9
 """Degrees of freedom from which variances count as known."""
 _DIRECTIONS = 24
-"""Nodes a coordinate of the quadrature over an octant of directions."""
+"""Number of nodes per coordinate of the quadrature over an octant of directions."""
 
 
 def principal_variances(covariance: np.ndarray) -> np.ndarray:

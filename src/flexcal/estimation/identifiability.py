@@ -1,4 +1,4 @@
-"""Identifiable parameters, and the combinations that absorb the others."""
+"""Identifiable parameters, and the linear combinations that absorb the others."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from flexcal.estimation.estimate import Dropped
 RANK_TOLERANCE = 1e-9
 """Relative size of a diagonal of R that counts as zero: exact derivatives leave 1e-15, finite differences about 1e-8."""
 _WEAK, _NAMED = 3, 0.2
-"""So many weak combinations are shown; members below this share of the largest are not named."""
+"""Number of weak combinations shown; members below this share of the largest are not named."""
 
 
 @dataclass(frozen=True, eq=False)

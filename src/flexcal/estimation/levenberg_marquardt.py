@@ -23,7 +23,7 @@ _CANNOT_STEP = {
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
-    """Where a minimisation ended: coordinates, residual, Jacobian and robust group weights there, cost, and how it went."""
+    """Result of a minimisation: coordinates, residual, Jacobian and robust group weights there, cost, and termination."""
 
     x: np.ndarray
     residual: np.ndarray

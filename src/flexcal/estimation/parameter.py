@@ -15,7 +15,7 @@ from flexcal.errors import FlexcalError
 
 @dataclass(frozen=True)
 class Parameter:
-    """One unknown. Everything is in natural units except `prior_std`.
+    """Unknown of an estimation. Everything is in natural units except `prior_std`.
 
     `scale` chooses the estimation coordinate x: the value itself ("linear") or its natural logarithm ("log",
     for positive values). The prior is Gaussian in that coordinate with standard deviation `prior_std` (for "log":

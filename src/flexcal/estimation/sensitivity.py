@@ -1,4 +1,4 @@
-"""Input of the design of experiments."""
+"""Sensitivity of candidate measurements, the input of the design of experiments."""
 
 from __future__ import annotations
 

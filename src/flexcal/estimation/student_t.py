@@ -13,7 +13,7 @@ _STEPS = 50
 
 @cache
 def student_quantile(probability: float, freedom: float) -> float:
-    """t that a variable of so many degrees of `freedom` (1 or more) stays below with this `probability` (0.5 to 1).
+    """Quantile of Student's t with `freedom` degrees of freedom (1 or more) at `probability` (0.5 to 1).
 
     With t = √ν tan θ the distribution is the integral of cos^(ν-1) θ, by Gauss and Legendre; Newton's steps come from below.
     """

@@ -33,7 +33,7 @@ class Uncertainty:
 def uncertainty(
     objective: Objective, optimum: Optimum, prefer: Sequence[str], tolerance: float
 ) -> Uncertainty:
-    """From the weighted rows and the prior's, by pivoted QR; the kept parameters' covariance is R₁₁⁻¹R₁₁⁻ᵀ, the rest zero."""
+    """Uncertainty from the weighted rows and the prior's, by pivoted QR; the kept parameters' covariance is R₁₁⁻¹R₁₁⁻ᵀ, the rest zero."""
     from scipy.linalg import solve_triangular
 
     names = objective.problem.parameters.names

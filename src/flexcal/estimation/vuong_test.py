@@ -1,4 +1,4 @@
-"""Vuong's test of two models that are not nested (Vuong 1989)."""
+"""Vuong's test of two non-nested models (Vuong 1989)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 def vuong_statistic(first: np.ndarray, second: np.ndarray, groups: np.ndarray) -> float:
-    """Vuong's statistic of the residuals (m,) of two models, weighed alike; positive where the first is better.
+    """Vuong's statistic of the residuals (m,) of two models with equal weights; positive if the first is better.
 
     The log likelihoods, each with the scatter that its model leaves, are summed over rows of one group (m,), numbered from 0, which need
     not be independent. The sum of their differences over its standard deviation is standard normal where both models are equally far from

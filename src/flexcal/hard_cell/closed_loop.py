@@ -1,4 +1,4 @@
-"""The hard cell's robot under its controller: one recording."""
+"""Hard cell's robot under its controller: one recording."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ BRISTLE_DAMPING = 0.5  # of bristles on the rotor: twice the damping ratio
 
 @dataclass(frozen=True, eq=False)
 class Command:
-    """What the controller is told, all (ticks, m): torque on top of the loop's, angle and rate of the m moving motors; SI."""
+    """Command of the controller, all (ticks, m): torque on top of the loop's, angle and rate of the m moving motors; SI."""
 
     torque: np.ndarray
     angle: np.ndarray
@@ -157,7 +157,7 @@ def _frictions(robot: HardRobot) -> np.ndarray:
 def _too_stiff(
     robot: HardRobot, arm: Multibody, angles: np.ndarray, step: float
 ) -> tuple[tuple[int, str], ...]:
-    """The springs that alone would vibrate too fast for a step, the other hinges free."""
+    """Springs that alone would vibrate too fast for a step, the other hinges free."""
     import mujoco
 
     arm.gravity(angles)

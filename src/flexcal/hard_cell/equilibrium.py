@@ -32,7 +32,7 @@ def spring_twist(torque: np.ndarray, stiffness: np.ndarray, hardening: np.ndarra
 
 
 def transmission_error(robot: HardRobot, motors: np.ndarray) -> np.ndarray:
-    """What the outputs of the gears are beyond the motors (n,), rad: harmonics 1 and 2 of the joint and of the motor."""
+    """Transmission error (n,), rad, of the gears: harmonics 1 and 2 of the joint and of the motor."""
     ratio = robot.arm.ratio
     order = np.column_stack([np.ones_like(ratio), 2 * np.ones_like(ratio), ratio, 2 * ratio])
     return (robot.error_amplitude * np.sin(order * motors[:, None] + robot.error_phase)).sum(axis=1)

@@ -23,7 +23,7 @@ def true_points(robot: HardRobot, described: ArmDescription, plan: PosePlan) -> 
 
 
 def measured_points(robot: HardRobot, described: ArmDescription, plan: PosePlan, seed: int) -> PoseSet:
-    """What the instruments say of every pose of a plan."""
+    """Measurements of all instruments in every pose of a plan."""
     rng = np.random.default_rng([seed, 2, plan.seed, len(plan)])
     size = len(plan)
     point, gravity = _standing(robot, described, plan, rng)

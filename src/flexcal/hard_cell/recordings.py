@@ -47,7 +47,7 @@ def friction(described: ArmDescription, rate: np.ndarray) -> np.ndarray:
 
 TORQUE_NOISE = 1.0  # N m
 PHASES = 128
-"""Of one turn of the slow reference motion, at which its feed-forward is computed; between them it is interpolated."""
+"""Number of phases of the slow reference motion at which its feed-forward is computed; interpolated in between."""
 
 
 def multisine_recordings(

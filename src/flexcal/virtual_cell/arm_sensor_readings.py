@@ -13,11 +13,11 @@ from flexcal.virtual_cell.config import SensorConfig
 from flexcal.virtual_cell.plant import Plant, sensor_site
 
 _WINDOW = 7
-"""Samples in a row that a derivative is taken from: of sixth order in the middle."""
+"""Number of successive samples of a difference quotient: of sixth order in the middle."""
 
 
 def mounted(truth: RobotModel, seed: int) -> tuple[ArmSensor, ...]:
-    """The sensors of a true robot where they really are: position and direction as far off as robot.yaml says of them, 1σ."""
+    """Sensors of the true robot as mounted: position and direction with errors of the 1σ in robot.yaml."""
     rng = np.random.default_rng([seed, 9])
     placed = []
     for sensor in truth.sensors.values():
@@ -34,7 +34,7 @@ def mounted(truth: RobotModel, seed: int) -> tuple[ArmSensor, ...]:
 
 
 def sensitivities(sensors: Sequence[ArmSensor], seed: int) -> np.ndarray:
-    """What readings (S,) are true ones times."""
+    """Sensitivities (S,): ratio of readings to true values."""
     rng = np.random.default_rng([seed, 10])
     stds = np.array([sensor.config.sensitivity_std for sensor in sensors])
     return np.exp(stds * rng.standard_normal(len(sensors)))

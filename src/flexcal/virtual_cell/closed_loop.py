@@ -25,7 +25,7 @@ class LoopGains:
 
 @dataclass(frozen=True, eq=False)
 class LoopCommand:
-    """What the loop follows, all (ticks, m): torque added to the PD's, reference position and rate."""
+    """Command of the loop, all (ticks, m): torque added to the PD's, reference position and rate."""
 
     torque: np.ndarray
     position: np.ndarray
@@ -34,7 +34,7 @@ class LoopCommand:
 
 @dataclass(frozen=True, eq=False)
 class LoopLog:
-    """What happened, all (ticks, m): encoder position at the tick, torque that acted until the next, true arm position.
+    """Log of the loop, all (ticks, m): encoder position at the tick, torque applied until the next, true arm position.
 
     `states` (ticks, d) are all coordinates of the plant at the tick, where they were asked for.
     """

@@ -82,7 +82,7 @@ class FrictionConfig:
 
 
 _WIDEST = 5.0
-"""Largest spread of the logarithm of a spring: a factor of 150."""
+"""Largest standard deviation of the logarithm of a spring: a factor of 150."""
 
 
 @dataclass(frozen=True)

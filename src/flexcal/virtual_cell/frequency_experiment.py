@@ -27,8 +27,9 @@ from flexcal.virtual_cell.step_size import resolved_plant
 
 @dataclass(frozen=True, eq=False)
 class Excitation:
-    """What all recordings of one pose share: the pose (n,), plant, loop, start (d,), the command without excitation, and the sensors on the
-    arm of the `truth` where they really are."""
+    """Common data of all recordings of one pose: the pose (n,), plant, loop, start (d,), the command without excitation, and the sensors
+    on the arm of the `truth` as mounted.
+    """
 
     pose: np.ndarray
     plant: Plant

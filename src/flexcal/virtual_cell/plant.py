@@ -244,7 +244,7 @@ def _frictions(model: RobotModel, config: CellConfig, joints: np.ndarray) -> np.
 
 
 def unresolved(plant: Plant) -> str | None:
-    """What the plant's time step is too long for, as a phrase; None where it is stable with motors sliding and sticking."""
+    """Modes too fast for the plant's time step, as a phrase; None if it is stable with motors sliding and sticking."""
     linear = linearise(plant, np.zeros(plant.mjmodel.nv))
     step, springs = plant.mjmodel.opt.timestep, plant.springs[:, 0]
     sticking = linear.damping.copy()

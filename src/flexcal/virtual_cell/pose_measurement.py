@@ -58,7 +58,7 @@ def in_instrument(truth: RobotModel, point: np.ndarray) -> np.ndarray:
 def measured_poses(
     truth: RobotModel, config: CellConfig, plan: PosePlan, rng: np.random.Generator
 ) -> PoseSet:
-    """What encoders, torque sensors and the tracker at the first station say of every pose of a plan."""
+    """Measured poses of a plan from encoders, torque sensors and the tracker at the first station."""
     sensors, mismatch = config.sensors, config.mismatch
     true = true_poses(truth, config, plan, rng)
     size = len(true.q)

@@ -14,7 +14,7 @@ from flexcal.model.robot import GEOMETRY, NUISANCE, SPRINGS, STATION, RobotModel
 from flexcal.virtual_cell.config import SpreadConfig
 
 _LARGEST = 1e12
-"""In SI units: the stiffest spring lies far below."""
+"""Largest value in SI units, far above the stiffest spring."""
 _POSITIVE = (".mass", ".rotor_inertia", ".stiffness")
 _NOT_NEGATIVE = (".damping", ".backlash", ".viscous", ".coulomb")
 
@@ -96,7 +96,7 @@ def write_truth(path: str | Path, values: Mapping[str, float]) -> None:
 
 
 def _block(name: str) -> Block:
-    """The identification that finds a parameter."""
+    """Block of the identification that estimates a parameter."""
     owner, _, last = name.rpartition(".")
     if owner == "payload":
         return "payload"

@@ -28,7 +28,7 @@ def refuse_unknown_options(verb: Verb, arguments: Sequence[str]) -> None:
 
 
 def parse_error(verb: Verb, said: str) -> InputError:
-    """What the parser said in a box, as one sentence."""
+    """Message of the parser's box, as one sentence."""
     told = _told(said)
     explained = f"'flexcal {verb.name} --help' explains."
     if told and told[0].startswith("Missing from"):

@@ -35,7 +35,9 @@ def estimates_option(place: Path | None) -> str:
 
 
 def after_dynamics(robot: Path, model: RobotModel, loaded: str) -> str:
-    """What follows the robot's own dynamics: the payload by `loaded`, where one is declared and not identified, and springs or poses."""
+    """Next commands after the robot's own dynamics: the payload by `loaded`, if one is declared and not identified, and springs or
+    poses.
+    """
     springs = f"flexcal design frequency {robot} --out frequency.yaml"
     poses = f"flexcal design poses {robot} --count 40 --out poses.yaml"
     onward = springs if model.elastic else poses
@@ -45,7 +47,7 @@ def after_dynamics(robot: Path, model: RobotModel, loaded: str) -> str:
 
 
 def estimates_entry_hint(robot: Path, estimates: Path) -> str:
-    """How other verbs find estimates that are not beside robot.yaml."""
+    """Hint on how other verbs find estimates that are not beside robot.yaml."""
     entry = f"'estimates: {relpath(estimates, robot.parent)}'"
     line = next((i for i, text in enumerate(_lines(robot), start=1) if text.startswith("estimates:")), None)
     if line is None:
@@ -54,7 +56,7 @@ def estimates_entry_hint(robot: Path, estimates: Path) -> str:
 
 
 def stored_lines(robot: Path, estimates: Path | None, out: Path | None) -> tuple[str, ...]:
-    """Which files hold the estimates and, in the folder `out`, the report; and how other verbs find estimates there."""
+    """Lines on the files with the estimates and, in the folder `out`, the report; and on how other verbs find estimates there."""
     if estimates is None:
         return ()
     if out is None:

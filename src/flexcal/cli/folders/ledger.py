@@ -23,7 +23,7 @@ class Ledger:
 
     @classmethod
     def read(cls, folder: Path) -> Ledger:
-        """That of a folder, empty where there is none; raises `InputError` where it cannot be read."""
+        """Ledger of a folder, empty if there is none; raises `InputError` if it cannot be read."""
         path, verb = folder / LEDGER, ""
         entries: dict[str, tuple[str, str]] = {}
         try:

@@ -72,7 +72,7 @@ class _Place:
         self.kind = "a folder" if whole_folder else "a file"
 
     def stage(self, run: FileTransaction) -> Stage:
-        """That of the run; raises `InputError` where the folder cannot be made or written to."""
+        """Stage of the run; raises `InputError` if the folder cannot be made or written to."""
         try:
             return run.stage(self.folder, f"flexcal {self.verb}", self.patterns)
         except OSError as problem:

@@ -1,4 +1,4 @@
-"""Where the output of a verb goes: results to standard output, progress and messages to standard error."""
+"""Output of a verb: results to standard output, progress and messages to standard error."""
 
 from __future__ import annotations
 

@@ -15,9 +15,9 @@ class Cell(Protocol):
     """A robot with its instruments: simulated, or a folder of recorded files."""
 
     def record(self, plan: MultisinePlan | TrajectoryPlan) -> Iterator[Recording]:
-        """The plan's recordings one by one, in its order, labelled; none has to stay in memory."""
+        """Recordings of the plan one by one, in its order, labelled; none has to stay in memory."""
         ...
 
     def measure(self, plan: PosePlan) -> PoseSet:
-        """The plan's poses as the instrument saw them."""
+        """Measured poses of the plan."""
         ...

@@ -20,7 +20,7 @@ ENDINGS = (".parquet", ".csv")
 
 
 def labels(plan: MultisinePlan | TrajectoryPlan) -> Iterator[RecordingLabel]:
-    """The recordings of a plan in the order in which they are made: pose, realisation, experiment, sign.
+    """Labels of a plan's recordings in the order of measurement: pose, realisation, experiment, sign.
 
     A trajectory counts as a realisation of the one pose.
     """
@@ -35,7 +35,7 @@ def labels(plan: MultisinePlan | TrajectoryPlan) -> Iterator[RecordingLabel]:
 
 
 def existing_file(folder: Path, name: str) -> Path:
-    """The file of this name with either ending; raises `InputError` where there is none, or both."""
+    """Path of the file of this name with either ending; raises `InputError` if there is none, or both."""
     files = [folder / (name + ending) for ending in ENDINGS if (folder / (name + ending)).is_file()]
     if not files:
         raise InputError(

@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
 
 _SAME = 0.1
-"""A measured pose farther than this from its planned one (rad or m) is another pose."""
+"""Distance of a measured pose from its planned one (rad or m) above which it is another pose."""
 
 
 class FolderCell:
-    """A folder with `plan.yaml` and what was measured by it; see `flexcal.data.experiments.folder` for the names."""
+    """Cell of recorded files: a folder with `plan.yaml` and its measurements; see `flexcal.data.experiments.folder` for the names."""
 
     def __init__(self, path: str | Path, model: RobotModel) -> None:
         """Raises `InputError` where the folder is not there or its plan cannot be read or is for another robot."""

@@ -94,17 +94,17 @@ class MultisinePlan:
 
     @property
     def joint_count(self) -> int:
-        """Joints of the robot that the plan is for."""
+        """Number of joints of the robot."""
         return self.poses.shape[1]
 
     @property
     def experiments(self) -> int:
-        """Orthogonal experiments of one realisation: as many as excited axes."""
+        """Number of orthogonal experiments of one realisation: as many as excited axes."""
         return len(self.joints)
 
     @property
     def recordings_per_pose(self) -> int:
-        """Logs that one pose takes."""
+        """Number of logs of one pose."""
         return self.realisations * self.experiments * (2 if self.signs else 1)
 
     @property

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flexcal.errors import FlexcalError
 
 SPLINE_DEGREE = 5
-"""Accelerations have two continuous derivatives, so that drives can follow."""
+"""Degree of the splines: accelerations have two continuous derivatives, so that drives can follow."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,18 +47,18 @@ class FourierPaths:
 
     @classmethod
     def of_coefficients(cls, coefficients: np.ndarray) -> FourierPaths:
-        """From (E, 1 + 2 H, n): centres, sines, cosines."""
+        """Paths of coefficients (E, 1 + 2 H, n): centres, sines, cosines."""
         each = coefficients.transpose(0, 2, 1)
         harmonics = each.shape[2] // 2
         return cls(each[:, :, 0], each[:, :, 1 : 1 + harmonics], each[:, :, 1 + harmonics :])
 
     @property
     def coefficients(self) -> np.ndarray:
-        """(E, 1 + 2 H, n), as `fourier_basis` takes them."""
+        """Coefficients (E, 1 + 2 H, n), as `fourier_basis` takes them."""
         return np.concatenate([self.centre[:, :, None], self.sine, self.cosine], axis=2).transpose(0, 2, 1)
 
     def basis(self, time: np.ndarray, period: float) -> np.ndarray:
-        """(3, N, 1 + 2 H): the maps of coefficients to position, velocity and acceleration at times (N,), s."""
+        """Basis (3, N, 1 + 2 H) from coefficients to position, velocity and acceleration at times (N,), s."""
         return fourier_basis(time, period, self.sine.shape[2])
 
 
@@ -82,21 +82,23 @@ class SplinePaths:
 
     @classmethod
     def of_coefficients(cls, coefficients: np.ndarray) -> SplinePaths:
-        """From (E, K, n)."""
+        """Paths of coefficients (E, K, n)."""
         return cls(coefficients.transpose(0, 2, 1))
 
     @property
     def coefficients(self) -> np.ndarray:
-        """(E, K, n), as `spline_basis` takes them."""
+        """Coefficients (E, K, n), as `spline_basis` takes them."""
         return self.control.transpose(0, 2, 1)
 
     def basis(self, time: np.ndarray, period: float) -> np.ndarray:
-        """(3, N, K): the maps of control points to position, velocity and acceleration at times (N,), s."""
+        """Basis (3, N, K) from control points to position, velocity and acceleration at times (N,), s."""
         return spline_basis(time, period, self.control.shape[2])
 
 
 def fourier_basis(time: np.ndarray, period: float, harmonics: int) -> np.ndarray:
-    """(3, N, 1 + 2 H): position, velocity and acceleration at times (N,), s, by centre, and sines and cosines of the velocity."""
+    """Fourier basis (3, N, 1 + 2 H): position, velocity and acceleration at times (N,), s, by centre, and sines and cosines of the
+    velocity.
+    """
     omega = 2 * np.pi / period * np.arange(1, harmonics + 1)
     s, c = np.sin(time[:, None] * omega), np.cos(time[:, None] * omega)
     centre = np.ones((len(time), 1))
@@ -110,7 +112,7 @@ def fourier_basis(time: np.ndarray, period: float, harmonics: int) -> np.ndarray
 
 
 def spline_basis(time: np.ndarray, period: float, points: int) -> np.ndarray:
-    """(3, N, K): the same by K control points of a cyclic B-spline of degree 5 (de Boor 1978); the first acts from time 0 on."""
+    """Spline basis (3, N, K) of K control points of a cyclic B-spline of degree 5 (de Boor 1978); the first acts from time 0 on."""
     from scipy.interpolate import BSpline
 
     piece = BSpline.basis_element(np.arange(SPLINE_DEGREE + 2.0), extrapolate=False)

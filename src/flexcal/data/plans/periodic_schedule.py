@@ -1,4 +1,4 @@
-"""Checks of what every plan of periodic experiments holds."""
+"""Checks common to all plans of periodic experiments."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class PeriodicSchedule(Protocol):
 
 
 def check_schedule(plan: PeriodicSchedule) -> None:
-    """Raise `FlexcalError` for values that no experiment can have."""
+    """Raise `FlexcalError` for invalid values."""
     if not (plan.base_frequency_hz > 0 and plan.rate_hz > 0):
         raise FlexcalError("E-PLAN-016", "base_frequency_hz and rate_hz must be positive.")
     if plan.rate_hz / plan.base_frequency_hz * max(plan.periods, 1) > _MAX_SAMPLES:

@@ -12,7 +12,7 @@ from flexcal.data.tables import Table, open_table, write_table
 from flexcal.errors import FlexcalError, InputError
 
 _OF_COMMANDS = ("target", "unambiguous")
-"""Columns that commands have besides, which do not matter to who moves the robot."""
+"""Further columns of commands, which are ignored."""
 
 
 def write_pose_table(path: Path, plan: PosePlan) -> None:

@@ -34,11 +34,11 @@ class PosePool:
         return len(self.q)
 
     def subset(self, rows: np.ndarray) -> PosePool:
-        """The poses with these indices, or where this mask is true, in their order."""
+        """Poses with these indices or of this mask, in their order."""
         return replace(self, q=self.q[rows], pose=self.pose[rows])
 
     def drawn(self, most: int) -> PosePool:
-        """At most so many of them, at random but always the same ones, in their order."""
+        """Random subset of at most so many poses, the same at every call, in their order."""
         if len(self) <= most:
             return self
         rows = np.sort(np.random.default_rng(0).choice(len(self), most, replace=False))

@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
 
 STILL = 1e-3
-"""A joint that moves by less over all poses (rad or m) counts as never moving."""
+"""Range over all poses (rad or m) below which a joint counts as never moving."""
 SAME_POSE = 0.02
-"""Rows of one pose may differ by this much in their joint positions (rad or m)."""
+"""Largest difference of joint positions (rad or m) between rows of one pose."""
 
 
 def check_motion(poses: PoseSet, model: RobotModel, where: str) -> None:

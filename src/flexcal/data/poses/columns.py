@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
 
 _HIGHEST = 2.0**53
-"""Whole numbers up to here are exact in a table."""
+"""Largest integer that is exact in a table."""
 
 
 def first_point(file: TableFile, model: RobotModel) -> str:

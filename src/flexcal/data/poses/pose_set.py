@@ -11,7 +11,7 @@ import numpy as np
 from flexcal.errors import FlexcalError
 
 DEFAULT_SIGMA = 1e-4
-"""1σ of a measured coordinate (m) where a file says nothing; only its size relative to priors matters then."""
+"""Default 1σ of a measured coordinate (m); only its size relative to priors matters."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,12 +96,12 @@ class PoseSet:
 
     @property
     def stations(self) -> tuple[str, ...]:
-        """The stations in the order in which they first appear."""
+        """Stations in the order of first appearance."""
         return tuple(dict.fromkeys(self.station.tolist()))
 
     @property
     def targets(self) -> tuple[str, ...]:
-        """The targets in the order in which they first appear."""
+        """Targets in the order of first appearance."""
         return tuple(dict.fromkeys(self.target.tolist()))
 
     def subset(self, rows: np.ndarray | Sequence[int] | slice) -> PoseSet:

@@ -10,10 +10,10 @@ import numpy as np
 from flexcal.errors import FlexcalError
 
 _REACH = 10
-"""Half the length of a decimation filter, in samples that it leaves."""
+"""Half length of a decimation filter, in output samples."""
 _LARGEST_STAGE = 10
 _TOGETHER = 10
-"""Samples that one matrix product leaves: more of them multiply more zeros, fewer make thinner matrices."""
+"""Number of output samples per matrix product: more of them multiply more zeros, fewer make thinner matrices."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Decimation:
 
     @classmethod
     def near(cls, factor: float) -> Decimation:
-        """By the largest possible factor that is not above `factor`, or by 1."""
+        """Decimation by the largest possible factor up to `factor`, or by 1."""
         whole = max(1, int(factor))
         while True:
             try:
@@ -58,7 +58,7 @@ class Decimation:
 
     @property
     def support(self) -> int:
-        """Samples before and after a kept one that it depends on; kept samples nearer to an end do not exist."""
+        """Number of input samples on either side of an output sample that it depends on; there are no output samples nearer to an end."""
         reach, spacing = 0, 1
         for stage in self.stages:
             reach += _REACH * stage * spacing
@@ -66,19 +66,19 @@ class Decimation:
         return reach
 
     def apply(self, columns: np.ndarray) -> np.ndarray:
-        """`columns` (k, N) at samples support, support + factor, …: (k, M), empty where N is not above 2 · support."""
+        """Filtered `columns` (k, N) at samples support, support + factor, …: (k, M), empty unless N is above 2 · support."""
         return DecimationStream(self).push(columns)
 
 
 class DecimationStream:
-    """Columns that come block by block, decimated as the whole would be: it holds back what the filters still need."""
+    """Block-wise decimation with the result of the whole; samples still needed by the filters are kept."""
 
     def __init__(self, decimation: Decimation) -> None:
         self._stages = decimation.stages
         self._pending: list[np.ndarray | None] = [None] * len(self._stages)
 
     def push(self, columns: np.ndarray) -> np.ndarray:
-        """The kept samples (k, M) that the next `columns` (k, N) complete; M may be zero."""
+        """Output samples (k, M) completed by the next `columns` (k, N); M may be zero."""
         for i, stage in enumerate(self._stages):
             pending = self._pending[i]
             whole = columns if pending is None else np.concatenate([pending, columns], axis=1)

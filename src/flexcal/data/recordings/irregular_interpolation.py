@@ -7,7 +7,7 @@ import numpy as np
 _NODES = 6
 _SIDE = _NODES // 2
 _APART = 0.5
-"""Least distance of two nodes over the interval that is interpolated in: nearer ones would amplify noise by their difference quotients."""
+"""Least distance of two nodes relative to the interpolated interval: nearer ones would amplify noise by their difference quotients."""
 
 
 def interpolated(t: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ from flexcal.errors import FlexcalError
 
 @dataclass(frozen=True)
 class RecordingLabel:
-    """Which recording of a plan this is: indices from 0 of pose, realisation and experiment, and the sign, ±1."""
+    """Label of a recording within a plan: indices from 0 of pose, realisation and experiment, and the sign, ±1."""
 
     pose: int
     realisation: int

@@ -45,7 +45,7 @@ _FIELDS = {
     "payload": "payload",
 }
 FILL = 0.02
-"""s without samples that interpolation may fill in a log of a robot's own motion, which lies below 10 Hz."""
+"""Longest time without samples, s, that interpolation may fill in a log of a robot's own motion, which lies below 10 Hz."""
 _REQUIRED = ("t", "q", "tau")
 _OPTIONAL = ("qa", "qax", "qay", "dq", "ddq", "dqa", "tau_ext", "force", "moment", "temperature", "payload")
 
@@ -246,7 +246,7 @@ def _recording(
 
 
 def _check_time(table: Table, signal: Signal, t: np.ndarray, before: float | None) -> None:
-    """Of the time stamps `t` (N,) after one at `before` (None: they begin the log)."""
+    """Check the time stamps `t` (N,) that follow one at `before` (None: they begin the log)."""
     if before is None and len(t) < 2:
         raise table.error("E-LOG-016", 0, None, "this is the only sample; a log needs at least two.")
     latest = np.maximum.accumulate(t if before is None else np.maximum(t, before))

@@ -15,7 +15,7 @@ _SHORTEST_TRANSFORM = 8192
 
 
 class TooFewSamples(FlexcalError):
-    """A signal is shorter than the impulse response of its filter."""
+    """Error: a signal is shorter than the impulse response of its filter."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class LowPass:
 
     @cached_property
     def support(self) -> int:
-        """Samples before and after a filtered one that it depends on."""
+        """Number of samples on either side of a filtered one that it depends on."""
         angles = math.pi * (2 * np.arange(_ORDER) + _ORDER + 1) / (2 * _ORDER)
         poles = self._corner * np.exp(1j * angles)
         slowest = np.abs((1 + poles) / (1 - poles)).max()
@@ -60,7 +60,7 @@ class LowPass:
         return length, np.fft.rfft(impulse / impulse.sum())
 
     def fits(self, samples: int, beyond: int = 0) -> bool:
-        """Whether so many samples are enough for `before`."""
+        """Whether the number of samples is sufficient for `before`."""
         return samples > self.support + beyond
 
     def gain(self, frequency_hz: np.ndarray) -> np.ndarray:

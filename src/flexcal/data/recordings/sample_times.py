@@ -8,29 +8,30 @@ from itertools import pairwise
 import numpy as np
 
 GAP = 2.5
-"""A step longer than this many time steps is a gap, unless it is shorter than what is filled in."""
+"""Ratio of a step to the time step above which it is a gap, unless it is short enough to be filled in."""
 JITTER = 0.02
 """Time stamps within this part of a time step of the uniform base are taken as uniform."""
 LATE = 0.05
-"""s by which rows may be out of order; they are sorted."""
+"""Time, s, by which rows may be out of order; they are sorted."""
 MOST_EQUAL = 5
-"""Rows of one time stamp, at most, whose values are averaged."""
+"""Largest number of rows of one time stamp whose values are averaged."""
 _COUNTED = 0.3
 """Deviation from the uniform base, in time steps, up to which every time stamp has a number of its own there."""
 _MOST_LOST = 2.0
-"""Samples on the uniform base for each that is there, at most; with more, samples came in bursts."""
+"""Largest number of lost samples per existing one; with more, samples came in bursts."""
 _SMOOTHER = 0.5
 """Positions are sampled evenly where this share, or less, of their error of interpolation is left when time stamps are ignored."""
 _DIFFER = 0.1
-"""Of the weights in an interpolation, when steps count as different."""
+"""Difference of interpolation weights above which steps count as different."""
 _GOES_ON = 0.5
-"""A robot that moves at least so fast as before, over repeated rows, has not stopped for them."""
+"""Least speed relative to the previous one at which a robot has not stopped over repeated rows."""
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Rows `values` (N, m) at ascending times `t` (N,), s. Of the rows as they were read, so many were `sorted`, `merged` (averaged with
-    others of the same time stamp) and `repeated` (left out: all values as in the row before, although the robot moves)."""
+    """Rows `values` (N, m) at ascending times `t` (N,), s, with the number of rows `sorted`, `merged` (averaged with others of the same
+    time stamp) and `repeated` (left out: all values as in the row before, although the robot moves).
+    """
 
     t: np.ndarray
     values: np.ndarray
@@ -46,7 +47,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class Clock:
-    """What time stamps tell of the sampling: `time_step` (s), and the longest step that is no `gap`, s.
+    """Sampling of time stamps: `time_step` (s), and the longest step that is no `gap`, s.
 
     `regular`: each stamp is next to a sample of a uniform base of its own, of which some may be missing. `even`: samples were taken at even
     times, about which only the stamps scatter, since positions are much smoother over their number than over the stamps.
@@ -69,7 +70,7 @@ def in_order(t: np.ndarray, values: np.ndarray, positions: int) -> Samples:
 
 
 def clock_of(t: np.ndarray, positions: np.ndarray, fill: float) -> Clock:
-    """The clock of ascending time stamps (N,) with positions (N, n); steps up to `fill` (s) are no gaps.
+    """Clock of ascending time stamps (N,) with positions (N, n); steps up to `fill` (s) are no gaps.
 
     The time step is that of the longest part without gaps. A rate within 1e-6, or five standard errors, of a whole number of Hz is taken as
     that one, so that logs of one controller have one time step.

@@ -14,9 +14,9 @@ from flexcal.data.recordings.sample_times import GAP, JITTER, Clock, Samples, cl
 from flexcal.errors import FlexcalError
 
 ENOUGH = 200
-"""Samples that the clock of blocks is taken from, at least, where there are as many."""
+"""Least number of samples, if available, for the clock of blocks."""
 _REACH = 5.0
-"""Longest steps that the interpolation reaches to either side, at most."""
+"""Largest number of longest steps that the interpolation reaches to either side."""
 _ROUNDING = 1e-6
 """Time steps by which the last sample may lie before its place on the base."""
 _BLOCK = tuple[np.ndarray, np.ndarray]
@@ -24,7 +24,7 @@ _BLOCK = tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True)
 class TimeBase:
-    """The uniform base t = start + k · time_step (s, k < samples) under time stamps, and how these lie about it.
+    """Uniform time base t = start + k · time_step (s, k < samples) under time stamps, and the deviations from it.
 
     jitter: standard deviation of the time stamps about the base, s; jitter_max: the largest deviation.
     shortest, longest: steps between time stamps, s. even: samples were taken evenly, and only their stamps scatter.
@@ -127,7 +127,7 @@ def _with_last(blocks: Iterable[_BLOCK]) -> Iterator[tuple[np.ndarray, np.ndarra
 
 
 class _EvenTimes:
-    """Times of samples that were taken evenly, from stamps that scatter about them; they follow the stamps from block to block."""
+    """Times of uniformly sampled values from scattered time stamps, followed from block to block."""
 
     def __init__(self, clock: Clock) -> None:
         self._step, self._gap = clock.time_step, clock.gap
@@ -135,7 +135,7 @@ class _EvenTimes:
         self._last: float | None = None
 
     def times(self, t: np.ndarray) -> np.ndarray:
-        """Of the samples with the stamps `t` (N,) that follow."""
+        """Times of the next samples, with the stamps `t` (N,)."""
         starts = sampling_gaps(t, self._gap) + 1
         if t.size and (self._last is None or t[0] - self._last > self._gap):
             starts = np.concatenate([[0], starts])
@@ -166,18 +166,18 @@ class _Stretch:
 
     @property
     def begun(self) -> bool:
-        """Whether samples are on the base."""
+        """Whether there are samples on the base."""
         return self._done > 0
 
     @property
     def next(self) -> float:
-        """Time of the sample that follows on the base, s."""
+        """Time of the next sample on the base, s."""
         return self._start + self._done * self._step
 
     def push(
         self, t: np.ndarray, values: np.ndarray, clock: Clock, *, whole: bool
     ) -> tuple[TimeBase, np.ndarray] | None:
-        """What the samples at `t` (N,) complete of the base, if anything: all that they enclose where the stretch ends with them."""
+        """Part of the base completed by samples at `t` (N,), if any: all that they enclose if the stretch ends with them."""
         step = clock.time_step
         start = self.next if self.begun else _start(t, step)
         enclosed = (float(t[-1]) - start) / step
@@ -224,7 +224,7 @@ class _Stretch:
 
 
 def _start(t: np.ndarray, step: float) -> float:
-    """Of the base under stamps that lie next to it; the first one else."""
+    """Start of the base under stamps that lie next to it; else the first stamp."""
     number = np.rint((t - t[0]) / step)
     start = float(t[0] + np.mean(t - t[0] - step * number))
     return float(t[0]) if abs(start - t[0]) < 1e-6 * step else start

@@ -7,23 +7,23 @@ from dataclasses import dataclass, field
 from flexcal.data.recordings.time_base import TimeBase
 
 _SHOWN = 1e-4
-"""Of all samples, out-of-order and repeated ones that are worth a word, at least one."""
+"""Least share of out-of-order and repeated samples that is reported, at least one."""
 
 
 @dataclass
 class TimeSummary:
-    """Collects the `bases` of a log's blocks; `short` are seconds between gaps that are too short for the filters."""
+    """Summary of the `bases` of a log's blocks; `short` are seconds between gaps that are too short for the filters."""
 
     bases: list[TimeBase] = field(default_factory=list)
     short: float = 0.0
 
     def add(self, base: TimeBase) -> None:
-        """That of the block that follows."""
+        """Add the base of the next block."""
         self.bases.append(base)
 
     @property
     def sentence(self) -> str:
-        """What was done with the time stamps; empty where they were uniform."""
+        """Sentence on the treatment of time stamps; empty if they are uniform."""
         return "; ".join((*self._resampled(), *self._divided(), *self._repaired()))
 
     def _resampled(self) -> list[str]:

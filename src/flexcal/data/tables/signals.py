@@ -38,7 +38,7 @@ _ACCELERATION = {"rad/s^2": 1.0, "deg/s^2": DEGREE, "m/s^2": 1.0, "mm/s^2": MILL
 _TORQUE = {"N m": 1.0, "Nm": 1.0, "N": 1.0, "A": 1.0, "mA": 1e-3}
 _LENGTH = {"m": 1.0, "mm": MILLIMETRE, "um": 1e-6}
 TIMESTAMP = "timestamp"
-"""In the place of a unit of time: texts with date or time of day, which count as seconds from the first."""
+"""Unit of time for texts with date or time of day, which count as seconds from the first."""
 UNITS: dict[str, dict[str, float]] = {
     "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, TIMESTAMP: 1.0},
     **dict.fromkeys(("q", "qa", "qax", "qay"), _ANGLE),
@@ -52,7 +52,7 @@ UNITS: dict[str, dict[str, float]] = {
     "quaternion": {},
     "temperature": {},
 }
-"""The quantities that `signals:` can map, and the factors of their units to SI; currents take a gain in N m/A."""
+"""Quantities that `signals:` can map, and the factors of their units to SI; currents take a gain in N m/A."""
 
 SENSOR_UNITS: tuple[dict[str, float], ...] = (
     _LENGTH,
@@ -122,7 +122,7 @@ def timestamp_columns(signals: Mapping[str, Signal]) -> tuple[str, ...]:
 
 
 def mapped_signals(model: RobotModel) -> dict[str, Signal]:
-    """What `signals:` of robot.yaml declares; raises `InputError` with its line where that does not fit together."""
+    """Signals declared in `signals:` of robot.yaml; raises `InputError` with its line if they are inconsistent."""
     declared = model.config.signals
     return {name: _mapped(model, name, declared[name]) for name in declared}
 
@@ -134,7 +134,7 @@ def assign(
     optional: Sequence[str],
     texts: Sequence[str] = (),
 ) -> dict[str, Signal]:
-    """Which columns of a file hold which quantity: the mapped ones where they are there, else the standard ones.
+    """Columns of a file for each quantity: the mapped ones if present, else the standard ones.
 
     Raises `InputError` for a required quantity that is missing, one that is only there in part, another number of
     joints than the robot's, and every column that is not understood.

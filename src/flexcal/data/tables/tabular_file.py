@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     import polars as pl
 
 _SHOWN = 4
-"""Tables named of a folder's."""
+"""Largest number of a folder's tables that are named."""
 BLOCK_BYTES = 64 * 2**20
 _DECODED = 100_000
 """Rows of Parquet that are decoded together: to slice some, all of their row group is."""
 _QUOTED = 20
-"""Letters of a number that a message quotes."""
+"""Largest number of characters of a number that a message quotes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class Table:
 
 @dataclass(frozen=True)
 class TableFile:
-    """A table whose header is read. `first` is the number of its first row: a line in CSV, else counted from 1."""
+    """Table whose header is read. `first` is the number of its first row: a line in CSV, else counted from 1."""
 
     path: Path
     columns: tuple[str, ...]
@@ -161,7 +161,7 @@ def write_table(path: str | Path, columns: Mapping[str, np.ndarray]) -> None:
 
 
 def tables_in(folder: Path) -> str:
-    """Which tables a folder holds, for a message; a few of them."""
+    """Names of the tables in a folder, for a message; a few of them."""
     try:
         tables = [file for file in folder.iterdir() if file.suffix in (".csv", ".parquet")]
     except OSError:
@@ -292,7 +292,7 @@ def _array(series: pl.Series) -> np.ndarray:
 
 
 def _read_cells(file: TableFile, content: bytes, texts: Collection[str], line: int) -> dict[str, np.ndarray]:
-    """The slow way, cell by cell, which finds the first fault; raises `InputError` there."""
+    """Read cell by cell, slowly, to find the first fault; raises `InputError` there."""
     cells: dict[str, list[Any]] = {name: [] for name in file.columns}
     for number, raw in enumerate(content.split(b"\n"), start=line):
         text = _decoded(file.path, raw, number).strip("\r")
@@ -327,7 +327,7 @@ def _row(path: Path, line: int, text: str) -> list[str]:
 
 
 def _measurable(values: np.ndarray) -> np.ndarray:
-    """Which of some numbers (N,) can be measurements: finite, and below `LARGEST`."""
+    """Mask (N,) of numbers that can be measurements: finite, and below `LARGEST`."""
     return np.abs(values) <= LARGEST
 
 

@@ -17,15 +17,15 @@ STAMP = re.compile(
     r"(?P<hour>\d\d?):(?P<minute>\d\d)(?::(?P<second>\d\d)(?:[.,](?P<fraction>\d+))?)?"
     r"\s*(?P<zone>Z|[-+]\d\d:?\d\d)?"
 )
-"""ISO 8601 with a T or a space, 01.03.2026 12:00:00, or a time of day; decimals after a point or a comma."""
+"""Pattern of time stamps: ISO 8601 with a T or a space, 01.03.2026 12:00:00, or a time of day; decimals after a point or a comma."""
 _DAY = 86400
 _NO_DATE = 1904
-"""Up to this year it is the date that Excel gives a time of day."""
+"""Latest year that stands for no date, as Excel's for a time of day."""
 _DATE = (("year", "year_last"), ("month", "month_second"), ("day", "day_first"))
 
 
 def seconds_of(texts: Sequence[str]) -> np.ndarray | None:
-    """Seconds (N,) from the first of `texts`, NaN where one is no timestamp; None where most that are not empty are none.
+    """Seconds (N,) from the first of `texts`, NaN for texts that are no time stamp; None if most nonempty ones are none.
 
     Without dates, a time of day that is half a day or more before the one above it is of the next day.
     """
@@ -86,7 +86,7 @@ class _Seconds:
         self._last, self._days = 0.0, 0
 
     def of(self, table: Table, column: str) -> np.ndarray:
-        """Of the next part (N,)."""
+        """Seconds of the next part (N,)."""
         seconds = np.zeros(len(table))
         for row, text in enumerate(table.columns[column].tolist()):
             stamp = stamp_of(text)

@@ -26,7 +26,7 @@ from flexcal.files.transaction import atomic_paths, current_path, recover, refus
 
 Block = Literal["dynamics", "stiffness", "calibration", "payload"]
 BLOCKS: tuple[Block, ...] = get_args(Block)
-"""The blocks of the file, in the order in which a robot takes them in."""
+"""Blocks of the file, in the order of their application to a robot."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class StoredDropped:
 
 @dataclass(frozen=True)
 class StoredFit:
-    """How the fit ended."""
+    """Statistics of the fit."""
 
     rank: int
     cost: float
@@ -86,7 +86,7 @@ class StoredFit:
 
 @dataclass(frozen=True)
 class StoredBlock:
-    """What one identification left in the file."""
+    """Block of one identification in the file."""
 
     values: dict[str, StoredValue]
     dropped: tuple[StoredDropped, ...] = ()
@@ -99,7 +99,7 @@ class StoredBlock:
 
 @dataclass(frozen=True)
 class StoredEstimates:
-    """The whole file."""
+    """Content of the whole file."""
 
     dynamics: StoredBlock | None = None
     stiffness: StoredBlock | None = None
@@ -163,7 +163,7 @@ def write_estimates(path: str | Path, block: Block, estimate: Estimate) -> None:
 
 
 def require_place(path: str | Path, block: Block) -> None:
-    """Raise `InputError` where `write_estimates` would not put a block into this file: so that it is known before the work begins."""
+    """Raise `InputError` if `write_estimates` could not put a block into this file, before the work begins."""
     recover(Path(path).parent)
     for file in (Path(path), Path(path).with_suffix(".npz")):
         refuse_irregular(file)
@@ -176,8 +176,9 @@ def provenance(
     estimates: str | Path | None = None,
     blocks: Iterable[Block] = (),
 ) -> dict[str, str]:
-    """Where an estimate comes from: program version, SHA-256 of input files and folders by name (with the path where a name
-    repeats), options, and the SHA-256 of the `blocks` of the file `estimates` that were used."""
+    """Provenance of an estimate: program version, SHA-256 of input files and folders by name (with the path where a name repeats),
+    options, and the SHA-256 of the `blocks` used from the file `estimates`.
+    """
     from importlib.metadata import version
 
     origin = {"program": f"flexcal {version('flexcal')}"}
@@ -223,7 +224,7 @@ def block_sha256(path: str | Path, block: Block) -> str:
 def _kept(
     path: Path, block: Block
 ) -> tuple[StoredEstimates, dict[Block, tuple[tuple[str, ...], np.ndarray]]]:
-    """What stays in a file when `block` is written: its content, and names and covariance of the other blocks."""
+    """Content to be kept when `block` is written: the file's content, and names and covariance of the other blocks."""
     if path.suffix not in (".yaml", ".yml"):
         raise InputError(
             "E-EST-007",

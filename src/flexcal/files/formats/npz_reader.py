@@ -29,12 +29,12 @@ _KINDS: dict[Kind, tuple[str, str]] = {
 _UNREADABLE = (
     OSError, ValueError, EOFError, KeyError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
-"""What NumPy and zipfile raise of a file that is none, cut short, encrypted or changed."""
+"""Exceptions of NumPy and zipfile for a file that is no archive, cut short, encrypted or changed."""
 
 
 @dataclass(frozen=True)
 class ArrayForm:
-    """What an array has to be: its kind, and per axis an extent or a name; axes of one name are as long in every array of a file.
+    """Expected form of an array: its kind, and per axis an extent or a name; axes of one name have equal length in all arrays of a file.
 
     Numbers that are not finite are refused unless `finite` is False; so are numbers beyond `units.LARGEST`.
     """
@@ -135,7 +135,7 @@ class NpzFile:
 
 
 def refuse_foreign(path: Path, ours: Set[str]) -> None:
-    """Raise `InputError` where a file is there that holds something else than arrays of the names `ours`: no flexcal wrote it."""
+    """Raise `InputError` for a file that holds anything but arrays of the names `ours`: it was not written by flexcal."""
     if not current_path(path).exists():
         return
     try:

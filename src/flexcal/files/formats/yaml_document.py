@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from yaml import CSafeLoader, Event, ScalarEvent
 
 DEEPEST = 50
-"""Lists and mappings inside each other."""
+"""Largest depth of nested lists and mappings."""
 MOST_REPEATED = 100_000
-"""Values that stand for aliases, those inside them counted too."""
+"""Largest number of values repeated by aliases, nested ones included."""
 _LONGEST_NUMBER = 250
-"""Digits of a whole number, in any base a `float` holds it."""
+"""Largest number of digits of an integer, in any base that a `float` holds."""
 _DECIMAL = re.compile(r"[-+]?[0-9]+")
 _OTHER_BASE = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")

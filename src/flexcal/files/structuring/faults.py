@@ -1,4 +1,4 @@
-"""What does not fit: a fault of one value, and all faults of a document as sentences with their places."""
+"""Faults of plain data: of one value, and of a document as sentences with their places."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flexcal.files.structuring.wording import suggestion
 
 
 class Failure(NamedTuple):
-    """A value that does not fit: code and sentence as of `FlexcalError`, and the keys that lead to the value."""
+    """Invalid value: code and sentence as of `FlexcalError`, and the keys that lead to the value."""
 
     code: str
     keys: Keys

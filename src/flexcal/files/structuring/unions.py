@@ -42,12 +42,12 @@ def union_hook(cls: Any, converter: Converter) -> Any:
 
 
 def _known(cls: Any, value: Any) -> int:
-    """How many of a value's keys a dataclass has: of two, the fault of the nearer one is told."""
+    """Number of a value's keys that a dataclass has: the fault of the nearer one of two is reported."""
     return len(value.keys() & set(known_keys(cls))) if dataclasses.is_dataclass(cls) else 0
 
 
 def _kind(cls: Any) -> type:
-    """How a value of this type stands in YAML: dict, list or scalar (object)."""
+    """Kind of a value of this type in YAML: dict, list or scalar (object)."""
     origin = get_origin(cls) or cls
     if dataclasses.is_dataclass(cls) or origin in (dict, Mapping):
         return dict

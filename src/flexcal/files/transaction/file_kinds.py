@@ -1,4 +1,4 @@
-"""What may be read as a file, and what may be replaced by one."""
+"""Checks of the file types that may be read or replaced."""
 
 from __future__ import annotations
 

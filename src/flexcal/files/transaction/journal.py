@@ -1,4 +1,4 @@
-"""What a publication is about to do, written down before it begins: whoever finds it can finish it."""
+"""Journal of a publication, written before it begins so that any process can finish it."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from pathlib import Path
 from flexcal.errors import InputError
 
 Seen = tuple[int, int] | None
-"""Size and time of the last change, ns, of a file; None of none."""
+"""Size and time of the last change, ns, of a file; None without a file."""
 _NAME = "journal.json"
 _PRIMARY = "primary"
 
 
 @dataclass(frozen=True)
 class Change:
-    """The file `staged` takes the `place` of one that is still as it was `seen`; None removes that one."""
+    """Replacement of `place`, unchanged since `seen`, by the file `staged`; None removes it."""
 
     staged: Path | None
     place: Path
@@ -37,7 +37,7 @@ class Journal:
     stages: tuple[Path, ...]
 
     def write(self) -> None:
-        """Leave it in the last stage, on the disk before this returns."""
+        """Write the journal to the last stage, synchronised to disk."""
         home = self.stages[-1]
         for stage in self.stages[:-1]:
             write_through(stage / _PRIMARY, os.fsencode(os.path.relpath(home, stage)))
@@ -60,7 +60,7 @@ class Journal:
         sync_folder(home)
 
     def carry_out(self) -> None:
-        """Make those changes that have not been made; raises `InputError` where somebody has changed a place meanwhile, and `OSError`."""
+        """Make the remaining changes; raises `InputError` for places changed meanwhile by others, and `OSError`."""
         for change in self.changes:
             if change.staged is None:
                 if change.seen is not None and seen(change.place) == change.seen:
@@ -103,7 +103,7 @@ def primary_of(stage: Path) -> Path | None:
 
 
 def seen(place: Path) -> Seen:
-    """What changes whenever a file is written anew."""
+    """State of a file that changes whenever it is written anew."""
     try:
         status = place.lstat()
     except FileNotFoundError:
@@ -112,7 +112,7 @@ def seen(place: Path) -> Seen:
 
 
 def write_through(path: Path, content: bytes) -> None:
-    """Write a file, on the disk before this returns."""
+    """Write a file, synchronised to disk."""
     with path.open("wb") as stream:
         stream.write(content)
         stream.flush()
@@ -120,7 +120,7 @@ def write_through(path: Path, content: bytes) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Wait until names given and taken in a folder are on the disk."""
+    """Synchronise the names in a folder to disk."""
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         os.fsync(handle)

@@ -1,4 +1,4 @@
-"""Advisory locks (flock), which end with the process that holds them, however it ends."""
+"""Advisory locks (flock), released when the process ends."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Hold a folder alone, and wait for it where another process does; without a lock where the file system has none for folders."""
+    """Hold a folder exclusively, waiting for other processes; without a lock if the file system has none for folders."""
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         with suppress(OSError):
@@ -22,7 +22,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def lock_file(path: Path) -> int | None:
-    """The handle of a file that nobody else holds, locked until it is closed; None where somebody does, or where that cannot be told."""
+    """Locked handle of a file that nobody else holds; None if somebody does, or if that cannot be determined."""
     try:
         handle = os.open(path, os.O_RDWR if os.access(path, os.W_OK) else os.O_RDONLY)
     except OSError:

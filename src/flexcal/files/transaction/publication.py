@@ -1,4 +1,4 @@
-"""The files of one run, which take their places together."""
+"""Transaction of the files of one run, which are put in place together."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _POSTPONED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 @contextmanager
 def deferred_signals() -> Iterator[None]:
-    """Within the block, exceptions that handlers of Ctrl-C and other signals would raise wait until its end."""
+    """Defer exceptions raised by handlers of Ctrl-C and other signals to the end of the block."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -41,7 +41,7 @@ def deferred_signals() -> Iterator[None]:
 
 
 _open: list[FileTransaction] = []
-"""The one whose block is being carried out, last; of the whole process, as files are."""
+"""Running transactions, the innermost last; of the whole process, as files are."""
 
 
 class FileTransaction:
@@ -75,12 +75,12 @@ class FileTransaction:
 
     @staticmethod
     def running() -> FileTransaction | None:
-        """The one whose block is being carried out."""
+        """Innermost running transaction."""
         return _open[-1] if _open else None
 
     @property
     def files(self) -> dict[Path, Path]:
-        """Where the files wait, by their places."""
+        """Staged files by their places."""
         return dict(self._waiting)
 
     def stage(self, folder: Path, verb: str = "", names: Sequence[str] = ()) -> Stage:
@@ -98,7 +98,7 @@ class FileTransaction:
         return self._stages[folder]
 
     def temporary(self, path: Path) -> Path:
-        """An empty file to be written for `path`, bit by bit if need be; `put` takes it when it is whole.
+        """Empty temporary file for `path`, to be written in any order; `put` takes it when it is complete.
 
         Raises `InputError` where something stands in its place that is no regular file, and `OSError`.
         """
@@ -109,7 +109,7 @@ class FileTransaction:
         return stage.file(place.suffix)
 
     def put(self, path: Path, temporary: Path) -> None:
-        """Let a whole file wait for its place; one that waits for it already is dropped. Raises `OSError`."""
+        """Stage a complete file for its place, replacing one staged before. Raises `OSError`."""
         place = _place(path)
         temporary.chmod(_mode_of(place))
         with temporary.open("rb") as stream:
@@ -132,7 +132,7 @@ class FileTransaction:
         self._removed[place] = seen(place)
 
     def waiting(self, path: Path) -> Path | None:
-        """Where the file of this place waits, None where none does."""
+        """Path of the staged file of this place, None without one."""
         return self._waiting.get(_place(path)) if self._waiting else None
 
     def publish(self, prepare: Callable[[], None] = lambda: None) -> None:
@@ -192,7 +192,7 @@ class FileTransaction:
                 )
 
     def discard(self) -> None:
-        """Drop the files that wait, unless they have been published."""
+        """Drop the staged files, unless they have been published."""
         if self._done:
             return
         with deferred_signals():
@@ -204,7 +204,7 @@ class FileTransaction:
 
 
 def current_path(path: str | Path) -> Path:
-    """Where to read `path`: the file that waits for this place in the publication being carried out, else the path itself.
+    """Path to read `path` from: the file staged for this place in the running transaction, else the path itself.
 
     Raises `InputError` where this is a pipe, socket or device.
     """

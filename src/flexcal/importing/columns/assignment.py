@@ -38,7 +38,7 @@ class ColumnAssignment:
         return self.units[0] if len(set(self.units)) == 1 else None
 
     def signal(self) -> Signal:
-        """How SI values come from the columns."""
+        """Conversion of the columns to SI values."""
         factors = np.array([_factor(self.quantity, unit) for unit in self.units])
         return Signal(
             self.quantity,

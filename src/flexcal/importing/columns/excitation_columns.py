@@ -1,4 +1,4 @@
-"""Columns of a record of an excited axis: what drives it, what moves, and the reference of its controller."""
+"""Columns of a record of an excited axis: input, output, and the reference of its controller."""
 
 from __future__ import annotations
 

@@ -94,7 +94,7 @@ def _completed(groups: _Groups, wholes: Sequence[set[int]]) -> _Groups:
 def _best(
     groups: Mapping[tuple[str, tuple[str, ...]], Mapping[int, str]], n: int, reasons: dict[str, str]
 ) -> dict[str, tuple[str, ...]]:
-    """Of every quantity the group with all joints that is measured rather than commanded; none where two are alike."""
+    """Group of every quantity with all joints that is measured rather than commanded; none if two are alike."""
     best: dict[str, tuple[str, ...]] = {}
     for quantity in dict.fromkeys(key[0] for key in groups):
         of_it = {words: columns for (kind, words), columns in groups.items() if kind == quantity}
@@ -119,7 +119,7 @@ def _best(
 
 
 def _joint_of(name: ColumnName, model: RobotModel) -> tuple[int | None, tuple[str, ...]]:
-    """The joint whose name stands in that of a column, and the other words."""
+    """Joint whose name is part of a column's name, and the other words."""
     best: tuple[int, int, tuple[str, ...]] | None = None
     for joint, called in enumerate(model.joint_names):
         rest = _says(name, called)
@@ -146,7 +146,7 @@ def _run_together(text: str) -> str:
 
 
 def _kind(words: Sequence[str], *, named: bool, unit: str | None, slides: bool) -> str | None:
-    """The quantity that words speak of; with a joint's name and no word it is its position. What `slides` is driven by a force."""
+    """Quantity denoted by words; with a joint's name and no word it is its position. A joint that slides has a force."""
     telling = [word for word in words if word not in NEUTRAL]
     if not named and set(words) & CARTESIAN:
         return None

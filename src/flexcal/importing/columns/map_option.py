@@ -143,7 +143,7 @@ def _said(
     foreign: ForeignTable,
     model: RobotModel,
 ) -> ColumnAssignment:
-    """What was said, and what was guessed of the rest; a unit that was not said is that of the name, else the guessed one."""
+    """Assignment from the stated parts and the guess for the rest; a missing unit is that of the name, else the guessed one."""
     missing = [name for i, name in enumerate(names) if i not in entries]
     if missing and guessed is None:
         raise InputError(

@@ -18,20 +18,20 @@ if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
 
 DOUBTFUL = 0.05
-"""Share of the reach from which on the nominal robot does not go with the points."""
+"""Misfit relative to the reach from which the nominal robot contradicts the points."""
 _ODD = 0.01
-"""Share from which on an explanation is looked for: a robot is seldom so far from its URDF, wherever the point may be."""
+"""Misfit relative to the reach from which explanations are searched: a robot is seldom so far from its URDF, wherever the point may be."""
 _MADE_GOOD = 0.2
-"""What explains a misfit leaves less than this share of it."""
+"""Largest share of the misfit that remains with a valid explanation."""
 _FEWEST = 6
 _FEWEST_FROM_HAND = 9
-"""Poses: twice as many numbers as an instrument on the hand and what it sees leave open, less three."""
+"""Least number of poses: twice as many numbers as unknowns of an instrument on the hand and its object, less three."""
 _FROM_HAND = (
     "they fit a point that stands still and is seen from the hand (eye-in-hand), which is not supported: measure a point on the tool with "
     "an instrument that stands still (a tracker, a fixed camera)"
 )
 _ROTATION = 0.1
-"""How far a matrix may be from a rotation in what it does to lengths."""
+"""Largest deviation of a matrix from a rotation, in lengths."""
 _MOST_ROWS = 60
 _MOST_JOINTS = 8
 _TURNS = (0.0, np.pi / 2, -np.pi / 2, np.pi)
@@ -213,7 +213,7 @@ def _signs_and_zeros(model: RobotModel, tool: _Tool, q: np.ndarray, xyz: np.ndar
 
 
 def _said(model: RobotModel, placed: ColumnAssignment, change: _Change) -> dict[str, Any]:
-    """`proposal` and `options` of a misfit that a change explains."""
+    """Values of `proposal` and `options` for a misfit explained by a change."""
     words, options = [], []
     if change.mirrored:
         words.append(

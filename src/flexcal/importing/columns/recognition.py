@@ -116,7 +116,7 @@ def guess_columns(foreign: ForeignTable, model: RobotModel) -> RecognisedColumns
 def _left(
     names: Sequence[ColumnName], placed: Mapping[str, ColumnAssignment], reasons: Mapping[str, str]
 ) -> list[ColumnName]:
-    """The columns that are nothing yet."""
+    """Columns without an assignment so far."""
     taken = {column for assignment in placed.values() for column in assignment.columns}
     return [name for name in names if name.column not in taken and name.column not in reasons]
 

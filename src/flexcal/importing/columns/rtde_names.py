@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 JOINTS = 6
 TIME = "timestamp"
 TOOL = tuple(f"actual_TCP_pose_{i}" for i in range(3))
-"""Where the controller has its tool, m in the base frame; a rotation vector follows."""
+"""Column names of the controller's tool position, m in the base frame; a rotation vector follows."""
 _WHY = "names of Universal Robots' controllers"
 _OF_JOINTS = (("dq", "actual_qd", "rad/s"), ("tau", "actual_current_as_torque", "N m"))
 _REASONS = {
@@ -37,13 +37,13 @@ _REASONS = {
 _TURN = "the rotation vector of the tool; calibrate takes points alone"
 _IN_LOG = "tool pose computed by the controller from the joints, not measured"
 _SLOWEST = 1.1
-"""s: a log has a sample a second or more; what was recorded more rarely are poses."""
+"""Longest time step of a log, s; rarer samples are poses."""
 
 
 def rtde_columns(
     foreign: ForeignTable, model: RobotModel, reasons: dict[str, str]
 ) -> dict[str, ColumnAssignment]:
-    """What the columns are where they have these names, positions of six joints among them; nothing otherwise.
+    """Assignment of columns with these names, positions of six joints among them; empty otherwise.
 
     The tool's position counts as a measured point only where no time says that this is a log. `reasons` gets the columns of that
     interface that are not imported.

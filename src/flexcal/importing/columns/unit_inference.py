@@ -12,14 +12,14 @@ if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
 
 _OVER = 1.05
-"""Robots go past the limits in their URDF by so much, which are often rounded."""
+"""Tolerance by which robots exceed the limits in their URDF, which are often rounded."""
 _NEARLY_ALL = 0.95
-"""Share of the rows by which a unit is guessed: a wild value does not change it."""
+"""Share of the rows by which a unit is guessed, so that outliers do not change it."""
 _LARGEST = 4.0
-"""Points of one target lie within so many times the reach of their middle."""
+"""Largest distance of the points of one target from their middle, in units of the reach."""
 _SLOWEST_IN_MS = 110.0
 _LONGEST_AT_A_POSE = 1000.0
-"""From one measured pose to the next it takes seconds or minutes, fewer seconds than this."""
+"""Longest time between measured poses, which takes seconds or minutes, s."""
 
 
 def joint_units(model: RobotModel, q: np.ndarray) -> tuple[str, ...]:

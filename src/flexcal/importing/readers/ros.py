@@ -77,14 +77,14 @@ def read_ros(path: Path, joints: Sequence[str], topic: str | None) -> ForeignTab
 
 
 def _reason(problem: Exception) -> str:
-    """What rosbags says of a recording; in general words where it met what it had not expected."""
+    """Reason given by rosbags for an unreadable recording; in general words for unexpected exceptions."""
     own = type(problem).__module__.startswith("rosbags.") or isinstance(problem, OSError)
     text = " ".join(str(problem).split())[:200].rstrip(".")
     return text if own and text else "its content is not as ROS writes it"
 
 
 def _without_states(kinds: dict[str, str], notes: Sequence[str]) -> str:
-    """Why there are no joint states in a recording that has topics of these `kinds`."""
+    """Reason why a recording with topics of these `kinds` has no joint states."""
     named = sorted(topic for topic, kind in kinds.items() if kind == _JOINTS)
     if not named:
         seen = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(kinds.items()))

@@ -16,7 +16,7 @@ from flexcal.importing.tables import NUMBER, ForeignTable, find_header
 
 _SEPARATORS = ("\t", ";", ",", " ")
 _LOOKED_AT = 200
-"""Rows in which the header is looked for, and the last ones by which the separator is known."""
+"""Number of rows searched for the header, and of the last ones that determine the separator."""
 
 
 def read_text(path: Path) -> ForeignTable:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 STILL = 1e-3
-"""A joint stands still where it stays within this (rad or m)."""
+"""Range (rad or m) within which a joint stands still."""
 LONG_ENOUGH = 0.5
-"""For so long (s): half of it at either end of a standstill is left for what still swings."""
+"""Shortest standstill, s: half of it at either end is left out for decaying vibration."""
 ENOUGH_READINGS = 5
-"""From so many readings of a point in every pose on, their scatter is its standard deviation."""
+"""Number of readings of a point in every pose from which their scatter is its standard deviation."""
 
 
 def standstills(t: np.ndarray, q: np.ndarray) -> list[tuple[int, int]]:

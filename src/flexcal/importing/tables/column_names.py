@@ -50,9 +50,9 @@ _AS_WORD = {
     "rpm",
     "kg",
 }
-"""Units that a last word of a name is taken for."""
+"""Units recognised as the last word of a name."""
 _LAST_WORD = {"m", "s", "a", "n"}
-"""Units that it is taken for after other words only, and no number."""
+"""Units recognised only after other words, and no number."""
 _BRACKETS = re.compile(r"[\[({<]\s*([^\])}>]*?)\s*[\])}>]\s*$")
 _WORDS = re.compile(r"\d+|[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[θφτσω]|[^\W\d_a-zA-Z]+")
 
@@ -77,7 +77,7 @@ def is_unit(text: str) -> bool:
 
 
 def unit_of(text: str) -> str | None:
-    """The unit that a text means, as `signals:` writes it."""
+    """Unit denoted by a text, as `signals:` writes it."""
     return _SPELLINGS.get(text.strip().strip("[](){}<>").strip().lower())
 
 

@@ -17,7 +17,7 @@ POSITION = JOINT | _words(
     "a lage weg hub stroke position positions pos posicion posicao posizione state states value values encoder"
 )
 CARTESIAN = _words("tcp cartesian")
-"""Of the tool, so of no joint."""
+"""Words of the tool, which exclude joints."""
 NO_JOINT = _words("pose error err dev deviation force voltage limit mode offset digital analog")
 NO_JOINT |= _words("residual correction delta status")
 KINDS = (
@@ -32,11 +32,11 @@ KINDS = (
     ("current", _words("current currents i iq strom amp amps")),
     ("q", POSITION),
 )
-"""What one column a joint can be, the most telling words first."""
+"""Words of quantities with one column per joint, the most specific first."""
 FORCE = _words("force forces kraft fuerza forza forca effort")
-"""Of what drives a joint that slides; elsewhere of a sensor."""
+"""Words of the force of a prismatic joint; elsewhere of a sensor."""
 SLIDING = ("N", "m/s", "mm/s", "m/s^2", "mm/s^2")
-"""Units of joints that slide alone."""
+"""Units of prismatic joints only."""
 MEASURED = _words(
     "actual act ist measured meas feedback fb tracker lt smr mesure mesuree medido medida misurato misurata"
 )
@@ -62,7 +62,7 @@ SINGLE = {
 
 
 def rank(words: tuple[str, ...]) -> int:
-    """Measured before plain before commanded."""
+    """Rank of a column: measured before plain before commanded."""
     if set(words) & MEASURED:
         return 0
     return 2 if set(words) & COMMANDED else 1

@@ -8,7 +8,7 @@ from typing import Any
 from flexcal.report.layout import Check, percent, significant
 
 _WIDE = 0.05
-"""1σ of a factor from which its gain is not known well."""
+"""1σ of a factor from which its gain is poorly determined."""
 _UNLIKELY, _DIFFERENT = 0.01, 0.01
 """Probability of the difference between the halves, and its relative size, from which they do not agree."""
 

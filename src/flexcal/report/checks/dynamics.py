@@ -15,7 +15,7 @@ JOINT_LARGE = 25.0
 """Relative torque error of a joint, per cent, above which it is predicted poorly; small torques are mostly friction."""
 _SHOWN = 3
 _SENSOR = 0.1
-"""How far beside 1 the share of the external torques may lie outside its interval: axes turned by half a radian."""
+"""Largest distance of 1 from the interval of the external torque ratio: axes rotated by half a radian."""
 
 
 def check_unseen_torques(error: Mapping[str, Any], held_out: str) -> Check:
@@ -105,13 +105,13 @@ def check_shown(remarks: list[str]) -> Check:
 
 
 def check_weight(faults: list[str]) -> Check:
-    """Reservation about torques unlike the links' weight that were accepted."""
+    """Reservation about accepted torques that contradict the links' gravity torques."""
     question = "Do the torques hold the links' weight?"
     return Check(question, f"No, which was accepted: {faults[0]}.", "care")
 
 
 def check_weight_shares(shares: Mapping[str, Mapping[str, float]]) -> Check:
-    """Reservation about joints, named in `shares`, on which the links weigh far less or more than the URDF says."""
+    """Reservation about joints, named in `shares`, whose identified gravity torque differs much from that of the URDF."""
     told = "; ".join(
         f"on {joint} {significant(max(0.0, share['share']), 2)} times that (95 % interval {significant(share['low'], 2)} to "
         f"{significant(share['high'], 2)})"
@@ -126,7 +126,7 @@ def check_weight_shares(shares: Mapping[str, Mapping[str, float]]) -> Check:
 
 
 def check_external(share: Mapping[str, float]) -> Check:
-    """Whether the motors feel what the force sensor reads."""
+    """Check whether the motor torques agree with the force sensor."""
     question = "Do the motors feel what the force sensor reads?"
     size = f"{significant(share['share'], 3)} (95 % interval {significant(share['low'], 3)} to {significant(share['high'], 3)})"
     answer = f"The motor torques show {size} times the measured external torques."

@@ -59,7 +59,7 @@ def misfit_sentences(misfit: Misfit) -> str:
 
 
 def misfit_document(misfit: Misfit | None) -> dict[str, Any] | None:
-    """As results.json has it."""
+    """Misfit as in results.json."""
     return None if misfit is None else dict(vars(misfit)) | {"far": list(misfit.far)}
 
 

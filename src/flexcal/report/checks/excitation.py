@@ -9,10 +9,11 @@ from flexcal.report.layout import Check, percent, significant
 
 _COHERENT, _INCOHERENT = 0.95, 0.7
 _CHANCE, _UNLIKE, _MATTERS = 1.5, 3.0, 0.03
-"""Ratio of the halves' difference to its standard deviation from which it is no chance, from which it is large, and its relative size
-from which it matters."""
+"""Ratio of the halves' difference to its standard deviation from which it is significant, and large, and its relative size from which it
+matters.
+"""
 _MISSED = 0.1
-"""Relative difference of measured response and masses from which the masses are no description of the axis."""
+"""Relative difference of measured response and masses from which the masses do not describe the axis."""
 _UNBIASED, _BIASED = 0.01, 0.05
 """Bias by feedback, relative, up to which it does not matter at 19 of 20 lines, and from which it is bad at the median one."""
 

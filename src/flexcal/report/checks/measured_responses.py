@@ -15,9 +15,9 @@ from flexcal.report.results import relative_to_diagonal
 Limit = Literal["noise", "distortion"]
 
 _LARGE, _TOO_LARGE = 0.1, 0.3
-"""1σ over |G| from which a response is not known well, and from which its logarithm is not weighted right (to first order)."""
+"""Relative 1σ of a response from which it is poorly determined, and from which the weight of its logarithm is wrong (to first order)."""
 _UNLIKE = 2.0
-"""Times the median pose's from which a pose stands out."""
+"""Ratio to the median pose from which a pose is an outlier."""
 _FREEDOM = 20
 _FEW_LINES = 20
 """Lines of all poses below which the difference of two elements says little."""
@@ -39,7 +39,7 @@ def limit_of(entries: Sequence[Mapping[str, Any]]) -> Limit:
 
 
 def worst_pose(entries: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
-    """The one with the largest relative standard deviation."""
+    """Pose with the largest relative standard deviation."""
     return max(entries, key=lambda entry: entry["relative_std"])
 
 

@@ -13,7 +13,7 @@ BODILESS = 29.6
 UNLIKE = 3.0
 """Torque error over that of separate fits of every joint and recording, above which the robot's dynamics do not fit."""
 _WIDE = 0.05
-"""Relative standard deviation of the mass above which it is known poorly."""
+"""Relative standard deviation of the mass above which it is poorly determined."""
 
 
 def payload_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:

@@ -13,21 +13,23 @@ from flexcal.estimation import Estimate
 from flexcal.report.layout import Check, document_millimetres, millimetres, p_value
 
 CHANCE, MISSING = 1.35, 2.0
-"""Observed over predicted size of errors that chance exceeds once in a hundred robots, and from which the model must lack something.
+"""Ratio of observed to predicted errors exceeded by chance once in a hundred robots, and from which the model must lack something.
+Errors at all poses come from one draw of the parameters, which counts as about two dozen independent numbers however many poses there
+are.
 
 Errors at all poses come from one draw of the parameters, which counts as about two dozen independent numbers however many poses there are.
 """
 
 FEW_POSES = 20
 FEW_NUMBERS = 4.0
-"""Independent numbers in the errors at all poses below which their size says little."""
+"""Number of independent numbers in the errors at all poses below which their size says little."""
 OVERSTATED = 0.5
 """Noise over the stated sigma below which the stated one counts as wrong."""
 CLEAR_GAP = 3.0
 
 
 def check_fresh_poses(fitted: ErrorStatistics, fresh: ErrorStatistics) -> Check:
-    """Whether accuracy was checked on enough poses outside the fit, and is as good there."""
+    """Check of the accuracy at enough poses outside the fit, and against that of the fit."""
     question = "Was it verified on poses outside the fit?"
     answer = (
         f"Yes, on {fresh.poses}: P90 is {millimetres(fresh.p90)} mm there and {millimetres(fitted.p90)} mm on the "
@@ -45,7 +47,7 @@ def check_fresh_poses(fitted: ErrorStatistics, fresh: ErrorStatistics) -> Check:
 
 
 def check_unseen(fitted: Sequence[str]) -> Check:
-    """Whether the calibration was fitted to none of the files; `fitted` names those that it was fitted to."""
+    """Check that the calibration was fitted to none of the files; `fitted` names those that it was fitted to."""
     question = "Are the points outside the fit?"
     if fitted:
         which = " and ".join(fitted)
@@ -58,7 +60,7 @@ def check_unseen(fitted: Sequence[str]) -> Check:
 
 
 def check_enough(poses: int) -> Check:
-    """Whether so many poses are enough for a 90 % value."""
+    """Check that the number of poses suffices for a 90 % value."""
     question = "Were enough fresh poses measured?"
     if poses >= FEW_POSES:
         return Check(question, f"{poses} points; P90 rests on about {max(1, poses // 10)} of them.", "good")
@@ -250,7 +252,7 @@ def check_outliers(outliers: int, fit: ErrorStatistics) -> Check:
 
 
 def check_known_points(uncalibrated: Sequence[str]) -> Check:
-    """Of points `uncalibrated` that no calibration pose measured."""
+    """Check for points `uncalibrated`, measured in no calibration pose."""
     return Check(
         "Did the calibration measure these points?",
         f"Not {' and '.join(uncalibrated)}: where it is on the tool is as declared, and an error of that is in these numbers. "
@@ -260,7 +262,7 @@ def check_known_points(uncalibrated: Sequence[str]) -> Check:
 
 
 def check_setup_unchanged(proposed: Mapping[str, Any]) -> Check:
-    """Of what would leave less than half of the errors if placed again, as results.json has it under `refit_proposed`."""
+    """Check for a placement whose refit would halve the errors, as in `refit_proposed` of results.json."""
     what = " and ".join(
         {"station": "instrument", "point": "measured point"}[name] for name in proposed["what"]
     )

@@ -40,7 +40,7 @@ class Trust:
 
     @property
     def trusted(self) -> bool | None:
-        """True, false, or None where there are reservations or nothing to judge by."""
+        """True, false, or None with reservations or without a basis for a judgement."""
         return {"good": True, "bad": False}.get(self.status)
 
     @property
@@ -94,7 +94,7 @@ def verdict_answer(verdict: Mapping[str, Any]) -> str:
 
 
 def _phrase(check: Check) -> str:
-    """What a check found, as a clause."""
+    """Finding of a check, as a clause."""
     known = PHRASES[check.code]
     return known.get(check.status, known["else"])
 
@@ -263,4 +263,4 @@ PHRASES: dict[str, dict[str, str]] = {
         "else": "the robot's other estimates assume another payload",
     },
 }
-"""What each check found, as a clause, by code and status; "else" where a status has no clause of its own."""
+"""Finding of each check, as a clause, by code and status; "else" if a status has no clause of its own."""

@@ -14,7 +14,7 @@ from flexcal.units import MILLIMETRE
 
 COLOURS = [[0, GRID], [0.5, ELASTIC], [1, RIGID]]
 SHOWN = 4000
-"""Points drawn; of more, every so manieth."""
+"""Largest number of points drawn; of more, a regular subset."""
 
 
 def accuracy_space(accuracy: PredictedAccuracy) -> go.Figure:
@@ -45,7 +45,7 @@ def accuracy_space(accuracy: PredictedAccuracy) -> go.Figure:
 
 
 def colour_bar() -> dict[str, object]:
-    """The bar that says what the colours mean."""
+    """Colour bar."""
     return {
         "title": {"text": "95 % / mm", "side": "top"},
         "thickness": 12,
@@ -56,9 +56,9 @@ def colour_bar() -> dict[str, object]:
 
 
 _CELLS = 30
-"""Along the longer side of a view, with points enough for them."""
+"""Largest number of cells along the longer side of a view."""
 _POINTS = 8
-"""In a cell, on average, at least."""
+"""Least average number of points in a cell."""
 _VIEWS = {"from above": (0, 1), "from the side": (0, 2), "from the front": (1, 2)}
 
 

@@ -101,8 +101,9 @@ def response_fit(responses: Sequence[FittedResponse], labels: Sequence[str]) -> 
 
 
 def sensor_fit(responses: Sequence[FittedResponse], labels: Sequence[str]) -> go.Figure:
-    """Magnitude of what every sensor on the arm (row) reads per torque on each motor (column): dots measured, lines the model, one pose
-    shown at a time as in `response_fit`."""
+    """Magnitude of the readings of every sensor on the arm (row) per torque on each motor (column): dots measured, lines the model, one
+    pose shown at a time as in `response_fit`.
+    """
     units = {name: unit for r in responses for name, unit in zip(r.sensors, r.sensor_units, strict=True)}
     names, joints = list(units), responses[0].joints
     figure = panels(
@@ -160,7 +161,7 @@ def bode(
     fits: Mapping[str, np.ndarray],
     unit: str,
 ) -> go.Figure:
-    """Of one element: response (L,), its standard deviation (L,), the coherence (L,) and fitted responses (L,) by name."""
+    """Bode plot of one element: response (L,), its standard deviation (L,), the coherence (L,) and fitted responses (L,) by name."""
     figure = panels(3, 1, 640, ("magnitude", "phase", "coherence"), row_gap=0.08)
     x = as_float32(frequencies_hz)
     curves = [("measured", response, ELASTIC, "solid")]

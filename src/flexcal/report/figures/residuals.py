@@ -177,7 +177,7 @@ def residual_workspace(poses: PoseSet, residuals: np.ndarray) -> go.Figure:
 
 _FIELD_BINS = 10
 _SHOWN = 0.998
-"""Quantile of the sizes that the axis spans: single outliers would flatten the rest."""
+"""Quantile of the sizes spanned by the axis, so that outliers do not compress the rest."""
 
 
 def error_field(position: np.ndarray, residuals: np.ndarray) -> go.Figure:

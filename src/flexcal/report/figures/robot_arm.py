@@ -15,10 +15,10 @@ from flexcal.report.layout import ELASTIC, GRID, LINKS, NOMINAL, QUIET, RIGID, a
 from flexcal.units import MILLIMETRE
 
 _FAINT = 0.25
-"""Opacity of the links in all of these but the first."""
+"""Opacity of the links in all poses but the first."""
 
 _HEAD = 0.35
-"""Length of an arrow's head over that of the arrow."""
+"""Length of an arrow's head relative to that of the arrow."""
 
 
 def arm_poses(arms: ArmPoses, labels: Mapping[str, str], factors: Mapping[str, float]) -> go.Figure:

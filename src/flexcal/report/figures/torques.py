@@ -11,7 +11,7 @@ from flexcal.dynamics.diagnostics import TorquePrediction
 from flexcal.report.layout import ELASTIC, NOMINAL, RIGID, as_float32, log_ticks, panels, positive
 
 _APART = 1.5
-"""Steps from one row to the next, at least, across a gap."""
+"""Steps between rows above which there is a gap."""
 
 
 def torque_traces(units: Mapping[str, str], logs: Mapping[str, TorquePrediction]) -> go.Figure:
@@ -65,7 +65,7 @@ def _interrupted(time: np.ndarray, torque: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def labelled(units: Mapping[str, str]) -> tuple[str, ...]:
-    """The joints; where units differ, with those of the ones that slide."""
+    """Names of the joints; where units differ, prismatic ones with theirs."""
     mixed = len(set(units.values())) > 1
     return tuple(f"{joint} ({unit})" if mixed and unit == "N" else joint for joint, unit in units.items())
 

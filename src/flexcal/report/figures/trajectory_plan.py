@@ -89,8 +89,8 @@ _ARMS = 6
 
 
 def swept_paths(chains: Mapping[str, np.ndarray], links: Mapping[str, go.Mesh3d]) -> go.Figure:
-    """Of each motion the path of the arm's last corner, from corners (N, corners, 3), m, and the `links` at its beginning, one motion
-    shown at a time.
+    """Path of the arm's last corner in each motion, from corners (N, corners, 3), m, and the `links` at its beginning, one motion shown
+    at a time.
 
     Traces carry `meta = {"trajectory": label}`, by which the page chooses.
     """

@@ -1,4 +1,4 @@
-"""What pages and figures are made of: content blocks, number formats, colours, rendering to HTML."""
+"""Building blocks of pages and figures: content blocks, number formats, colours, rendering to HTML."""
 
 import lazy_loader
 

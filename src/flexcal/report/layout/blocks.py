@@ -67,7 +67,7 @@ class Verdict:
 
     @property
     def tally(self) -> str:
-        """How many checks are good, in words; the comparison with a simulation's truth is none that decides."""
+        """Number of good checks, in words; the comparison with a simulation's truth does not count."""
         return tally([check for check in self.checks if check.code != TRUTH])
 
 
@@ -116,7 +116,7 @@ class Selector:
 
 @dataclass(frozen=True)
 class Slider:
-    """How many times longer than they are a figure draws the vectors of those traces whose `meta` has the `exaggeration` they come with.
+    """Slider for the magnification of vectors in traces whose `meta` has the `exaggeration` they come with.
 
     `factors` are the choices; every option of the selector `key` has its own, `start` at first.
     """
@@ -190,14 +190,14 @@ TRUTH = "truth"
 
 
 def tally(checks: Sequence[Check]) -> str:
-    """How many checks are good, and how many could not be judged, in words."""
+    """Number of good checks, and of undecidable ones, in words."""
     good, unknown = (sum(check.status == status for check in checks) for status in ("good", "unknown"))
     words = f"{good} of {len(checks)} checks are good"
     return f"{words}, {unknown} cannot be judged" if unknown else words
 
 
 def worst(checks: Sequence[Check]) -> Status:
-    """The status of the least good check; those that could not be judged do not count."""
+    """Status of the worst check; undecidable ones do not count."""
     for status in ("bad", "care"):
         if any(check.status == status for check in checks):
             return status

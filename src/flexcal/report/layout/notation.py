@@ -9,7 +9,7 @@ from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.units import MILLIMETRE
 
 NOTHING = "–"
-"""Where there is no number."""
+"""Placeholder for a missing number."""
 
 _SCALED = {
     "m": (1e3, "mm"),
@@ -58,7 +58,7 @@ def significant(value: float | None, digits: int = 4) -> str:
 
 
 def to_half_width(value: float, half_width: float, digits: int = 2) -> str:
-    """A number with the decimals that half the width of its interval asks for: so many significant `digits` of it."""
+    """Number rounded to `digits` significant digits of the half width of its interval."""
     if not half_width > 0:
         return significant(value)
     decimals = max(0, digits - 1 - int(f"{half_width:.{digits - 1}e}".rpartition("e")[2]))
@@ -80,7 +80,7 @@ def spring_label(name: str) -> str:
 
 
 def ratio(worse: float, better: float) -> str:
-    """How many times smaller, in words for a sentence: "31 times"."""
+    """Factor of reduction, in words for a sentence: "31 times"."""
     if not better > 0:
         return "many times"
     times = worse / better
@@ -88,7 +88,7 @@ def ratio(worse: float, better: float) -> str:
 
 
 def sentences(remarks: Sequence[str]) -> tuple[str, ...]:
-    """Remarks as they end a line of the terminal, as sentences: with a capital and a full stop."""
+    """Remarks of the terminal as sentences: with a capital and a full stop."""
     return tuple(f"{remark[:1].upper()}{remark[1:]}." for remark in remarks)
 
 

@@ -91,7 +91,7 @@ _UP_ONLY = (
 
 
 def _applied(study: MapStudy) -> str:
-    """By what the predictions were multiplied."""
+    """Factor applied to the predictions."""
     verified = study.results["verification"]
     if verified is None or verified["applied"] == 1:
         return ""

@@ -17,7 +17,7 @@ from flexcal.report.results import MeasurementDetails
 from flexcal.units import MILLIMETRE
 
 _WIDTH, _ROW = 640.0, 34.0
-"""Of the strip of errors and one of its rows, in its own units."""
+"""Width of the error strip and height of one row, in its own units."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,7 @@ from flexcal.report.sections import BEFORE
 
 _MARKS = {"good": "✓", "care": "!", "bad": "✗", "unknown": "?"}
 _FILES = 8
-"""Files that are listed; the sheet holds no more."""
+"""Largest number of files listed on the sheet."""
 _REMARKS = 4
 
 

@@ -32,7 +32,7 @@ class ResponseStudy:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """What a reader calls the poses."""
+        """Labels of the poses in the report."""
         return tuple(f"Pose {response.pose + 1}" for response in self.responses)
 
 

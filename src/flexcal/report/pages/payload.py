@@ -130,7 +130,7 @@ def _table(study: PayloadStudy) -> Table:
 
 
 def _half_width(estimate: Estimate, name: str) -> float | None:
-    """Of the 95 % interval, in the unit that is printed."""
+    """Half width of the 95 % interval, in the printed unit."""
     interval = estimate.interval(name)
     return (
         None

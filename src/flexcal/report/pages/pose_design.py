@@ -73,7 +73,7 @@ def pose_page(study: PoseStudy) -> Page:
 
 
 def pose_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
-    """What to look at before measuring."""
+    """Checks of a plan before measuring."""
     checks = []
     for joint, sides in results.get("flanks", {}).items():
         least, total = min(sides.values()), sum(sides.values())

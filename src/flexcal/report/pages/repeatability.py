@@ -29,7 +29,7 @@ KINDS = {"nominal": "AP before (the robot's own)", "calibrated": "AP calibrated"
 
 
 _DRAWN, _LISTED = 20_000, 1000
-"""Visits in a figure and poses in a table, at most."""
+"""Largest number of visits in a figure and of poses in a table."""
 
 
 @dataclass(frozen=True, eq=False)

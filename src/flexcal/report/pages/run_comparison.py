@@ -53,7 +53,7 @@ def comparison_page(comparison: Comparison) -> Page:
 
 
 def comparison_verdict(comparison: Comparison) -> Verdict:
-    """Which of the two is more accurate, by how much, and whether that is more than chance."""
+    """Verdict on which run is more accurate, by how much, and whether that is significant."""
     first, second, difference = comparison.first, comparison.second, comparison.difference
     checks = _checks(comparison)
     status = worst(checks)

@@ -22,7 +22,7 @@ _HEADLINES: dict[Status, str] = {
 
 @dataclass(frozen=True, eq=False)
 class StiffnessStudy:
-    """What `identify stiffness` left: the document of results.json, the block of estimates.yaml, and the responses by pose."""
+    """Results of `identify stiffness`: the document of results.json, the block of estimates.yaml, and the responses by pose."""
 
     results: Mapping[str, Any]
     estimate: Estimate

@@ -108,7 +108,7 @@ def _verdict(study: VerificationStudy) -> Verdict:
 
 
 def _refitted(results: Mapping[str, Any]) -> str:
-    """What was fitted to the verification's own poses, in a sentence."""
+    """Sentence on the quantities fitted to the verification's own poses."""
     refit = results.get("refit")
     if not refit:
         return ""

@@ -1,4 +1,4 @@
-"""A measured frequency response and the fitted model's, as the reports draw them."""
+"""Measured frequency response and that of the fitted model, as plotted in reports."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class FittedResponse:
 
 
 def fitted_responses(result: SpringFit, robot: RobotModel) -> tuple[FittedResponse, ...]:
-    """Of every pose of a fit; `robot` has the payload of those that say nothing of it."""
+    """Fitted responses of every pose; `robot` has the payload of those without one."""
     declared = robot.payload.mass if robot.payload is not None else 0.0
     return tuple(
         FittedResponse(

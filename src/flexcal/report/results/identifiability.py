@@ -1,4 +1,4 @@
-"""Identifiable parameters of a calibration, and what was left out."""
+"""Identifiable and dropped parameters of a calibration."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from flexcal.estimation import Dropped
 
 @dataclass(frozen=True, eq=False)
 class IdentifiableParameters:
-    """Which of so many `parameters` are determined.
+    """Identifiable ones out of a number of `parameters`.
 
     `singular_values` and `diagonal` (of R) are relative to the largest; `gap` in decades; `weak` names the weakest directions that are
     kept, each with its singular value.
@@ -29,7 +29,7 @@ class IdentifiableParameters:
 
     @classmethod
     def stored(cls, block: Mapping[str, Any]) -> IdentifiableParameters:
-        """From the block of results.json."""
+        """Parameters read from the block of results.json."""
         dropped = tuple(
             Dropped(item["name"], tuple((by["name"], by["coefficient"]) for by in item["absorbed_by"]))
             for item in block["dropped"]

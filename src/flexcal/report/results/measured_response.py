@@ -18,12 +18,12 @@ class MeasuredResponse(Protocol):
 
     @property
     def frequencies_hz(self) -> np.ndarray:
-        """(L,) Hz."""
+        """Frequencies (L,), Hz."""
         ...
 
     @property
     def response(self) -> np.ndarray:
-        """(L, n, n) complex, rad/s² per N m."""
+        """Response (L, n, n), complex, rad/s² per N m."""
         ...
 
     @property
@@ -48,7 +48,7 @@ def relative_to_diagonal(std: np.ndarray, response: np.ndarray) -> np.ndarray:
 
 
 def uncertainty_sentence(responses: Sequence[MeasuredResponse]) -> str:
-    """How large the standard deviations are, at the median line of the diagonal, for those who cannot see a figure of them."""
+    """Sentence on the standard deviations at the median line of the diagonal, in place of a figure."""
     first = responses[0]
     share, noise = (
         100 * float(np.median([np.median(relative_to_diagonal(std, r.response)) for r, std in pairs]))

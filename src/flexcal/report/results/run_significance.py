@@ -11,7 +11,7 @@ import numpy as np
 from flexcal.estimation import Estimate
 
 _STRETCHES = 20
-"""Neighbours in measuring order err alike, so what counts are the means of so many stretches of it."""
+"""Number of stretches whose means count as independent, since errors of neighbours in measuring order are correlated."""
 LEVEL = 0.05
 
 
@@ -63,7 +63,8 @@ class ParameterChanges:
 
 
 def mean_difference(first: np.ndarray, second: np.ndarray, *, paired: bool) -> MeanDifference:
-    """Of the sizes of error vectors (N, 3) and (M, 3) m in measuring order; Student's t on means of stretches, Welch's where not `paired`.
+    """Difference of the mean sizes of error vectors (N, 3) and (M, 3) m in measuring order; Student's t on means of stretches, Welch's
+    if not `paired`.
 
     It speaks of other points measured with the same two robots, not of other robots or calibrations.
     """
@@ -88,7 +89,7 @@ def mean_difference(first: np.ndarray, second: np.ndarray, *, paired: bool) -> M
 
 
 def parameter_changes(first: Estimate, second: Estimate) -> ParameterChanges:
-    """From two independent estimates: difference over the square root of the summed variances.
+    """Changes between two independent estimates: difference over the square root of the summed variances.
 
     A kept parameter estimates itself and what it absorbed, so it is compared only where both absorbed the same.
     """
@@ -120,7 +121,7 @@ def parameter_changes(first: Estimate, second: Estimate) -> ParameterChanges:
 
 
 def _absorbed(estimate: Estimate) -> Mapping[str, set[str]]:
-    """What each kept parameter took up, by name."""
+    """Dropped parameters absorbed by each kept one, by name."""
     absorbed: dict[str, set[str]] = {}
     for dropped in estimate.dropped:
         for kept, coefficient in dropped.absorbed_by:

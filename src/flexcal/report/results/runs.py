@@ -1,4 +1,4 @@
-"""Two runs side by side, as their folders have them."""
+"""Comparison of two runs from their folders."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from flexcal.units import MILLIMETRE
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A run and what it left: errors of the calibrated robot (N, 3) m at joint positions `q` (N, n), measured (or true) at `points` (N, 3).
+    """Run of a verb: errors of the calibrated robot (N, 3) m at joint positions `q` (N, n), measured (or true) at `points` (N, 3).
 
     `before` are the errors of the robot as delivered, where known; `fresh` says that no fit saw the points. `data` are the SHA-256 of the
     measurements by name, `origin` all that the run says of where it comes from.
@@ -43,7 +43,7 @@ class Run:
 
     @property
     def after(self) -> ErrorStatistics:
-        """Of the calibrated robot."""
+        """Error statistics of the calibrated robot."""
         return ErrorStatistics.of(self.errors)
 
 
@@ -56,7 +56,7 @@ class Comparison:
 
     @cached_property
     def difference(self) -> MeanDifference:
-        """Of the mean errors, point by point where the same measurements stand behind both."""
+        """Difference of the mean errors, point by point if both have the same measurements."""
         first, second = self.first, self.second
         same = (
             first.q.shape == second.q.shape
@@ -67,7 +67,7 @@ class Comparison:
 
     @cached_property
     def changes(self) -> dict[Block, ParameterChanges]:
-        """Of the parameters, by the blocks that both runs have."""
+        """Changes of the parameters, by the blocks that both runs have."""
         pair = self.first.estimates, self.second.estimates
         return {
             block: parameter_changes(pair[0][block], pair[1][block])
@@ -84,7 +84,7 @@ class Comparison:
 
     @property
     def _common(self) -> tuple[str, ...]:
-        """How many of the measured points both fitted, in words, whatever files they were in."""
+        """Number of measured points that both fitted, in words, in whatever files."""
         first, second = (
             set(run.estimates["calibration"].measurements if "calibration" in run.estimates else ())
             for run in (self.first, self.second)
@@ -93,7 +93,7 @@ class Comparison:
         return (f"{count} of the same measured points",) if count else ()
 
     def document(self) -> dict[str, object]:
-        """What machines read; lengths in millimetres, `probability` and scores as `ParameterChanges` has them."""
+        """Machine-readable document; lengths in millimetres, `probability` and scores as in `ParameterChanges`."""
         difference = self.difference
         return {
             "runs": [run.name for run in (self.first, self.second)],

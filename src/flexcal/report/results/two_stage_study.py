@@ -1,4 +1,4 @@
-"""A two-stage calibration, as the folder of `flexcal demo` has it."""
+"""Two-stage calibration read from the folder of `flexcal demo`."""
 
 from __future__ import annotations
 
@@ -47,22 +47,22 @@ class TwoStageStudy:
 
     @property
     def truth(self) -> Mapping[str, float]:
-        """The robot as it really is: SI values by parameter name."""
+        """True parameters of the robot: SI values by parameter name."""
         return self.results["truth"]
 
     @property
     def stiffness(self) -> Estimate:
-        """What stage 1 found."""
+        """Estimate of stage 1."""
         return self.estimates["stiffness"]
 
     @property
     def geometry(self) -> Estimate:
-        """What stage 2 found."""
+        """Estimate of stage 2."""
         return self.estimates["calibration"]
 
     @property
     def determined(self) -> IdentifiableParameters:
-        """What the points of stage 2 determine."""
+        """Parameters determined by the points of stage 2."""
         return IdentifiableParameters.stored(self.results["identifiability"])
 
     @property
@@ -93,5 +93,5 @@ class TwoStageStudy:
 
     @property
     def floor(self) -> ErrorStatistics | None:
-        """What would remain at the fresh poses with every parameter known; None of a robot that has other parameters than the model."""
+        """Error at the fresh poses with every parameter known; None for a robot with other parameters than the model."""
         return None if self.results["verification"]["floor"] is None else self.errors("floor")

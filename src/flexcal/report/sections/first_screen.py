@@ -12,7 +12,7 @@ from flexcal.report.layout import NOTHING, ErrorRange, Fact, millimetres
 def headline_facts(
     before: ErrorStatistics | None, after: ErrorStatistics, trust: Trust, noun: str
 ) -> tuple[Fact, ...]:
-    """How accurate it was, how accurate it is, and whether it can be trusted; `noun` is poses or points."""
+    """Facts of the first screen: accuracy before and after, and trust; `noun` is poses or points."""
     was = _fact(
         "How accurate was it?", before, f"P90 over the {noun}, the robot's own error before calibration."
     )

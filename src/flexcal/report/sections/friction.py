@@ -8,7 +8,7 @@ from typing import Any
 from flexcal.report.layout import NOTHING, Block, Section, Table, Text, significant
 
 LONG = 12
-"""Rows from which the table of what was tried is folded away: the terms taken are said above it."""
+"""Number of rows from which the table of trials is folded."""
 
 
 def friction_section(results: Mapping[str, Any]) -> Section:

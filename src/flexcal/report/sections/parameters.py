@@ -97,7 +97,7 @@ def parameter_table(
 
 
 def coverage(estimate: Estimate, names: tuple[str, ...], truth: Mapping[str, float]) -> tuple[int, int]:
-    """How many 95 % intervals contain the (regrouped) truth, of how many."""
+    """Number of 95 % intervals that contain the (regrouped) truth, and of all."""
     should = estimate.regrouped(truth)
     seen = [(estimate.interval(name), should[name]) for name in names if name in truth]
     known = [(interval, value) for interval, value in seen if interval is not None]

@@ -1,4 +1,4 @@
-"""Origin of the numbers, and the command that reproduces them."""
+"""Provenance of the numbers, and the command that reproduces them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flexcal.report.layout import Block as PageBlock
 from flexcal.report.layout import Section, Table, Text
 
 _MANY = 20
-"""Input files from which they have a table of their own, folded: an experiment of several poses has hundreds."""
+"""Number of input files from which they have a folded table of their own: an experiment of several poses has hundreds."""
 
 
 def provenance_section(
@@ -57,7 +57,7 @@ def input_files(origin: Mapping[str, str]) -> dict[str, str]:
 
 
 def common_origin(estimates: Mapping[Block, Estimate]) -> dict[str, str]:
-    """What all blocks say of their origin; of the same key in several blocks with different values, each under the block's name."""
+    """Common provenance of all blocks; different values of a key stand under their blocks' names."""
     origin: dict[str, str] = {}
     for block, estimate in estimates.items():
         for key, value in estimate.provenance.items():

@@ -47,7 +47,7 @@ def unseen_springs(estimate: Estimate, names: Sequence[str]) -> tuple[str, ...]:
 
 
 def hardening_sentence(estimate: Estimate) -> str:
-    """What the drives harden by, where that was estimated; "" otherwise."""
+    """Sentence on the estimated hardening of the drives; "" without an estimate."""
     names = [name for name in estimate.parameters.names if name.endswith(".drive.hardening")]
     if not names:
         return ""
