@@ -7,7 +7,7 @@ import numpy as np
 
 from flexcal.data.plans import MultisinePlan
 from flexcal.data.recordings import Recording, RecordingLabel
-from flexcal.frequency.periodic import frequency_response, multisine_spectra, synthesise
+from flexcal.frequency.periodic import multisine_spectra, pose_response, synthesise
 
 AXES, REALISATIONS, PERIODS, SETTLE, LINES = 6, 4, 4, 2, 1000
 BASE_HZ, RATE_HZ = 0.25, 4000.0
@@ -16,14 +16,14 @@ BASE_HZ, RATE_HZ = 0.25, 4000.0
 def run() -> list[tuple[str, float, str]]:
     """Ratios (name, times faster, note): the same records, the same covariance of the mean and of the noise."""
     plan, recordings = experiment(np.random.default_rng(3))
-    ours = min(_seconds(lambda: frequency_response(plan, 0, recordings)) for _ in range(3))
+    ours = min(_seconds(lambda: pose_response(plan, 0, recordings)) for _ in range(3))
     results = []
     for name, transform in (("a DFT per line", dft_per_line), ("an FFT per block", fft_per_block)):
         naive = _seconds(lambda t=transform: loop(plan, recordings, t))
         results.append(
             (f"frequency response, loops with {name}", naive / ours, f"{naive:.2f} s against {ours:.3f} s")
         )
-    response = frequency_response(plan, 0, recordings).response
+    response = pose_response(plan, 0, recordings).response
     assert np.allclose(response, loop(plan, recordings, fft_per_block)[0], rtol=1e-8)
     return results
 

@@ -25,7 +25,7 @@ from .errors import FlexcalError, InputError
 from .estimation import Estimate
 from .export import export_urdf
 from .files.formats import read_yaml
-from .frequency.periodic import FrequencyResponse, frequency_response, frequency_responses
+from .frequency.periodic import FrequencyResponse, frequency_responses
 from .jobs.accuracy import (
     AccuracyMap,
     Certificate,
@@ -58,6 +58,7 @@ from .jobs.gains import GainsIdentification, identify_gains
 from .jobs.inertials import InertialsIdentification, identify_inertials
 from .jobs.inputs import CalibratedRobot
 from .jobs.payload import PayloadIdentification, identify_payload
+from .jobs.response import AxisResponse, frequency_response
 from .jobs.stiffness import StiffnessIdentification, identify_stiffness
 from .model.robot import RobotModel
 from .model.statics import gravity_torque, tool_at_rest
@@ -76,6 +77,7 @@ __all__ = [
     "TLS",
     "WLS",
     "AccuracyMap",
+    "AxisResponse",
     "CalibratedRobot",
     "Calibration",
     "CellConfig",

@@ -5,7 +5,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from flexcal.frequency.periodic import Average, averages, frequency_response
+from flexcal.frequency.periodic import Average, averages, pose_response
 
 
 def complex_normal(rng, *shape):
@@ -16,8 +16,8 @@ def complex_normal(rng, *shape):
 def test_all_averages_agree_without_noise(make_plan, linear_cell, rng, average):
     plan = make_plan()
     recordings = list(linear_cell(feedback=500.0).record(plan, rng))
-    expected = frequency_response(plan, 0, recordings).response
-    found = frequency_response(plan, 0, recordings, average).response
+    expected = pose_response(plan, 0, recordings).response
+    found = pose_response(plan, 0, recordings, average).response
     np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
 
 
@@ -53,14 +53,14 @@ def test_harmonic_is_the_inverse_of_the_mean_inverse(rng):
 def closed_loop_bias(make_plan, linear_cell, seeds):
     """Mean relative error over seeds of the diagonal, per average, where feedback carries sensor noise into the torque."""
     plan = make_plan(lines=2 * np.arange(4, 40) + 1)
-    exact = frequency_response(plan, 0, linear_cell().record(plan, np.random.default_rng(0))).response
+    exact = pose_response(plan, 0, linear_cell().record(plan, np.random.default_rng(0))).response
     errors = {average: [] for average in get_args(Average)}
     for seed in range(seeds):
         recordings = list(
             linear_cell(feedback=2e4, position_noise=1e-4).record(plan, np.random.default_rng(seed))
         )
         for average in errors:
-            found = frequency_response(plan, 0, recordings, average).response
+            found = pose_response(plan, 0, recordings, average).response
             errors[average].append(np.einsum("lii->li", found / exact - 1.0))
     return {average: np.abs(np.mean(values, 0)).mean() for average, values in errors.items()}
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flexcal.frequency.periodic import frequency_response, kronecker, pool_noise
+from flexcal.frequency.periodic import kronecker, pool_noise, pose_response
 from flexcal.frequency.periodic.covariance import (
     input_gain,
     output_noise,
@@ -28,12 +28,10 @@ def complex_normal(rng, *shape):
 def test_error_of_the_mean_is_what_the_covariance_says(make_plan, linear_cell, noise, signs):
     """16 seeds × 75 lines × 4 elements: E|δ|²/σ² = 1, 95 % regions hold the truth, the noise explains it all."""
     plan = make_plan(signs=signs, reference_amplitude=0.02)
-    exact = frequency_response(plan, 0, linear_cell().record(plan, np.random.default_rng(0)))
+    exact = pose_response(plan, 0, linear_cell().record(plan, np.random.default_rng(0)))
     ratios, noise_ratios, distances = [], [], []
     for seed in range(16):
-        found = frequency_response(
-            plan, 0, linear_cell(**NOISES[noise]).record(plan, np.random.default_rng(seed))
-        )
+        found = pose_response(plan, 0, linear_cell(**NOISES[noise]).record(plan, np.random.default_rng(seed)))
         error = np.abs(found.response - exact.response) ** 2
         ratios.append(error / found.std**2)
         noise_ratios.append(error / found.noise_std**2)
@@ -52,10 +50,10 @@ def test_error_of_the_mean_is_what_the_covariance_says(make_plan, linear_cell, n
 def test_every_line_is_covered(make_plan, linear_cell):
     """200 seeds: line by line and element by element, poles and zeros included, E|δ|²/σ² is near 1."""
     plan = make_plan()
-    exact = frequency_response(plan, 0, linear_cell().record(plan, np.random.default_rng(0))).response
+    exact = pose_response(plan, 0, linear_cell().record(plan, np.random.default_rng(0))).response
     ratios = []
     for seed in range(200):
-        found = frequency_response(
+        found = pose_response(
             plan, 0, linear_cell(position_noise=2e-5).record(plan, np.random.default_rng(seed))
         )
         ratios.append(np.abs(found.response - exact) ** 2 / found.std**2)

@@ -10,10 +10,10 @@ from refusals import refused
 from flexcal.data.recordings import Recording, RecordingLabel
 from flexcal.frequency.periodic import (
     excitation_torque,
-    frequency_response,
     kronecker,
     local_polynomial_responses,
     odd_lines,
+    pose_response,
 )
 from flexcal.frequency.periodic.local_polynomial import local_polynomial, without_transient
 
@@ -132,7 +132,7 @@ def test_it_agrees_with_averaging_in_the_steady_state(make_plan, linear_cell, me
     plan = make_plan(reference_amplitude=0.05, periods=4)
     recordings = list(linear_cell(position_noise=2e-7, torque_noise=1e-3).record(plan, rng))
     (local,) = local_polynomial_responses(plan, recordings, joint_names=("a", "b"))
-    averaged = frequency_response(plan, 0, recordings)
+    averaged = pose_response(plan, 0, recordings)
     true = mechanism.acceleration_response(local.omega)
     sharp = np.abs(local.response - true).max((1, 2)) / np.abs(true).max((1, 2))
     assert np.median(sharp) < 0.01

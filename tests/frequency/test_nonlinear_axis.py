@@ -8,9 +8,9 @@ import pytest
 from flexcal.data.recordings import Recording, RecordingLabel
 from flexcal.frequency.periodic import (
     excitation_torque,
-    frequency_response,
     noise_lines,
     odd_lines,
+    pose_response,
     reference_trajectory,
     spectrum,
 )
@@ -88,7 +88,7 @@ def test_half_integer_reference_keeps_coulomb_sidebands_off_the_excited_lines(ma
     for frequency in (2.125, 2.25):
         plan = make_axis_plan(make_plan, frequency)
         recordings = list(record_axis(plan, coulomb=30.0))
-        found = frequency_response(plan, 0, recordings)
+        found = pose_response(plan, 0, recordings)
         direct = np.sqrt((np.abs(found.realisations - found.realisations.mean(0)) ** 2).sum(0) / 7)
         scatter[frequency] = np.mean(direct / np.abs(found.response))
         assert (
@@ -115,14 +115,14 @@ def test_noise_is_found_under_the_friction(make_plan):
     found = np.mean(np.abs(spectrum(half_sum, 2, high)) ** 2)
     expected = (1e-5**2 / 2) * 4 / 8000  # half sum, phasor scale 2/N squared times N
     assert 0.7 < found / expected < 1.4
-    response = frequency_response(plan, 0, recordings)
+    response = pose_response(plan, 0, recordings)
     assert (response.distortion_std[:-40] > 3 * response.noise_std[:-40]).mean() > 0.9
 
 
 def test_cubic_stiffness_shows_as_distortion(make_plan):
     plan = make_axis_plan(make_plan, 2.125, reference_amplitude=0.0, kp=np.zeros(1))
     linear, cubic = (
-        frequency_response(
+        pose_response(
             plan, 0, record_axis(plan, spring=2e4, cubic=c, noise=1e-7, rng=np.random.default_rng(1))
         )
         for c in (0.0, 3e8)
@@ -131,7 +131,7 @@ def test_cubic_stiffness_shows_as_distortion(make_plan):
     assert np.median(cubic.distortion_std[low] / cubic.noise_std[low]) > 5.0
     assert 0.7 < np.median(linear.std[low] / linear.noise_std[low]) < 1.3
     quieter = replace(plan, amplitude=plan.amplitude / 10)
-    small = frequency_response(
+    small = pose_response(
         quieter, 0, record_axis(quieter, spring=2e4, cubic=3e8, noise=1e-8, rng=np.random.default_rng(1))
     )
     ratio = np.median(cubic.distortion_std[low]) / np.median(np.maximum(small.distortion_std[low], 1e-12))

@@ -8,9 +8,9 @@ from refusals import refused
 
 from flexcal.frequency.periodic import (
     FrequencyResponse,
-    frequency_response,
     frequency_responses,
     leave_out_detection_lines,
+    pose_response,
 )
 
 
@@ -24,29 +24,29 @@ def test_exact_hold_is_corrected(make_plan, linear_cell, mechanism, rng):
     """A zero-order-hold simulation at 1 kHz: 0.01 % after the correction (what is left is aliasing), 12 % without."""
     plan = make_plan(rate_hz=1000.0)
     recordings = list(linear_cell().record(plan, rng))
-    assert relative_error(frequency_response(plan, 0, recordings), mechanism) < 2e-4
-    uncorrected = frequency_response(replace(plan, torque="instantaneous"), 0, recordings)
+    assert relative_error(pose_response(plan, 0, recordings), mechanism) < 2e-4
+    uncorrected = pose_response(replace(plan, torque="instantaneous"), 0, recordings)
     assert relative_error(uncorrected, mechanism) > 0.1
 
 
 def test_subtraction_removes_reference_and_even_nonlinearity(make_plan, linear_cell, rng):
     plan = make_plan()
-    plain = frequency_response(plan, 0, linear_cell().record(plan, rng)).response
+    plain = pose_response(plan, 0, linear_cell().record(plan, rng)).response
     moving = replace(plan, reference_amplitude=0.03)
     cell = linear_cell(reference_torque=40.0, even=lambda q: 300.0 * q**2 + 2e7 * q**4)
-    removed = frequency_response(moving, 0, cell.record(moving, rng))
+    removed = pose_response(moving, 0, cell.record(moving, rng))
     np.testing.assert_allclose(removed.response, plain, atol=1e-9 * np.abs(plain).max())
     one_sign = replace(moving, signs=False)
-    kept = frequency_response(one_sign, 0, cell.record(one_sign, rng)).response
+    kept = pose_response(one_sign, 0, cell.record(one_sign, rng)).response
     np.testing.assert_allclose(kept, plain, atol=1e-9 * np.abs(plain).max())  # even: only unexcited lines
     on_grid = replace(one_sign, reference_frequency_hz=13 * plan.base_frequency_hz)
-    spoilt = frequency_response(on_grid, 0, cell.record(on_grid, rng)).response
+    spoilt = pose_response(on_grid, 0, cell.record(on_grid, rng)).response
     assert np.abs(spoilt - plain).max() > 0.1 * np.abs(plain).max()
 
 
 def test_result_describes_the_experiment(make_plan, linear_cell, rng, tmp_path):
     plan = make_plan(payload=2.0)
-    found = frequency_response(plan, 0, linear_cell(position_noise=1e-5).record(plan, rng), "logarithmic")
+    found = pose_response(plan, 0, linear_cell(position_noise=1e-5).record(plan, rng), "logarithmic")
     n_lines = plan.lines.size
     assert found.response.shape == (n_lines, 2, 2) and found.covariance.shape == (n_lines, 4, 4)
     assert found.realisations.shape == (4, n_lines, 2, 2) and found.degrees_of_freedom == 45.0
@@ -89,7 +89,7 @@ def test_poses_are_streamed_in_one_pass(make_plan, linear_cell, rng):
     assert [one.pose for one in found] == [0, 1] and found[1].joints == ("a", "b")
     np.testing.assert_allclose(found[1].q_mean, plan.poses[1], atol=1e-6)
     shuffled = [recordings[i] for i in rng.permutation(len(recordings))]
-    np.testing.assert_allclose(frequency_response(plan, 1, shuffled).response, found[1].response, rtol=1e-12)
+    np.testing.assert_allclose(pose_response(plan, 1, shuffled).response, found[1].response, rtol=1e-12)
     with refused("E-FRF-024", "1", "16", "2", "pose_2_realisation_4_experiment_2_minus"):
         list(frequency_responses(plan, recordings[:-1]))
 
@@ -101,7 +101,7 @@ def test_bad_recordings_are_refused(make_plan, linear_cell, rng):
 
     def check(recordings, refusal, plan=plan, **options):
         with refused(*refusal):
-            frequency_response(plan, 0, recordings, **options)
+            pose_response(plan, 0, recordings, **options)
 
     check(good[:-1], ["E-FRF-024", "pose_1_realisation_4_experiment_2_minus"])
     check([*good, first], ["E-FRF-025", "pose_1_realisation_1_experiment_1_plus is there twice"])
@@ -142,7 +142,7 @@ def test_lines_left_out_show_the_odd_distortion(make_plan, linear_cell, rng):
         return gain * position**3
 
     noise = 2e-7
-    found = frequency_response(plan, 0, linear_cell(even=cubic, position_noise=noise).record(plan, rng))
+    found = pose_response(plan, 0, linear_cell(even=cubic, position_noise=noise).record(plan, rng))
     bent, straight = [], []
     for recording in linear_cell().record(plan, rng):
         moved = recording.q[-400:, [0, 2]] - recording.q[-400:, [0, 2]].mean(0)
@@ -154,6 +154,6 @@ def test_lines_left_out_show_the_odd_distortion(make_plan, linear_cell, rng):
     expected = np.sqrt(np.mean(np.abs(bent) ** 2, axis=(0, 1)) / np.mean(np.abs(straight) ** 2, axis=(0, 1)))
     assert expected.min() > 1e-3
     np.testing.assert_allclose(found.odd_distortion, expected, rtol=0.2)
-    linear = frequency_response(plan, 0, linear_cell(position_noise=noise).record(plan, rng))
+    linear = pose_response(plan, 0, linear_cell(position_noise=noise).record(plan, rng))
     assert (linear.odd_distortion < 0.2 * expected).all()
-    assert frequency_response(make_plan(), 0, linear_cell().record(make_plan(), rng)).odd_distortion is None
+    assert pose_response(make_plan(), 0, linear_cell().record(make_plan(), rng)).odd_distortion is None

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from flexcal.frequency.periodic import frequency_response, local_polynomial_responses
+from flexcal.frequency.periodic import local_polynomial_responses, pose_response
 
 MIX = np.array([3.0, -2.0])
 """What the sensor reads is this mixture of the motors' displacements, and noise of its own."""
@@ -30,12 +30,12 @@ def expected(response, mechanism):
 @pytest.mark.parametrize("method", ["arithmetic", "h1", "joint_input_output"])
 def test_rows_of_a_sensor_without_noise(make_plan, linear_cell, mechanism, rng, method) -> None:
     plan = make_plan(rate_hz=1000.0)
-    found = frequency_response(plan, 0, sensing(linear_cell().record(plan, rng), plan, 0.0, rng), method)
+    found = pose_response(plan, 0, sensing(linear_cell().record(plan, rng), plan, 0.0, rng), method)
     assert found.outputs == ("joint_1", "joint_3", "probe") and found.response.shape[1:] == (2, 2)
     truth = expected(found, mechanism)
     difference = np.abs(found.stacked - truth).max(axis=2) / np.linalg.norm(truth, axis=2)
     assert difference.max() < 2e-3
-    alone = frequency_response(plan, 0, linear_cell().record(plan, rng), method)
+    alone = pose_response(plan, 0, linear_cell().record(plan, rng), method)
     np.testing.assert_array_equal(found.response, alone.response)
 
 
@@ -46,10 +46,10 @@ def test_joint_covariance_is_that_of_the_scatter(make_plan, linear_cell, mechani
     truth, squares, cross = None, [], []
     for seed in range(40):
         rng = np.random.default_rng([3, seed])
-        found = frequency_response(plan, 0, sensing(cell.record(plan, rng), plan, 4e-5, rng))
+        found = pose_response(plan, 0, sensing(cell.record(plan, rng), plan, 4e-5, rng))
         if truth is None:
             exact = np.random.default_rng(0)
-            truth = frequency_response(plan, 0, sensing(plain.record(plan, exact), plan, 0.0, exact)).stacked
+            truth = pose_response(plan, 0, sensing(plain.record(plan, exact), plan, 0.0, exact)).stacked
         error = np.swapaxes(found.stacked - truth, 1, 2).reshape(len(truth), 6)
         white = np.linalg.solve(np.linalg.cholesky(found.stacked_covariance), error[:, :, None])[:, :, 0]
         squares.append(np.mean(np.abs(white) ** 2, axis=0))
@@ -70,8 +70,8 @@ def test_local_polynomial_method_has_the_rows_too(make_plan, linear_cell, mechan
 def test_what_does_not_fit_is_refused(make_plan, linear_cell, rng) -> None:
     plan = make_plan()
     with refused("E-FRF-038", "probe"):
-        frequency_response(plan, 0, sensing(linear_cell().record(plan, rng), plan, 1e-6, rng), "logarithmic")
+        pose_response(plan, 0, sensing(linear_cell().record(plan, rng), plan, 1e-6, rng), "logarithmic")
     mixed = list(linear_cell().record(plan, rng))
     mixed[:3] = sensing(mixed[:3], plan, 1e-6, rng)
     with refused("E-FRF-027", "none", "probe"):
-        frequency_response(plan, 0, mixed)
+        pose_response(plan, 0, mixed)

@@ -15,7 +15,7 @@ from .multisine import (
     samples_per_period,
     synthesise,
 )
-from .response import FrequencyResponse, frequency_response, frequency_responses
+from .response import FrequencyResponse, frequency_responses, pose_response
 from .symmetry import reciprocity
 
 __all__ = [
@@ -25,7 +25,6 @@ __all__ = [
     "LocalWindows",
     "crest_factor",
     "excitation_torque",
-    "frequency_response",
     "frequency_responses",
     "half_integer_frequency",
     "hold_factor",
@@ -37,6 +36,7 @@ __all__ = [
     "odd_lines",
     "orthogonal_matrix",
     "pool_noise",
+    "pose_response",
     "projected",
     "reciprocity",
     "reference_trajectory",

@@ -257,7 +257,7 @@ class FrequencyResponse:
         )
 
 
-def frequency_response(
+def pose_response(
     plan: MultisinePlan,
     pose: int,
     recordings: Iterable[Recording],
@@ -298,20 +298,6 @@ def frequency_response(
     FlexcalError
         Where a recording is missing, double, too short or does not fit the plan, where there are fewer than two realisations (then
         see `local_polynomial_responses`), or the excitation does not reach every axis.
-
-    Examples
-    --------
-    Joint 2 of the virtual cell alone is excited:
-
-    >>> from dataclasses import replace
-    >>> from flexcal import RobotModel, VirtualCell, frequency_plan, frequency_response
-    >>> model = RobotModel.from_yaml("examples/tx90l/robot.yaml", estimates=False)
-    >>> plan = frequency_plan(model, "examples/tx90l/frequency_poses.csv", "default", seed=0)
-    >>> plan = replace(plan, joints=(1,), amplitude=plan.amplitude[1:2], poses=plan.poses[:1])
-    >>> plan = replace(plan, realisations=3, signs=False, periods=2, settle_periods=1)
-    >>> measured = frequency_response(plan, 0, VirtualCell(model).record(plan))
-    >>> measured.response.shape
-    (154, 1, 1)
     """
     (records,) = by_pose(plan, recordings, keep_periods, [pose])
     return response_of(records, average, joint_names=joint_names, pooled_lines=pooled_lines)
@@ -333,8 +319,13 @@ def frequency_responses(
         Plan of the experiment.
     recordings : iterable of Recording
         Labelled recordings, in any order.
-    average, joint_names, pooled_lines
-        As `frequency_response` takes them.
+    average : {"arithmetic", "logarithmic", "harmonic", "h1", "joint_input_output", "errors_in_variables"}
+        How the realisations are averaged.
+    joint_names : sequence of str, optional
+        Names of the excited axes.
+    pooled_lines : int
+        Number of neighbouring lines that share one covariance; more in the proportion of outputs to axes where sensors on the arm
+        recorded too.
 
     Returns
     -------
@@ -344,7 +335,8 @@ def frequency_responses(
     Raises
     ------
     FlexcalError
-        As `frequency_response` does.
+        Where a recording is missing, double, too short or does not fit the plan, where there are fewer than two realisations, or the
+        excitation does not reach every axis.
 
     Examples
     --------
@@ -368,7 +360,7 @@ def response_of(
     joint_names: Sequence[str] | None = None,
     pooled_lines: int = POOLED_LINES,
 ) -> FrequencyResponse:
-    """Frequency response from collected spectra; see `frequency_response`."""
+    """Frequency response from collected spectra; see `pose_response`."""
     plan = records.plan
     joints = axis_names(plan, joint_names)
     members = plan.realisations

@@ -1,5 +1,5 @@
 from .assignment import ColumnAssignment
-from .excitation_records import ResponseRecords, read_response_records
+from .excitation_records import ExcitationSource, ResponseRecords, read_response_records, record_paths
 from .map_option import apply_map
 from .nominal_consistency import NominalMismatch, check_nominal
 from .recognition import RecognisedColumns, UnusedColumn, guess_columns, reasons_unused
@@ -8,6 +8,7 @@ from .rtde_names import TOOL
 __all__ = [
     "TOOL",
     "ColumnAssignment",
+    "ExcitationSource",
     "NominalMismatch",
     "RecognisedColumns",
     "ResponseRecords",
@@ -17,4 +18,5 @@ __all__ = [
     "guess_columns",
     "read_response_records",
     "reasons_unused",
+    "record_paths",
 ]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from flexcal.data.recordings import LATE, TimeSummary, uniform_blocks
+from flexcal.data.tables import Table, TableFile
 from flexcal.errors import InputError
 from flexcal.frequency.arbitrary import SHORTEST, Channel, ExcitationRecord
 from flexcal.importing.columns.excitation_columns import ResponseColumns, response_columns
@@ -17,6 +18,8 @@ from flexcal.importing.readers import read_foreign
 from flexcal.importing.tables import ForeignTable, parse_name
 from flexcal.units import LARGEST
 
+ExcitationSource = Path | Mapping[str, np.ndarray]
+"""Record of an excitation: a file, or columns (N,) by name."""
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 
 
@@ -42,19 +45,23 @@ class ResponseRecords:
 
 
 def read_response_records(
-    files: Sequence[Path],
+    sources: Sequence[ExcitationSource],
     *,
     inputs: Sequence[str] = (),
     outputs: Sequence[str] = (),
     references: Sequence[str] = (),
     rate_hz: float | None = None,
 ) -> ResponseRecords:
-    """Read files of one experiment; the columns are those of the first file.
+    """Records of one experiment from files, or from columns in memory; the columns are those of the first.
 
     `rate_hz` is the sampling rate of files without a column of time. Raises `InputError` where a file lacks a column, holds a cell that is
     no number, or a time that does not grow.
     """
-    tables = [read_foreign(file, ()) for file in files]
+    files = record_paths(sources)
+    tables = [
+        read_foreign(source, ()) if isinstance(source, Path) else _table(file, source)
+        for file, source in zip(files, sources, strict=True)
+    ]
     columns = response_columns(tables[0], inputs=inputs, outputs=outputs, references=references)
     if columns.guessed and not all(_is_whole(table, columns) for table in tables):
         columns = replace(columns, references=(), guessed=False)
@@ -76,6 +83,25 @@ def read_response_records(
         _merged(remarks, len(files)),
         columns.guessed,
     )
+
+
+def record_paths(sources: Sequence[ExcitationSource]) -> tuple[Path, ...]:
+    """The files, and in place of columns in memory their names, "record 1" and so on."""
+    return tuple(
+        source if isinstance(source, Path) else Path(f"record {number}")
+        for number, source in enumerate(sources, start=1)
+    )
+
+
+def _table(name: Path, columns: Mapping[str, np.ndarray]) -> ForeignTable:
+    values = {key: np.asarray(column, dtype=float) for key, column in columns.items()}
+    lengths = {len(column) if column.ndim == 1 else -1 for column in values.values()}
+    if len(lengths) != 1 or min(lengths) < 1:
+        raise InputError(
+            "E-IMPORT-056",
+            f"{name}: columns of a record have one number a sample, and all are of one length.",
+        )
+    return ForeignTable(Table(TableFile(name, tuple(values), 1), 1, values))
 
 
 def _is_whole(table: ForeignTable, columns: ResponseColumns) -> bool:

@@ -1,7 +1,15 @@
 from .comparison import compare_folders
 from .customer import customer_report
 from .report import REPORT, report_folder, two_stage_study
-from .result import Identification, PlottedResult, ReportedResult, Result, TorqueIdentification, summary_row
+from .result import (
+    Identification,
+    PlottedResult,
+    ReportedResult,
+    Result,
+    TorqueIdentification,
+    WrittenResult,
+    summary_row,
+)
 
 __all__ = [
     "REPORT",
@@ -10,6 +18,7 @@ __all__ = [
     "ReportedResult",
     "Result",
     "TorqueIdentification",
+    "WrittenResult",
     "compare_folders",
     "customer_report",
     "report_folder",

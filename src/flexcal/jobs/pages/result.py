@@ -22,30 +22,44 @@ from flexcal.model.robot import RobotModel
 from flexcal.report.layout import Page, write_page
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Result(ABC):
-    """Result of a verb about the robot `model`: a short `repr`, a summary in text, and all numbers as a document."""
+class SummarisedResult(ABC):
+    """Result of a verb: a short `repr`, a summary in text, and all numbers as a document."""
 
-    model: RobotModel
+    @property
+    @abstractmethod
+    def subject(self) -> str:
+        """Name of the robot or of the measurement that the result is about."""
 
     @property
     @abstractmethod
     def headline(self) -> str:
-        """Result in one line, without the robot's name."""
+        """The result in one line, without the subject."""
 
     @abstractmethod
     def summary(self) -> str:
-        """Summary of the result in a few lines of text."""
+        """The result in a few lines of text, for people."""
 
     @abstractmethod
     def document(self) -> dict[str, Any]:
-        """Results as a document, as results.json or --json has them."""
+        """All numbers, as results.json or --json has them."""
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} of {self.model.name}: {self.headline}>"
+        return f"<{type(self).__name__} of {self.subject}: {self.headline}>"
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(self.summary())}</pre>"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Result(SummarisedResult):
+    """Result of a verb about the robot `model`."""
+
+    model: RobotModel
+
+    @property
+    def subject(self) -> str:
+        """Name of the robot."""
+        return self.model.name
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -74,9 +88,8 @@ class PlottedResult(Result):
         return path
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class ReportedResult(Result):
-    """Result with a report and the folder of files that it is made from."""
+class WrittenResult(SummarisedResult):
+    """Result with a folder of files, and a report that is made from them."""
 
     @abstractmethod
     def write_arrays(self, folder: Path) -> None:
@@ -114,6 +127,11 @@ class ReportedResult(Result):
             self.write(folder)
             write_text(path, (Path(folder) / REPORT).read_text("utf-8"))
         return path
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ReportedResult(Result, WrittenResult):
+    """Result about a robot, with a folder of files and a report that is made from them."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

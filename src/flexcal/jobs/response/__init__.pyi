@@ -1,8 +1,10 @@
 from .planned import identify_response
-from .unplanned import ExcitationOptions, identify_excitation
+from .unplanned import AxisResponse, ExcitationOptions, frequency_response, identify_excitation
 
 __all__ = [
+    "AxisResponse",
     "ExcitationOptions",
+    "frequency_response",
     "identify_excitation",
     "identify_response",
 ]

@@ -95,7 +95,7 @@ def identify_response(
 ) -> IdentifiedResponses:
     """Reduce the joint logs in `folder` to response_pose_<p>.npz in `out`, one recording in memory at a time.
 
-    `method` averages the realisations in one of the ways of `frequency_response`, or is the local polynomial method. The plan goes with
+    `method` averages the realisations in one of the ways of `frequency_responses`, or is the local polynomial method. The plan goes with
     the responses: the fit of stage 1 needs its reference motion. results.json and report.html go there too.
     Raises `FlexcalError` where a log is missing, has gaps or does not fit the plan.
     """

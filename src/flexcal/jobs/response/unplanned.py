@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -38,10 +38,11 @@ from flexcal.frequency.arbitrary import (
     half_difference,
     local_response,
 )
-from flexcal.importing.columns import ResponseRecords, read_response_records
+from flexcal.importing.columns import ResponseRecords, read_response_records, record_paths
+from flexcal.jobs.pages import WrittenResult, summary_row
 from flexcal.jobs.response.feedback import FeedbackCheck
 from flexcal.jobs.response.spectra import measure_spectra
-from flexcal.jobs.result_files import RunRecord, header, write_response_arrays, write_results
+from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, header, write_response_arrays
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust, excitation_checks
 
@@ -62,9 +63,33 @@ class ExcitationOptions:
     masses: int | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class IdentifiedExcitation:
-    """Frequency response of the records `measured`, its modes, and the masses of the axis."""
+@dataclass(frozen=True, eq=False, repr=False)
+class AxisResponse(WrittenResult):
+    """Result of `frequency_response`: response of an axis to any excitation, its modes, and its masses.
+
+    Attributes
+    ----------
+    measured : ResponseRecords
+        Records with their channels.
+    options : ExcitationOptions
+        What was asked for.
+    spectra : RecordSpectra
+        Spectra of the records in the band.
+    identified : IdentifiedModes
+        The fitted modes, and the measured response.
+    masses : AxisMasses
+        Fits of one to three masses, and the chosen one.
+    halves : HalfDifference or None
+        Difference of the first half of the records from the second; None where they are too few.
+    fed : FeedbackCheck
+        Effect of a controller on the output.
+    period_s : float or None
+        Period of the excitation, s; None where it has none.
+    files : tuple of Path
+        The files, or names of records in memory.
+    record : RunRecord
+        What the result comes from, where it was made from files.
+    """
 
     measured: ResponseRecords
     options: ExcitationOptions
@@ -74,11 +99,49 @@ class IdentifiedExcitation:
     halves: HalfDifference | None
     fed: FeedbackCheck
     period_s: float | None
-    record: RunRecord
     files: tuple[Path, ...]
+    record: RunRecord = NOT_RECORDED
+
+    @property
+    def subject(self) -> str:
+        """Names of the records."""
+        first, *others = (file.name for file in self.files)
+        return first + (f" and {len(others)} more" if others else "")
+
+    @property
+    def headline(self) -> str:
+        """Band, resonances and number of masses."""
+        lines = self.response.frequencies_hz
+        frequencies = ", ".join(f"{item.frequency_hz.estimate:.4g}" for item in self.resonances)
+        return (
+            f"{len(lines)} lines from {lines[0]:.3g} to {lines[-1]:.3g} Hz; "
+            + (f"resonances at {frequencies} Hz" if frequencies else "no resonance")
+            + (f"; {self.masses.count} masses" if self.masses.chosen is not None else "")
+        )
+
+    def summary(self) -> str:
+        """Band and resonances, the masses with their standard deviations, remarks and verdict."""
+        parameters = self._numbers["masses"]["parameters"]
+        rows = [
+            summary_row(name, one["estimate"], one["std"], one["unit"]) for name, one in parameters.items()
+        ]
+        return "\n".join([self.headline, *rows, *self._numbers["remarks"], self.trust.sentence])
+
+    @property
+    def resonances(self) -> tuple[Resonance, ...]:
+        """Fitted resonances, each with `frequency_hz` and `damping`, with their standard deviations."""
+        return resonances(self.identified.fit)
+
+    def write_arrays(self, folder: Path) -> None:
+        """Leave response.npz and response.csv in a folder."""
+        lines, chosen = self.response.frequencies_hz, self.masses.chosen
+        masses = np.zeros(0) if chosen is None else chosen.chain.response(lines)
+        write_response_arrays(folder, self.response, self.identified.fit.model.response(lines), masses)
+        write_text(folder / RESPONSE_TABLE, _table(self))
 
     @property
     def response(self) -> LocalResponse:
+        """Measured response (L, n, m) at the lines of the band, with its standard deviations and coherence."""
         return self.identified.response
 
     @cached_property
@@ -92,7 +155,7 @@ class IdentifiedExcitation:
 
     @cached_property
     def _numbers(self) -> dict[str, Any]:
-        fit, response = self.identified.fit, self.response
+        response = self.response
         outputs, inputs = self.measured.outputs, self.measured.inputs
         return {
             "excitation": {
@@ -114,7 +177,7 @@ class IdentifiedExcitation:
             },
             "elements": [self._element(y, u) for y in range(len(outputs)) for u in range(len(inputs))],
             "feedback": self.fed.document(),
-            "resonances": [_quantities(item) for item in resonances(fit)],
+            "resonances": [_quantities(item) for item in self.resonances],
             "masses": self._masses(),
             "halves": None if self.halves is None else asdict(self.halves),
             "remarks": [*self.measured.remarks, *self._remarks()],
@@ -213,6 +276,90 @@ def _peak(item: Peak) -> dict[str, Any]:
     return {"frequency_hz": item.frequency_hz.quantity(), "magnitude": item.magnitude}
 
 
+def frequency_response(
+    records: Sequence[str | Path | Mapping[str, np.ndarray]],
+    *,
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    references: Sequence[str] = (),
+    rate_hz: float | None = None,
+    band: Sequence[float] = (),
+    hold: Hold = "held",
+    modes: int | None = None,
+    masses: int | None = None,
+    progress: Progress = silent,
+) -> AxisResponse:
+    """Frequency response, resonances and masses of an axis from records of any excitation, without a plan.
+
+    Records of planned multisines are for `frequency_responses`.
+
+    Parameters
+    ----------
+    records : sequence of path or mapping
+        Records of one experiment, repetitions of each other, as files (CSV, text, Excel, MAT, Parquet, …) or in memory, columns (N,) by
+        name: ``{"t": …, "torque[Nm]": …, "velocity[rad/s]": …}``.
+    inputs, outputs, references : sequence of str
+        Columns that drive the axis, that move, and that a controller was asked for, as COLUMN or COLUMN[unit]; recognised by default.
+    rate_hz : float, optional
+        Sampling rate where there is no column of time, Hz.
+    band : sequence of float
+        Lowest and highest frequency to use, Hz; by default where the input determines the response.
+    hold : {"held", "instantaneous", "mean"}
+        Whether a sample of the input is held until the next one, the value at the instant, or a mean over the step.
+    modes, masses : int, optional
+        Number of resonances, and of masses, 1 to 3; by default by evidence.
+    progress : Progress
+        Called with the stage and the share of it that is done.
+
+    Returns
+    -------
+    AxisResponse
+        Its `response`, `resonances`, `masses`, `summary()`, `report(path)` and `write(folder)`.
+
+    Raises
+    ------
+    FlexcalError
+        Where a record cannot be used, and where the input excites no band.
+
+    Examples
+    --------
+    Two masses of 0.01 and 0.02 kg m² on a spring of 400 N m/rad resonate at 39 Hz:
+
+    >>> import numpy as np
+    >>> from scipy.signal import cont2discrete, dlsim
+    >>> from flexcal import frequency_response
+    >>> accelerations = [[-4e4, 4e4, -4.0, 4.0], [2e4, -2e4, 2.0, -2.0]]
+    >>> A, B = np.array([[0, 0, 1, 0], [0, 0, 0, 1], *accelerations]), np.array([[0], [0], [100.0], [0]])
+    >>> system = cont2discrete((A, B, np.array([[0, 0, 1, 0]]), np.zeros((1, 1))), 1e-3)
+    >>> rng = np.random.default_rng(0)
+    >>> torque = rng.standard_normal(8000)
+    >>> velocity = dlsim(system, torque)[1][:, 0] + 0.01 * rng.standard_normal(8000)
+    >>> record = {"t": 1e-3 * np.arange(8000), "torque[Nm]": torque, "velocity[rad/s]": velocity}
+    >>> axis = frequency_response([record])
+    >>> [round(item.frequency_hz.estimate) for item in axis.resonances]
+    [39]
+    """
+    progress("response", 0.0)
+    options = ExcitationOptions(
+        tuple(inputs), tuple(outputs), tuple(references), rate_hz, tuple(band), hold, modes, masses
+    )
+    sources = [Path(one) if isinstance(one, str) else one for one in records]
+    files = record_paths(sources)
+    measured = read_response_records(
+        sources,
+        inputs=options.inputs,
+        outputs=options.outputs,
+        references=options.references,
+        rate_hz=options.rate_hz,
+    )
+    try:
+        return _identified(measured, files, options, progress)
+    except InputError:
+        raise
+    except FlexcalError as problem:
+        raise InputError(problem.code, f"{files[0]}: {problem}") from problem
+
+
 def identify_excitation(
     files: Sequence[Path],
     out: Path,
@@ -220,26 +367,15 @@ def identify_excitation(
     *,
     command: str = "",
     progress: Progress = silent,
-) -> IdentifiedExcitation:
-    """Measure the response, and write response.csv, response.npz, results.json and report.html to `out`.
+) -> AxisResponse:
+    """`frequency_response` of files; response.csv, response.npz, results.json and report.html are written to `out`.
 
-    Raises `FlexcalError` where a file cannot be used, or the input excites no band.
+    Raises `FlexcalError` as `frequency_response` does; nothing is written then.
     """
-    progress("response", 0.0)
-    measured = read_response_records(
-        files,
-        inputs=options.inputs,
-        outputs=options.outputs,
-        references=options.references,
-        rate_hz=options.rate_hz,
-    )
-    try:
-        result = _identified(measured, files, options, command, progress)
-    except InputError:
-        raise
-    except FlexcalError as problem:
-        raise InputError(problem.code, f"{files[0]}: {problem}") from problem
-    _write(out, result)
+    identified = frequency_response(files, **vars(options), progress=progress)
+    origin = provenance(list(files), {"method": identified.response.method})
+    result = replace(identified, record=RunRecord(origin, command))
+    result.write(out)
     return result
 
 
@@ -247,9 +383,8 @@ def _identified(
     measured: ResponseRecords,
     files: Sequence[Path],
     options: ExcitationOptions,
-    command: str,
     progress: Progress,
-) -> IdentifiedExcitation:
+) -> AxisResponse:
     measured_spectra = measure_spectra(measured, options.hold)
     measured, period = measured_spectra.measured, measured_spectra.period
     spectra = _in_band(
@@ -261,7 +396,7 @@ def _identified(
     )
     identified = identify_modes(spectra, local_response(spectra), modes=options.modes, progress=progress)
     masses = identify_masses(identified.fit, identified.response, options.masses)
-    return IdentifiedExcitation(
+    return AxisResponse(
         measured=measured,
         options=options,
         spectra=spectra,
@@ -276,7 +411,6 @@ def _identified(
             guessed=measured.guessed,
         ),
         period_s=None if period is None else period * spectra.time_step,
-        record=RunRecord(provenance(list(files), {"method": identified.response.method}), command),
         files=tuple(files),
     )
 
@@ -328,19 +462,7 @@ def _halves(spectra: RecordSpectra, identified: IdentifiedModes) -> HalfDifferen
     return half_difference(first, second) if len(first.frequencies_hz) == len(second.frequencies_hz) else None
 
 
-def _write(out: Path, result: IdentifiedExcitation) -> None:
-    from flexcal.jobs.pages import report_folder
-
-    response, model = result.response, result.identified.fit.model
-    chosen = result.masses.chosen
-    masses = np.zeros(0) if chosen is None else chosen.chain.response(response.frequencies_hz)
-    write_response_arrays(out, response, model.response(response.frequencies_hz), masses)
-    write_text(out / RESPONSE_TABLE, _table(result))
-    write_results(out, result.document())
-    report_folder(out)
-
-
-def _table(result: IdentifiedExcitation) -> str:
+def _table(result: AxisResponse) -> str:
     """Text of response.csv: one row per line and element."""
     rows = ["frequency_hz,output,input,real,imaginary,std,coherence"]
     response, std = result.response.response, result.response.std
