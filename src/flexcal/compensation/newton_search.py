@@ -156,6 +156,6 @@ class _Search:
         """Gauss-Newton step from the origin, without the held joints."""
         jacobian = self.jacobian[rows]
         moved = self.q[rows] - self.origin[rows]
-        wanted = (self.after[rows] + np.matmul(jacobian, moved[:, :, None])[:, :, 0]) * self.weight
+        residual = (self.after[rows] + np.matmul(jacobian, moved[:, :, None])[:, :, 0]) * self.weight
         free = np.where(self.at_limit[rows][:, None, :], 0.0, jacobian * self.weight[:, None])
-        self.q[rows] = self.origin[rows] + damped_step(free, wanted, _DAMPING * self.model.reach)
+        self.q[rows] = self.origin[rows] + damped_step(free, residual, _DAMPING * self.model.reach)

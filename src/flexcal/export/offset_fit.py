@@ -85,11 +85,11 @@ def _fit(
 ) -> OffsetFit:
     """Fit without the offsets `fixed` (n,) at zero."""
     q, _ = random_poses(model, point, np.random.default_rng(1))
-    wanted, flank = tool_positions(model, q, point=point)
+    targets, flank = tool_positions(model, q, point=point)
     n = model.n
     free = _free(n, frames=not keep_frames) & ~np.concatenate([fixed, np.zeros(9, dtype=bool)])
-    fitted = _solve(nominal, q, wanted, point, free)
-    still = _solve(nominal, q, wanted, point, free & (np.arange(n + 9) >= n))
+    fitted = _solve(nominal, q, targets, point, free)
+    still = _solve(nominal, q, targets, point, free & (np.arange(n + 9) >= n))
     columns = _columns(nominal, q, fitted, point, free)
     spread = propagated_covariance_root(
         model, lambda m: tool_positions(m, q, point=point, flank=flank)[0].ravel()
@@ -97,7 +97,7 @@ def _fit(
     rows = np.vstack([columns, _rest_rows(n, len(q))])
     response = _least_squares(rows, np.vstack([spread, np.zeros((9, spread.shape[1]))]))
     std = np.linalg.norm(response, axis=1)
-    before = PositionErrors.of(wanted - offset_tool(nominal, q, still, point))
+    before = PositionErrors.of(targets - offset_tool(nominal, q, still, point))
     return OffsetFit(
         np.where(fixed, 0.0, fitted[:n]), std[:n], ~fixed, fitted[n : n + 6], fitted[n + 6 :], before
     )
@@ -128,14 +128,14 @@ def _free(n: int, *, frames: bool) -> np.ndarray:
 
 
 def _solve(
-    nominal: RobotModel, q: np.ndarray, wanted: np.ndarray, point: str, free: np.ndarray
+    nominal: RobotModel, q: np.ndarray, targets: np.ndarray, point: str, free: np.ndarray
 ) -> np.ndarray:
     """Gauss-Newton from zero over the `free` parameters, (n + 9,)."""
     parameters = np.zeros(nominal.n + 9)
     rest = _rest_rows(nominal.n, len(q))
     for _ in range(_STEPS):
         columns = _columns(nominal, q, parameters, point, free)
-        missing = (wanted - offset_tool(nominal, q, parameters, point)).ravel()
+        missing = (targets - offset_tool(nominal, q, parameters, point)).ravel()
         rows, right = np.vstack([columns, rest]), np.concatenate([missing, -rest @ parameters])
         step = _least_squares(rows, right)
         turned = vector_rotation(step[nominal.n + 3 : nominal.n + 6]) @ vector_rotation(

@@ -157,9 +157,9 @@ def random_poses(model: RobotModel, point: str | None, rng: np.random.Generator)
     lower, upper = np.where(free, -reach, lower), np.where(free, reach, upper)
     box = model.config.working_volume
     if box is not None:
-        wanted = rng.uniform(box.lower, box.upper, (SAMPLES // _TRIES, 3))
-        starts = rng.uniform(lower, upper, (_TRIES, len(wanted), model.n))
-        tried = [reach_points(model, wanted, start, lower, upper, point=point) for start in starts]
+        targets = rng.uniform(box.lower, box.upper, (SAMPLES // _TRIES, 3))
+        starts = rng.uniform(lower, upper, (_TRIES, len(targets), model.n))
+        tried = [reach_points(model, targets, start, lower, upper, point=point) for start in starts]
         poses = np.concatenate([q[reached] for q, reached in tried])
         if len(poses) >= _LEAST_REACHED:
             return poses, "working volume"

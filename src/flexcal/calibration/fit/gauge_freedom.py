@@ -60,7 +60,7 @@ def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotMod
             lateral_compliance=np.zeros_like(model.geometry.lateral_compliance),
         ),
     )
-    wanted = predict_measurements(stiff, poses, elastic=False).position
+    reference = predict_measurements(stiff, poses, elastic=False).position
     scale = np.where(np.isfinite(std), std, 1.0)
     weight = np.where(np.isfinite(std), 1 / std, 0.0)
     robot, free = stiff, np.zeros((len(names), 0))
@@ -69,7 +69,7 @@ def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotMod
         columns = at.jacobian(names).reshape(-1, len(names)) * scale
         left, sizes, right = np.linalg.svd(columns, full_matrices=len(columns) < len(names))
         rank = int(np.sum(sizes > _UNSEEN * sizes[0]))
-        missing = left[:, :rank].T @ (wanted - at.position).ravel()
+        missing = left[:, :rank].T @ (reference - at.position).ravel()
         step = scale * (right[:rank].T @ (missing / sizes[:rank]))
         free = scale[:, None] * right[rank:].T
         values = np.array([robot.value(name) for name in names]) + step

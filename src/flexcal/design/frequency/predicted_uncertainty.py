@@ -58,8 +58,8 @@ class PlannedResponses:
         """Predicted relative standard deviation of every stiffness and damping."""
         return spring_std(self.sensitivity)
 
-    def reaching(self, wanted: float) -> PlannedResponses:
-        """Plan with the realisations and periods of the shortest experiment that reaches the `wanted` standard deviation of every
+    def reaching(self, desired_std: float) -> PlannedResponses:
+        """Plan with the realisations and periods of the shortest experiment with a standard deviation of at most `desired_std` for every
         stiffness.
 
         Kept periods come in twos, after which the reference motion repeats. Raises `FlexcalError` that says what is reached where the
@@ -73,15 +73,15 @@ class PlannedResponses:
         ]
         most = self._measured(MOST, MOST_PERIODS // step * step)
         name, reached = largest_stiffness_std(most.sensitivity)
-        if reached > wanted:
+        if reached > desired_std:
             raise FlexcalError(
                 "E-DESIGN-010",
-                f"a standard deviation of {100 * wanted:g} % is not reached with any duration: {MOST} realisations leave "
+                f"a standard deviation of {100 * desired_std:g} % is not reached with any duration: {MOST} realisations leave "
                 f"{100 * reached:.2g} % for {name}; choose more poses or hold a payload off the wrist's axis.",
             )
         for _, realisations, kept in sorted(tried):
             planned = self._measured(realisations, kept)
-            if largest_stiffness_std(planned.sensitivity)[1] <= wanted:
+            if largest_stiffness_std(planned.sensitivity)[1] <= desired_std:
                 return planned
         return most
 

@@ -80,8 +80,8 @@ class TraceOptimal:
 
     def gradient(self, information: np.ndarray) -> np.ndarray:
         inverse = _inverse(information)
-        spread = inverse @ self.weight @ inverse
-        return spread / (2 * np.trace(inverse @ self.weight))
+        weighted = inverse @ self.weight @ inverse
+        return weighted / (2 * np.trace(inverse @ self.weight))
 
 
 @dataclass(frozen=True)

@@ -187,25 +187,26 @@ def choose_poses(
             f"{count} poses cannot determine {rank} geometric parameters of {candidates.model.name}; "
             f"choose at least {-(-rank // 3)}, better twice as many.",
         )
-    wanted = criterion_named(criterion, candidates.tool_error_weight)
-    selection = exchange_on_shortlist(candidates.base.sensitivity, count, wanted, progress=progress)
-    return PoseDesign.of(candidates, wanted, selection, rng)
+    optimality = criterion_named(criterion, candidates.tool_error_weight)
+    selection = exchange_on_shortlist(candidates.base.sensitivity, count, optimality, progress=progress)
+    return PoseDesign.of(candidates, optimality, selection, rng)
 
 
-def fewest_poses(candidates: PoseCandidates, most: int, wanted: float) -> int:
-    """Least number of candidates, chosen one by one, with a predicted tool error of at most `wanted` (m); raises `FlexcalError` if
+def fewest_poses(candidates: PoseCandidates, most: int, desired_error: float) -> int:
+    """Least number of candidates, chosen one by one, with a predicted tool error of at most `desired_error` (m); raises `FlexcalError` if
     `most` do not suffice.
     """
     weight, sensitivity = candidates.tool_error_weight, candidates.base.sensitivity
     order = greedy(sensitivity, most, TraceOptimal(weight, "c")).chosen
     least = -(-candidates.base.identifiability.rank // 3)
     for count in range(least, most + 1):
-        if tool_error(candidates.base, weight, order[:count]) <= wanted:
+        if tool_error(candidates.base, weight, order[:count]) <= desired_error:
             return count
     reached = tool_error(candidates.base, weight, order)
     raise FlexcalError(
         "E-DESIGN-027",
-        f"{most} poses predict a tool error of {reached / MILLIMETRE:.4f} mm from tracker noise alone, not {wanted / MILLIMETRE:.4f} mm; "
+        f"{most} poses predict a tool error of {reached / MILLIMETRE:.4f} mm from tracker noise alone, not "
+        f"{desired_error / MILLIMETRE:.4f} mm; "
         "allow more poses, or a larger error.",
     )
 

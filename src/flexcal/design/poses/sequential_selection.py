@@ -33,9 +33,11 @@ class NextPoses:
     tool_error: np.ndarray
     possible: np.ndarray
 
-    def enough(self, wanted: float | None = None) -> int | None:
-        """Number of these poses after which to stop: the tool error is at most `wanted` (m), or more only average; None for never."""
-        limit = (1 + AVERAGING) * self.possible if wanted is None else wanted
+    def enough(self, desired_error: float | None = None) -> int | None:
+        """Number of these poses after which to stop: the tool error is at most `desired_error` (m), or more only average; None for
+        never.
+        """
+        limit = (1 + AVERAGING) * self.possible if desired_error is None else desired_error
         good = np.flatnonzero(self.tool_error <= limit)
         return int(good[0]) if len(good) else None
 

@@ -47,15 +47,15 @@ def working_box(
             "E-DESIGN-032",
             f"the working volume from {_told(lower)} to {_told(upper)} is no box; give every smallest coordinate before the largest.",
         )
-    wanted = rng.uniform(lower, upper, (BOX_POINTS, 3))
-    q, reached = _configurations(checker, wanted, rng, point)
+    targets = rng.uniform(lower, upper, (BOX_POINTS, 3))
+    q, reached = _configurations(checker, targets, rng, point)
     if not reached.any():
         raise FlexcalError(
             "E-DESIGN-033",
             f"{checker.model.name} reaches no point of the working volume from {_told(lower)} to {_told(upper)} m without touching "
             f"something, though it reaches {checker.model.reach:.3g} m; give it in m in the robot's base frame.",
         )
-    return WorkingVolume(q[reached], wanted[reached], float(reached.mean()), np.stack([lower, upper]))
+    return WorkingVolume(q[reached], targets[reached], float(reached.mean()), np.stack([lower, upper]))
 
 
 def working_points(
@@ -74,19 +74,19 @@ def working_points(
 
 
 def _configurations(
-    checker: CollisionChecker, wanted: np.ndarray, rng: np.random.Generator, point: str | None
+    checker: CollisionChecker, targets: np.ndarray, rng: np.random.Generator, point: str | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Configurations (W, n) for the points (W, 3), and a mask (W,) of those found."""
     model = checker.model
     lower, upper = joint_ranges(model)
-    q = np.zeros((len(wanted), model.n))
-    solved = np.zeros(len(wanted), dtype=bool)
+    q = np.zeros((len(targets), model.n))
+    solved = np.zeros(len(targets), dtype=bool)
     for _ in range(TRIES):
         left = np.flatnonzero(~solved)
         if not len(left):
             break
         tried, reached = reach_points(
-            model, wanted[left], rng.uniform(lower, upper, (len(left), model.n)), lower, upper, point=point
+            model, targets[left], rng.uniform(lower, upper, (len(left), model.n)), lower, upper, point=point
         )
         reached &= above_floor(checker, tried, point)
         reached[reached] = ~checker.collides(tried[reached])

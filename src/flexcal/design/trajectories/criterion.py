@@ -78,9 +78,9 @@ class ExcitationCriterion:
             by_total += self.conditioning * _CONDITION.gradient(total)
         return self.instants * by_total
 
-    def about(self, wanted: Sequence[str]) -> ExcitationCriterion:
+    def about(self, requested: Sequence[str]) -> ExcitationCriterion:
         """Criterion for some of the unknowns only, the others eliminated (Ds-optimality)."""
-        return replace(self, criterion=MarginalD(np.isin(self.unknowns.names, list(wanted))))
+        return replace(self, criterion=MarginalD(np.isin(self.unknowns.names, list(requested))))
 
     def after(self, information: np.ndarray) -> ExcitationCriterion:
         """Criterion for the next motion."""
@@ -89,23 +89,23 @@ class ExcitationCriterion:
 
 @dataclass(frozen=True, eq=False)
 class MarginalD:
-    """log det of the information on the `wanted` unknowns, the others eliminated, per wanted one (Ds-optimality)."""
+    """Ds-optimality: log det of the information on the `requested` unknowns, the others eliminated, per unknown."""
 
-    wanted: np.ndarray
+    requested: np.ndarray
     name: str = "D"
     uses_prior: bool = True
 
     def merit(self, information: np.ndarray) -> float:
         sign, value = np.linalg.slogdet(information)
-        other = np.linalg.slogdet(information[np.ix_(~self.wanted, ~self.wanted)])[1]
-        return float(value - other) / max(int(self.wanted.sum()), 1) if sign > 0 else -np.inf
+        other = np.linalg.slogdet(information[np.ix_(~self.requested, ~self.requested)])[1]
+        return float(value - other) / max(int(self.requested.sum()), 1) if sign > 0 else -np.inf
 
     def gradient(self, information: np.ndarray) -> np.ndarray:
         slope = np.linalg.inv(information)
-        slope[np.ix_(~self.wanted, ~self.wanted)] -= np.linalg.inv(
-            information[np.ix_(~self.wanted, ~self.wanted)]
+        slope[np.ix_(~self.requested, ~self.requested)] -= np.linalg.inv(
+            information[np.ix_(~self.requested, ~self.requested)]
         )
-        return slope / max(int(self.wanted.sum()), 1)
+        return slope / max(int(self.requested.sum()), 1)
 
 
 def excitation_criterion(
@@ -134,11 +134,11 @@ def excitation_criterion(
             _require_visible(columns, unknowns, of)
             chosen = np.isin(unknowns.names, list(of)).astype(float)
             return ExcitationCriterion(TraceOptimal(np.diag(chosen), "c"), unknowns, nothing, instants)
-        wanted = np.array([name.rpartition(".")[2] not in DRIVE[1:] for name in unknowns.names])
+        requested = np.array([name.rpartition(".")[2] not in DRIVE[1:] for name in unknowns.names])
         if criterion == "posterior":
-            return ExcitationCriterion(MarginalD(wanted, criterion), unknowns, nothing, instants)
+            return ExcitationCriterion(MarginalD(requested, criterion), unknowns, nothing, instants)
         return ExcitationCriterion(
-            MarginalD(wanted, criterion), unknowns, faint * np.outer(sizes, sizes), instants, CONDITIONING
+            MarginalD(requested, criterion), unknowns, faint * np.outer(sizes, sizes), instants, CONDITIONING
         )
     names = columns.identifiability.kept_names
     if criterion == "condition":

@@ -169,7 +169,7 @@ def optimise_trajectories(
     coefficients, merits, information = [], [], []
     least, compares = NEAR, program.clearance.compares
     for number, stage in enumerate(stages):
-        aim = goal.about(stage.wanted) if stage.wanted else goal
+        aim = goal.about(stage.parameters) if stage.parameters else goal
         program = replace(program, merit=aim, space=space.moving(stage.moving))
         x = _designed(program, begin, starts, steps, rng, progress, number, len(stages))
         fine = program.finer(FINER)

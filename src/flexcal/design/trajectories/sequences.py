@@ -15,7 +15,7 @@ class Stage:
     """One trajectory of a sequence: the moving joints, and the names of the base parameters to be determined."""
 
     moving: tuple[int, ...]
-    wanted: tuple[str, ...]
+    parameters: tuple[str, ...]
 
 
 def sequence(columns: BaseRegressor, name: SequenceName) -> tuple[Stage, ...]:
@@ -30,8 +30,8 @@ def sequence(columns: BaseRegressor, name: SequenceName) -> tuple[Stage, ...]:
     each = [(kept, *kept.rpartition(".")[::2]) for kept in columns.identifiability.kept_names]
 
     def of_joints(first: int, last: int) -> Stage:
-        wanted = tuple(kept for kept, body, _ in each if first <= owner[body] < last)
-        return Stage(everything[first:], wanted)
+        parameters = tuple(kept for kept, body, _ in each if first <= owner[body] < last)
+        return Stage(everything[first:], parameters)
 
     def of_kinds(*keys: str) -> Stage:
         return Stage(everything, tuple(kept for kept, _, key in each if key.startswith(keys)))
@@ -42,4 +42,4 @@ def sequence(columns: BaseRegressor, name: SequenceName) -> tuple[Stage, ...]:
         "axes": [of_joints(half, model.n), of_joints(0, half)],
         "kinds": [of_kinds("I", DRIVE[0]), of_kinds("mc", "mass"), of_kinds(*DRIVE[1:])],
     }[name]
-    return tuple(stage for stage in stages if stage.wanted)
+    return tuple(stage for stage in stages if stage.parameters)

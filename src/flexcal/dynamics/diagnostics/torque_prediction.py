@@ -91,8 +91,8 @@ def predict_torques(
 
 def _segment(rows: int) -> int:
     """Length of a segment, a power of two."""
-    wanted = min(_LONGEST_SEGMENT, max(_SHORTEST_SEGMENT, rows // _SEGMENTS))
-    return 1 << (wanted.bit_length() - 1)
+    length = min(_LONGEST_SEGMENT, max(_SHORTEST_SEGMENT, rows // _SEGMENTS))
+    return 1 << (length.bit_length() - 1)
 
 
 class _Spectrum:

@@ -61,12 +61,14 @@ def kalman_filter(data: RegressionData, recorded: RecordedRows) -> Estimate:
                     state.restart()
                 models = StateTransitions.of(steps, about, _smoothing(recorded))
                 state.follow(models, _step_noise(sigma, steps, recorded))
-    parameters, spread = _settled(state, recorded, torque, unknowns.kept)
+    parameters, uncertainty = _settled(state, recorded, torque, unknowns.kept)
     cost = float(np.linalg.norm(system.right - system.matrix @ parameters) ** 2)
     level = state.squares / max(1, state.count)
     message = f"extended Kalman filter; mean normalised innovation squared {level:.3g}, which should be 1"
     freedom = unknowns.freedom(system)
-    return unknowns.estimate(parameters, spread.covariance, spread.freedom, cost, freedom, message, _PASSES)
+    return unknowns.estimate(
+        parameters, uncertainty.covariance, uncertainty.freedom, cost, freedom, message, _PASSES
+    )
 
 
 def _smoothing(recorded: RecordedRows) -> int:
@@ -162,10 +164,10 @@ class _Filter:
         onward[: 2 * n, 2 * n :] = model.by_parameters[:, self._kept] * self._scale
         noise = np.zeros((n, size))
         noise[:, : 2 * n] = (model.by_torque * torque_noise).T
-        spread = np.vstack([self._whole @ onward.T, noise])
-        table = np.zeros((n + len(spread), n + size))
+        square_root = np.vstack([self._whole @ onward.T, noise])
+        table = np.zeros((n + len(square_root), n + size))
         table[:n, :n] = POSITION_NOISE * np.eye(n)
-        table[n:, :n], table[n:, n:] = spread[:, :n], spread
+        table[n:, :n], table[n:, n:] = square_root[:, :n], square_root
         factor = triangular(table)
         innovation = np.linalg.solve(factor[:n, :n].T, after - model.predicted[:n])
         change = factor[:n, n:].T @ innovation

@@ -36,10 +36,10 @@ class InnovationScores:
                 self._state = None
                 continue
             if self._state is None:
-                spread = np.diag(np.repeat([self._noise**2, first_speed**2], n))
+                covariance = np.diag(np.repeat([self._noise**2, first_speed**2], n))
                 self._state = (
                     np.concatenate([steps.before[k], steps.speed[k]]),
-                    spread,
+                    covariance,
                     np.zeros((2 * n, size)),
                 )
             self._step(models.step(k, self._state[0], self._parameters), steps.after[k], torque_noise)
@@ -47,14 +47,14 @@ class InnovationScores:
     def _step(self, model: StateTransition, after: np.ndarray, torque_noise: np.ndarray) -> None:
         assert self._state is not None
         n = len(after)
-        _, spread, slope = self._state
+        _, covariance, slope = self._state
         pushed = model.by_torque * torque_noise
-        spread = model.by_state @ spread @ model.by_state.T + pushed @ pushed.T
+        covariance = model.by_state @ covariance @ model.by_state.T + pushed @ pushed.T
         slope = model.by_state @ slope + model.by_parameters[:, self._kept] @ self._root
-        innovation_covariance = spread[:n, :n] + self._noise**2 * np.eye(n)
+        innovation_covariance = covariance[:n, :n] + self._noise**2 * np.eye(n)
         innovation = after - model.predicted[:n]
         weighted = np.linalg.solve(
-            innovation_covariance, np.column_stack([innovation, slope[:n], spread[:n]])
+            innovation_covariance, np.column_stack([innovation, slope[:n], covariance[:n]])
         )
         batch = (self._number - 1) // self._length
         score, information = self._by_batch.get(batch, (0.0, 0.0))
@@ -63,10 +63,10 @@ class InnovationScores:
             information + slope[:n].T @ weighted[:, 1 : 1 + slope.shape[1]],
         )
         gain = weighted[:, 1 + slope.shape[1] :].T
-        spread = spread - gain @ spread[:n]
+        covariance = covariance - gain @ covariance[:n]
         self._state = (
             model.predicted + gain @ innovation,
-            0.5 * (spread + spread.T),
+            0.5 * (covariance + covariance.T),
             slope - gain @ slope[:n],
         )
 

@@ -31,9 +31,9 @@ def linear_fit(data: RegressionData, noise: Sequence[float]) -> Estimate:
     freedom = unknowns.freedom(system)
     cost = float(factor[-1, -1] ** 2)
     root = scale[:, None] * np.linalg.solve(triangle, np.eye(len(kept)))
-    spread = batch_covariance(data, noise, parameters, kept, root, cost / freedom)
+    uncertainty = batch_covariance(data, noise, parameters, kept, root, cost / freedom)
     return unknowns.estimate(
-        parameters, spread.covariance, spread.freedom, cost, freedom, "linear least squares"
+        parameters, uncertainty.covariance, uncertainty.freedom, cost, freedom, "linear least squares"
     )
 
 

@@ -49,12 +49,12 @@ def total_least_squares(data: RegressionData, errors: RegressionData) -> Estimat
     freedom = unknowns.freedom(system)
     triangle, errors_seen = factor[:-1, :-1], spoilt[:-1, :-1]
     root = scale[:, None] * np.linalg.solve(triangle, np.eye(len(kept)))
-    spread = batch_covariance(data, noise, parameters, kept, root, cost / freedom)
+    uncertainty = batch_covariance(data, noise, parameters, kept, root, cost / freedom)
     seen = triangle.T @ triangle
     more = np.linalg.solve(seen - level * errors_seen.T @ errors_seen, seen) * scale[:, None] / scale
-    covariance = more @ spread.covariance @ more.T
+    covariance = more @ uncertainty.covariance @ more.T
     message = f"total least squares; the errors are {np.sqrt(level):.3g} times as large as those of position and torque noise"
-    return unknowns.estimate(parameters, covariance, spread.freedom, cost, freedom, message)
+    return unknowns.estimate(parameters, covariance, uncertainty.freedom, cost, freedom, message)
 
 
 def _torque_share(own: Subsystem, wrong: Subsystem, sigma: float, parameters: np.ndarray) -> float:

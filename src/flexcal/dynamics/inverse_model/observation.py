@@ -121,7 +121,7 @@ class Observation:
     @cached_property
     def widths(self) -> list[int]:
         """Number of reduced columns of each equation, and one for its torque."""
-        return [len(spread) + 1 for spread in self.projection]
+        return [len(matrix) + 1 for matrix in self.projection]
 
     @cached_property
     def _places(self) -> tuple[np.ndarray, np.ndarray]:

@@ -116,22 +116,25 @@ def covariance_of_scores(
     for experiment in experiments:
         middle += _windows(experiment, window, variance) / _seen_share(follows, window)
     freedom = min(batches - 1.0, 1.5 * batches / window)
-    spread = root @ middle @ root.T
-    std = np.sqrt(np.diag(spread))
+    covariance = root @ middle @ root.T
+    std = np.sqrt(np.diag(covariance))
     if offsets is not None:
         slow, memory = autoregressive_covariance(experiments, offsets)
         if memory > max(_SHORT, _WITHIN * window):
             freedom = max(1.0, min(freedom, 0.5 * batches / memory))
-            spread = root @ (given + slow) @ root.T
-            std = np.maximum(std, np.sqrt(np.diag(spread)))
-    return BatchCovariance(mixed_covariance(spread, root @ root.T, std, freedom), freedom, window)
+            covariance = root @ (given + slow) @ root.T
+            std = np.maximum(std, np.sqrt(np.diag(covariance)))
+    return BatchCovariance(mixed_covariance(covariance, root @ root.T, std, freedom), freedom, window)
 
 
-def mixed_covariance(spread: np.ndarray, nominal: np.ndarray, std: np.ndarray, freedom: float) -> np.ndarray:
-    """Covariance (k, k) of standard deviations `std` (k,), with the correlations of `spread`, of so many degrees of `freedom`, drawn
-    towards those of `nominal` as k + freedom : k."""
+def mixed_covariance(
+    covariance: np.ndarray, nominal: np.ndarray, std: np.ndarray, freedom: float
+) -> np.ndarray:
+    """Covariance (k, k) of standard deviations `std` (k,), with the correlations of `covariance` (`freedom` degrees of freedom) shrunk
+    towards those of `nominal` by the share k / (k + freedom).
+    """
     share = len(std) / (len(std) + freedom)
-    correlation = (1.0 - share) * _correlation(spread) + share * _correlation(nominal)
+    correlation = (1.0 - share) * _correlation(covariance) + share * _correlation(nominal)
     return correlation * np.outer(std, std)
 
 

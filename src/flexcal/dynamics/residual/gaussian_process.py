@@ -47,8 +47,8 @@ class GaussianProcess:
         from sklearn.gaussian_process import GaussianProcessRegressor
         from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
-        spread, size = np.std(inputs, axis=0), float(np.sqrt(np.mean(values**2)))
-        scale = np.where(spread > 0, spread, 1.0)
+        std, size = np.std(inputs, axis=0), float(np.sqrt(np.mean(values**2)))
+        scale = np.where(std > 0, std, 1.0)
         if size == 0:
             return cls(inputs, values, scale, 0.0, 1.0)
         every = -(-len(values) // _SHAPED_BY)

@@ -473,8 +473,8 @@ def _measured_noise(visited: MeasuredTargets, covariance: ErrorCovariance) -> Er
 
 def _visit_to_visit(visits: list[PoseRepeatability]) -> float:
     """Root mean square distance of single visits from their expected barycentre, m."""
-    spread = np.concatenate([pose.deviations for pose in visits])
-    return float(np.sqrt((spread**2).sum() / (len(spread) - len(visits))))
+    deviations = np.concatenate([pose.deviations for pose in visits])
+    return float(np.sqrt((deviations**2).sum() / (len(deviations) - len(visits))))
 
 
 def _files(robot: list[Path], others: Mapping[str, Path]) -> dict[str, str]:

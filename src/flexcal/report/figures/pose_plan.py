@@ -60,9 +60,9 @@ _NUMBERS = [m * 10**e for e in range(5) for m in (1, 2, 5)]
 
 
 def pose_numbers(
-    numbers: Sequence[int], errors: Mapping[str, Sequence[float]], plan: int, wanted: float | None
+    numbers: Sequence[int], errors: Mapping[str, Sequence[float]], plan: int, desired_error: float | None
 ) -> go.Figure:
-    """Named `errors` (mm) against the `numbers` of poses, both logarithmic; the number of the `plan` and the `wanted` error marked."""
+    """Named `errors` (mm) against the `numbers` of poses, both logarithmic, with the number of the `plan` and the `desired_error`."""
     figure = canvas(400)
     for colour, (name, values) in zip(_COLOURS, errors.items(), strict=False):
         figure.add_trace(
@@ -73,8 +73,8 @@ def pose_numbers(
             )
         )  # fmt: skip
     figure.add_vline(x=plan, line={"color": AXIS, "width": 1.5, "dash": "dash"})
-    if wanted is not None:
-        figure.add_hline(y=wanted, line={"color": RIGID, "width": 1.5, "dash": "dot"})
+    if desired_error is not None:
+        figure.add_hline(y=desired_error, line={"color": RIGID, "width": 1.5, "dash": "dot"})
     figure.update_xaxes(type="log", title_text="poses", tickvals=_NUMBERS)
     millimetre_axis(figure, title="predicted tool error / mm")
     return figure

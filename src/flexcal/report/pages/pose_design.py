@@ -148,17 +148,17 @@ def _numbers(results: Mapping[str, Any]) -> Section:
         numbers = [results["measured"] + k for k in range(len(results["tool_error_mm"]))]
         errors = {"chosen one after the other": list(results["tool_error_mm"])}
         errors["no choice is below"] = list(results["least_possible_mm"])
-        wanted, plan = results["wanted_mm"], results["measured"] + results["poses"]
+        desired_error, plan = results["wanted_mm"], results["measured"] + results["poses"]
     else:
         curve = results["curve"]
         numbers = [point["poses"] for point in curve]
         errors = {"chosen one by one": [point["tool_error_mm"] for point in curve]}
         errors["at random, median"] = [point["random_mm"] for point in curve]
-        wanted, plan = None, results["poses"]
+        desired_error, plan = None, results["poses"]
     block = FigureBlock(
         "figure-numbers",
         "Predicted tool error against the number of poses",
-        pose_numbers(numbers, errors, plan, wanted),
+        pose_numbers(numbers, errors, plan, desired_error),
         "Where four times the poses halve the error, further poses only average noise. The dashed line is this plan. From the "
         "instrument's noise alone, without deflection and repeatability.",
         f"Predicted tool error in mm against {len(numbers)} numbers of poses.",

@@ -95,13 +95,13 @@ def _row(
 
 def _reason(estimate: Estimate, name: str) -> str:
     number = estimate.parameters.index(name)
-    spread = float(estimate.covariance[number, number]) ** 0.5
+    log_std = float(estimate.covariance[number, number]) ** 0.5
     dropped = next((d for d in estimate.dropped if d.name == name), None)
     if dropped is not None and dropped.absorbed_by:
         return f"the data do not distinguish it from {', '.join(n for n, _ in dropped.absorbed_by[:3])}."
-    if dropped is not None or spread == 0:
+    if dropped is not None or log_std == 0:
         return "the measured responses do not depend on it in these poses."
     return (
-        f"the responses hardly depend on it in these poses: any value within a factor of {2.718281828 ** (1.96 * spread):.0f} fits as "
+        f"the responses hardly depend on it in these poses: any value within a factor of {2.718281828 ** (1.96 * log_std):.0f} fits as "
         "well. Another pose, or a payload farther off the axis, would excite it."
     )
