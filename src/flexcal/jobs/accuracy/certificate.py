@@ -39,7 +39,7 @@ from flexcal.model.parts import vector_rotation
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import carried_mass, points_kinematics
 from flexcal.progress import Progress, silent
-from flexcal.report.checks import Trust, prediction_checks
+from flexcal.report.checks import Trust, check_improvement, prediction_checks
 from flexcal.report.pages import CertificateStudy, write_certificate
 from flexcal.report.results import NOT_GIVEN, MeasurementDetails
 from flexcal.units import MILLIMETRE
@@ -209,8 +209,9 @@ class Certificate(Result):
 
     @property
     def trust(self) -> Trust:
-        """The verdict, from the same checks as those of a map."""
-        return Trust(prediction_checks(self.scale, self.fitted))
+        """The verdict, from the same checks as those of a map, and whether the compensation made the robot more accurate."""
+        before, after = (float(one.accuracy.mean) for one in (self.before, self.refitted))
+        return Trust((check_improvement(before, after), *prediction_checks(self.scale, self.fitted)))
 
     def document(self) -> dict[str, Any]:
         """The JSON document."""

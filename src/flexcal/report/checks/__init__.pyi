@@ -34,7 +34,7 @@ from .pose_errors import (
     check_truth,
     check_unseen,
 )
-from .predicted_errors import prediction_checks
+from .predicted_errors import check_improvement, prediction_checks
 from .verdict import ANSWERS, Trust, verdict_answer
 
 __all__ = [
@@ -55,6 +55,7 @@ __all__ = [
     "check_fit",
     "check_flanks",
     "check_fresh_poses",
+    "check_improvement",
     "check_joints",
     "check_known_points",
     "check_left_out",

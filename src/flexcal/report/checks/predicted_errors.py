@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from flexcal.calibration.verification import ErrorScale
 from flexcal.report.checks.pose_errors import FEW_POSES, check_claimed_uncertainty, check_enough, check_unseen
 from flexcal.report.layout import Check
+from flexcal.units import MILLIMETRE
+
+_BETTER = "Is the robot more accurate than before?"
 
 
 def prediction_checks(scale: ErrorScale | None, fitted: Sequence[str]) -> tuple[Check, ...]:
@@ -29,3 +32,16 @@ def prediction_checks(scale: ErrorScale | None, fitted: Sequence[str]) -> tuple[
     if len(scale.probability) < FEW_POSES:
         checks.append(check_enough(len(scale.probability)).named("enough_poses"))
     return tuple(checks)
+
+
+def check_improvement(before: float, after: float) -> Check:
+    """Check whether mean errors (m) at the same targets fell by the compensation, both with instrument and point registered by best fit."""
+    sizes = f"from {before / MILLIMETRE:.3f} to {after / MILLIMETRE:.3f} mm"
+    if after < before:
+        return Check(_BETTER, f"Yes: {sizes}, each after a best fit.", "good", "improvement")
+    return Check(
+        _BETTER,
+        f"No: the mean error goes {sizes}, each after a best fit. Were the compensated commands sent, and then measured?",
+        "bad",
+        "improvement",
+    )

@@ -112,6 +112,10 @@ PHRASES: dict[str, dict[str, str]] = {
         "unknown": "no poses outside the fit were predicted",
         "else": "poses left out of the fit are predicted worse than expected",
     },
+    "improvement": {
+        "good": "the errors are smaller than before",
+        "else": "the errors are not smaller than before",
+    },
     "unseen_poses": {
         "good": "no pose was used for the fit",
         "else": "the calibration was fitted to these poses",
