@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from flexcal.files.formats import read_yaml_file
@@ -35,7 +34,7 @@ class RobotStandIn:
     points: dict[str, object]
     payload: object | None = "declared"
     reach: float = 1.2
-    stations: Stations = field(default_factory=lambda: Stations(("tracker",), np.zeros((1, 6))))
+    stations: Stations = field(default_factory=lambda: Stations.at_base(("tracker",)))
     sensors: dict[str, object] = field(default_factory=dict)
 
     @property

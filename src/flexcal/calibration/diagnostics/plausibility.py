@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.calibration.fit import GeometricFit, manufacturing_tolerances
+from flexcal.model.parts import vector_rotation
 
 FAR = 50.0
 """Largest plausible deviation of a geometric parameter, in tolerances: 15 mm, 25 mrad."""
@@ -40,9 +41,19 @@ def is_implausible(calibration: GeometricFit) -> bool:
 def residuals_implausible(calibration: GeometricFit) -> bool:
     """Whether the residuals, without outliers, are larger than plausible for any robot."""
     rows = ~np.isin(np.arange(len(calibration.poses)), calibration.estimate.outliers)
-    position = calibration.poses.position[rows]
+    position = _in_base(calibration)[rows]
     extent = np.sqrt(np.mean((position - position.mean(axis=0)) ** 2))
     return bool(np.sqrt(np.mean(calibration.residuals[rows] ** 2)) > SCATTERED * extent)
+
+
+def _in_base(calibration: GeometricFit) -> np.ndarray:
+    """Measured points (N, 3), m, in the robot's base frame, where the stations are as fitted."""
+    model, poses = calibration.model, calibration.poses
+    result = np.empty_like(poses.position)
+    for station in poses.stations:
+        own, place = poses.station == station, model.stations.pose[model.station_index(station)]
+        result[own] = (poses.position[own] - place[:3]) @ vector_rotation(place[3:])
+    return result
 
 
 def implausible_shifts(calibration: GeometricFit) -> tuple[ImplausibleShift, ...]:
@@ -69,4 +80,4 @@ def _limits(kept: list[str], size: np.ndarray) -> np.ndarray:
 
 def _has_size(name: str) -> bool:
     """Whether robot.yaml or the URDF give a parameter's size: not for the place of the instrument, nor for a compliance."""
-    return not name.startswith("station.") and ".gravity_compliance" not in name
+    return not name.startswith(("station.", "sockets.")) and ".gravity_compliance" not in name

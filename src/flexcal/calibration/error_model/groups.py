@@ -46,9 +46,7 @@ class ErrorGroups:
         count = min(len(size) // _CELL_VISITS, _MOST_CELLS)
         if count < _FEWEST_CELLS:
             return cls(visit, command=command)
-        place = np.column_stack([np.bincount(visit, coordinate) for coordinate in poses.position.T])
-        workspace = workspace_folds(place / size[:, None], count)
-        return cls(visit, workspace[visit], order_folds(len(size), count)[visit], command)
+        return cls(visit, _regions(poses, visit, count), order_folds(len(size), count)[visit], command)
 
     def subset(self, rows: np.ndarray) -> ErrorGroups:
         """Groups of the rows with these indices or of this mask."""
@@ -85,6 +83,22 @@ class ErrorGroups:
         """Covariance (G, 3 T, 3 T) of a unit error in every coordinate that is common to the points of a visit."""
         unit = self.gathered(np.broadcast_to(np.eye(3), (len(self.pose), 3, 3)))
         return unit @ np.swapaxes(unit, 1, 2)
+
+
+def _regions(poses: PoseSet, visit: np.ndarray, count: int) -> np.ndarray | None:
+    """Labels (N,) of `count` cells of the workspace, of whole visits (N,), for points of an instrument; None where there are none.
+
+    Points in sockets are each alone: an error common to those at one place of the fixture is taken for where it stands.
+    """
+    measured = ~poses.in_socket
+    if not measured.any():
+        return None
+    labels = group_numbers(visit[measured])
+    size = np.bincount(labels)
+    place = np.column_stack([np.bincount(labels, axis) for axis in poses.position[measured].T])
+    result = count + np.arange(len(poses))
+    result[measured] = workspace_folds(place / size[:, None], count)[labels]
+    return group_numbers(result)
 
 
 def block_columns(labels: np.ndarray) -> np.ndarray:

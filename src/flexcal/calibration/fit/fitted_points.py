@@ -25,7 +25,13 @@ from flexcal.calibration.fit.structural_identifiability import (
     random_identifiability,
     require_enough,
 )
-from flexcal.calibration.fit.terms import LEAST_POSES, geometric_parameters, plausible_size, random_waves
+from flexcal.calibration.fit.terms import (
+    LEAST_POSES,
+    declared_size,
+    geometric_parameters,
+    plausible_size,
+    random_waves,
+)
 from flexcal.calibration.measurement import (
     PredictedMeasurements,
     predict_measurements,
@@ -34,7 +40,7 @@ from flexcal.calibration.measurement import (
 )
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import RANK_TOLERANCE, Estimate, Identifiability, Loss, Parameter, Parameters
-from flexcal.model.robot import SCATTER, RobotModel, unit_of
+from flexcal.model.robot import SCATTER, SOCKET_SCALE, RobotModel, unit_of
 from flexcal.progress import Progress
 
 _FLANK_PASSES = 4
@@ -131,6 +137,15 @@ class PointFit:
         """Parameters determined by rank or a declared prior."""
         kept = self.identifiability.kept_names
         return Parameters(p for p in self.geometric if p.name in kept or np.isfinite(p.prior_std))
+
+    @property
+    def known(self) -> Parameters:
+        """Parameters that are held at what is declared, within its standard deviation: the scale of the distances between sockets.
+
+        Errors of the joints grow with the robot, so a fit would make a smaller robot of fewer errors, and shorter distances.
+        """
+        std = declared_size(self.start, SOCKET_SCALE) if self.poses.in_socket.any() else None
+        return Parameters([] if std is None else [Parameter(SOCKET_SCALE, "1", 0.0, prior_std=std)])
 
     def solved(
         self,
@@ -286,11 +301,13 @@ class FittedPoints:
 
     def whole_estimate(self) -> Estimate:
         """Estimate of all parameters: fitted, held (with the uncertainty due to holding them), and the scatter."""
-        undetermined_names = [item.name for item in self.fixed]
+        known = self.fit.known
+        undetermined_names = [*(item.name for item in self.fixed), *known.names]
         dropped = tuple(d for d in self.fit.identifiability.dropped if d.name not in self.task.kept.names)
         turns = [f"station.{s}.{key}" for s in self.fit.poses.stations for key in ("rx", "ry", "rz")]
         names = dict.fromkeys([*undetermined_names, *(d.name for d in dropped)])
-        items = [self.fit.geometric[name] for name in names]
+        every = self.fit.geometric + known
+        items = [every[name] for name in names]
         items += [Parameter(n, "rad", self.model.value(n)) for n in turns if n not in self.fit.geometric]
         estimate, fixed = replace(self.estimate, covariance=self._covariance()), Parameters(items)
         size, all_ = len(estimate.parameters), len(estimate.parameters) + len(fixed) + len(SCATTER)
@@ -299,7 +316,7 @@ class FittedPoints:
         count = len(undetermined_names)
         if count:
             gain = self._gain(undetermined_names)
-            sizes = np.array([item.size for item in self.fixed])
+            sizes = np.array([*(item.size for item in self.fixed), *known.prior_std()])
             covariance[:size, :size] += (gain * sizes**2) @ gain.T
             covariance[:size, size : size + count] = gain * sizes**2
             covariance[size : size + count, :size] = (gain * sizes**2).T

@@ -67,7 +67,7 @@ def _cause(start: RobotModel, poses: PoseSet, name: str, partners: tuple[tuple[s
         extent = float(np.ptp(poses.q[:, i]))
         if joint.kind == "revolute" and extent < _SMALL_RANGE:
             return f"{joint.name} moved {np.rad2deg(extent):.1f}° only"
-    shape = _shape(poses.position)
+    shape = "" if poses.in_socket.any() else _shape(poses.position)
     if shape:
         return shape
     with_ = " and ".join(partner for partner, _ in partners[:2])

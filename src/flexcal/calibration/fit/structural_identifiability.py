@@ -32,6 +32,9 @@ def kinematic_identifiability(
     straight = predict_measurements(model, poses, elastic=False, jacobians=True)
     columns = straight.jacobian(parameters.names).reshape(-1, len(parameters))
     preferred = [name for name in parameters.names if name.endswith("backlash")]
+    if poses.in_socket.all():
+        # where the fixture stands is to take up what moves the whole robot, not a joint
+        preferred += [name for name in parameters.names if name.startswith("station.")]
     if np.isfinite(parameters.prior_std()).any():
         # a declared prior must not stand against what the points tell of a parameter without
         preferred += [item.name for item in parameters if not np.isfinite(item.prior_std)]

@@ -6,15 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from flexcal.calibration.measurement import left_jacobian, predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameter, Parameters
-from flexcal.model.robot import GEOMETRY, LATERAL, RobotModel, unit_of
+from flexcal.model.robot import GEOMETRY, LATERAL, SOCKET_SCALE, STATION, RobotModel, unit_of
 from flexcal.model.statics import carried_mass, gravity_moments, gravity_torque
 
 LEAST_POSES = 20
 """Least number of different poses for a selection of terms and for the variance of transmission errors."""
 
-TOLERANCE = {"m": 3e-4, "rad": 5e-4, "rad/(N m)": 1e-6}
+TOLERANCE = {"m": 3e-4, "rad": 5e-4, "rad/(N m)": 1e-6, "1": 1e-3}
 """Size of a relevant change (1σ of manufacture), by unit, which makes parameters of different units comparable."""
 
 
@@ -22,6 +23,10 @@ PER_JOINT = ("gravity_compliance", "lateral_compliance")
 """Kinds of terms that may be named for one joint, as `<joint>.<kind>`: compliance about its axis, and about the two axes normal to it."""
 
 
+_FLAT = 0.01
+"""Extent of sockets normal to a line, relative to that along it, below which they lie on the line."""
+_AS_ONE = 1e-4
+"""Relative motion of the points, beside that of a rigid body, below which the whole robot moves as one."""
 _LOADED = 0.01
 """Least standard deviation of a gravity load, relative to the largest, at which its compliance is separable from a constant."""
 _LEAST_LOAD = 1e-6
@@ -32,19 +37,23 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
     """Geometric parameters of some terms, starting at the model's values (Neubauer et al. 2015, §3).
 
     `kinematic`: a place for every station, and a rotation for all but the first, whose rotation the first joint's errors span; six
-    errors for every joint that moves a measured target, six for the tool, three for each further target. `backlash`: the joints declared
-    with it; `transmission` none, its waves being random effects (`random_waves`). `gravity_compliance`, `lateral_compliance`,
-    `transmission_1`…: one or two for every revolute joint on the way, compliances only where no spring is declared in their place and
-    gravity loads the axis: by moments that vary by more than 1 % of those that vary most. `<joint>.gravity_compliance` is that of one
-    joint.
+    errors for every joint that moves a measured target, six for the tool, three for each further target. Sockets alone do not tell where
+    the robot's base is: all places of the fixture may turn, and errors of joints that move the whole robot as one are left out.
+    `backlash`: the joints declared with it; `transmission` none, its waves being random effects (`random_waves`).
+    `gravity_compliance`, `lateral_compliance`, `transmission_1`…: one or two for every revolute joint on the way, compliances only where
+    no spring is declared in their place and gravity loads the axis: by moments that vary by more than 1 % of those that vary most.
+    `<joint>.gravity_compliance` is that of one joint.
     """
     joints = moving_joints(model, poses)
     names: list[str] = []
+    unplaced = bool(poses.in_socket.all())
     for k, station in enumerate(dict.fromkeys(poses.station)):
         names += [f"station.{station}.{key}" for key in ("x", "y", "z")]
-        names += [f"station.{station}.{key}" for key in ("rx", "ry", "rz")] if k else []
-    for i in joints:
-        names += [f"{model.joints[i].name}.{key}" for key in GEOMETRY]
+        names += (
+            [f"station.{station}.{key}" for key in _turns(model, poses, station)] if k or unplaced else []
+        )
+    errors = [f"{model.joints[i].name}.{key}" for i in joints for key in GEOMETRY]
+    names += _moving_parts(model, poses, errors) if unplaced else errors
     names += [f"tool.{key}" for key in GEOMETRY]
     first = next(iter(model.points))
     names += [f"point.{t}.{key}" for t in dict.fromkeys(poses.target) if t != first for key in "xyz"]
@@ -67,6 +76,40 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
             seen = [name for name in every if name in loaded or kind not in PER_JOINT]
             further |= dict.fromkeys(every if owner and not seen else seen)
     return Parameters([*items, *(_parameter(model, name) for name in further)])
+
+
+def _moving_parts(model: RobotModel, poses: PoseSet, names: Sequence[str]) -> list[str]:
+    """Those of the `names` that do not move the whole robot as one, as an offset of the first joint does."""
+    at = predict_measurements(model, poses, elastic=False, jacobians=True)
+    point = at.kinematics.position
+    rigid = np.zeros((len(point), 3, 6))
+    rigid[:, :, :3], rigid[:, :, 3:] = np.eye(3), np.cross(np.eye(3)[:, None], point).transpose(1, 2, 0)
+    columns = np.matmul(at.base.swapaxes(1, 2), at.jacobian(names)).reshape(3 * len(point), -1)
+    flat = rigid.reshape(3 * len(point), 6)
+    left = columns - flat @ np.linalg.lstsq(flat, columns, rcond=None)[0]
+    size = np.linalg.norm(columns, axis=0)
+    return [
+        name
+        for name, own, whole in zip(names, np.linalg.norm(left, axis=0), size, strict=True)
+        if own > _AS_ONE * whole
+    ]
+
+
+def _turns(model: RobotModel, poses: PoseSet, station: str) -> Sequence[str]:
+    """Rotations of a station that its points tell: none of a fixture with one socket, two of one whose sockets lie on a line."""
+    keys = STATION[3:]
+    if station not in poses.fixtures:
+        return keys
+    places = np.unique(poses.position[poses.station == station], axis=0)
+    _, sizes, axes = np.linalg.svd(places - places.mean(axis=0))
+    if len(places) == 1 or sizes[0] == 0:
+        return ()
+    if len(places) > 2 and sizes[1] > _FLAT * sizes[0]:
+        return keys
+    # a rotation about the line changes nothing; the most similar of the three is left out
+    vector = model.stations.pose[model.station_index(station), 3:]
+    about = np.linalg.solve(left_jacobian(vector), axes[0])
+    return [key for k, key in enumerate(keys) if k != int(np.argmax(np.abs(about)))]
 
 
 def random_waves(model: RobotModel, poses: PoseSet, free: Parameters) -> dict[str, float]:
@@ -158,6 +201,9 @@ def plausible_size(model: RobotModel, name: str) -> float:
 def declared_size(model: RobotModel, name: str) -> float | None:
     """Standard deviation of a geometric parameter in robot.yaml's `prior:`, by name or by kind; None if not given."""
     prior, (owner, _, key) = model.prior, name.rpartition(".")
+    if name == SOCKET_SCALE:
+        fixtures = [item for item in model.config.measurements.values() if item.extent > 0]
+        return fixtures[0].std / fixtures[0].extent if fixtures else None
     if name in prior.parameters:
         return prior.parameters[name]
     if owner not in model.joint_names or key not in GEOMETRY:

@@ -12,7 +12,7 @@ from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import PointKinematics
 from flexcal.model.parts import skew_matrix, vector_rotation
-from flexcal.model.robot import GEOMETRY, LATERAL, SPRINGS, STATION, RobotModel
+from flexcal.model.robot import GEOMETRY, LATERAL, SOCKET_SCALE, SPRINGS, STATION, RobotModel
 from flexcal.model.statics import (
     Equilibrium,
     carried_mass,
@@ -69,7 +69,9 @@ class PredictedMeasurements:
         first = next(iter(self.model.points))
         for k, name in enumerate(names):
             owner, _, key = name.rpartition(".")
-            if owner.startswith("station.") and key in STATION:
+            if name == SOCKET_SCALE:
+                result[:, :, k] = -np.where(self.poses.in_socket[:, None], self.poses.position, 0.0)
+            elif owner.startswith("station.") and key in STATION:
                 result[:, :, k] = self._by_station(owner.removeprefix("station."), key)
             elif owner.startswith("point."):
                 own = self.poses.target == owner.removeprefix("point.")
@@ -122,7 +124,7 @@ class PredictedMeasurements:
         if key in ("x", "y", "z"):
             return own * np.eye(3)["xyz".index(key)]
         values = [self.model.value(f"station.{station}.{k}") for k in STATION]
-        arm = self.position - np.array(values[:3])
+        arm = self.position - np.array(values[:3]) + _socket_shift(self.model, self.poses)
         return own * np.cross(left_jacobian(np.array(values[3:]))[:, "xyz".index(key[1])], arm)
 
     def load(self, name: str) -> np.ndarray:
@@ -153,6 +155,11 @@ class PredictedMeasurements:
                 return block[:, :, 0] + block[:, :, 1:] @ self.model.links.com[i]
             return self.model.links.mass[i] * block[:, :, 1 + "xyz".index(key[-1])]
         raise FlexcalError("E-CAL-013", f"the position of a point does not depend on '{name}'.")
+
+
+def _socket_shift(model: RobotModel, poses: PoseSet) -> np.ndarray:
+    """Shift (N, 3), m, of the sockets from their declared positions in the fixture, by the scale of their distances."""
+    return np.where(poses.in_socket[:, None], model.stations.scale[0] * poses.position, 0.0)
 
 
 def left_jacobian(vector: np.ndarray) -> np.ndarray:
@@ -187,6 +194,7 @@ def predict_measurements(
         own, place = poses.station == name, model.stations.pose[model.station_index(name)]
         at[own], base[own] = place[:3], vector_rotation(place[3:])
     position = np.matmul(base, tool.kinematics.position[:, :, None])[:, :, 0] + at
+    position -= _socket_shift(model, poses)
     return PredictedMeasurements(model, poses, position, base, tool.rest, tool.kinematics)
 
 

@@ -28,7 +28,8 @@ def register(model: RobotModel, poses: PoseSet, predicted: np.ndarray) -> RobotM
         if np.median(np.linalg.norm(measured - expected, axis=1)) < ALREADY_ALIGNED:
             rotation, offset = np.eye(3), np.zeros(3)
         else:
-            rotation, offset = rigid_motion(expected, measured, station)
+            known = station in poses.fixtures
+            rotation, offset = (best_motion if known else rigid_motion)(expected, measured, station)
         turn = rotation_vector(rotation)
         values |= {
             f"station.{station}.{key}": float(v) for key, v in zip(("x", "y", "z"), offset, strict=True)
@@ -70,16 +71,37 @@ def rigid_motion(source: np.ndarray, target: np.ndarray, name: str = "") -> tupl
     >>> translation.round(6)
     array([1., 2., 3.])
     """
-    if len(source) < 3:
-        raise FlexcalError(
-            "E-CAL-015", f"station '{name}' has {len(source)} poses; at least 3 are needed to register it."
-        )
-    from_centre, to_centre = source.mean(axis=0), target.mean(axis=0)
-    left, sizes, right = np.linalg.svd((target - to_centre).T @ (source - from_centre))
+    left, sizes, right = _correlation(source, target, name)
     if sizes[1] < 1e-9 * max(sizes[0], 1e-12):
         raise FlexcalError(
             "E-CAL-016", f"the points of station '{name}' lie on a line; measure poses distributed in space."
         )
+    return _motion(source, target, left, right)
+
+
+def best_motion(source: np.ndarray, target: np.ndarray, name: str = "") -> tuple[np.ndarray, np.ndarray]:
+    """One of the rigid motions of `rigid_motion` for points (N, 3) that may lie on a line, or in one place, as sockets of a fixture do.
+
+    Raises `FlexcalError` for fewer than three points.
+    """
+    left, _, right = _correlation(source, target, name)
+    return _motion(source, target, left, right)
+
+
+def _correlation(
+    source: np.ndarray, target: np.ndarray, name: str
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    if len(source) < 3:
+        raise FlexcalError(
+            "E-CAL-015", f"station '{name}' has {len(source)} poses; at least 3 are needed to register it."
+        )
+    return np.linalg.svd((target - target.mean(axis=0)).T @ (source - source.mean(axis=0)))
+
+
+def _motion(
+    source: np.ndarray, target: np.ndarray, left: np.ndarray, right: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    from_centre, to_centre = source.mean(axis=0), target.mean(axis=0)
     sign = np.sign(np.linalg.det(left @ right))
     rotation = left @ np.diag([1.0, 1.0, sign]) @ right
     return rotation, to_centre - rotation @ from_centre

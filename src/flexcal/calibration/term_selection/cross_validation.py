@@ -68,7 +68,13 @@ def cross_validated(fit: GeometricFit) -> CrossValidation | None:
 def _folds(poses: PoseSet) -> tuple[tuple[np.ndarray, ...], int]:
     """Folds (N,) in measuring order, in the workspace, and of single poses, and the number of single poses."""
     alone = repeated_pose_numbers(poses.q)
-    folds = (order_folds(len(poses), FOLDS), workspace_folds(poses.position, FOLDS), alone)
+    held = poses.in_socket
+    order, workspace = order_folds(len(poses), FOLDS), workspace_folds(poses.position, FOLDS)
+    if held.any():
+        # a place of a fixture is left out with all its rows: the rest of them would tell where it stands
+        place = FOLDS + np.unique(poses.station, return_inverse=True)[1]
+        order, workspace = np.where(held, place, order), np.where(held, place, workspace)
+    folds = (order, workspace, alone)
     return folds, len(np.unique(alone))
 
 

@@ -37,12 +37,14 @@ def leave_out_fit(
     penalty: Sequence[float],
     residuals: np.ndarray,
     folds: Sequence[np.ndarray],
+    places: Sequence[tuple[np.ndarray, np.ndarray]] = (),
 ) -> LeaveOutErrors:
     """Fit blocks of `columns` (N, 3, k) to `residuals` (N, 3) m, and predict every fold of each kind (N,) from the others.
 
     With the hat matrix H of the fit to all points and r what it leaves, fold g is off by (1 - H_gg)⁻¹ r_g when it is left out
     (Allen 1974). `penalty` is the factor on the sum of squared coefficients of each block, m²: of a prior, with the columns in its
     standard deviations; 0 for none. H_gg = Q_g Q_gᵀ is inverted in the space of its points or of its columns, whichever is smaller.
+    `places`: rows (m,) and columns (m, 3, k) by the place of each fixture; one that is left out whole is placed by its own points.
     """
     scaled = [
         block * _scale(block) if free == 0 else block for block, free in zip(columns, penalty, strict=True)
@@ -57,7 +59,7 @@ def leave_out_fit(
     seen = basis[: residuals.size]
     left = residuals.ravel() - seen @ (seen.T @ residuals.ravel())
     q, r = seen.reshape(len(residuals), 3, -1), left.reshape(-1, 3)
-    distances = tuple(_distances(q, r, fold) for fold in folds)
+    distances = tuple(_distances(q, r, fold, places) for fold in folds)
     return LeaveOutErrors(distances, float(left @ residuals.ravel()), float((seen**2).sum()))
 
 
@@ -67,7 +69,12 @@ def _scale(block: np.ndarray) -> np.ndarray:
     return np.divide(1.0, size, out=np.zeros_like(size), where=size > 0)
 
 
-def _distances(basis: np.ndarray, left: np.ndarray, fold: np.ndarray) -> np.ndarray:
+def _distances(
+    basis: np.ndarray,
+    left: np.ndarray,
+    fold: np.ndarray,
+    places: Sequence[tuple[np.ndarray, np.ndarray]],
+) -> np.ndarray:
     distance = np.empty(len(left))
     for k in np.unique(fold):
         own = fold == k
@@ -76,5 +83,12 @@ def _distances(basis: np.ndarray, left: np.ndarray, fold: np.ndarray) -> np.ndar
             error = np.linalg.solve(np.eye(len(r)) - q @ q.T, r)
         else:
             error = r + q @ np.linalg.solve(np.eye(q.shape[1]) - q.T @ q, q.T @ r)
-        distance[own] = np.linalg.norm(error.reshape(-1, 3), axis=1)
+        errors = np.zeros((len(left), 3))
+        errors[own] = error.reshape(-1, 3)
+        for rows, columns in places:
+            if own[rows].all():
+                flat = columns.reshape(3 * len(rows), -1)
+                shift = flat @ np.linalg.lstsq(flat, errors[rows].ravel(), rcond=1e-9)[0]
+                errors[rows] -= shift.reshape(-1, 3)
+        distance[own] = np.linalg.norm(errors[own], axis=1)
     return distance

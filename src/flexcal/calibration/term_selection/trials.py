@@ -11,7 +11,7 @@ import numpy as np
 from flexcal.calibration.fit import GeometricFit, geometric_parameters
 from flexcal.calibration.measurement import PredictedMeasurements, predict_measurements
 from flexcal.calibration.term_selection.leave_out_errors import LeaveOutErrors, leave_out_fit
-from flexcal.model.robot import RobotModel
+from flexcal.model.robot import GEOMETRY, STATION, RobotModel
 from flexcal.units import MILLIMETRE
 
 _WORSE = 1.05
@@ -114,7 +114,7 @@ class TermTrials:
         if terms not in self._fits:
             blocks = [self._block(term) for term in terms] + [self._held]
             penalty = [0.0] * len(terms) + [self._noise]
-            self._fits[terms] = leave_out_fit(blocks, penalty, self.rigid.residuals, self.folds)
+            self._fits[terms] = leave_out_fit(blocks, penalty, self.rigid.residuals, self.folds, self._places)
         return self._fits[terms]
 
     def mean(self, terms: tuple[str, ...]) -> float:
@@ -141,6 +141,16 @@ class TermTrials:
         return float(gains.mean()), float(gains.std(ddof=1) / np.sqrt(len(gains))) + _LEAST_GAIN
 
     @cached_property
+    def _places(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Rows (m,) at each place of a fixture with sockets, and their derivatives (m, 3, 6) by that place."""
+        poses, places = self.rigid.poses, []
+        for fixture in poses.fixtures:
+            rows = np.flatnonzero(poses.in_socket & (poses.station == fixture))
+            columns = self._prediction.jacobian([f"station.{fixture}.{key}" for key in STATION])
+            places.append((rows, columns[rows]))
+        return places
+
+    @cached_property
     def _prediction(self) -> PredictedMeasurements:
         return predict_measurements(
             self.model, self.rigid.poses, elastic=bool(self.model.elastic), jacobians=True
@@ -163,8 +173,10 @@ class TermTrials:
 
     def _block(self, term: str) -> np.ndarray:
         if term not in self._columns:
-            names = geometric_parameters(self.model, self.rigid.poses, [term]).names
             if term == "kinematic":
-                names = tuple(n for n in names if n in self.rigid.identifiability.kept_names)
+                kept = self.rigid.identifiability.kept_names
+                names = tuple(n for n in kept if n.rpartition(".")[2] in (*GEOMETRY, *STATION))
+            else:
+                names = geometric_parameters(self.model, self.rigid.poses, [term]).names
             self._columns[term] = self._prediction.jacobian(names)
         return self._columns[term]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.calibration.error_model import group_numbers
-from flexcal.calibration.measurement import rigid_motion
+from flexcal.calibration.measurement import best_motion, rigid_motion
 from flexcal.data.poses import PoseSet
 from flexcal.model.parts import rotation_vector, vector_rotation
 from flexcal.model.robot import STATION, RobotModel
@@ -62,7 +62,8 @@ def rigid_placement(poses: PoseSet, nominal: np.ndarray) -> Placement:
     stations = {}
     for name in poses.stations:
         own = poses.station == name
-        stations[name] = rigid_motion(nominal[own], poses.position[own], name)
+        motion = best_motion if name in poses.fixtures else rigid_motion
+        stations[name] = motion(nominal[own], poses.position[own], name)
     return Placement(stations, {})
 
 
@@ -130,7 +131,8 @@ def can_register(poses: PoseSet) -> bool:
     for station in poses.stations:
         own = poses.subset(poses.station == station)
         centred = own.position - own.position.mean(axis=0)
-        if _distinct(own) < _LEAST_POINTS or np.linalg.matrix_rank(centred, tol=1e-3) < 2:
+        flat = station not in poses.fixtures and np.linalg.matrix_rank(centred, tol=1e-3) < 2
+        if _distinct(own) < _LEAST_POINTS or flat:
             return False
     return True
 

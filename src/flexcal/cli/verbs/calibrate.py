@@ -69,6 +69,8 @@ class Calibrate:
     """Relative 1σ of the ratio of a drive's secant stiffness under gravity to its stiffness in the frequency response; 0.1 is usual."""
     elasticity: Literal["reestimated", "marginalised"] = "reestimated"
     """Treatment of the uncertainty of stiffness and inertia; both give the same geometry to first order."""
+    hold_out: Annotated[str | None, arg(metavar="COLUMN", help_behavior_hint="")] = None
+    """Column of POSES: the measurements with each of its values are left out of a further calibration in turn, and compared with it."""
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
     """Folder for report.html, results.json, points.csv and estimates.yaml (then not beside robot.yaml); without it there is no report."""
     write_point: bool = False
@@ -112,6 +114,8 @@ class Calibrate:
         labels = {"rigid": "rigid", "selected": f"selected: {terms}"}
         rows = uncalibrated_rows(document) | {label: errors[key] for key, label in labels.items()}
         console.show(error_table("distance to the measured points", rows))
+        if calibration.held_out is not None:
+            console.say(held_out_line(calibration.held_out.document()))
         for remark in document["remarks"]:
             console.say(remark)
         if write:
@@ -149,6 +153,7 @@ class Calibrate:
             loss=self.loss,
             secant_scale=self.secant_scale,
             elasticity=self.elasticity,
+            hold_out=self.hold_out,
             out=self.out,
             command=command_line(),
             progress=progress,
@@ -166,6 +171,14 @@ class Calibrate:
         except BaseException:
             write_text(self.robot, text)
             raise
+
+
+def held_out_line(held_out: Mapping[str, Any]) -> str:
+    """A sentence on the errors at groups that were left out."""
+    groups = ", ".join(f"{name} {group['mean_mm']:.3f}" for name, group in held_out["groups"].items())
+    line = f"left out by {held_out['by']}, mean error {held_out['mean_mm']:.3f} mm ({groups})"
+    known = held_out["distance_mm"]
+    return line if known is None else f"{line}; known distances are off by {known:.3f} mm"
 
 
 _FOUND_BESIDE = 5e-4

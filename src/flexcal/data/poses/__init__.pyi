@@ -1,7 +1,7 @@
 from .candidate_pool import PosePool
 from .checks import check_metres, check_same_pose
 from .columns import check_positive, unit_quaternions, whole_numbers
-from .measured_tables import read_pose_pool, read_poses, write_poses
+from .measured_tables import column_labels, read_pose_pool, read_poses, write_poses
 from .pose_set import DEFAULT_SIGMA, PoseSet, concatenate
 from .target_files import read_commands, read_targets, write_commands, write_targets
 from .tool_targets import ToolTargets
@@ -15,6 +15,7 @@ __all__ = [
     "check_metres",
     "check_positive",
     "check_same_pose",
+    "column_labels",
     "concatenate",
     "read_commands",
     "read_pose_pool",

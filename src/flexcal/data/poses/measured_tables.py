@@ -19,6 +19,7 @@ from flexcal.data.poses.columns import (
     whole_numbers,
 )
 from flexcal.data.poses.pose_set import DEFAULT_SIGMA, PoseSet, concatenate
+from flexcal.data.poses.socket_tables import SOCKET_COLUMNS, measures_sockets, read_sockets
 from flexcal.data.tables import (
     TableFile,
     assign,
@@ -40,7 +41,11 @@ _TEXTS = ("target", "station")
 
 
 def read_poses(
-    paths: str | Path | Sequence[str | Path], model: RobotModel, *, require_motion: bool = True
+    paths: str | Path | Sequence[str | Path],
+    model: RobotModel,
+    *,
+    require_motion: bool = True,
+    further: Sequence[str] = (),
 ) -> PoseSet:
     """Read measured poses from one file or several, joined in order (see `concatenate`).
 
@@ -49,11 +54,14 @@ def read_poses(
     paths : str or Path, or sequence of these
         CSV or Parquet tables with the columns q1…qn (rad or m) and x, y, z (m). Without a column `target` the point is
         the first under `points:`; without `station` the instrument stands at the robot's first station; without `sigma` it is
-        0.1 mm and `sigma_given` is False.
+        0.1 mm and `sigma_given` is False. A file with `fixture`, `socket` and q1…qn has a ball on the tool in sockets, as declared
+        under `measurements:`, at places of the fixture that are not known.
     model : RobotModel
         Robot whose joints, points and stations the columns name.
     require_motion : bool
         Whether poses that are all equal, and joints that never move, are refused: nothing can be calibrated from them.
+    further : sequence of str
+        Names of columns that may be there beside those above, and are not used.
 
     Returns
     -------
@@ -76,7 +84,7 @@ def read_poses(
     ((20, 6), (20, 3))
     """
     listed = [paths] if isinstance(paths, str | Path) else list(paths)
-    poses = concatenate([_read(Path(path), model) for path in listed])
+    poses = concatenate([_read(Path(path), model, tuple(further)) for path in listed])
     if require_motion:
         check_motion(poses, model, " and ".join(str(path) for path in listed))
     return poses
@@ -139,9 +147,29 @@ def write_poses(path: str | Path, poses: PoseSet) -> None:
     write_table(path, columns)
 
 
-def _read(path: Path, model: RobotModel) -> PoseSet:
+def column_labels(paths: Sequence[Path], column: str) -> np.ndarray:
+    """Texts (N,) of one column of tables, joined in order; raises `InputError` for a file without it."""
+    labels = []
+    for path in paths:
+        file = open_table(path)
+        if column not in file.columns:
+            raise file.error(
+                "E-POSES-041", f"there is no column '{column}' by which to hold out measurements."
+            )
+        labels.append(file.read(_named_texts(file, (column,))).columns[column])
+    return np.concatenate(labels)
+
+
+def _named_texts(file: TableFile, further: Sequence[str]) -> tuple[str, ...]:
+    """Columns of a file that hold texts, beside the `further` ones."""
+    return tuple(dict.fromkeys(name for name in (*_TEXTS, *SOCKET_COLUMNS, *further) if name in file.columns))
+
+
+def _read(path: Path, model: RobotModel, further: tuple[str, ...]) -> PoseSet:
     file = open_table(path)
-    texts = tuple(name for name in _TEXTS if name in file.columns)
+    if measures_sockets(file):
+        return read_sockets(file, model, further)
+    texts = tuple(dict.fromkeys(name for name in (*_TEXTS, *further) if name in file.columns))
     place = _place(file, model)
     _check_measured(file, model, place)
     signals = assign(file, model, ("pose", "q", place), _NUMBERS, texts)

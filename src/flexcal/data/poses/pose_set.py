@@ -42,6 +42,9 @@ class PoseSet:
         Lengths (N,) of a draw-wire, m.
     time : ndarray, optional
         Times (N,) of the measurements, s.
+    socket : ndarray, optional
+        Names (N,) of the sockets that held the target; empty where an instrument measured it. `position` then is the socket's in
+        the fixture, and `station` the place of the fixture.
     sigma_given : bool
         False where `sigma` is a default.
 
@@ -63,6 +66,7 @@ class PoseSet:
     quaternion_wxyz: np.ndarray | None = None
     length: np.ndarray | None = None
     time: np.ndarray | None = None
+    socket: np.ndarray | None = None
     sigma_given: bool = True
 
     def __post_init__(self) -> None:
@@ -83,6 +87,7 @@ class PoseSet:
             "quaternion_wxyz": (n_rows, 4),
             "length": (n_rows,),
             "time": (n_rows,),
+            "socket": (n_rows,),
         }
         for name, shape in shapes.items():
             values = getattr(self, name)
@@ -93,6 +98,16 @@ class PoseSet:
 
     def __len__(self) -> int:
         return self.q.shape[0]
+
+    @property
+    def in_socket(self) -> np.ndarray:
+        """Rows (N,) whose target was held by a socket."""
+        return np.zeros(len(self), bool) if self.socket is None else self.socket != ""
+
+    @property
+    def fixtures(self) -> tuple[str, ...]:
+        """Places of a fixture with sockets, in the order in which they first appear."""
+        return tuple(dict.fromkeys(self.station[self.in_socket].tolist()))
 
     @property
     def stations(self) -> tuple[str, ...]:
@@ -153,6 +168,10 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
                     f"only {sum(values)} of {len(sets)} pose sets have sigma; give it for all, or for none.",
                 )
             joined[field.name] = all(values)
+        elif field.name == "socket" and any(present):
+            joined[field.name] = np.concatenate(
+                [np.full(len(s), "") if s.socket is None else s.socket for s in sets]
+            )
         elif field.name == "pose":
             joined[field.name] = _numbered_on(values)
         elif all(present):

@@ -261,7 +261,9 @@ def _checked_map(
 ) -> AccuracyMap:
     """`accuracy_map` after the check by verification poses."""
     model = robot.model
-    stations = [s for s in model.stations.names if is_station_identified(model, s)]
+    # a fixture with sockets is no instrument: what it tells is in the base frame
+    instruments = robot.nominal.stations.names
+    stations = [s for s in instruments if is_station_identified(model, s)]
     reach = propagation(model, station=stations[0] if stations else None, payload=payload)
     rng = np.random.default_rng([seed, 7])
     if q is None:

@@ -9,7 +9,7 @@ from typing import Literal
 
 from flexcal.calibration.fit import LossName
 from flexcal.calibration.measurement import require_points
-from flexcal.data.poses import read_poses
+from flexcal.data.poses import column_labels, read_poses
 from flexcal.files.formats import provenance, read_estimates
 from flexcal.jobs.calibration.procedure import calibrate
 from flexcal.jobs.calibration.result import Calibration
@@ -27,6 +27,7 @@ def calibrate_robot(
     loss: LossName = "auto",
     secant_scale: float = 0.0,
     elasticity: Literal["reestimated", "marginalised"] = "reestimated",
+    hold_out: str | None = None,
     out: Path | None = None,
     command: str = "",
     progress: Progress = silent,
@@ -35,7 +36,8 @@ def calibrate_robot(
 
     The robot starts from nominal and the other blocks of its estimates; stiffness found by stage 1 enters with its uncertainty. `terms`
     (None: as robot.yaml says) are names, or "auto" for those that cross-validation supports. A sigma in the files is that of the
-    instrument; the scatter of robot and model are found from the points.
+    instrument; the scatter of robot and model are found from the points. `hold_out` names a column: the measurements with each of its
+    values are left out in turn.
 
     With `out`, estimates, results.json, points.csv, arm.npz, gravity_loads.npz and report.html go to that folder, and nothing beside
     robot.yaml changes. Raises `FlexcalError` as reading and `fit_geometry` do; nothing is written then.
@@ -47,7 +49,7 @@ def calibrate_robot(
     blocks = read_estimates(source, without="calibration") if source.exists() else {}
     target = estimates_target(source, out, "calibration")
     model = with_blocks(bare, blocks, source)
-    poses = read_poses(list(files), model)
+    poses = read_poses(list(files), model, further=() if hold_out is None else (hold_out,))
     require_points(poses, " and ".join(str(file) for file in files))
     progress("reading", 1.0)
     calibration = calibrate(
@@ -57,6 +59,7 @@ def calibrate_robot(
         loss=loss,
         secant_scale=secant_scale,
         elasticity=elasticity,
+        hold_out=None if hold_out is None else (hold_out, column_labels(files, hold_out)),
         progress=progress,
     )
     origin = provenance([robot_file, bare.urdf, *files], None, source if blocks else None, tuple(blocks))

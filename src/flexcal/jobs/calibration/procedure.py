@@ -32,6 +32,7 @@ from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.files.formats import provenance
 from flexcal.jobs.calibration.fitted_measurements import measurement_digests
+from flexcal.jobs.calibration.held_out import held_out_errors
 from flexcal.jobs.calibration.joint_ranges import joint_extents
 from flexcal.jobs.calibration.result import Calibration
 from flexcal.jobs.inputs import TARGETS, TARGETS_BETWEEN, is_station_identified
@@ -49,6 +50,7 @@ def calibrate(
     loss: LossName = "auto",
     secant_scale: float = 0.0,
     elasticity: Literal["reestimated", "marginalised"] = "reestimated",
+    hold_out: tuple[str, np.ndarray] | None = None,
     progress: Progress = silent,
 ) -> Calibration:
     """Calibrate the geometry of a robot from measured points, with its elastic deflection taken into account.
@@ -72,6 +74,9 @@ def calibrate(
         Relative standard deviation of the ratio of each drive's secant stiffness under gravity to its tangent stiffness.
     elasticity : {"reestimated", "marginalised"}
         How the uncertainty of stiffness and inertia enters; both give the same estimate to first order.
+    hold_out : tuple of str and ndarray, optional
+        Name and labels (N,) of groups of measurements. Each group is left out in turn of another calibration, with terms selected anew,
+        and compared with it: `Calibration.held_out`.
     progress : Progress
         Called with the stage and the share of it that is done.
 
@@ -101,6 +106,7 @@ def calibrate(
     _require_uncalibrated(model)
     require_points(poses)
     nominal, measured = model, poses
+    model = model.with_stations(poses.fixtures)
     sample = StratifiedSample.of(measured)
     poses = measured if sample is None else measured.subset(sample.rows)
     requested = _terms(model, terms)
@@ -133,6 +139,19 @@ def calibrate(
         selection = select_terms(model, poses.subset(good))
         progress("terms", 1.0)
         model, requested = selection.model, _with_random_waves(selection.terms)
+    held_out = None
+    if hold_out is not None:
+        progress("held out", 0.0)
+        held_out = held_out_errors(
+            lambda rest: (
+                calibrate(
+                    nominal, rest, terms=terms, loss=loss, secant_scale=secant_scale, elasticity=elasticity
+                ).model
+            ),
+            measured,
+            *hold_out,
+        )
+        progress("held out", 1.0)
     elastic = bool(model.elastic)
     same = not elastic and tuple(requested) == base
     selected = rigid if same else fit(model, requested, "selected fit", elastic=elastic)
@@ -161,6 +180,7 @@ def calibrate(
         validated=None if selection is None else cross_validated(selected),
         sample=sample,
         everywhere=None if sample is None else all_errors(selected.model, measured, progress),
+        held_out=held_out,
     )
 
 

@@ -37,6 +37,7 @@ from flexcal.calibration.verification import (
 )
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, json_values
+from flexcal.jobs.calibration.held_out import HeldOut
 from flexcal.jobs.calibration.remarks import calibration_remarks, outliers_of
 from flexcal.jobs.calibration.subsample import calibration_subsample_remark, subsample_document
 from flexcal.jobs.inputs import CalibratedRobot
@@ -88,6 +89,8 @@ class Calibration(Identification):
         Which points were fitted, where there are more than a fit takes.
     everywhere : ErrorStatistics or None
         Errors of `selected` at all points, where a sample was fitted.
+    held_out : HeldOut or None
+        Errors at groups of measurements that were left out whole, where they were asked for.
     estimates : Path or None
         File that the estimate was stored in.
     command : str
@@ -105,6 +108,7 @@ class Calibration(Identification):
     validated: CrossValidation | None = None
     sample: StratifiedSample | None = None
     everywhere: ErrorStatistics | None = None
+    held_out: HeldOut | None = None
     estimates: Path | None = None
     command: str = ""
 
@@ -200,6 +204,7 @@ class Calibration(Identification):
                 "mean_mm": self.validated.mean / MILLIMETRE,
                 "parameters": self.validated.freedom,
             },
+            "held_out": None if self.held_out is None else self.held_out.document(),
             "before": before,
             "points": self.found_points,
             "calibration": {

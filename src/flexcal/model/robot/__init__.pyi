@@ -1,6 +1,6 @@
 from .arm_sensor import ArmSensor, mounting_names, sensitivity_name, sensor_column, sensor_delay_name
 from .attached_payload import carried_inertias, last_frame, with_payload, with_point_at_frame
-from .config import AcceptanceConfig, DynamicsConfig, RobotConfig, SignalConfig
+from .config import AcceptanceConfig, DynamicsConfig, RobotConfig, SignalConfig, SocketsConfig
 from .parameter_groups import Links, Stations
 from .parameter_names import (
     FRICTION_PARAMETERS,
@@ -10,6 +10,7 @@ from .parameter_names import (
     MOMENTS,
     PARALLEL,
     SCATTER,
+    SOCKET_SCALE,
     SPRINGS,
     STATION,
     spring_names,
@@ -51,6 +52,7 @@ __all__ = [
     "PAYLOAD_FRAME",
     "SCATTER",
     "SHARED_DISTORTION",
+    "SOCKET_SCALE",
     "SPRINGS",
     "STATION",
     "AcceptanceConfig",
@@ -61,6 +63,7 @@ __all__ = [
     "RobotConfig",
     "RobotModel",
     "SignalConfig",
+    "SocketsConfig",
     "Stations",
     "carried_inertias",
     "declared_parameter",

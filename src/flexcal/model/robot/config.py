@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -291,6 +292,31 @@ class StationConfig:
 
 
 @dataclass(frozen=True)
+class SocketsConfig:
+    """Sockets of a fixture, which hold a ball on the tool: their positions by name in the fixture's own axes, m.
+
+    The fixture stands anywhere, and is moved from place to place. std: standard deviation of the distances between its sockets, m.
+    """
+
+    kind: Literal["sockets"]
+    sockets: dict[str, Triple]
+    std: float = 1e-4
+
+    def __post_init__(self) -> None:
+        if not self.sockets:
+            raise FlexcalError(
+                "E-ROBOT-050", "sockets need at least one position, as `sockets: {a: [0, 0, 0]}`."
+            )
+        if not self.std > 0:
+            raise FlexcalError("E-ROBOT-051", f"std must be positive, not {self.std:g} m.")
+
+    @property
+    def extent(self) -> float:
+        """Largest distance between two sockets, m; zero for one."""
+        return max(math.dist(a, b) for a in self.sockets.values() for b in self.sockets.values())
+
+
+@dataclass(frozen=True)
 class BoxConfig:
     """Corners of a box in the robot's base frame, m."""
 
@@ -370,6 +396,7 @@ class RobotConfig:
     geometry: GeometryConfig = GeometryConfig()
     dynamics: DynamicsConfig = DynamicsConfig()
     stations: dict[str, StationConfig] = field(default_factory=dict)
+    measurements: dict[str, SocketsConfig] = field(default_factory=dict)
     obstacles: tuple[str, ...] = ()
     limits: LimitsConfig = LimitsConfig()
     working_volume: BoxConfig | None = None

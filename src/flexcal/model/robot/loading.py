@@ -83,7 +83,7 @@ def read_robot(robot_type: type[RobotModel], path: Path) -> RobotModel:
         springs=springs,
         drives=_drives(file, config, n),
         links=Links.of(description.inertias),
-        stations=Stations(stations, np.zeros((len(stations), 6))),
+        stations=Stations.at_base(stations),
         scatter=Scatter(np.zeros(len(SCATTER))),
         payload=payload,
         force_sensor=_force_sensor(file, description, config),

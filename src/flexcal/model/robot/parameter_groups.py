@@ -91,10 +91,20 @@ class Links:
 
 @dataclass(frozen=True, eq=False)
 class Stations:
-    """Poses of the measuring instrument: `names`, and `pose` (stations, 6) as x, y, z, m, and the rotation vector rx, ry, rz, rad."""
+    """Poses of the measuring instrument: `names`, and `pose` (stations, 6) as x, y, z, m, and the rotation vector rx, ry, rz, rad.
+
+    Each place of a fixture with sockets is a station too, which measures where the ball is in the fixture. `scale` (1,): relative
+    deviation of the distances between sockets from the declared ones.
+    """
 
     names: tuple[str, ...]
     pose: np.ndarray
+    scale: np.ndarray
+
+    @classmethod
+    def at_base(cls, names: Sequence[str]) -> Stations:
+        """Stations in the robot's base frame."""
+        return cls(tuple(names), np.zeros((len(names), 6)), np.zeros(1))
 
 
 @dataclass(frozen=True, eq=False)

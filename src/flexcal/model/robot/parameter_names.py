@@ -30,6 +30,8 @@ COUPLED = ("rotor_inertia", "viscous", "coulomb")
 MASS_AND_COM = ("mass", "com_x", "com_y", "com_z")
 MOMENTS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 STATION = ("x", "y", "z", "rx", "ry", "rz")
+SOCKET_SCALE = "sockets.scale"
+"""Relative deviation of the distances between a fixture's sockets from the declared ones."""
 SCATTER = ("instrument", "instrument_share", "robot", "angular", "model", "pose", "transmission")
 
 _UNITS = {
@@ -111,6 +113,7 @@ def parameter_locations(model: RobotModel) -> dict[str, Location]:
     for s, name in enumerate(model.stations.names):
         for k, key in enumerate(STATION):
             table[f"station.{name}.{key}"] = Location("stations", "pose", (s, k))
+    table[SOCKET_SCALE] = Location("stations", "scale", (0,))
     elastic = {e.index: e for e in model.elastic}
     for i, joint in enumerate(model.joints):
         for k, key in enumerate(GEOMETRY):

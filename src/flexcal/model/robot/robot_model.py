@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -168,6 +168,23 @@ class RobotModel:
             state,
             tree=kinematic_tree(state["joints"], state["springs"].bearing_frames, state["config"].bearings),
         )
+
+    def with_stations(self, names: Iterable[str]) -> RobotModel:
+        """Robot with further stations, in the base frame: places of a fixture, which robot.yaml does not list.
+
+        Parameters
+        ----------
+        names : iterable of str
+            Names of stations; known ones stay as they are.
+
+        Returns
+        -------
+        RobotModel
+            The changed robot.
+        """
+        more = [name for name in dict.fromkeys(names) if name not in self.stations.names]
+        pose = np.concatenate([self.stations.pose, np.zeros((len(more), 6))])
+        return replace(self, stations=replace(self.stations, names=(*self.stations.names, *more), pose=pose))
 
     def with_bearings(self, bearings: Bearings) -> RobotModel:
         """Robot with bearing springs before or after the joint's rotation; parameters and posterior are kept.

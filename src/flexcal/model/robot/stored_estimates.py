@@ -41,7 +41,7 @@ def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path)
     """Robot with the estimates of `blocks`, read from the file `path`.
 
     A joint whose backlash was estimated counts as declared to have backlash, one whose drive stiffness was estimated as elastic, and a
-    payload that was identified as declared in its frame.
+    payload that was identified as declared in its frame; places of a fixture with sockets are stations.
     Raises `InputError` for a unit that is not the parameter's; for a name that the robot does not have: the file is then of another
     robot, or robot.yaml has changed since; where robot.yaml declares the payload in another frame; and for an elastic robot where
     `dynamics` has links that no body can be, as linear least squares may: they give the right torques at the joints, and wrong ones
@@ -53,6 +53,12 @@ def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path)
         model = _with_payload(model, blocks["payload"], path)
     for block, estimate in blocks.items():
         model = model.with_estimated_springs(estimate.values)
+        if model.config.measurements:
+            model = model.with_stations(
+                n.removeprefix("station.").removesuffix(".x")
+                for n in estimate.parameters.names
+                if n.startswith("station.") and n.endswith(".x")
+            )
         unknown = [
             n for n in estimate.parameters.names if n not in model.values and not NUISANCE.fullmatch(n)
         ]

@@ -1,0 +1,262 @@
+"""`calibrate` without an instrument: a ball on the tool in the sockets of a fixture."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from refusals import assert_refusal
+from scipy.optimize import least_squares
+
+from flexcal import RobotModel, calibrate, read_poses
+from flexcal.cli.main import main
+from flexcal.data.poses import concatenate
+
+SOCKETS = "measurements: {fixture: {kind: sockets, sockets: {a: [0, 0, 0], b: [0, 0.08, 0]}, std: 2.0e-5}}\n"
+LINK = (
+    '<link name="l{0}"><inertial><origin xyz="0 0 0.1"/><mass value="2"/>'
+    '<inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>'
+)
+JOINTS = [
+    ((0, 0, 0.3), (0, 0, 0)),
+    ((0, 0, 0), (-1.5707963, 0, 0)),
+    ((0.02, -0.35, 0), (1.5707963, 0, 0)),
+    ((0.05, 0, 0), (1.5707963, 0, 0)),
+    ((-0.05, 0.3, 0), (-1.5707963, 0, 0)),
+    ((0, 0, 0), (1.5707963, 0, 0)),
+    ((0.09, 0, 0), (1.5707963, 0, 0)),
+]
+BALL = (0.03, -0.05, 0.14)
+
+
+def urdf(path: Path, rng: np.random.Generator | None) -> Path:
+    """A seven-joint arm; with `rng` its joints are off by 0.6 mm and 1.5 mrad, and its ball by 2 mm."""
+    size = (0.0, 0.0, 0.0) if rng is None else (6e-4, 1.5e-3, 2e-3)
+    draw = np.random.default_rng(0) if rng is None else rng
+    parts = [LINK.format(i) for i in range(8)]
+    for i, (xyz, rpy) in enumerate(JOINTS):
+        at = np.array(xyz) + size[0] * draw.normal(size=3)
+        turn = np.array(rpy) + size[1] * draw.normal(size=3)
+        parts.append(
+            f'<joint name="j{i + 1}" type="revolute"><parent link="l{i}"/><child link="l{i + 1}"/>'
+            f'<origin xyz="{" ".join(map(repr, at.tolist()))}" rpy="{" ".join(map(repr, turn.tolist()))}"/><axis xyz="0 0 1"/>'
+            '<limit lower="-2.8" upper="2.8" effort="50" velocity="2"/></joint>'
+        )
+    ball = np.array(BALL) + size[2] * draw.normal(size=3)
+    parts.append(
+        f'<link name="ball"/><joint name="hold" type="fixed"><parent link="l7"/><child link="ball"/>'
+        f'<origin xyz="{" ".join(map(repr, ball.tolist()))}"/></joint>'
+    )
+    path.write_text(f'<robot name="seven">{"".join(parts)}</robot>')
+    return path
+
+
+class Arm:
+    """The true arm, by Pinocchio."""
+
+    def __init__(self, path: Path) -> None:
+        self.model = pin.buildModelFromUrdf(str(path))
+        self.data = self.model.createData()
+
+    def ball(self, q: np.ndarray) -> np.ndarray:
+        pin.forwardKinematics(self.model, self.data, q)
+        pin.updateFramePlacements(self.model, self.data)
+        return self.data.oMf[self.model.getFrameId("ball")].translation.copy()
+
+    def recorded(self, rng: np.random.Generator, noise: float, places: int, poses: int) -> str:
+        """Rows of a file: at every place, poses with the ball in either socket, with noise (rad) of the joint angles."""
+        rows = ["fixture,socket," + ",".join(f"q{k + 1}" for k in range(7))]
+        for k in range(places):
+            at = np.array([0.5, 0.45 * (k / (places - 1) - 0.5), 0.15]) + 0.1 * rng.normal(size=3)
+            across = np.array([np.cos(k), np.sin(k), 0.1 * rng.normal()])
+            across /= np.linalg.norm(across)
+            for name, place in (("a", at), ("b", at + 0.08 * across)):
+                found = 0
+                while found < poses:
+                    start = rng.uniform(-1.6, 1.6, 7)
+                    solved = least_squares(
+                        lambda q, place=place, start=start: np.concatenate(
+                            [(self.ball(q) - place) * 1e3, 1e-4 * (q - start)]
+                        ),
+                        start,
+                        bounds=(-2.8, 2.8),
+                        max_nfev=60,
+                    )
+                    q = solved.x
+                    if np.linalg.norm(self.ball(q) - place) > 1e-6:
+                        continue
+                    found += 1
+                    rows.append(
+                        f"place{k},{name}," + ",".join(map(repr, (q + noise * rng.normal(size=7)).tolist()))
+                    )
+        return "\n".join(rows) + "\n"
+
+
+@pytest.fixture(scope="module")
+def seven(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Arm]:
+    folder, rng = tmp_path_factory.mktemp("seven"), np.random.default_rng(11)
+    arm = Arm(urdf(folder / "true.urdf", rng))
+    urdf(folder / "seven.urdf", None)
+    (folder / "robot.yaml").write_text(
+        "robot: seven.urdf\npoints: {ball: {frame: ball, xyz: [0, 0, 0]}}\n" + SOCKETS
+    )
+    (folder / "held.csv").write_text(arm.recorded(rng, 5e-5, 6, 14))
+    return folder, arm
+
+
+def test_an_arm_of_strangers_is_found_but_for_its_base(seven: tuple[Path, Arm]) -> None:
+    """Distances between positions of the ball need no base: nominal off by millimetres, calibrated by the noise and the 0.02 mm of 80."""
+    folder, arm = seven
+    model = RobotModel.from_yaml(folder / "robot.yaml")
+    poses = read_poses(folder / "held.csv", model)
+    result = calibrate(model, poses, terms=["kinematic"], hold_out=("fixture", poses.station))
+    q = np.random.default_rng(1).uniform(-1.6, 1.6, (300, 7))
+    truth = np.array([arm.ball(row) for row in q])
+
+    def distances(points: np.ndarray) -> np.ndarray:
+        return np.linalg.norm(points[::2] - points[1::2], axis=1)
+
+    off = [
+        np.abs(distances(calibrated_points(robot, q)) - distances(truth)).mean()
+        for robot in (model, result.model)
+    ]
+    assert off[0] > 2.5e-3 and off[1] < 0.12 * off[0]
+    assert result.held_out is not None
+    assert result.held_out.mean < 0.1e-3 and result.held_out.distance < 0.06e-3
+    assert result.selected.identifiability.rank == 25 + 6 * 5
+    for name in ("j1.offset", "j1.length_z"):
+        assert name not in result.estimate.parameters, "what moves the whole robot is claimed of no joint"
+
+
+def calibrated_points(robot: RobotModel, q: np.ndarray) -> np.ndarray:
+    """Positions of the ball in the base frame."""
+    from flexcal.model.kinematics import point_kinematics
+
+    return point_kinematics(robot, q, jacobians=False).position
+
+
+def test_lengths_are_known_no_better_than_the_distance_of_the_sockets(
+    seven: tuple[Path, Arm], tmp_path: Path
+) -> None:
+    """Sockets that are 1 % farther apart than declared make a robot that is 1 % larger, and with that std the intervals say so."""
+    folder, arm = seven
+    for name in ("robot.yaml", "seven.urdf", "held.csv"):
+        shutil.copy(folder / name, tmp_path)
+    file = tmp_path / "robot.yaml"
+    file.write_text(file.read_text().replace("0.08, 0]}, std: 2.0e-5", "0.0808, 0]}, std: 8.0e-4"))
+    model = RobotModel.from_yaml(file)
+    result = calibrate(model, read_poses(tmp_path / "held.csv", model), terms=["kinematic"])
+    q = np.random.default_rng(2).uniform(-1.6, 1.6, (200, 7))
+    truth = np.array([arm.ball(row) for row in q])
+    sizes = [
+        np.linalg.norm(p[::2] - p[1::2], axis=1).sum() for p in (calibrated_points(result.model, q), truth)
+    ]
+    assert sizes[0] / sizes[1] == pytest.approx(1.01, abs=1e-3)
+    lengths = [n for n in result.estimate.parameters.names if n.startswith("j") and ".length_" in n]
+    longest = max(std for n in lengths if (std := result.estimate.std(n)) is not None)
+    assert 0.7 < longest / (0.01 * 0.35) < 1.5
+
+
+def test_the_arms_of_delft(examples: Path, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    """Published: 0.197 mm at places left out."""
+    folder = tmp_path / "panda"
+    shutil.copytree(examples / "panda_sockets", folder)
+    robot = folder / "robot.yaml"
+    arguments = [
+        "calibrate",
+        str(robot),
+        str(folder / "panda_3.csv"),
+        "--hold-out",
+        "fixture",
+        "--out",
+        str(tmp_path / "out"),
+    ]
+    assert main(arguments) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "left out by fixture, mean error 0.1" in said
+    found = json.loads((tmp_path / "out" / "results.json").read_text())
+    held = found["held_out"]
+    assert held["by"] == "fixture" and len(held["groups"]) == 6
+    assert held["mean_mm"] <= 0.17 and held["distance_mm"] <= 0.045
+    assert set(held["groups"]["backleft"]) == {"poses", "mean_mm", "p90_mm", "max_mm", "distance_mm"}
+    assert (
+        main(
+            [
+                "export",
+                "urdf",
+                str(robot),
+                "--estimates",
+                str(tmp_path / "out"),
+                "--out",
+                str(tmp_path / "new.urdf"),
+            ]
+        )
+        == 0
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "refusal"),
+    [
+        (("socket\n", "socket\n"), None),
+        (("place0,a", "place0,c"), ["E-POSES-037", "'c'"]),
+        (("measurements", "# measurements"), ["E-POSES-039", "measurements:"]),
+        (("std: 2.0e-5", "std: 0"), ["E-ROBOT-051", "positive"]),
+        (("kind: sockets", "kind: socket"), ["E-YAML-032", "sockets"]),
+        (("--hold-out fixture", "--hold-out shift"), ["E-POSES-041", "shift"]),
+    ],
+)
+def test_what_is_wrong_is_named(
+    seven: tuple[Path, Arm],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture,
+    change: tuple[str, str],
+    refusal: list[str] | None,
+) -> None:
+    folder, _ = seven
+    for name in ("robot.yaml", "seven.urdf", "held.csv"):
+        (tmp_path / name).write_text((folder / name).read_text().replace(*change))
+    options = "--terms kinematic --hold-out fixture".replace(*change).split()
+    status = main(
+        [
+            "calibrate",
+            str(tmp_path / "robot.yaml"),
+            str(tmp_path / "held.csv"),
+            *options,
+            "--out",
+            str(tmp_path / "out"),
+        ]
+    )
+    assert status == (0 if refusal is None else 2)
+    if refusal is not None:
+        assert_refusal(capsys.readouterr().err, *refusal)
+
+
+def test_sockets_beside_a_tracker(seven: tuple[Path, Arm]) -> None:
+    """Points of an instrument tell where the base stands; both together are fitted as one."""
+    folder, arm = seven
+    model = RobotModel.from_yaml(folder / "robot.yaml")
+    held = read_poses(folder / "held.csv", model)
+    rng = np.random.default_rng(4)
+    q = rng.uniform(-1.6, 1.6, (30, 7))
+    rows = ["pose,x,y,z," + ",".join(f"q{k + 1}" for k in range(7))]
+    for k, one in enumerate(q):
+        point = arm.ball(one) + [0.5, -2.0, 0.3] + 3e-5 * rng.normal(size=3)
+        rows.append(f"{k + 1}," + ",".join(map(repr, [*point.tolist(), *one.tolist()])))
+    (folder / "tracker.csv").write_text("\n".join(rows) + "\n")
+    both = concatenate([held, read_poses(folder / "tracker.csv", model)])
+    results = [calibrate(model, one, terms=["kinematic"]) for one in (both, both.subset(~both.in_socket))]
+    fresh = rng.uniform(-1.6, 1.6, (200, 7))
+    truth = np.array([arm.ball(one) for one in fresh])
+    truth += [0.5, -2.0, 0.3]
+    errors = []
+    for result in results:
+        place = [result.model.value(f"station.tracker.{key}") for key in ("x", "y", "z", "rx", "ry", "rz")]
+        turn = pin.exp3(np.array(place[3:]))
+        seen = calibrated_points(result.model, fresh) @ turn.T + place[:3]
+        errors.append(np.linalg.norm(seen - truth, axis=1).mean())
+    assert errors[0] < errors[1] < 0.5e-3
