@@ -56,12 +56,13 @@ class Drift:
         """Score test (Rao) on the residuals of a fit: first-order estimate of a drift with three further coordinates.
 
         The covariance of the errors is that of the fit without what stretches of the measuring order share, scaled by the chi-square
-        that is left. Rows are in measuring order; outliers do not count.
+        that is left. Rows are in measuring order; outliers do not count, nor do points in sockets, which take a drift for another place of
+        the fixture: at least one point must be of an instrument.
         """
         poses = fit.poses
         share = np.linspace(-0.5, 0.5, len(poses))
         kept = ~np.isin(np.arange(len(poses)), fit.estimate.outliers)
-        ramp = share[kept][:, None, None] * np.eye(3)
+        ramp = (share * ~poses.in_socket)[kept][:, None, None] * np.eye(3)
         products = fit.linear.products(replace(fit.scatter, order=0.0), ramp)
         covariance = np.linalg.inv(products[:-1, :-1])
         travel = covariance @ products[:-1, -1]

@@ -52,8 +52,8 @@ def calibration_remarks(fit: GeometricFit, cause: Sequence[str] = ()) -> tuple[s
         more = f" and {len(outliers) - _LISTED} more" if len(outliers) > _LISTED else ""
         remarks.append(f"{len(outliers)} outliers: {listed}{more}")
     remarks += [*_undetermined(fit), *_noise(fit)]
-    drift = Drift.of(fit)
-    if drift.certain:
+    drift = None if fit.poses.in_socket.all() else Drift.of(fit)
+    if drift is not None and drift.certain:
         remarks.append(
             f"residuals drift with time (p = {drift.probability:.1g}), by {drift.distance / MILLIMETRE:.3f} mm from first to last pose: "
             "robot or instrument warmed up, or position and measuring order are correlated"

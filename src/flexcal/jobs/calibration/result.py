@@ -181,7 +181,8 @@ class Calibration(Identification):
     @cached_property
     def _numbers(self) -> dict[str, Any]:
         selected, chosen, before = self.selected, self.selection, self.before.document()
-        identifiability, drift = selected.identifiability, Drift.of(selected)
+        identifiability = selected.identifiability
+        drift = None if selected.poses.in_socket.all() else Drift.of(selected)
         bearings = bearing_remarks(self.bearings, selected)
         blamed = self.bearings is not None and self.bearings.contradicted
         misfit = None if self.stiffness is None else self.stiffness.misfit
@@ -221,7 +222,7 @@ class Calibration(Identification):
                 "is_implausible": is_implausible(selected),
             },
             "variances": selected.variances,
-            "drift": drift.document(),
+            "drift": None if drift is None else drift.document(),
             "sample": subsample_document(self.sample, self.everywhere),
             "outliers": [
                 {"pose": o.pose, "target": o.target, "error_mm": o.error / MILLIMETRE}

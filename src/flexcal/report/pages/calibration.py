@@ -158,7 +158,7 @@ def calibration_checks(
             estimate, results["variances"], is_implausible=results["fit"]["is_implausible"]
         ).named("residual"),
         check_rank(identifiable.parameters, identifiable.rank, identifiable.gap).named("rank"),
-        check_drift(results["drift"]).named("drift"),
+        *([] if results["drift"] is None else [check_drift(results["drift"]).named("drift")]),
         check_outliers(len(estimate.outliers), errors).named("outliers"),
         *check_bearings(results.get("bearings")),
         *_stage_one_checks(results.get("stage1")),
