@@ -236,6 +236,17 @@ def test_what_is_wrong_is_named(
         assert_refusal(capsys.readouterr().err, *refusal)
 
 
+def test_sockets_verify_nothing(
+    seven: tuple[Path, Arm], tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    folder, _ = seven
+    files = [str(folder / "robot.yaml"), str(folder / "held.csv")]
+    assert main(["calibrate", *files, "--terms", "kinematic", "--out", str(tmp_path)]) == 0
+    capsys.readouterr()
+    assert main(["verify", *files, "--estimates", str(tmp_path)]) == 2
+    assert_refusal(capsys.readouterr().err, "E-RUN-102", "--hold-out fixture")
+
+
 def test_sockets_beside_a_tracker(seven: tuple[Path, Arm]) -> None:
     """Points of an instrument tell where the base stands; both together are fitted as one."""
     folder, arm = seven

@@ -317,7 +317,15 @@ def verification_poses(
 
 
 def require_stations(robot: CalibratedRobot, poses: PoseSet, placed_again: bool = False) -> None:
-    """Raise `FlexcalError` for points measured from a station that the calibration did not place, unless it is `placed_again`."""
+    """Raise `FlexcalError` for a ball in sockets, and for points measured from a station that the calibration did not place, unless it is
+    `placed_again`.
+    """
+    if poses.in_socket.any():
+        raise FlexcalError(
+            "E-RUN-102",
+            "a ball in sockets cannot verify a robot, because nobody knows where the fixture stands; leave out its places one after the "
+            "other: 'flexcal calibrate' with --hold-out fixture.",
+        )
     for station in poses.stations:
         if not placed_again and not is_station_identified(robot.model, station):
             raise FlexcalError(
