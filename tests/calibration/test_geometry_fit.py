@@ -288,8 +288,6 @@ def test_stations_and_measurements_that_are_not_known_are_named(
     for call in (fit_geometry, prediction_errors):
         with refused("E-ROBOT-042", "window", "tracker"):
             call(tx90l, elsewhere)
-        with refused("E-CAL-012"):
-            call(tx90l, replace(poses, quaternion_wxyz=np.tile([1.0, 0, 0, 0], (len(poses), 1))))
         with refused("E-CAL-011"):
             call(tx90l, replace(poses, length=np.ones(len(poses))))
 

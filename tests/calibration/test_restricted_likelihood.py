@@ -11,6 +11,7 @@ from scipy.optimize import minimize
 from flexcal.calibration.error_model import ErrorComponents, ErrorGroups, LinearFit
 from flexcal.calibration.error_model.point_sums import PointSums
 from flexcal.calibration.error_model.restricted_likelihood import RestrictedLikelihood
+from flexcal.calibration.measurement import METRES
 
 ONE_POINT = np.arange(30)
 SEVERAL_POINTS = np.r_[np.repeat(np.arange(9), 2), np.repeat([9, 10, 11], 3), 12, 12, 13]
@@ -28,7 +29,8 @@ def drawn(visits: np.ndarray, command: np.ndarray = ALL_AGAIN) -> LinearFit:
     sigma = rng.uniform(1e-5, 3e-5, (30, 3))
     parts = (rng.normal(size=(30, 3, k)) for k in (5, 2, 3, 4))
     free, tied, turns, waves = parts
-    return LinearFit(4e-5 * rng.normal(size=(30, 3)), free, 1e-5 * tied, waves, sigma, turns, cells)
+    unit = np.full((30, 3), METRES)
+    return LinearFit(4e-5 * rng.normal(size=(30, 3)), free, 1e-5 * tied, waves, sigma, turns, cells, unit)
 
 
 def derivative(fit: LinearFit, name: str) -> np.ndarray:

@@ -202,12 +202,13 @@ def test_draw_wire_lengths_are_refused_by_name(run, ur5_folder: Path) -> None:
     )
 
 
-def test_orientations_are_refused_by_name(run, ur5_folder: Path) -> None:
+def test_orientations_that_are_not_the_robots_are_refused(run, ur5_folder: Path) -> None:
     header, rows = read_csv(ur5_folder / "random.csv")
-    turned = np.hstack([rows, np.tile([1.0, 0.0, 0.0, 0.0], (len(rows), 1))])
+    quaternion = np.random.default_rng(0).normal(size=(len(rows), 4))
+    turned = np.hstack([rows, quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)])
     file = write_csv(ur5_folder / "turned.csv", [*header, "qw", "qx", "qy", "qz"], turned)
     sentence = refused_run(run, ur5_folder, "calibrate", ur5_folder / "robot.yaml", file)
-    assert_refusal(sentence, "E-CAL-012", "turned.csv")
+    assert_refusal(sentence, "E-CAL-012", "flexcal import")
 
 
 def test_calibrate_from_a_station_that_robot_yaml_does_not_have(run, ur5_folder: Path) -> None:

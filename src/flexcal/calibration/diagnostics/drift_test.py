@@ -6,7 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from flexcal.calibration.error_model import translations
 from flexcal.calibration.fit import GeometricFit
+from flexcal.calibration.measurement import Readings
 from flexcal.units import MILLIMETRE
 
 _CHANCE = 0.0027
@@ -60,9 +62,10 @@ class Drift:
         the fixture: at least one point must be of an instrument.
         """
         poses = fit.poses
-        share = np.linspace(-0.5, 0.5, len(poses))
-        kept = ~np.isin(np.arange(len(poses)), fit.estimate.outliers)
-        ramp = (share * ~poses.in_socket)[kept][:, None, None] * np.eye(3)
+        share = np.linspace(-0.5, 0.5, len(poses)) * ~poses.in_socket
+        row = Readings.of(poses).row
+        kept = ~np.isin(row, fit.estimate.outliers)
+        ramp = share[row[kept]][:, None, None] * translations(fit.linear.unit)
         products = fit.linear.products(replace(fit.scatter, order=0.0), ramp)
         covariance = np.linalg.inv(products[:-1, :-1])
         travel = covariance @ products[:-1, -1]

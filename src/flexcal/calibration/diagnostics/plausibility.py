@@ -79,5 +79,8 @@ def _limits(kept: list[str], size: np.ndarray) -> np.ndarray:
 
 
 def _has_size(name: str) -> bool:
-    """Whether robot.yaml or the URDF give a parameter's size: not for the place of the instrument, nor for a compliance."""
-    return not name.startswith(("station.", "sockets.")) and ".gravity_compliance" not in name
+    """Whether robot.yaml or the URDF give a parameter's size: not for the place of the instrument, how a target's axes are mounted, nor
+    for a compliance.
+    """
+    mounted = name.startswith("point.") and name.endswith(("rx", "ry", "rz"))
+    return not mounted and not name.startswith(("station.", "sockets.")) and ".gravity_compliance" not in name

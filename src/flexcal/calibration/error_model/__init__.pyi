@@ -1,4 +1,4 @@
-from .error_components import ErrorComponents, joint_rotation_jacobian, known_scatter, whitened
+from .error_components import ErrorComponents, joint_rotation_jacobian, known_scatter, translations, whitened
 from .error_statistics import ErrorStatistics
 from .folds import are_different, order_folds, repeated_pose_numbers, workspace_folds
 from .groups import SAME_COMMAND, ErrorGroups, block_columns, group_numbers, occurrence
@@ -19,6 +19,7 @@ __all__ = [
     "occurrence",
     "order_folds",
     "repeated_pose_numbers",
+    "translations",
     "whitened",
     "workspace_folds",
 ]

@@ -34,10 +34,11 @@ class CommandSums:
         """Sums of `points` with commands; `cell` (G, T, kinds) are the cells of their visits, -1 where there is no point."""
         assert points.command is not None
         visits = points.visits
-        again = np.bincount(points.command) > 1
+        again = np.bincount(points.command[points.command >= 0]) > 1
         number = np.where(again, np.cumsum(again) - 1, -1)
-        command = np.where(visits >= 0, number[points.command[visits]], -1)
-        once = np.repeat((visits >= 0) & (command < 0), 3, axis=1).astype(float)
+        commanded = (visits >= 0) & (points.command[visits] >= 0)
+        command = np.where(commanded, number[points.command[visits]], -1)
+        once = np.repeat(commanded & (command < 0), 3, axis=1).astype(float)
         group = _tied(command, int(again.sum()))
         size = np.bincount(group)
         order = np.lexsort([group, size[group]])

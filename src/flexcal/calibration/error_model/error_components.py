@@ -8,7 +8,7 @@ import numpy as np
 
 from flexcal.calibration.error_model.groups import ErrorGroups
 from flexcal.calibration.error_model.incidence_matrices import incidence
-from flexcal.calibration.measurement import PredictedMeasurements
+from flexcal.calibration.measurement import METRES, RADIANS, PredictedMeasurements
 from flexcal.model.robot import RobotModel
 
 _SMALLEST = 1e-6
@@ -23,7 +23,8 @@ class ErrorComponents:
 
     `share`: the instrument's noise over the stated sigma, 0 where none is stated (the robot's then contains it); `robot` m, independent
     from measurement to measurement, `pose` m and `angular` rad at every revolute joint, common to the points of one visit to a pose:
-    repeatability; `workspace`, `order` and `command` m: model error common to a cell of the workspace, to a stretch of the measuring
+    repeatability; `orientation` rad, independent from measured orientation to orientation, the instrument's where none is stated;
+    `workspace`, `order` and `command` m: model error common to a cell of the workspace, to a stretch of the measuring
     order, and to all visits of one command; `transmission` rad, of a wave of order 1 of a joint's transmission error (`waves`).
     """
 
@@ -35,6 +36,7 @@ class ErrorComponents:
     order: float = 0.0
     command: float = 0.0
     transmission: float = 0.0
+    orientation: float = 0.0
 
     @property
     def model(self) -> float:
@@ -45,48 +47,64 @@ class ErrorComponents:
         """Whether every component has converged to a share `tolerance` of the whole."""
         own, other = (np.array([s.robot, s.pose, s.workspace, s.order, s.command]) for s in (self, before))
         same = np.abs(own - other).max() <= tolerance * (np.linalg.norm(own) + _SMALLEST)
-        angles = ((self.angular, before.angular), (self.transmission, before.transmission))
+        angles = (
+            (self.angular, before.angular),
+            (self.transmission, before.transmission),
+            (self.orientation, before.orientation),
+        )
         turned = all(abs(a - b) <= tolerance * (a + _SMALLEST_TURN) for a, b in angles)
         return bool(same) and turned and abs(self.share - before.share) <= tolerance
 
-    def independent(self, sigma: np.ndarray, turns: np.ndarray) -> np.ndarray:
-        """Covariance (N, 3, 3), m², of instrument and repeatability at each measurement.
+    def independent(self, sigma: np.ndarray, turns: np.ndarray, unit: np.ndarray | None = None) -> np.ndarray:
+        """Covariance (R, 3, 3), m² or rad², of instrument and repeatability at each reading.
 
-        `sigma` (N, 3) m is the stated one, `turns` (N, 3, r) m/rad how the revolute joints move the points.
+        `sigma` (R, 3), m or rad, is the stated one, `turns` (R, 3, r) how the revolute joints move the readings, per rad, `unit` (R, 3)
+        that of the coordinates, metres by default.
         """
-        diagonal = (self.share * sigma) ** 2 + self.robot**2 + self.pose**2 + _SMALLEST**2
+        diagonal = self._alone(sigma, unit) + self.pose**2 * _in(METRES, sigma, unit)
         return diagonal[:, :, None] * np.eye(3) + self.angular**2 * turns @ np.swapaxes(turns, 1, 2)
 
-    def jointly(self, sigma: np.ndarray, turns: np.ndarray, cells: ErrorGroups) -> np.ndarray:
-        """Joint covariance (G, 3 T, 3 T), m², of all measurements of a visit to a pose, independent of other visits.
+    def _alone(self, sigma: np.ndarray, unit: np.ndarray | None) -> np.ndarray:
+        """Variances (R, 3) of what is independent from reading to reading."""
+        diagonal = (self.share * sigma) ** 2 + self.robot**2 * _in(METRES, sigma, unit)
+        return diagonal + self.orientation**2 * _in(RADIANS, sigma, unit) + _SMALLEST**2
 
-        The diagonal is 1 where a visit lacks a point.
+    def jointly(
+        self, sigma: np.ndarray, turns: np.ndarray, cells: ErrorGroups, unit: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Joint covariance (G, 3 T, 3 T) of all readings of a visit to a pose, independent of other visits.
+
+        The diagonal is 1 where a visit lacks a reading.
         """
-        diagonal = cells.gathered((self.share * sigma) ** 2 + self.robot**2 + _SMALLEST**2)
+        diagonal = cells.gathered(self._alone(sigma, unit))
         single = np.where(diagonal > 0, diagonal, 1.0)[:, :, None] * np.eye(diagonal.shape[1])
-        common = cells.gathered(self.common(turns))
+        common = cells.gathered(self.common(turns, unit))
         return single + common @ np.swapaxes(common, 1, 2)
 
-    def common(self, turns: np.ndarray) -> np.ndarray:
-        """Columns (N, 3, 3 + r) m of the repeatability shared by the points of a visit, each times a standard normal variable."""
-        moved = np.broadcast_to(self.pose * np.eye(3), (len(turns), 3, 3))
-        return np.concatenate([moved, self.angular * turns], axis=2)
+    def common(self, turns: np.ndarray, unit: np.ndarray | None = None) -> np.ndarray:
+        """Columns (R, 3, 3 + r) of the repeatability shared by the readings of a visit, each times a standard normal variable."""
+        moved = np.eye(3) * _in(METRES, turns[:, :, :1], unit)
+        return np.concatenate([self.pose * moved, self.angular * turns], axis=2)
 
-    def whitening(self, sigma: np.ndarray, turns: np.ndarray) -> np.ndarray:
-        """Whitening matrix W (N, 3, 3) 1/m with WᵀW the inverse of the total variance of single measurements."""
-        whole = self.independent(sigma, turns) + self.model**2 * np.eye(3)
+    def whitening(self, sigma: np.ndarray, turns: np.ndarray, unit: np.ndarray | None = None) -> np.ndarray:
+        """Whitening matrix W (R, 3, 3) with WᵀW the inverse of the total variance of single readings."""
+        whole = self.independent(sigma, turns, unit)
+        whole = whole + self.model**2 * _in(METRES, sigma, unit)[:, :, None] * np.eye(3)
         return np.linalg.inv(np.linalg.cholesky(whole))
 
-    def weights(self, sigma: np.ndarray, turns: np.ndarray) -> np.ndarray:
-        """Whitening matrix (N, 3, 3) with the repeatability of the joints averaged over points and directions.
+    def weights(self, sigma: np.ndarray, turns: np.ndarray, unit: np.ndarray | None = None) -> np.ndarray:
+        """Whitening matrix (R, 3, 3) with the repeatability of the joints averaged over readings and directions.
 
         What is taken for it may be an error of the model, and weights that follow it would fit the points of short levers only.
         """
-        even = replace(self, robot=self.evenly(turns), pose=0.0, angular=0.0)
-        return even.whitening(sigma, turns)
+        points = _in(METRES, sigma, unit).any(axis=1)
+        turned = float(np.mean((turns[~points] ** 2).sum(axis=2))) if turns[~points].size else 0.0
+        orientation = float(np.hypot(self.orientation, self.angular * np.sqrt(turned)))
+        even = replace(self, robot=self.evenly(turns[points]), pose=0.0, angular=0.0, orientation=orientation)
+        return even.whitening(sigma, turns, unit)
 
     def evenly(self, turns: np.ndarray) -> float:
-        """Standard deviation of a coordinate, m, due to the robot's repeatability, root mean square over the points."""
+        """Standard deviation of a coordinate of points, m, due to the robot's repeatability, root mean square over the points."""
         turned = float(np.mean((turns**2).sum(axis=2))) if turns.size else 0.0
         return float(np.sqrt(self.robot**2 + self.pose**2 + self.angular**2 * turned))
 
@@ -102,6 +120,18 @@ class ErrorComponents:
         return np.concatenate(sums).reshape(-1, rows.shape[2])
 
 
+def translations(unit: np.ndarray) -> np.ndarray:
+    """Columns (R, 3, 3) of a displacement of the tool in the coordinates that are in metres."""
+    return np.eye(3) * (unit == METRES)[:, :, None]
+
+
+def _in(wanted: int, like: np.ndarray, unit: np.ndarray | None) -> np.ndarray:
+    """1 where a coordinate has the unit, else 0; of the shape of `like`, whose coordinates are in metres where no `unit` is given."""
+    if unit is None:
+        return np.full(like.shape, float(wanted == METRES))
+    return (unit == wanted).astype(float).reshape(*unit.shape, *(1,) * (like.ndim - 2))
+
+
 def whitened(whitening: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Product of W (N, 3, 3) with `rows` (N, 3) or (N, 3, m), stacked: (3 N,) or (3 N, m)."""
     if rows.ndim == 2:
@@ -114,7 +144,7 @@ def known_scatter(model: RobotModel, *, stated: bool) -> ErrorComponents | None:
 
     A sigma that the calibration did not have is not added: the robot's part there holds the instrument's. None where nothing is known.
     """
-    instrument, share, robot, angular, _, pose, _ = model.scatter.std
+    instrument, share, robot, angular, _, pose, _, _ = model.scatter.std
     if not model.scatter.std.any():
         return ErrorComponents(share=1.0, robot=0.0) if stated else None
     if not stated:
@@ -124,6 +154,6 @@ def known_scatter(model: RobotModel, *, stated: bool) -> ErrorComponents | None:
 
 
 def joint_rotation_jacobian(at: PredictedMeasurements) -> np.ndarray:
-    """Derivative (N, 3, r), m/rad, of the points with respect to a rotation of every revolute joint, in the instrument's frame."""
+    """Derivative (R, 3, r) of the readings with respect to a rotation of every revolute joint, per rad, in the instrument's frame."""
     joints = [joint for joint in at.model.joints if joint.kind == "revolute"]
     return at.jacobian([f"{joint.name}.offset" for joint in joints])

@@ -1,4 +1,4 @@
-"""Groups of measured points with a common error: visits to a pose, regions of the workspace, sections in time, commands."""
+"""Groups of readings with a common error: visits to a pose, regions of the workspace, sections in time, commands."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ _FEWEST_REPEATED = 5
 
 @dataclass(frozen=True, eq=False)
 class ErrorGroups:
-    """Labels (N,) of points that share an error, integers from 0.
+    """Labels (R,) of readings that share an error, integers from 0.
 
-    `pose`: measured in one visit to a pose, each another target; the robot's scatter is common to them. The others share a model error:
-    a cell of the `workspace`, a stretch of the measuring `order`, a `command` with its target; None where there are too few poses, or too
-    few commands that were visited again.
+    `pose`: measured in one visit to a pose, each another target or its orientation; the robot's scatter is common to them. The others
+    share a model error of their points: a cell of the `workspace`, a stretch of the measuring `order`, a `command` with its target, -1
+    for an orientation; None where there are too few poses, or too few commands that were visited again.
     """
 
     pose: np.ndarray
@@ -37,6 +37,16 @@ class ErrorGroups:
     @classmethod
     def of(cls, poses: PoseSet) -> ErrorGroups:
         """Groups by visit: rows of one pose number are a visit; a target that the visit already has begins another."""
+        points = cls._of_points(poses)
+        turned = poses.turned
+        if not turned.any():
+            return points
+        alone = np.full(int(turned.sum()), -1)
+        blocks = {name: np.concatenate([labels, alone]) for name, labels in points.blocks.items()}
+        return cls(np.concatenate([points.pose, points.pose[turned]]), **blocks)
+
+    @classmethod
+    def _of_points(cls, poses: PoseSet) -> ErrorGroups:
         _, target = np.unique(poses.target, return_inverse=True)
         visit = group_numbers(np.column_stack([poses.pose, occurrence(group_numbers(poses.pose, target))]))
         commands = group_numbers(np.column_stack([np.round(poses.q / SAME_COMMAND), target]))
@@ -50,7 +60,7 @@ class ErrorGroups:
 
     def subset(self, rows: np.ndarray) -> ErrorGroups:
         """Groups of the rows with these indices or of this mask."""
-        blocks = {name: group_numbers(labels[rows]) for name, labels in self.blocks.items()}
+        blocks = {name: _numbered_again(labels[rows]) for name, labels in self.blocks.items()}
         return ErrorGroups(group_numbers(self.pose[rows]), **blocks)
 
     @property
@@ -58,11 +68,6 @@ class ErrorGroups:
         """Labels (N,) of the blocks of a common model error, by name."""
         named = {"workspace": self.workspace, "order": self.order, COMMAND: self.command}
         return {name: labels for name, labels in named.items() if labels is not None}
-
-    @property
-    def several(self) -> bool:
-        """Whether any pose has several points."""
-        return self.visits.shape[1] > 1
 
     @cached_property
     def visits(self) -> np.ndarray:
@@ -78,11 +83,14 @@ class ErrorGroups:
         by_visit[self.visits < 0] = 0.0
         return by_visit.reshape(len(by_visit), -1, *rows.shape[2:])
 
-    @cached_property
-    def common(self) -> np.ndarray:
-        """Covariance (G, 3 T, 3 T) of a unit error in every coordinate that is common to the points of a visit."""
-        unit = self.gathered(np.broadcast_to(np.eye(3), (len(self.pose), 3, 3)))
-        return unit @ np.swapaxes(unit, 1, 2)
+
+def _numbered_again(labels: np.ndarray) -> np.ndarray:
+    """Labels (R,) as numbers from 0 without gaps; negative ones stay -1."""
+    known = labels >= 0
+    result = np.full(len(labels), -1)
+    if known.any():
+        result[known] = group_numbers(labels[known])
+    return result
 
 
 def _regions(poses: PoseSet, visit: np.ndarray, count: int) -> np.ndarray | None:

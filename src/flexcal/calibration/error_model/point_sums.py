@@ -9,8 +9,10 @@ import numpy as np
 
 from flexcal.calibration.error_model.arrowhead_matrix import Arrowhead
 from flexcal.calibration.error_model.command_sums import CommandSums
+from flexcal.calibration.error_model.error_components import translations
 from flexcal.calibration.error_model.groups import COMMAND
 from flexcal.calibration.error_model.incidence_matrices import added, by_axes, incidence, pairs_of
+from flexcal.calibration.measurement import METRES, RADIANS
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -45,10 +47,12 @@ class PointSums:
             np.concatenate([fit.free, fit.tied, fit.waves, more, fit.residual[:, :, None]], axis=2)
         )
         turned = cells.gathered(fit.turns)
+        together = cells.gathered(translations(fit.unit))
         structures = {
-            "robot": cells.gathered(np.ones(fit.residual.shape)),
+            "robot": cells.gathered((fit.unit == METRES).astype(float)),
+            "orientation": cells.gathered((fit.unit == RADIANS).astype(float)),
             "share": cells.gathered(fit.sigma**2),
-            "pose": cells.common,
+            "pose": together @ np.swapaxes(together, 1, 2),
             "angular": turned @ np.swapaxes(turned, 1, 2),
         }
         blocks, labels, count = {}, [], 0
@@ -56,7 +60,8 @@ class PointSums:
             if name != COMMAND:
                 size = int(own.max()) + 1
                 blocks[name] = np.arange(count, count + size)
-                labels.append(np.where(cells.visits >= 0, own[cells.visits] + count, -1))
+                known = (cells.visits >= 0) & (own[cells.visits] >= 0)
+                labels.append(np.where(known, own[cells.visits] + count, -1))
                 count += size
         label = np.stack(labels, axis=2) if labels else np.zeros((*cells.visits.shape, 0), dtype=int)
         rows = np.arange(cells.visits.size).reshape(*cells.visits.shape, 1)

@@ -11,6 +11,7 @@ from flexcal.calibration.error_model.error_components import ErrorComponents
 from flexcal.calibration.error_model.groups import ErrorGroups
 from flexcal.calibration.error_model.point_sums import PointSums
 from flexcal.calibration.error_model.restricted_likelihood import RestrictedLikelihood
+from flexcal.calibration.measurement import METRES, RADIANS
 
 _CLEAR_GAIN = 3.0
 """Gain in log-likelihood from which a stated sigma counts as too large (p = 0.01, one parameter at its bound)."""
@@ -25,6 +26,8 @@ TRANSMISSION = "transmission"
 _SMALLEST = 1e-9
 """Share of the total variance that bounds a component from below."""
 _STEPS, _HALVINGS = 60, 30
+_ALWAYS = ("robot", "orientation")
+"""Components that the data need not support: points and orientations scatter."""
 _STILL = 1e-6
 """Change of the deviance, by its slope, below which the maximisation has converged."""
 _ARMIJO = 1e-4
@@ -33,10 +36,11 @@ _ARMIJO = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class LinearFit:
-    """Fit linearised at its solution: `residual` (N, 3) m = `free` x + `tied` z + error, z standard normal a priori.
+    """Fit linearised at its solution: `residual` (R, 3) = `free` x + `tied` z + error, z standard normal a priori.
 
-    `free` (N, 3, p) and `tied` (N, 3, t) m; `waves` (N, 3, w) m/rad move the points with the waves of transmission errors; `sigma` (N, 3) m
-    as stated, `turns` (N, 3, r) m/rad; `cells` say which points share an error.
+    `unit` (R, 3) says which coordinates are in m and which in rad; `free` (R, 3, p) and `tied` (R, 3, t) are in these; `waves` (R, 3, w),
+    per rad, move the readings with the waves of transmission errors, `turns` (R, 3, r) with rotations of the joints; `sigma` (R, 3) as
+    stated; `cells` say which readings share an error.
     """
 
     residual: np.ndarray
@@ -46,6 +50,12 @@ class LinearFit:
     sigma: np.ndarray
     turns: np.ndarray
     cells: ErrorGroups
+    unit: np.ndarray
+
+    @property
+    def points(self) -> np.ndarray:
+        """Readings (R,) that are points."""
+        return (self.unit == METRES).any(axis=1)
 
     def products(self, scatter: ErrorComponents, columns: np.ndarray) -> np.ndarray:
         """Scalar products (k + 1, k + 1) of further `columns` (N, 3, k) m and, last, the residual, after projection off the parameters.
@@ -65,21 +75,25 @@ class LinearFit:
         Where a sigma is `stated`, the instrument's part is that, or less where the points scatter clearly less than it says.
         """
         shared = [*([TRANSMISSION] if self.waves.size else []), *self.cells.blocks]
-        names = ["robot", *(["pose"] if self.cells.several else []), "angular", *shared]
-        total = self._mean_square()
+        angles = ["orientation"] if (self.unit == RADIANS).any() else []
+        names = ["robot", *angles, *(["pose"] if self._several else []), "angular", *shared]
+        totals = self._mean_squares()
+        total = totals[METRES]
         levers = {
-            name: _lever(moved) for name, moved in (("angular", self.turns), (TRANSMISSION, self.waves))
+            name: _lever(moved[self.points])
+            for name, moved in (("angular", self.turns), (TRANSMISSION, self.waves))
         }
-        scale = np.array([total / levers.get(name, 1.0) for name in names])
+        sizes = {"orientation": totals.get(RADIANS, 0.0)}
+        scale = np.array([sizes.get(name, total / levers.get(name, 1.0)) for name in names])
         share = 1.0 if stated else 0.0
         variances, likelihood = self._maximum(names, scale, share)
         if stated:
             # the points may scatter less than the instrument alone should, even if nothing else errs
-            own = scale[len(names) - len(shared) :]
-            sizes = np.append(own, total / float(np.mean(self.sigma**2)))
-            alone = self._maximum([*shared, "share"], sizes, None, favour=False)[1]
+            own = np.concatenate([scale[1 : 1 + len(angles)], scale[len(names) - len(shared) :]])
+            sizes = np.append(own, total / float(np.mean(self.sigma[self.points] ** 2)))
+            alone = self._maximum([*angles, *shared, "share"], sizes, None, favour=False)[1]
             if alone - self._maximum(names, scale, share, favour=False)[1] > _CLEAR_GAIN:
-                names, scale = ["robot", *shared], np.append(total, own)
+                names, scale = ["robot", *angles, *shared], np.append(total, own)
                 sizes = np.append(scale, sizes[-1])
                 narrower, likelihood = self._maximum([*names, "share"], sizes, None)
                 variances, share = narrower[:-1], float(np.sqrt(narrower[-1]))
@@ -93,12 +107,12 @@ class LinearFit:
         self, names: list[str], scale: np.ndarray, variances: np.ndarray, likelihood: float, share: float
     ) -> tuple[list[str], np.ndarray, np.ndarray]:
         """Model error, and the components of repeatability supported by the data, by backward elimination with a likelihood-ratio test."""
-        seen = [k for k in range(len(names)) if k == 0 or variances[k] > _NEGLIGIBLE * scale[k]]
+        seen = [k for k in range(len(names)) if names[k] in _ALWAYS or variances[k] > _NEGLIGIBLE * scale[k]]
         names, scale, variances = [names[k] for k in seen], scale[seen], variances[seen]
         while len(names) > 1:
             trials = []
             for k in range(1, len(names)):
-                if self._favour(names[k]):
+                if names[k] in _ALWAYS or self._favour(names[k]):
                     continue
                 rest = [i for i in range(len(names)) if i != k]
                 near = variances[rest] / scale[rest]
@@ -123,12 +137,26 @@ class LinearFit:
             return 1.0
         return 1.0 / len(self.cells.blocks) if name in self.cells.blocks else 0.0
 
-    def _mean_square(self) -> float:
-        """Residual variance of a coordinate, m², with the parameters' degrees of freedom deducted."""
+    @property
+    def _several(self) -> bool:
+        """Whether any visit to a pose has several points."""
+        return bool(np.bincount(self.cells.pose[self.points]).max(initial=0) > 1)
+
+    def _mean_squares(self) -> dict[int, float]:
+        """Residual variance of a coordinate by its unit, with the parameters' degrees of freedom deducted."""
+        units = {unit: self.unit.ravel() == unit for unit in (METRES, RADIANS) if (self.unit == unit).any()}
         rows, size = self.residual.size, self.free.shape[2]
-        basis = np.linalg.qr(self.free.reshape(rows, size))[0]
-        left = self.residual.ravel() - basis @ (basis.T @ self.residual.ravel())
-        return float(left @ left) / max(rows - size, 1) + 1e-24
+        residual, free = self.residual.ravel(), self.free.reshape(rows, size)
+        weight = np.ones(rows)
+        for own in units.values():
+            weight[own] = 1 / (float(np.sqrt(np.mean(residual[own] ** 2))) + 1e-12)
+        basis = np.linalg.qr(weight[:, None] * free)[0]
+        left = residual - basis @ (basis.T @ (weight * residual)) / weight
+        taken = np.sum(basis**2, axis=1)
+        return {
+            unit: float(left[own] @ left[own]) / max(int(own.sum()) - float(taken[own].sum()), 1) + 1e-24
+            for unit, own in units.items()
+        }
 
     def _maximum(
         self,

@@ -33,10 +33,13 @@ from flexcal.calibration.fit.terms import (
     random_waves,
 )
 from flexcal.calibration.measurement import (
+    RADIANS,
     PredictedMeasurements,
     predict_measurements,
     register,
     require_both_flanks,
+    require_orientations,
+    with_target_axes,
 )
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import RANK_TOLERANCE, Estimate, Identifiability, Loss, Parameter, Parameters
@@ -46,6 +49,8 @@ from flexcal.progress import Progress
 _FLANK_PASSES = 4
 _FIRST_SCATTER = 1e-4
 """Initial scatter (m) of a fit: its size matters relative to priors only."""
+_FIRST_ORIENTATION = 2e-4
+"""Initial scatter (rad) of measured orientations."""
 _CHI_MEDIAN = 2.366
 """Median of chi-square with three degrees of freedom."""
 _SUSPICION = 1e-3
@@ -92,6 +97,8 @@ class PointFit:
             terms = tuple(term for term in terms if term != TRANSMISSION)
         bare = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
         start = register(model, poses, predict_measurements(bare, poses, elastic=elastic).position)
+        start = with_target_axes(start, poses)
+        require_orientations(start, poses)
         if "backlash" in terms:
             require_both_flanks(model, predict_measurements(start, poses, elastic=elastic).rest.flank)
         geometric = geometric_parameters(start, poses, terms)
@@ -123,7 +130,8 @@ class PointFit:
     @property
     def first_scatter(self) -> ErrorComponents:
         """Initial error model: stated values, and typical ones of robots."""
-        return ErrorComponents(share=1.0 if self.poses.sigma_given else 0.0, robot=_FIRST_SCATTER)
+        share = 1.0 if self.poses.sigma_given else 0.0
+        return ErrorComponents(share=share, robot=_FIRST_SCATTER, orientation=_FIRST_ORIENTATION)
 
     @property
     def hidden(self) -> tuple[str, ...]:
@@ -170,7 +178,8 @@ class PointFit:
             kept = Parameters(
                 replace(p, value=near.estimate.values.get(p.name, p.value), prior_mean=p.value) for p in kept
             )
-        whitening = scatter.weights(self.poses.sigma, turns)
+        readings = at.readings
+        whitening = scatter.weights(readings.sigma, turns, readings.unit)
         flank, prior = at.rest.flank, self.prior.beside(self.waves, scatter.transmission)
         passes = 0
         while True:
@@ -206,19 +215,14 @@ class FittedPoints:
     task: GeometryProblem
 
     @cached_property
-    def residuals(self) -> np.ndarray:
-        """Measured minus predicted (N, 3), m."""
-        return self.fit.poses.position - self.at.position
-
-    @cached_property
     def turns(self) -> np.ndarray:
-        """Derivative (N, 3, r), m/rad, of the points with respect to a rotation of every revolute joint."""
+        """Derivative (R, 3, r), per rad, of the readings with respect to a rotation of every revolute joint."""
         return joint_rotation_jacobian(self.at)
 
     @cached_property
     def inliers(self) -> np.ndarray:
-        """Mask (N,) of rows that a robust loss keeps."""
-        return ~np.isin(np.arange(len(self.fit.poses)), self.estimate.outliers)
+        """Mask (R,) of the readings that a robust loss keeps."""
+        return ~np.isin(self.at.readings.row, self.estimate.outliers)
 
     @cached_property
     def linear(self) -> LinearFit:
@@ -226,7 +230,7 @@ class FittedPoints:
 
         Stiffness is nearly free there: an error of stage 1 must not pass for scatter of the robot, which would hide it.
         """
-        estimate, prior, poses = self.estimate, self.fit.prior, self.fit.poses
+        estimate, prior, readings = self.estimate, self.fit.prior, self.at.readings
         elastic = prior.parameters.names
         items = [estimate.parameters[name] for name in elastic]
         moved = Parameters(items)
@@ -234,7 +238,7 @@ class FittedPoints:
         wide = [_FREE_STIFFNESS**2 if name.endswith(".stiffness") else 0.0 for name in elastic]
         values, vectors = np.linalg.eigh(prior.covariance + np.diag(wide))
         tied = slopes @ (vectors * np.sqrt(np.maximum(values, 0.0)))
-        residual = self.residuals + slopes @ (moved.coordinates() - moved.prior_mean())
+        residual = self.at.residual + slopes @ (moved.coordinates() - moved.prior_mean())
         names = tuple(self.fit.waves)
         waves = self.at.jacobian(names)
         residual = residual + waves @ np.array([estimate.values.get(name, 0.0) for name in names])
@@ -247,17 +251,20 @@ class FittedPoints:
         columns = columns[:, :, free]
         scale = np.linalg.norm(columns, axis=(0, 1))
         rows = self.inliers
+        # a rad counts as the largest lever of a point, m
+        lever = np.where(readings.unit[rows] == RADIANS, self.fit.start.reach, 1.0).reshape(-1, 1)
         flat = (columns / np.where(scale > 0, scale, 1.0))[rows].reshape(3 * int(rows.sum()), -1)
-        basis, sizes, _ = np.linalg.svd(flat, full_matrices=False)
-        basis = basis[:, sizes > RANK_TOLERANCE * sizes[0]]
+        basis, sizes, _ = np.linalg.svd(lever * flat, full_matrices=False)
+        basis = basis[:, sizes > RANK_TOLERANCE * sizes[0]] / lever
         return LinearFit(
             residual[rows],
             basis.reshape(int(rows.sum()), 3, -1),
             tied[rows],
             (waves * np.array(list(self.fit.waves.values())))[rows],
-            poses.sigma[rows],
+            readings.sigma[rows],
             self.turns[rows],
             self.fit.cells.subset(rows),
+            readings.unit[rows],
         )
 
     def estimated_scatter(self) -> tuple[ErrorComponents, dict[str, float]]:
@@ -265,17 +272,23 @@ class FittedPoints:
         return self.linear.scatter(stated=self.fit.poses.sigma_given)
 
     def robust_scatter(self) -> ErrorComponents:
-        """Common scatter of all coordinates, from the median of the residuals' distances."""
-        rows = self.residuals.size
-        freedom = max(rows - self.fit.identifiability.rank, 1)
-        variance = float(np.median((self.residuals**2).sum(axis=1))) / _CHI_MEDIAN * rows / freedom
-        return ErrorComponents(share=0.0, robot=float(np.sqrt(variance)))
+        """Common scatter of all coordinates of a unit, from the median of the residuals' distances."""
+        rows = self.at.residual.size
+        spread = rows / max(rows - self.fit.identifiability.rank, 1) / _CHI_MEDIAN
+        squares = (self.at.residual**2).sum(axis=1)
+        angles = (self.at.readings.unit == RADIANS).any(axis=1)
+        robot, orientation = (
+            float(np.sqrt(np.median(own) * spread)) if len(own) else 0.0
+            for own in (squares[~angles], squares[angles])
+        )
+        return ErrorComponents(share=0.0, robot=robot, orientation=orientation)
 
     def undetermined(self, scatter: ErrorComponents) -> tuple[Undetermined, ...]:
         """Parameters that the poses do not determine under a given scatter."""
         fit = self.fit
         kept = Parameters(p for p in fit.free if not np.isfinite(p.prior_std))
-        whitening = scatter.whitening(fit.poses.sigma, self.turns)
+        readings = self.at.readings
+        whitening = scatter.whitening(readings.sigma, self.turns, readings.unit)
         return undetermined(fit.straight, kept, whitening, fit.hidden)
 
     @property
@@ -283,8 +296,9 @@ class FittedPoints:
         """Whether single points deviate by more than the scatter of most others allows."""
         from scipy.special import chdtri
 
-        whitening = self.scatter.whitening(self.fit.poses.sigma, self.turns)
-        squares = (whitened(whitening, self.residuals).reshape(-1, 3) ** 2).sum(axis=1)
+        readings = self.at.readings
+        whitening = self.scatter.whitening(readings.sigma, self.turns, readings.unit)
+        squares = (whitened(whitening, self.at.residual).reshape(-1, 3) ** 2).sum(axis=1)
         limit = float(chdtri(3, _SUSPICION / len(squares))) * _SLACK
         return bool(squares.max() > limit * np.median(squares) / _CHI_MEDIAN)
 
@@ -295,7 +309,7 @@ class FittedPoints:
         if poses.sigma_given:
             return poses
         variances = np.diagonal(
-            replace(scatter, share=0.0).independent(poses.sigma, self.turns), axis1=1, axis2=2
+            replace(scatter, share=0.0).independent(poses.sigma, self.turns[: len(poses)]), axis1=1, axis2=2
         )
         return replace(poses, sigma=np.sqrt(variances + scatter.model**2))
 
@@ -310,7 +324,8 @@ class FittedPoints:
         items = [every[name] for name in names]
         items += [Parameter(n, "rad", self.model.value(n)) for n in turns if n not in self.fit.geometric]
         estimate, fixed = replace(self.estimate, covariance=self._covariance()), Parameters(items)
-        size, all_ = len(estimate.parameters), len(estimate.parameters) + len(fixed) + len(SCATTER)
+        scatter, spread = self._scatter_parameters()
+        size, all_ = len(estimate.parameters), len(estimate.parameters) + len(fixed) + len(scatter)
         covariance = np.zeros((all_, all_))
         covariance[:size, :size] = estimate.covariance
         count = len(undetermined_names)
@@ -321,14 +336,13 @@ class FittedPoints:
             covariance[:size, size : size + count] = gain * sizes**2
             covariance[size : size + count, :size] = (gain * sizes**2).T
             covariance[range(size, size + count), range(size, size + count)] = sizes**2
-        scatter, known = self._scatter_parameters()
-        covariance[range(all_ - len(SCATTER), all_), range(all_ - len(SCATTER), all_)] = known**2
+        covariance[range(all_ - len(scatter), all_), range(all_ - len(scatter), all_)] = spread**2
         return replace(
             estimate,
             parameters=estimate.parameters + fixed + scatter,
             covariance=covariance,
             dropped=estimate.dropped + dropped,
-            identifiable=self._identifiable() + (False,) * len(fixed) + tuple(bool(k > 0) for k in known),
+            identifiable=self._identifiable() + (False,) * len(fixed) + tuple(bool(k > 0) for k in spread),
         )
 
     def _covariance(self) -> np.ndarray:
@@ -343,7 +357,7 @@ class FittedPoints:
         respond = np.swapaxes(task.whitening[self.inliers], 1, 2) @ white
         linear = self.linear
         together = scatter.shared(linear.cells, respond)
-        jointly = scatter.jointly(linear.sigma, linear.turns, linear.cells)
+        jointly = scatter.jointly(linear.sigma, linear.turns, linear.cells, linear.unit)
         visits = linear.cells.gathered(respond)
         spread = np.einsum("gip,gij,gjq->pq", visits, jointly, visits, optimize=True)
         taken = np.einsum("nip,niq->pq", white, white, optimize=True)
@@ -380,18 +394,22 @@ class FittedPoints:
             model,
             scatter.pose,
             scatter.transmission,
+            scatter.orientation,
         )
-        angular_std, pose_std, wave_std = (
-            self.spread.get(name, 0.0) for name in ("angular", "pose", "transmission")
+        angular_std, pose_std, wave_std, orientation_std = (
+            self.spread.get(name, 0.0) for name in ("angular", "pose", "transmission", "orientation")
         )
         # the points of the fit are all that speaks for a stated sigma
         share_std = scatter.share / np.sqrt(2 * max(self.estimate.degrees_of_freedom, 1))
-        known = np.array([0.0, share_std, robot_std, angular_std, model_std, pose_std, wave_std])
+        known = np.array(
+            [0.0, share_std, robot_std, angular_std, model_std, pose_std, wave_std, orientation_std]
+        )
+        count = len(SCATTER) if self.fit.poses.turned.any() else len(SCATTER) - 1
         items = (
             Parameter(f"scatter.{key}", unit_of(f"scatter.{key}"), float(value), lower=0.0)
-            for key, value in zip(SCATTER, values, strict=True)
+            for key, value in zip(SCATTER[:count], values, strict=False)
         )
-        return Parameters(items), known
+        return Parameters(items), known[:count]
 
     def _together(self, *names: str) -> tuple[float, float]:
         """Root sum of squares of components of the scatter, and its standard deviation."""

@@ -18,6 +18,7 @@ from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameter, Parameters
 from flexcal.model.kinematics import found_xyz, joint_limits
+from flexcal.model.parts import rotation_wxyz
 from flexcal.model.robot import GEOMETRY, STATION, Posterior, RobotModel, propagated_covariance_root, unit_of
 
 KNOWN_POINT_STD = 0.002
@@ -40,8 +41,9 @@ def probable_robot(model: RobotModel, targets: Sequence[str]) -> RobotModel:
 def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotModel, RobotModel]:
     """Robots with their geometry most probable along the directions that do not move the measured points `targets`.
 
-    Weighted least squares of all geometric errors, subject to unchanged positions of the points, as every calibrated station sees them, by
-    Gauss-Newton, of the robot taken as stiff under gravity: tilting axes would show such directions faintly. The posterior follows: what
+    Weighted least squares of all geometric errors, subject to unchanged positions of the points, and orientations of targets of which they
+    were measured, as every calibrated station sees them, by Gauss-Newton, of the robot taken as stiff under gravity: tilting axes would
+    show such directions faintly. The posterior follows: what
     was estimated is propagated, and the free directions have the tolerances as their covariance. The second robot is the same with only
     these in its posterior: what the measured points leave open. Both are the
     robot itself where nothing was calibrated.
@@ -60,7 +62,7 @@ def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotMod
             lateral_compliance=np.zeros_like(model.geometry.lateral_compliance),
         ),
     )
-    reference = predict_measurements(stiff, poses, elastic=False).position
+    poses = _as_predicted(stiff, poses)
     scale = np.where(np.isfinite(std), std, 1.0)
     weight = np.where(np.isfinite(std), 1 / std, 0.0)
     robot, free = stiff, np.zeros((len(names), 0))
@@ -69,7 +71,7 @@ def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotMod
         columns = at.jacobian(names).reshape(-1, len(names)) * scale
         left, sizes, right = np.linalg.svd(columns, full_matrices=len(columns) < len(names))
         rank = int(np.sum(sizes > _UNSEEN * sizes[0]))
-        missing = left[:, :rank].T @ (reference - at.position).ravel()
+        missing = left[:, :rank].T @ at.residual.ravel()
         step = scale * (right[:rank].T @ (missing / sizes[:rank]))
         free = scale[:, None] * right[rank:].T
         values = np.array([robot.value(name) for name in names]) + step
@@ -105,6 +107,7 @@ def _names(model: RobotModel, targets: Sequence[str], stations: Sequence[str]) -
     names += [f"tool.{key}" for key in GEOMETRY]
     first = next(iter(model.points))
     names += [f"point.{t}.{axis}" for t in targets if t != first for axis in "xyz"]
+    names += [f"point.{t}.{key}" for t in targets if _is_turned(model, t) for key in STATION[3:]]
     for k, station in enumerate(model.stations.names):
         if station in stations:
             turned = bool(model.stations.pose[k, 3:].any())
@@ -115,12 +118,26 @@ def _names(model: RobotModel, targets: Sequence[str], stations: Sequence[str]) -
 def _std(model: RobotModel, name: str, targets: Sequence[str]) -> float:
     """Prior 1σ of a parameter; infinite if nothing is known."""
     owner, _, key = name.rpartition(".")
-    if owner.startswith("station."):
+    if owner.startswith("station.") or (owner.startswith("point.") and key in STATION[3:]):
         return np.inf
     first = next(iter(model.points))
     if owner.startswith("point.") or (owner == "tool" and key.startswith("length") and first in targets):
         return POINT_STD
     return TOLERANCE[unit_of(name)]
+
+
+def _is_turned(model: RobotModel, target: str) -> bool:
+    """Whether the orientation of a target was measured."""
+    return f"point.{target}.rx" in model.posterior.parameters
+
+
+def _as_predicted(model: RobotModel, poses: PoseSet) -> PoseSet:
+    """Poses with what `model` predicts as measured: points, and the orientations of targets whose orientation was measured."""
+    turned = np.array([_is_turned(model, target) for target in poses.target.tolist()])
+    quaternion = np.where(turned[:, None], [1.0, 0.0, 0.0, 0.0], np.nan)
+    at = predict_measurements(model, replace(poses, quaternion_wxyz=quaternion), elastic=False)
+    quaternion[turned] = rotation_wxyz(at.orientation)
+    return replace(poses, position=at.position, quaternion_wxyz=quaternion)
 
 
 def _random_poses(model: RobotModel, targets: Sequence[str], stations: Sequence[str]) -> PoseSet:

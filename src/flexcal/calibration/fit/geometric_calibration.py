@@ -32,9 +32,9 @@ class GeometricFit:
 
     `model` is the calibrated robot; `estimate` holds all geometric parameters (dropped and undetermined ones at their start, not
     identifiable), stiffness and inertia as `prior` and points together have them, and the `scatter`; `identifiability` is that of
-    the kinematic Jacobian, `undetermined` what has full rank and is hidden by noise or the choice of poses; `residuals` (N, 3) m,
-    measured minus predicted; `linear` the fit linearised at its solution, without outliers; `flank` (N, n); `ambiguous` (N,) poses
-    whose flank is not certain; `terms` those fitted.
+    the kinematic Jacobian, `undetermined` what has full rank and is hidden by noise or the choice of poses; `readings` (R, 3),
+    measured minus predicted, m of the points, then rad of the orientations; `linear` the fit linearised at its solution, without outliers;
+    `flank` (N, n); `ambiguous` (N,) poses whose flank is not certain; `terms` those fitted.
     """
 
     model: RobotModel
@@ -44,7 +44,7 @@ class GeometricFit:
     undetermined: tuple[Undetermined, ...]
     scatter: ErrorComponents
     poses: PoseSet
-    residuals: np.ndarray
+    readings: np.ndarray
     linear: LinearFit
     flank: np.ndarray
     ambiguous: np.ndarray
@@ -70,6 +70,16 @@ class GeometricFit:
         )
 
     @property
+    def residuals(self) -> np.ndarray:
+        """Measured minus predicted points (N, 3), m."""
+        return self.readings[: len(self.poses)]
+
+    @property
+    def rotations(self) -> np.ndarray:
+        """Rotation vectors (M, 3), rad, from predicted to measured orientations, in the order of the poses that have one."""
+        return self.readings[len(self.poses) :]
+
+    @property
     def errors(self) -> ErrorStatistics:
         """Errors of the calibrated robot at the points of the fit."""
         return ErrorStatistics.of(self.residuals)
@@ -81,11 +91,11 @@ class GeometricFit:
         `instrument_mm` is null where no sigma is stated: the robot's part then holds it. `robot_mm` has the repeatability of the
         joints at the measured points in it. `stated_mm` is the sigma of the files, root mean square.
         """
-        scatter, sigma = self.scatter, float(np.sqrt(np.mean(self.linear.sigma**2)))
+        scatter, sigma = self.scatter, float(np.sqrt(np.mean(self.linear.sigma[self.linear.points] ** 2)))
         stated = self.poses.sigma_given
         return {
             "instrument_mm": scatter.share * sigma / MILLIMETRE if stated else None,
-            "robot_mm": scatter.evenly(self.linear.turns) / MILLIMETRE,
+            "robot_mm": scatter.evenly(self.linear.turns[self.linear.points]) / MILLIMETRE,
             "model_mm": scatter.model / MILLIMETRE,
             "stated_mm": sigma / MILLIMETRE if stated else None,
         }
@@ -114,7 +124,8 @@ def fit_geometry(
         Robot without an earlier calibration on the same poses. What its posterior holds of stiffness and inertia (stage 1) is
         their prior.
     poses : PoseSet
-        Joint positions (N, n) in rad or m and measured points (N, 3) in m.
+        Joint positions (N, n) in rad or m and measured points (N, 3) in m, with orientations where they were
+        measured.
     terms : sequence of str
         Names of the error terms. `transmission`, transmission errors of all revolute joints as waves in the joint position, is
         a random effect: all waves are normal with one variance, which falls with the square of their order and is estimated
@@ -140,7 +151,7 @@ def fit_geometry(
     Raises
     ------
     FlexcalError
-        For measured lengths and orientations, fewer rows than identifiable parameters, poses that are all equal, joints that
+        For measured lengths, fewer rows than identifiable parameters, poses that are all equal, joints that
         do not move, a backlash seen from one flank only, stations that robot.yaml does not know, and a robust loss with
         marginalised elasticity.
 
@@ -208,7 +219,7 @@ def _calibration(fitted: FittedPoints) -> GeometricFit:
         undetermined=fitted.fixed,
         scatter=fitted.scatter,
         poses=fitted.poses,
-        residuals=fitted.residuals,
+        readings=fitted.at.residual,
         linear=fitted.linear,
         flank=fitted.flank,
         ambiguous=ambiguous_poses(calibrated, fitted.at),

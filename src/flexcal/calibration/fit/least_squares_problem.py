@@ -10,7 +10,7 @@ import numpy as np
 
 from flexcal.calibration.error_model import whitened
 from flexcal.calibration.fit.elastic_prior import ElasticPrior
-from flexcal.calibration.measurement import PredictedMeasurements, predict_measurements
+from flexcal.calibration.measurement import PredictedMeasurements, Readings, predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Estimate, Loss, Parameters, Problem, solve
 from flexcal.model.robot import RobotModel
@@ -24,8 +24,8 @@ LossName = Literal["auto", "squares", "huber", "cauchy"]
 class GeometryProblem:
     """Problem of fitting the geometric parameters `kept` of the robot `start` to `poses` on the backlash flanks `flank` (N, n).
 
-    `prior` is what is known of stiffness and inertia beforehand; `elastic` says whether the arm deflects at all; `whitening` W (N, 3, 3) in
-    1/m weighs the points: WᵀW is the inverse covariance of each.
+    `prior` is what is known of stiffness and inertia beforehand; `elastic` says whether the arm deflects at all; `whitening` W (R, 3, 3)
+    weighs the readings: WᵀW is the inverse covariance of each.
     """
 
     start: RobotModel
@@ -44,11 +44,11 @@ class GeometryProblem:
         )
 
     def residual(self, at: PredictedMeasurements) -> np.ndarray:
-        """Whitened residual (3 N,), measured minus predicted coordinates, Eq. (28)."""
-        return whitened(self.whitening, self.poses.position - at.position)
+        """Whitened residual (3 R,), measured minus predicted coordinates, Eq. (28)."""
+        return whitened(self.whitening, at.residual)
 
     def columns(self, at: PredictedMeasurements, names: tuple[str, ...]) -> np.ndarray:
-        """Whitened Jacobian of all coordinates (3 N, p) by some parameters, natural units."""
+        """Whitened Jacobian of all coordinates (3 R, p) by some parameters, natural units."""
         return whitened(self.whitening, at.jacobian(names))
 
     def reestimated(self, *, loss: Loss | PlainLoss, progress: Progress) -> Estimate:
@@ -67,6 +67,6 @@ class GeometryProblem:
 
         covariance = np.diag(parameters.prior_std() ** 2)
         covariance[len(self.kept) :, len(self.kept) :] = self.prior.covariance
-        groups = np.repeat(np.arange(len(self.poses)), 3)
+        groups = np.repeat(Readings.of(self.poses).row, 3)
         problem = Problem(parameters, linearise, residual, covariance, groups)
         return solve(problem, loss=loss, progress=progress)

@@ -32,6 +32,10 @@ def kinematic_identifiability(
     straight = predict_measurements(model, poses, elastic=False, jacobians=True)
     columns = straight.jacobian(parameters.names).reshape(-1, len(parameters))
     preferred = [name for name in parameters.names if name.endswith("backlash")]
+    # how a target's axes are mounted is to take up a rotation of the tool, or an offset of the last joint
+    preferred += [
+        name for name in parameters.names if name.startswith("point.") and name.endswith(("rx", "ry", "rz"))
+    ]
     if poses.in_socket.all():
         # where the fixture stands is to take up what moves the whole robot, not a joint
         preferred += [name for name in parameters.names if name.startswith("station.")]
@@ -67,7 +71,7 @@ def require_enough(
     model: RobotModel, poses: PoseSet, parameters: Parameters, identifiability: Identifiability
 ) -> None:
     """Raise `FlexcalError` if there are too few rows for the parameters that many random poses would determine."""
-    rows = 3 * len(poses)
+    rows = 3 * (len(poses) + int(poses.turned.sum()))
     if identifiability.rank < rows:
         return
     rank = random_identifiability(model, poses, parameters, identifiability).rank

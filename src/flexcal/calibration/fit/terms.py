@@ -37,7 +37,8 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
     """Geometric parameters of some terms, starting at the model's values (Neubauer et al. 2015, §3).
 
     `kinematic`: a place for every station, and a rotation for all but the first, whose rotation the first joint's errors span; six
-    errors for every joint that moves a measured target, six for the tool, three for each further target. Sockets alone do not tell where
+    errors for every joint that moves a measured target, six for the tool, three for each further target, and a rotation for each target
+    whose orientation was measured. Sockets alone do not tell where
     the robot's base is: all places of the fixture may turn, and errors of joints that move the whole robot as one are left out.
     `backlash`: the joints declared with it; `transmission` none, its waves being random effects (`random_waves`).
     `gravity_compliance`, `lateral_compliance`, `transmission_1`…: one or two for every revolute joint on the way, compliances only where
@@ -57,6 +58,7 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
     names += [f"tool.{key}" for key in GEOMETRY]
     first = next(iter(model.points))
     names += [f"point.{t}.{key}" for t in dict.fromkeys(poses.target) if t != first for key in "xyz"]
+    names += [f"point.{t}.{key}" for t in dict.fromkeys(poses.target[poses.turned]) for key in STATION[3:]]
     items = [_parameter(model, name) for name in names if "kinematic" in terms]
     if "backlash" in terms:
         items += [
@@ -184,7 +186,7 @@ def plausible_size(model: RobotModel, name: str) -> float:
     if declared is not None:
         return declared
     owner, _, key = name.rpartition(".")
-    if owner.startswith("station."):
+    if owner.startswith("station.") or (owner.startswith("point.") and key in STATION[3:]):
         return _PLAUSIBLE_STATION
     if owner.startswith("point.") or (owner == "tool" and key.startswith("length")):
         return _PLAUSIBLE_POINT

@@ -7,11 +7,15 @@ from .prediction import (
     require_points,
 )
 from .propagated_covariance import Propagation, covariance_root, moving_parameters, propagation
-from .registration import best_motion, register, rigid_motion
+from .readings import METRES, RADIANS, Readings
+from .registration import best_motion, register, require_orientations, rigid_motion, with_target_axes
 
 __all__ = [
+    "METRES",
+    "RADIANS",
     "PredictedMeasurements",
     "Propagation",
+    "Readings",
     "ambiguous_poses",
     "best_motion",
     "covariance_root",
@@ -22,6 +26,8 @@ __all__ = [
     "propagation",
     "register",
     "require_both_flanks",
+    "require_orientations",
     "require_points",
     "rigid_motion",
+    "with_target_axes",
 ]

@@ -8,10 +8,11 @@ from functools import cached_property
 
 import numpy as np
 
+from flexcal.calibration.measurement.readings import Readings
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import PointKinematics
-from flexcal.model.parts import skew_matrix, vector_rotation
+from flexcal.model.parts import rotation_vector, skew_matrix, vector_rotation, wxyz_rotation
 from flexcal.model.robot import GEOMETRY, LATERAL, SOCKET_SCALE, SPRINGS, STATION, RobotModel
 from flexcal.model.statics import (
     Equilibrium,
@@ -25,15 +26,10 @@ from flexcal.progress import Progress, silent
 
 
 def require_points(poses: PoseSet, where: str = "the poses") -> None:
-    """Raise `FlexcalError` for measured quantities other than points, which would be ignored; `where` names the files."""
+    """Raise `FlexcalError` for measured lengths, which would be ignored; `where` names the files."""
     if poses.length is not None:
         raise FlexcalError(
             "E-CAL-011", f"{where}: lengths of a wire cannot be used yet; give points x, y, z."
-        )
-    if poses.quaternion_wxyz is not None:
-        raise FlexcalError(
-            "E-CAL-012",
-            f"{where}: measured orientations cannot be used yet; take out the columns qw, qx, qy, qz to use the points alone.",
         )
 
 
@@ -43,7 +39,7 @@ _BLOCK = 20_000
 
 @dataclass(frozen=True, eq=False)
 class PredictedMeasurements:
-    """Predicted points (N, 3) in the instrument's frame at the poses, with the data for their derivatives."""
+    """Predicted points (N, 3) in the instrument's frame at the poses, with the data for their derivatives and for all R `readings`."""
 
     model: RobotModel
     poses: PoseSet
@@ -52,46 +48,102 @@ class PredictedMeasurements:
     rest: Equilibrium
     kinematics: PointKinematics
 
-    def jacobian(self, names: Sequence[str]) -> np.ndarray:
-        """∂position/∂parameter (N, 3, len(names)) in natural units, the motion of the deflection included.
+    @cached_property
+    def readings(self) -> Readings:
+        """What was measured at the poses."""
+        return Readings.of(self.poses)
 
-        Raises `FlexcalError` for a name without effect on points.
+    @cached_property
+    def residual(self) -> np.ndarray:
+        """Measured minus predicted (R, 3): points, m, and the rotation vector from predicted to measured axes, rad, both in the
+        instrument's frame.
         """
-        result = np.zeros((len(self.position), 3, len(names)))
-        by_motion = self._turned(self.kinematics.motion_jacobian[:, :3].reshape(len(self.position), 3, -1))
-        by_motion = by_motion.reshape(len(self.position), 3, self.model.n, 3)
+        return np.concatenate([self.poses.position - self.position, self._rotations])
+
+    @cached_property
+    def orientation(self) -> np.ndarray:
+        """Predicted axes (M, 3, 3) of the targets whose orientation was measured, in the instrument's frame."""
+        own = self.poses.turned
+        axes = np.matmul(self.base[own], self.kinematics.orientation[own])
+        for name in dict.fromkeys(self.poses.target[own].tolist()):
+            rows = self.poses.target[own] == name
+            axes[rows] = axes[rows] @ vector_rotation(self._turn(name))
+        return axes
+
+    def _turn(self, target: str) -> np.ndarray:
+        return self.model.geometry.point_turn[list(self.model.points).index(target)]
+
+    @cached_property
+    def _rotations(self) -> np.ndarray:
+        """Rotation vectors (M, 3), rad, from predicted to measured axes."""
+        quaternion = self.poses.quaternion_wxyz
+        if quaternion is None or not self.poses.turned.any():
+            return np.zeros((0, 3))
+        measured = wxyz_rotation(quaternion[self.poses.turned])
+        return rotation_vector(np.matmul(measured, np.swapaxes(self.orientation, 1, 2)))
+
+    @cached_property
+    def _rotating(self) -> np.ndarray:
+        """Change (M, 3, 3) of the negative rotation vectors with a rotation of the predicted axes about the instrument's."""
+        return inverse_right_jacobians(self._rotations)
+
+    def _by_tool(self, columns: np.ndarray) -> np.ndarray:
+        """Readings (R, 3, k) from motions of the targets, `columns` (N, 6, k) in the base frame."""
+        moved = np.matmul(self.base, columns[:, :3])
+        if self.readings.only_points:
+            return moved
+        own = self.poses.turned
+        return np.concatenate([moved, np.matmul(self._rotating @ self.base[own], columns[own, 3:])])
+
+    def _by_row(self, values: np.ndarray) -> np.ndarray:
+        """Values (N, …) of the poses at each reading, (R, …)."""
+        return values if self.readings.only_points else values[self.readings.row]
+
+    def jacobian(self, names: Sequence[str]) -> np.ndarray:
+        """∂reading/∂parameter (R, 3, len(names)) in natural units, the motion of the deflection included.
+
+        Raises `FlexcalError` for a name without effect on the readings.
+        """
+        readings, n = self.readings, self.model.n
+        result = np.zeros((len(readings.row), 3, len(names)))
+        samples = len(self.position)
+        by_motion = self._by_tool(self.kinematics.motion_jacobian.reshape(samples, 6, -1))
+        by_motion = by_motion.reshape(len(result), 3, n, 3)
         by_load = -np.matmul(
-            by_motion[:, :, self.rest.axes[:, 0], self.rest.axes[:, 1]], self.rest.compliance
+            by_motion[:, :, self.rest.axes[:, 0], self.rest.axes[:, 1]], self._by_row(self.rest.compliance)
         )
-        by_geometry = self._turned(self.kinematics.geometry_jacobian[:, :3])
-        by_geometry[:, :, : 6 * self.model.n] += np.matmul(by_load, self.rest.coupling)
+        by_geometry = self._by_tool(self.kinematics.geometry_jacobian)
+        by_geometry[:, :, : 6 * n] += np.matmul(by_load, self._by_row(self.rest.coupling))
         owners = [*self.model.joint_names, "tool"]
         first = next(iter(self.model.points))
+        target = self._by_row(self.poses.target)
         for k, name in enumerate(names):
             owner, _, key = name.rpartition(".")
             if name == SOCKET_SCALE:
-                result[:, :, k] = -np.where(self.poses.in_socket[:, None], self.poses.position, 0.0)
+                result[:samples, :, k] = -np.where(self.poses.in_socket[:, None], self.poses.position, 0.0)
             elif owner.startswith("station.") and key in STATION:
                 result[:, :, k] = self._by_station(owner.removeprefix("station."), key)
+            elif owner.startswith("point.") and key in STATION[3:]:
+                result[samples:, :, k] = self._by_turn(owner.removeprefix("point."), key)
             elif owner.startswith("point."):
-                own = self.poses.target == owner.removeprefix("point.")
-                result[own, :, k] = by_geometry[own, :, 6 * self.model.n + 3 + "xyz".index(key)]
+                own = target == owner.removeprefix("point.")
+                result[own, :, k] = by_geometry[own, :, 6 * n + 3 + "xyz".index(key)]
             elif key in GEOMETRY:
                 result[:, :, k] = by_geometry[:, :, 6 * owners.index(owner) + GEOMETRY.index(key)]
                 if owner == "tool" and key.startswith("length"):
-                    result[self.poses.target != first, :, k] = 0.0
+                    result[target != first, :, k] = 0.0
             elif key in ("backlash", "gravity_compliance") or key.startswith("transmission_"):
                 i = self.model.joint_index(owner)
-                result[:, :, k] = self._twist(i, key)[:, None] * by_geometry[:, :, 6 * i]
+                result[:, :, k] = self._by_row(self._twist(i, key))[:, None] * by_geometry[:, :, 6 * i]
             elif key == "hardening":
                 i = self.model.joint_index(owner.removesuffix(".drive"))
-                result[:, :, k] = self._twist(i, key)[:, None] * by_motion[:, :, i, 2]
+                result[:, :, k] = self._by_row(self._twist(i, key))[:, None] * by_motion[:, :, i, 2]
             elif key in LATERAL:
                 i = self.model.joint_index(owner)
-                tilt = self._lateral[:, i, LATERAL.index(key)]
+                tilt = self._by_row(self._lateral[:, i, LATERAL.index(key)])
                 result[:, :, k] = np.matmul(by_motion[:, :, i, :2], tilt[:, :, None])[:, :, 0]
             else:
-                result[:, :, k] = np.matmul(by_load, self.load(name)[:, :, None])[:, :, 0]
+                result[:, :, k] = np.matmul(by_load, self._by_row(self.load(name))[:, :, None])[:, :, 0]
         return result
 
     def _twist(self, joint: int, key: str) -> np.ndarray:
@@ -116,16 +168,25 @@ class PredictedMeasurements:
         masses = carried_mass(self.model, self.poses.payload, len(self.poses))
         return lateral_slopes(self.model, self.poses.q, masses)
 
-    def _turned(self, columns: np.ndarray) -> np.ndarray:
-        return np.matmul(self.base, columns)
-
     def _by_station(self, station: str, key: str) -> np.ndarray:
-        own = (self.poses.station == station)[:, None]
+        """Derivative (R, 3) of the readings by one number of a station's pose."""
+        own, turned = self.poses.station == station, self.poses.turned
         if key in ("x", "y", "z"):
-            return own * np.eye(3)["xyz".index(key)]
+            moved = own[:, None] * np.eye(3)["xyz".index(key)]
+            return np.concatenate([moved, np.zeros((int(turned.sum()), 3))])
         values = [self.model.value(f"station.{station}.{k}") for k in STATION]
         arm = self.position - np.array(values[:3]) + _socket_shift(self.model, self.poses)
-        return own * np.cross(left_jacobian(np.array(values[3:]))[:, "xyz".index(key[1])], arm)
+        axis = left_jacobian(np.array(values[3:]))[:, "xyz".index(key[1])]
+        return np.concatenate(
+            [own[:, None] * np.cross(axis, arm), own[turned][:, None] * (self._rotating @ axis)]
+        )
+
+    def _by_turn(self, target: str, key: str) -> np.ndarray:
+        """Derivative (M, 3) of the measured orientations by one coordinate of the rotation vector of a target's axes."""
+        turn, own = self._turn(target), self.poses.target[self.poses.turned] == target
+        # R exp(v + dv) = exp(R Jr(v) dv) R for the predicted axes R exp(v), with Jr(v) = exp(-v) Jl(v)
+        axis = vector_rotation(-turn) @ left_jacobian(turn)[:, "xyz".index(key[1])]
+        return own[:, None] * np.matmul(self._rotating @ self.orientation, axis)
 
     def load(self, name: str) -> np.ndarray:
         """Change of the load on each elastic coordinate (N, d) with a stiffness, mass or centre of mass."""
@@ -171,6 +232,15 @@ def left_jacobian(vector: np.ndarray) -> np.ndarray:
     return (
         np.eye(3) + (1 - np.cos(angle)) / angle**2 * skew + (angle - np.sin(angle)) / angle**3 * skew @ skew
     )
+
+
+def inverse_right_jacobians(vectors: np.ndarray) -> np.ndarray:
+    """Inverse right Jacobians (N, 3, 3) of rotation vectors (N, 3): change of the vector with a rotation in the turned axes."""
+    angle = np.linalg.norm(vectors, axis=1)
+    half = np.maximum(angle, 1e-6) / 2
+    factor = np.where(angle < 1e-6, 1 / 12, (1 - half / np.tan(half)) / (4 * half**2))
+    skew = np.cross(vectors[:, None, :], np.eye(3)).swapaxes(1, 2)
+    return np.eye(3) + skew / 2 + factor[:, None, None] * (skew @ skew)
 
 
 def predict_measurements(

@@ -230,5 +230,7 @@ def _is_elastic(name: str) -> bool:
 
 
 def _is_geometric(name: str) -> bool:
-    key = name.rpartition(".")[2]
+    owner, _, key = name.rpartition(".")
+    if owner.startswith("point.") and key in STATION[3:]:
+        return False
     return key in _GEOMETRIC or key.startswith("transmission_")

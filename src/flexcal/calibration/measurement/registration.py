@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from flexcal.calibration.measurement.prediction import predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
-from flexcal.model.parts import rotation_vector
+from flexcal.model.parts import rotation_vector, wxyz_rotation
 from flexcal.model.robot import RobotModel
 
+FOREIGN = np.deg2rad(15)
+"""Median angle, rad, between measured and nominal orientations above which they follow another convention."""
 ALREADY_ALIGNED = 0.010
 """Median distance, m, between nominal and measured points below which instrument and base frame are the same."""
 
@@ -36,6 +41,39 @@ def register(model: RobotModel, poses: PoseSet, predicted: np.ndarray) -> RobotM
         }
         values |= {f"station.{station}.r{key}": float(v) for key, v in zip("xyz", turn, strict=True)}
     return model.with_values(values)
+
+
+def with_target_axes(model: RobotModel, poses: PoseSet) -> RobotModel:
+    """Robot with the axes of every target whose orientation was measured, as the registered stations of `model` see them on average."""
+    if poses.quaternion_wxyz is None or not poses.turned.any():
+        return model
+    own = poses.subset(poses.turned)
+    bare = replace(
+        model, geometry=replace(model.geometry, point_turn=np.zeros_like(model.geometry.point_turn))
+    )
+    predicted = predict_measurements(bare, own, elastic=False).orientation
+    between = np.matmul(np.swapaxes(predicted, 1, 2), wxyz_rotation(poses.quaternion_wxyz[poses.turned]))
+    values = {}
+    for target in own.targets:
+        left, _, right = np.linalg.svd(between[own.target == target].sum(axis=0))
+        mean = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+        turn = rotation_vector(mean)
+        values |= {f"point.{target}.r{key}": float(v) for key, v in zip("xyz", turn, strict=True)}
+    return model.with_values(values)
+
+
+def require_orientations(model: RobotModel, poses: PoseSet) -> None:
+    """Raise `FlexcalError` where the measured orientations are far from those of the registered `model`, whose targets' axes are placed."""
+    if not poses.turned.any():
+        return
+    own = poses.subset(poses.turned)
+    angles = np.linalg.norm(predict_measurements(model, own, elastic=False).residual[len(own) :], axis=1)
+    if (angle := float(np.median(angles))) > FOREIGN:
+        raise FlexcalError(
+            "E-CAL-012",
+            f"the measured orientations differ from the robot's by {np.rad2deg(angle):.0f}° (median) however the target is turned on "
+            "the tool; qw, qx, qy, qz must turn its axes into the instrument's: 'flexcal import' tells the convention of a file.",
+        )
 
 
 def rigid_motion(source: np.ndarray, target: np.ndarray, name: str = "") -> tuple[np.ndarray, np.ndarray]:

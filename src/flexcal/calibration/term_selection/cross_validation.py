@@ -8,6 +8,7 @@ import numpy as np
 
 from flexcal.calibration.error_model import order_folds, repeated_pose_numbers, workspace_folds
 from flexcal.calibration.fit import LEAST_POSES, GeometricFit, fit_geometry
+from flexcal.calibration.measurement import Readings
 from flexcal.calibration.term_selection.candidates import candidates
 from flexcal.calibration.term_selection.trials import TermComparison, TermTrials, not_tried
 from flexcal.data.poses import PoseSet
@@ -54,7 +55,9 @@ class CrossValidation:
 def cross_validated(fit: GeometricFit) -> CrossValidation | None:
     """Cross-validation of a fit with all its terms, linearised and without its outliers; None with fewer than 20 different poses."""
     rows = np.setdiff1d(np.arange(len(fit.poses)), list(fit.estimate.outliers))
-    inside = replace(fit, poses=fit.poses.subset(rows), residuals=fit.residuals[rows])
+    inside = replace(
+        fit, poses=fit.poses.subset(rows), readings=fit.readings[np.isin(Readings.of(fit.poses).row, rows)]
+    )
     folds, distinct = _folds(inside.poses)
     if distinct < LEAST_POSES:
         return None

@@ -9,7 +9,12 @@ from functools import cached_property
 import numpy as np
 
 from flexcal.calibration.fit import GeometricFit, geometric_parameters
-from flexcal.calibration.measurement import PredictedMeasurements, predict_measurements
+from flexcal.calibration.measurement import (
+    METRES,
+    RADIANS,
+    PredictedMeasurements,
+    predict_measurements,
+)
 from flexcal.calibration.term_selection.leave_out_errors import LeaveOutErrors, leave_out_fit
 from flexcal.model.robot import GEOMETRY, STATION, RobotModel
 from flexcal.units import MILLIMETRE
@@ -21,6 +26,8 @@ _WORSE = 1.05
 _LEAST_GAIN = 1e-12
 """Gain, m, below which it is a rounding error."""
 
+_TINY = 1e-24
+"""Mean square, rad², of orientations that were fitted exactly."""
 _OUT = ("left out in measuring order", "left out in the workspace", "left out one by one")
 
 
@@ -114,7 +121,9 @@ class TermTrials:
         if terms not in self._fits:
             blocks = [self._block(term) for term in terms] + [self._held]
             penalty = [0.0] * len(terms) + [self._noise]
-            self._fits[terms] = leave_out_fit(blocks, penalty, self.rigid.residuals, self.folds, self._places)
+            fit = leave_out_fit(blocks, penalty, self._residual, self._row_folds, self._places)
+            points = len(self.rigid.poses)
+            self._fits[terms] = replace(fit, distances=tuple(d[:points] for d in fit.distances))
         return self._fits[terms]
 
     def mean(self, terms: tuple[str, ...]) -> float:
@@ -131,7 +140,7 @@ class TermTrials:
 
     def _criterion(self, old: LeaveOutErrors, new: LeaveOutErrors) -> float:
         """Change of the Bayesian information criterion of the coordinates that the base terms leave free (Schwarz 1978)."""
-        free = max(self.rigid.residuals.size - self.fit(self._base).freedom, 1.0)
+        free = max(self._residual.size - self.fit(self._base).freedom, 1.0)
         return free * np.log(new.squares / old.squares) + (new.freedom - old.freedom) * np.log(free)
 
     def _gain(self, old: LeaveOutErrors, new: LeaveOutErrors, kind: int) -> tuple[float, float]:
@@ -146,7 +155,7 @@ class TermTrials:
         poses, places = self.rigid.poses, []
         for fixture in poses.fixtures:
             rows = np.flatnonzero(poses.in_socket & (poses.station == fixture))
-            columns = self._prediction.jacobian([f"station.{fixture}.{key}" for key in STATION])
+            columns = self._seen([f"station.{fixture}.{key}" for key in STATION])
             places.append((rows, columns[rows]))
         return places
 
@@ -157,19 +166,39 @@ class TermTrials:
         )
 
     @cached_property
+    def _lever(self) -> np.ndarray:
+        """Factors (R, 1), m/rad for orientations, that make all readings scatter alike."""
+        unit, residual = self._prediction.readings.unit[:, 0], self.rigid.readings
+        points, angles = unit == METRES, unit == RADIANS
+        lever = np.ones(len(unit))
+        if angles.any():
+            lever[angles] = np.sqrt(np.mean(residual[points] ** 2) / (np.mean(residual[angles] ** 2) + _TINY))
+        return lever[:, None]
+
+    @cached_property
+    def _residual(self) -> np.ndarray:
+        """Residuals (R, 3) of the base fit, as lengths, m."""
+        return self.rigid.readings * self._lever
+
+    @cached_property
+    def _row_folds(self) -> tuple[np.ndarray, ...]:
+        """Folds (R,) of the readings."""
+        return tuple(fold[self._prediction.readings.row] for fold in self.folds)
+
+    @cached_property
     def _noise(self) -> float:
-        freedom = max(self.rigid.residuals.size - self.rigid.identifiability.rank, 1)
-        return float((self.rigid.residuals**2).sum()) / freedom
+        freedom = max(self._residual.size - self.rigid.identifiability.rank, 1)
+        return float((self._residual**2).sum()) / freedom
 
     @cached_property
     def _held(self) -> np.ndarray:
-        """Columns (N, 3, k) of springs and inertia, in prior standard deviations."""
+        """Columns (R, 3, k) of springs and inertia, in prior standard deviations."""
         prior = self.rigid.prior
         if not len(prior.parameters):
-            return np.zeros((len(self.rigid.poses), 3, 0))
+            return np.zeros((*self._residual.shape, 0))
         parameters = self.rigid.estimate.parameters.subset(prior.parameters.names)
         slope = parameters.natural_slope(parameters.coordinates())
-        return self._prediction.jacobian(parameters.names) * slope @ np.linalg.cholesky(prior.covariance)
+        return self._seen(parameters.names) * slope @ np.linalg.cholesky(prior.covariance)
 
     def _block(self, term: str) -> np.ndarray:
         if term not in self._columns:
@@ -178,5 +207,8 @@ class TermTrials:
                 names = tuple(n for n in kept if n.rpartition(".")[2] in (*GEOMETRY, *STATION))
             else:
                 names = geometric_parameters(self.model, self.rigid.poses, [term]).names
-            self._columns[term] = self._prediction.jacobian(names)
+            self._columns[term] = self._seen(names)
         return self._columns[term]
+
+    def _seen(self, names: Sequence[str]) -> np.ndarray:
+        return self._prediction.jacobian(names) * self._lever[:, :, None]

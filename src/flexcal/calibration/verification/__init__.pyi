@@ -2,6 +2,12 @@ from .arm_poses import ArmPoses, arms_at
 from .best_fit_registration import best_placement, can_register, can_register_with_points, rigid_placement
 from .error_scale_test import ErrorScale, error_scale, prediction_document
 from .errors_by_model import CALIBRATED, DECLARED, NOMINAL, OWN, RIGID, MeasuredPoints, errors_before
+from .measured_orientations import (
+    OrientationErrors,
+    orientation_document,
+    orientation_errors,
+    uncalibrated_orientations,
+)
 from .refitted_placement import Refit, RefittedVerification, verify_refitted
 from .uncalibrated_robot import UncalibratedErrors, uncalibrated_model
 from .unseen_poses import (
@@ -21,6 +27,7 @@ __all__ = [
     "ErrorCovariance",
     "ErrorScale",
     "MeasuredPoints",
+    "OrientationErrors",
     "PredictionErrors",
     "Refit",
     "RefittedVerification",
@@ -31,10 +38,13 @@ __all__ = [
     "can_register_with_points",
     "error_scale",
     "errors_before",
+    "orientation_document",
+    "orientation_errors",
     "prediction_document",
     "prediction_errors",
     "prediction_errors_with_covariance",
     "rigid_placement",
     "uncalibrated_model",
+    "uncalibrated_orientations",
     "verify_refitted",
 ]

@@ -50,6 +50,7 @@ def verify_refitted(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) ->
     few for that.
     """
     require_points(poses)
+    poses = poses.without_orientations()
     placed = _placed(model, poses, what)
     at = predict_measurements(placed, poses, jacobians=True)
     columns = at.jacobian(_names(poses, what)).reshape(3 * len(poses), -1)

@@ -89,6 +89,7 @@ def uncalibrated_model(model: RobotModel, poses: PoseSet) -> UncalibratedRobot:
     """
     for station in poses.stations:
         model.station_index(station)
+    poses = poses.without_orientations()
     at_base = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
     declared = _declared(at_base, poses)
     if not can_register(poses):

@@ -127,7 +127,7 @@ def prediction_errors(
     Raises
     ------
     FlexcalError
-        For measured lengths and orientations, and as `predict_measurements` does.
+        For measured lengths, and as `predict_measurements` does.
 
     Examples
     --------
@@ -147,6 +147,7 @@ def prediction_errors_with_covariance(
 ) -> tuple[PredictionErrors, ErrorCovariance]:
     """As `prediction_errors`, with the joint covariance of the errors at all poses predicted from parameters and scatter."""
     require_points(poses)
+    poses = poses.without_orientations()
     at = predict_measurements(model, poses, elastic=elastic, jacobians=True)
     used = moving_parameters(model, elastic=elastic)
     roots = at.jacobian(used) @ covariance_root(model, used)
@@ -154,7 +155,11 @@ def prediction_errors_with_covariance(
     shared = _shared_errors(model, cells)
     scatter = None if noise_free else known_scatter(model, stated=poses.sigma_given)
     independent = None if scatter is None else _independent(model, scatter, at, poses)
-    common = scatter.common(joint_rotation_jacobian(at)) if scatter is not None and cells.several else None
+    common = (
+        scatter.common(joint_rotation_jacobian(at))
+        if scatter is not None and len(np.unique(cells.pose)) < len(poses)
+        else None
+    )
     squares = (shared**2).sum(axis=(1, 2))
     if independent is not None:
         squares = squares + np.trace(independent, axis1=1, axis2=2)

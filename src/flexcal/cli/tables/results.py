@@ -23,6 +23,22 @@ def error_table(title: str, rows: Mapping[str, Mapping[str, Any]]) -> Table:
     return table
 
 
+def orientation_table(block: Mapping[str, Any]) -> Table:
+    """Angles between measured and predicted axes, degrees; `block` is `orientation` of results.json."""
+    placed = " (axes of the target fitted to them)"
+    table = Table(title="angle to the measured orientations", title_justify="left")
+    table.add_column("")
+    for heading in ("poses", "mean °", "p90 °", "max °"):
+        table.add_column(heading, justify="right")
+    for label, key in (("before, best-fit registered", "before"), ("calibrated", "calibrated")):
+        row = block[key]
+        if row is not None:
+            numbers = [f"{row[name]:.4f}" for name in ("mean_deg", "p90_deg", "max_deg")]
+            label += placed if key == "calibrated" and row["placed"] else ""
+            table.add_row(label, str(row["poses"]), *numbers)
+    return table
+
+
 def uncalibrated_rows(document: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
     """The three blocks `before` of a document as rows of `error_table`, dashes where one is not known."""
     labels = {

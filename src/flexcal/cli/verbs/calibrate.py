@@ -81,7 +81,13 @@ class Calibrate:
         """Calibrate, and print identifiability, errors and remarks."""
         from flexcal.calibration.diagnostics import is_implausible
         from flexcal.calibration.fit import KNOWN_POINT_STD
-        from flexcal.cli.tables.results import dropped_table, error_table, uncalibrated_rows, weak_table
+        from flexcal.cli.tables.results import (
+            dropped_table,
+            error_table,
+            orientation_table,
+            uncalibrated_rows,
+            weak_table,
+        )
 
         require_robot_and_files(self.robot, self.poses, "POSES")
         require_at_least(0, secant_scale=self.secant_scale)
@@ -114,6 +120,8 @@ class Calibrate:
         labels = {"rigid": "rigid", "selected": f"selected: {terms}"}
         rows = uncalibrated_rows(document) | {label: errors[key] for key, label in labels.items()}
         console.show(error_table("distance to the measured points", rows))
+        if document["orientation"] is not None:
+            console.show(orientation_table(document["orientation"]))
         if calibration.held_out is not None:
             console.say(held_out_line(calibration.held_out.document()))
         for remark in document["remarks"]:

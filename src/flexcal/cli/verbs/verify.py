@@ -42,7 +42,7 @@ class Verify:
 
     def run(self) -> None:
         """Verify, and print the errors."""
-        from flexcal.cli.tables.results import error_table, uncalibrated_rows
+        from flexcal.cli.tables.results import error_table, orientation_table, uncalibrated_rows
         from flexcal.jobs.accuracy import verify_robot
 
         require_robot_and_files(self.robot, self.poses, "POSES")
@@ -71,6 +71,8 @@ class Verify:
             label: blocks[key] for key, label in labels.items() if key in blocks
         }
         console.show(error_table("distance to the measured points", rows))
+        if document["orientation"] is not None:
+            console.show(orientation_table(document["orientation"]))
         rms = document["rms_mm"]
         whole = (
             "; noise of instrument and robot is not known"

@@ -36,7 +36,7 @@ from flexcal.errors import InputError
 if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
 
-_NUMBERS = ("quaternion", "sigma", "sigma_xyz", "tau", "payload", "temperature", "t")
+_NUMBERS = ("quaternion", "sigma", "sigma_xyz", "sigma_angle", "tau", "payload", "temperature", "t")
 _TEXTS = ("target", "station")
 
 
@@ -125,6 +125,8 @@ def write_poses(path: str | Path, poses: PoseSet) -> None:
     vectors.append(("xyz", poses.position) if poses.length is None else ("length", poses.length[:, None]))
     if poses.quaternion_wxyz is not None:
         vectors.append(("quaternion", poses.quaternion_wxyz))
+    if poses.orientation_sigma is not None:
+        vectors.append(("sigma_angle", poses.orientation_sigma[:, None]))
     if poses.sigma_given:
         vectors.append(("sigma_xyz", poses.sigma) if poses.length is None else ("sigma", poses.sigma[:, :1]))
     if poses.torque is not None:
@@ -182,7 +184,7 @@ def _read(path: Path, model: RobotModel, further: tuple[str, ...]) -> PoseSet:
     rows = len(table)
     position = values["xyz"] if place == "xyz" else np.full((rows, 3), np.nan)
     sigma = values.get("sigma_xyz", values.get("sigma"))
-    for name in ("sigma", "sigma_xyz", "length"):
+    for name in ("sigma", "sigma_xyz", "sigma_angle", "length"):
         if name in values:
             check_positive(table, signals[name], values[name], zero=False)
     target = target_column(table, model) if "target" in texts else np.full(rows, first_point(file, model))
@@ -201,6 +203,7 @@ def _read(path: Path, model: RobotModel, further: tuple[str, ...]) -> PoseSet:
         quaternion_wxyz=unit_quaternions(table, signals["quaternion"], values["quaternion"])
         if "quaternion" in values
         else None,
+        orientation_sigma=values["sigma_angle"][:, 0] if "sigma_angle" in values else None,
         length=values["length"][:, 0] if "length" in values else None,
         sigma_given=sigma is not None,
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -37,7 +37,9 @@ class PoseSet:
     pose : ndarray
         Numbers (N,) of the poses; rows of one pose share it.
     quaternion_wxyz : ndarray, optional
-        Measured orientations (N, 4), unit norm.
+        Measured orientations (N, 4) of the target's axes in the instrument's frame, unit norm; NaN where only the point is measured.
+    orientation_sigma : ndarray, optional
+        Standard deviations (N,) of a measured orientation about each axis, rad.
     length : ndarray, optional
         Lengths (N,) of a draw-wire, m.
     time : ndarray, optional
@@ -64,6 +66,7 @@ class PoseSet:
     temperature: np.ndarray | None
     pose: np.ndarray
     quaternion_wxyz: np.ndarray | None = None
+    orientation_sigma: np.ndarray | None = None
     length: np.ndarray | None = None
     time: np.ndarray | None = None
     socket: np.ndarray | None = None
@@ -85,6 +88,7 @@ class PoseSet:
             "temperature": (n_rows,),
             "pose": (n_rows,),
             "quaternion_wxyz": (n_rows, 4),
+            "orientation_sigma": (n_rows,),
             "length": (n_rows,),
             "time": (n_rows,),
             "socket": (n_rows,),
@@ -103,6 +107,28 @@ class PoseSet:
     def in_socket(self) -> np.ndarray:
         """Rows (N,) whose target was held by a socket."""
         return np.zeros(len(self), bool) if self.socket is None else self.socket != ""
+
+    @property
+    def turned(self) -> np.ndarray:
+        """Rows (N,) whose orientation was measured too."""
+        quaternion = self.quaternion_wxyz
+        return (
+            np.zeros(len(self), bool) if quaternion is None else np.array(np.isfinite(quaternion).all(axis=1))
+        )
+
+    def without_orientations(self) -> PoseSet:
+        """The points alone.
+
+        Returns
+        -------
+        PoseSet
+            The same rows without measured orientations.
+        """
+        return (
+            self
+            if self.quaternion_wxyz is None
+            else replace(self, quaternion_wxyz=None, orientation_sigma=None)
+        )
 
     @property
     def fixtures(self) -> tuple[str, ...]:
@@ -147,7 +173,7 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
 
     Where a later set uses a pose number again, its numbers are shifted past the largest so far. Raises `FlexcalError`
     where there is nothing to join, joint counts differ, or only some sets have sigma, torques, payload, temperature,
-    time, orientation or length.
+    time or length. Orientations are NaN where a set has none.
     """
     if not sets:
         raise FlexcalError("E-POSES-023", "there are no poses to join; give at least one set.")
@@ -172,6 +198,15 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
             joined[field.name] = np.concatenate(
                 [np.full(len(s), "") if s.socket is None else s.socket for s in sets]
             )
+        elif field.name == "quaternion_wxyz" and any(present):
+            joined[field.name] = np.concatenate(
+                [
+                    np.full((len(s), 4), np.nan) if s.quaternion_wxyz is None else s.quaternion_wxyz
+                    for s in sets
+                ]
+            )
+        elif field.name == "orientation_sigma" and any(present):
+            joined[field.name] = _orientation_sigmas(sets)
         elif field.name == "pose":
             joined[field.name] = _numbered_on(values)
         elif all(present):
@@ -184,6 +219,18 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
         else:
             joined[field.name] = None
     return PoseSet(**joined)
+
+
+def _orientation_sigmas(sets: Sequence[PoseSet]) -> np.ndarray:
+    without = [s for s in sets if s.orientation_sigma is None]
+    if any(s.turned.any() for s in without):
+        raise FlexcalError(
+            "E-POSES-042",
+            "only some pose sets have orientation_sigma; give it for all orientations, or for none.",
+        )
+    return np.concatenate(
+        [np.full(len(s), np.nan) if s.orientation_sigma is None else s.orientation_sigma for s in sets]
+    )
 
 
 def _numbered_on(numbers: Sequence[np.ndarray]) -> np.ndarray:

@@ -50,6 +50,7 @@ UNITS: dict[str, dict[str, float]] = {
     "moment": {"N m": 1.0, "Nm": 1.0},
     "payload": {"kg": 1.0, "g": 1e-3},
     "quaternion": {},
+    "sigma_angle": {"rad": 1.0, "deg": DEGREE},
     "temperature": {},
 }
 """Quantities that `signals:` can map, and the factors of their units to SI; currents take a gain in N m/A."""

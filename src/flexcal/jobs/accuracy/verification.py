@@ -17,15 +17,19 @@ from flexcal.calibration.verification import (
     CALIBRATED,
     ErrorCovariance,
     MeasuredPoints,
+    OrientationErrors,
     PredictionErrors,
     Refit,
     RefittedVerification,
     UncalibratedErrors,
     arms_at,
     errors_before,
+    orientation_document,
+    orientation_errors,
     prediction_document,
     prediction_errors_with_covariance,
     uncalibrated_model,
+    uncalibrated_orientations,
     verify_refitted,
 )
 from flexcal.data.poses import PoseSet, read_poses
@@ -85,6 +89,10 @@ class Verification(ReportedResult):
         What the result comes from.
     sample : StratifiedSample or None
         Which of very many points were taken.
+    orientation : OrientationErrors or None
+        Errors of the measured orientations; None without any.
+    orientation_before : OrientationErrors or None
+        Errors of the orientations of the uncalibrated robot.
     everywhere : ErrorStatistics or None
         Errors at all points, where a sample was taken.
     """
@@ -100,6 +108,8 @@ class Verification(ReportedResult):
     outside: str
     fitted: tuple[str, ...]
     record: RunRecord = NOT_RECORDED
+    orientation: OrientationErrors | None = None
+    orientation_before: OrientationErrors | None = None
     sample: StratifiedSample | None = None
     everywhere: ErrorStatistics | None = None
 
@@ -191,6 +201,7 @@ class Verification(ReportedResult):
             "backlash": list(self.model.backlash_joints),
             "before": before,
             "verification": blocks,
+            "orientation": orientation_document(self.orientation_before, self.orientation),
             "refit": refit_document(self.refit, len(self.poses)),
             "refit_proposed": refit_document(self.better, len(self.poses)),
             "uncalibrated_points": list(self.uncalibrated),
@@ -232,7 +243,7 @@ def verify(
     Raises
     ------
     FlexcalError
-        For measured lengths and orientations, and where a station was not calibrated and is not refitted.
+        For measured lengths, and where a station was not calibrated and is not refitted.
 
     Examples
     --------
@@ -246,9 +257,10 @@ def verify(
     """
     require_points(poses)
     require_stations(robot, poses, "station" in refit)
-    measured = poses
+    turned, measured = poses, poses.without_orientations()
     sample = StratifiedSample.of(measured)
     poses = measured if sample is None else measured.subset(sample.rows)
+    turned = turned if sample is None else turned.subset(sample.rows)
     unmeasured = tuple(name for name in poses.targets if name not in robot.measured)
     model = robot.probable if unmeasured else robot.model
     known = all(is_station_identified(model, station) for station in poses.stations)
@@ -257,12 +269,13 @@ def verify(
     verified = stands if anew is None else (anew.result, anew.covariance)
     assert verified is not None
     standing = model if anew is None else anew.model
+    uncalibrated = uncalibrated_model(robot.nominal, poses)
     return Verification(
         model=standing,
         poses=poses,
         predicted=verified[0],
         covariance=verified[1],
-        before=uncalibrated_model(robot.nominal, poses).errors(poses),
+        before=uncalibrated.errors(poses),
         refit=anew,
         as_calibrated=stands[0] if stands is not None and refit else None,
         better=proposed_refit(model, poses, verified[0]) if anew is None else None,
@@ -271,6 +284,8 @@ def verify(
         fitted=fitted_points(robot, poses),
         sample=sample,
         everywhere=None if sample is None else all_errors(standing, measured, progress),
+        orientation=orientation_errors(standing, turned),
+        orientation_before=uncalibrated_orientations(uncalibrated.registered, turned),
     )
 
 

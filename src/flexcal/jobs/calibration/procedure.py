@@ -27,6 +27,7 @@ from flexcal.calibration.term_selection import (
 )
 from flexcal.calibration.verification import (
     uncalibrated_model,
+    uncalibrated_orientations,
 )
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
@@ -64,8 +65,9 @@ def calibrate(
         Nominal robot, with the dynamics and stiffness that were identified, and without an earlier calibration:
         ``RobotModel.from_yaml(path, without="calibration")``.
     poses : PoseSet
-        Joint positions (N, n) in rad or m and measured points (N, 3) in m. Its sigma is that of the instrument; the scatter of robot
-        and model are estimated from the points. Of very many points a stratified sample is fitted.
+        Joint positions (N, n) in rad or m and measured points (N, 3) in m, with orientations where they were measured. Its sigma is
+        that of the instrument; the scatter of robot and model are estimated from the points. Of very many points a stratified sample is
+        fitted.
     terms : sequence of str, optional
         Names of the error terms, or "auto" alone for those that cross-validation supports; by default as robot.yaml declares.
     loss : {"auto", "squares", "huber", "cauchy"}
@@ -89,7 +91,7 @@ def calibrate(
     Raises
     ------
     FlexcalError
-        For a robot that has been calibrated already, an unknown term, measured lengths and orientations, fewer coordinates than
+        For a robot that has been calibrated already, an unknown term, measured lengths, fewer coordinates than
         parameters, joints that never move, and stations that robot.yaml does not know.
 
     Examples
@@ -168,11 +170,12 @@ def calibrate(
         ranges=joint_extents(selected.model, selected.poses.q),
         measurements=measurement_digests(poses),
     )
+    uncalibrated = uncalibrated_model(model, poses)
     return Calibration(
         model=selected.model,
         estimate=estimate,
         nominal=nominal,
-        before=uncalibrated_model(model, poses).errors(poses),
+        before=uncalibrated.errors(poses),
         rigid=rigid,
         selection=selection,
         selected=selected,
@@ -181,6 +184,7 @@ def calibrate(
         sample=sample,
         everywhere=None if sample is None else all_errors(selected.model, measured, progress),
         held_out=held_out,
+        orientation_before=uncalibrated_orientations(uncalibrated.registered, poses),
     )
 
 

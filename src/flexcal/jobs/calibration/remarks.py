@@ -27,18 +27,35 @@ _LISTED = 20
 
 @dataclass(frozen=True)
 class Outlier:
-    """Measurement with a small weight in the robust loss: number of its pose, point, distance from the fit (m)."""
+    """Measurement with a small weight in the robust loss: number of its pose, point, distance from the fit (m), angle from it (rad) where
+    the orientation was measured.
+    """
 
     pose: int
     target: str
     error: float
+    angle: float | None = None
+
+    def __str__(self) -> str:
+        turned = "" if self.angle is None else f", {np.rad2deg(self.angle):.2f}°"
+        return f"pose {self.pose} ({self.error / MILLIMETRE:.2f} mm{turned})"
+
+    def document(self) -> dict[str, object]:
+        """Entry of results.json."""
+        turned = {} if self.angle is None else {"angle_deg": float(np.rad2deg(self.angle))}
+        return {"pose": self.pose, "target": self.target, "error_mm": self.error / MILLIMETRE, **turned}
 
 
 def outliers_of(fit: GeometricFit) -> tuple[Outlier, ...]:
     """Outliers of a fit, the farthest first."""
     distance = np.linalg.norm(fit.residuals, axis=1)
     rows = sorted(fit.estimate.outliers, key=lambda row: -distance[row])
-    return tuple(Outlier(int(fit.poses.pose[i]), str(fit.poses.target[i]), float(distance[i])) for i in rows)
+    turned = np.flatnonzero(fit.poses.turned).tolist()
+    angle = dict(zip(turned, np.linalg.norm(fit.rotations, axis=1).tolist(), strict=True))
+    return tuple(
+        Outlier(int(fit.poses.pose[i]), str(fit.poses.target[i]), float(distance[i]), angle.get(i))
+        for i in rows
+    )
 
 
 def calibration_remarks(fit: GeometricFit, cause: Sequence[str] = ()) -> tuple[str, ...]:
@@ -48,7 +65,7 @@ def calibration_remarks(fit: GeometricFit, cause: Sequence[str] = ()) -> tuple[s
         remarks.append(f"the flank of a backlash is uncertain at {fit.ambiguous.sum()} poses")
     outliers = outliers_of(fit)
     if outliers:
-        listed = ", ".join(f"pose {o.pose} ({o.error / MILLIMETRE:.2f} mm)" for o in outliers[:_LISTED])
+        listed = ", ".join(str(outlier) for outlier in outliers[:_LISTED])
         more = f" and {len(outliers) - _LISTED} more" if len(outliers) > _LISTED else ""
         remarks.append(f"{len(outliers)} outliers: {listed}{more}")
     remarks += [*_undetermined(fit), *_noise(fit)]

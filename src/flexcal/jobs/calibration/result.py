@@ -31,9 +31,11 @@ from flexcal.calibration.verification import (
     CALIBRATED,
     RIGID,
     MeasuredPoints,
+    OrientationErrors,
     UncalibratedErrors,
     arms_at,
     errors_before,
+    orientation_document,
 )
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, json_values
@@ -91,6 +93,8 @@ class Calibration(Identification):
         Errors of `selected` at all points, where a sample was fitted.
     held_out : HeldOut or None
         Errors at groups of measurements that were left out whole, where they were asked for.
+    orientation_before : OrientationErrors or None
+        Errors of the orientations of the uncalibrated robot, where they were measured.
     estimates : Path or None
         File that the estimate was stored in.
     command : str
@@ -109,6 +113,7 @@ class Calibration(Identification):
     sample: StratifiedSample | None = None
     everywhere: ErrorStatistics | None = None
     held_out: HeldOut | None = None
+    orientation_before: OrientationErrors | None = None
     estimates: Path | None = None
     command: str = ""
 
@@ -205,6 +210,10 @@ class Calibration(Identification):
                 "mean_mm": self.validated.mean / MILLIMETRE,
                 "parameters": self.validated.freedom,
             },
+            "orientation": orientation_document(
+                self.orientation_before,
+                OrientationErrors(selected.rotations) if len(selected.rotations) else None,
+            ),
             "held_out": None if self.held_out is None else self.held_out.document(),
             "before": before,
             "points": self.found_points,
@@ -224,10 +233,7 @@ class Calibration(Identification):
             "variances": selected.variances,
             "drift": None if drift is None else drift.document(),
             "sample": subsample_document(self.sample, self.everywhere),
-            "outliers": [
-                {"pose": o.pose, "target": o.target, "error_mm": o.error / MILLIMETRE}
-                for o in outliers_of(selected)
-            ],
+            "outliers": [outlier.document() for outlier in outliers_of(selected)],
             "bearings": bearings_block(self.bearings),
             "stage1": None if self.stiffness is None else {"misfit": misfit_document(self.stiffness.misfit)},
             "remarks": [

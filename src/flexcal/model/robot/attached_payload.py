@@ -72,11 +72,13 @@ def with_point_at_frame(model: RobotModel, frame: str) -> RobotModel:
         )
     place = _moving_frame(model, frame)
     point = Point(frame, frame, place.joint, place.rotation, place.translation, np.zeros(3))
-    errors = np.vstack([model.geometry.point_error, np.zeros(3)])
+    errors, turns = (
+        np.vstack([array, np.zeros(3)]) for array in (model.geometry.point_error, model.geometry.point_turn)
+    )
     return replace(
         model,
         points=MappingProxyType({**model.points, frame: point}),
-        geometry=replace(model.geometry, point_error=errors),
+        geometry=replace(model.geometry, point_error=errors, point_turn=turns),
     )
 
 

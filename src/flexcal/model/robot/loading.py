@@ -77,6 +77,7 @@ def read_robot(robot_type: type[RobotModel], path: Path) -> RobotModel:
             errors=np.zeros((n, 6)),
             tool=np.zeros(6),
             point_error=np.zeros((len(points), 3)),
+            point_turn=np.zeros((len(points), 3)),
             gravity_compliance=np.zeros(n),
             lateral_compliance=np.zeros((n, 2)),
         ),

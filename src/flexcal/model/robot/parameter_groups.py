@@ -16,12 +16,14 @@ class Geometry:
     """Geometric deviations from the URDF, and compliances of rigid joints.
 
     `errors` (n, 6) of every joint and `tool` (6,) in the order of `GEOMETRY`, rad and m; `point_error` (points, 3), m, in the order of
-    the robot's points; `gravity_compliance` (n,) about the joints' axes and `lateral_compliance` (n, 2) across them, rad/(N m).
+    the robot's points; `point_turn` (points, 3), rad, rotation vectors from the points' frames to the axes of a target whose orientation is
+    measured; `gravity_compliance` (n,) about the joints' axes and `lateral_compliance` (n, 2) across them, rad/(N m).
     """
 
     errors: np.ndarray
     tool: np.ndarray
     point_error: np.ndarray
+    point_turn: np.ndarray
     gravity_compliance: np.ndarray
     lateral_compliance: np.ndarray
 
@@ -109,7 +111,7 @@ class Stations:
 
 @dataclass(frozen=True, eq=False)
 class Scatter:
-    """Scatter of measured points: `std` (7,) of its causes in the order of `SCATTER`, m and rad; `instrument_share` is a ratio."""
+    """Scatter of measured points: `std` (8,) of its causes in the order of `SCATTER`, m and rad; `instrument_share` is a ratio."""
 
     std: np.ndarray
 

@@ -32,7 +32,16 @@ MOMENTS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 STATION = ("x", "y", "z", "rx", "ry", "rz")
 SOCKET_SCALE = "sockets.scale"
 """Relative deviation of the distances between a fixture's sockets from the declared ones."""
-SCATTER = ("instrument", "instrument_share", "robot", "angular", "model", "pose", "transmission")
+SCATTER = (
+    "instrument",
+    "instrument_share",
+    "robot",
+    "angular",
+    "model",
+    "pose",
+    "transmission",
+    "orientation",
+)
 
 _UNITS = {
     "offset": "rad", "misalignment_1": "rad", "misalignment_2": "rad", "length_x": "m", "length_y": "m", "length_z": "m",
@@ -46,7 +55,7 @@ _UNITS = {
     "held_inertia": "kg m²", "arm_inertia": "kg m²", "arm_viscous": "N m s/rad", "arm_coulomb": "N m", "gap_torque": "N m",
     **_FRICTION_UNITS, "mc_x": "kg m", "mc_y": "kg m", "mc_z": "kg m",
     **dict.fromkeys(("position_x", "position_y", "position_z"), "m"), "direction_1": "rad", "direction_2": "rad",
-    "instrument": "m", "robot": "m", "angular": "rad", "model": "m", "pose": "m", "transmission": "rad",
+    "instrument": "m", "robot": "m", "angular": "rad", "model": "m", "pose": "m", "transmission": "rad", "orientation": "rad",
 }  # fmt: skip
 
 
@@ -152,6 +161,7 @@ def parameter_locations(model: RobotModel) -> dict[str, Location]:
     for p, name in enumerate(model.points):
         for k, key in enumerate("xyz"):
             table[f"point.{name}.{key}"] = Location("geometry", "point_error", (p, k))
+            table[f"point.{name}.r{key}"] = Location("geometry", "point_turn", (p, k))
     for k, key in enumerate(SCATTER):
         table[f"scatter.{key}"] = Location("scatter", "std", (k,))
     return table

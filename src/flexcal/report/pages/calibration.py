@@ -45,6 +45,7 @@ from flexcal.report.sections import (
     error_range,
     headline_facts,
     identifiability_blocks,
+    orientation_tables,
     parameter_figures,
     parameter_table,
     provenance_section,
@@ -194,6 +195,7 @@ def _accuracy_section(study: CalibrationStudy) -> Section:
         "and run flexcal verify.",
         (
             table,
+            *orientation_tables(study.results.get("orientation")),
             *([Text((), "Remarks", sentences(remarks))] if remarks else []),
             budget_table(study.results["variances"]),
             arm_figure(study.arms, len(points.poses)),

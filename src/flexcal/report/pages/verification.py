@@ -39,6 +39,7 @@ from flexcal.report.sections import (
     arm_figure,
     error_range,
     headline_facts,
+    orientation_tables,
     provenance_section,
     residual_blocks,
     uncalibrated_ranges,
@@ -164,6 +165,7 @@ def _errors_section(study: VerificationStudy) -> Section:
             tuple(rows),
             note=BEFORE_NOTE,
         ),
+        *orientation_tables(study.results.get("orientation")),
         *([Text((), "Remarks", sentences(remarks))] if remarks else []),
         arm_figure(study.arms, len(poses)),
         FigureBlock(

@@ -6,6 +6,7 @@ from .headline_numbers import comparison_section
 from .identifiability import identifiability_blocks
 from .learned_residual import learned_section
 from .link_inertials import link_inertials_section
+from .orientations import orientation_tables
 from .parameters import coverage, parameter_figures, parameter_table
 from .provenance import common_origin, input_files, provenance_section
 from .residuals import residual_blocks, residuals_section
@@ -39,6 +40,7 @@ __all__ = [
     "learned_section",
     "levels_block",
     "link_inertials_section",
+    "orientation_tables",
     "parameter_figures",
     "parameter_table",
     "provenance_section",
