@@ -87,12 +87,12 @@ class Verification(ReportedResult):
         Files or points among these that the calibration was made from.
     record : RunRecord
         What the result comes from.
-    sample : StratifiedSample or None
-        Which of very many points were taken.
     orientation : OrientationErrors or None
         Errors of the measured orientations; None without any.
     orientation_before : OrientationErrors or None
         Errors of the orientations of the uncalibrated robot.
+    sample : StratifiedSample or None
+        Which of very many points were taken.
     everywhere : ErrorStatistics or None
         Errors at all points, where a sample was taken.
     """
