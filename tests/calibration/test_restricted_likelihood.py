@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 from flexcal.calibration.error_model import ErrorComponents, ErrorGroups, LinearFit
 from flexcal.calibration.error_model.point_sums import PointSums
 from flexcal.calibration.error_model.restricted_likelihood import RestrictedLikelihood
-from flexcal.calibration.measurement import METRES
+from flexcal.calibration.measurement import METRES, Readings
 
 ONE_POINT = np.arange(30)
 SEVERAL_POINTS = np.r_[np.repeat(np.arange(9), 2), np.repeat([9, 10, 11], 3), 12, 12, 13]
@@ -29,8 +29,8 @@ def drawn(visits: np.ndarray, command: np.ndarray = ALL_AGAIN) -> LinearFit:
     sigma = rng.uniform(1e-5, 3e-5, (30, 3))
     parts = (rng.normal(size=(30, 3, k)) for k in (5, 2, 3, 4))
     free, tied, turns, waves = parts
-    unit = np.full((30, 3), METRES)
-    return LinearFit(4e-5 * rng.normal(size=(30, 3)), free, 1e-5 * tied, waves, sigma, turns, cells, unit)
+    readings = Readings(np.arange(30), np.full((30, 3), METRES), sigma)
+    return LinearFit(4e-5 * rng.normal(size=(30, 3)), free, 1e-5 * tied, waves, readings, turns, cells)
 
 
 def derivative(fit: LinearFit, name: str) -> np.ndarray:
@@ -39,7 +39,7 @@ def derivative(fit: LinearFit, name: str) -> np.ndarray:
     if name == "robot":
         return np.eye(90)
     if name == "share":
-        return np.diag(fit.sigma.ravel() ** 2)
+        return np.diag(fit.readings.sigma.ravel() ** 2)
     if name == "transmission":
         return fit.waves.reshape(90, -1) @ fit.waves.reshape(90, -1).T
     labels = cells.pose if name in ("pose", "angular") else cells.blocks[name]
@@ -89,8 +89,8 @@ def test_likelihood_and_its_derivatives(
 def test_visits_have_the_covariance_of_their_points(visits: np.ndarray) -> None:
     fit = drawn(visits)
     scatter = ErrorComponents(share=1.0, robot=2e-5, pose=3e-5, angular=1e-5)
-    jointly = scatter.jointly(fit.sigma, fit.turns, fit.cells)
-    alone = scatter.independent(fit.sigma, fit.turns)
+    jointly = scatter.jointly(fit.readings, fit.turns, fit.cells)
+    alone = scatter.independent(fit.readings, fit.turns)
     for rows, block in zip(fit.cells.visits, jointly, strict=True):
         there = np.flatnonzero(rows >= 0)
         for k in there:

@@ -65,7 +65,7 @@ class Drift:
         share = np.linspace(-0.5, 0.5, len(poses)) * ~poses.in_socket
         row = Readings.of(poses).row
         kept = ~np.isin(row, fit.estimate.outliers)
-        ramp = share[row[kept]][:, None, None] * translations(fit.linear.unit)
+        ramp = share[row[kept]][:, None, None] * translations(fit.linear.readings)
         products = fit.linear.products(replace(fit.scatter, order=0.0), ramp)
         covariance = np.linalg.inv(products[:-1, :-1])
         travel = covariance @ products[:-1, -1]

@@ -18,6 +18,9 @@ FAR_POINT = 0.05
 FAR_FROM_PRIOR = 5.0
 """Largest plausible deviation of a stiffness, mass or centre of mass, in standard deviations of its prior."""
 
+NOISY = 3.0
+"""Ratio of errors after the fit to the known noise of a camera's single views below which they are that noise."""
+
 SCATTERED = 0.01
 """Ratio of errors after the fit to the extent of the points (root mean square both) from which data and robot do not belong together."""
 
@@ -43,7 +46,9 @@ def residuals_implausible(calibration: GeometricFit) -> bool:
     rows = ~np.isin(np.arange(len(calibration.poses)), calibration.estimate.outliers)
     position = _in_base(calibration)[rows]
     extent = np.sqrt(np.mean((position - position.mean(axis=0)) ** 2))
-    return bool(np.sqrt(np.mean(calibration.residuals[rows] ** 2)) > SCATTERED * extent)
+    size = float(np.sqrt(np.mean(calibration.residuals[rows] ** 2)))
+    noise = np.where(calibration.poses.seen[:, None], calibration.poses.sigma, 0.0)[rows]
+    return size > SCATTERED * extent and size > NOISY * float(np.sqrt(np.mean(noise**2)))
 
 
 def _in_base(calibration: GeometricFit) -> np.ndarray:

@@ -1,8 +1,9 @@
-from .error_components import ErrorComponents, joint_rotation_jacobian, known_scatter, translations, whitened
+from .error_components import ErrorComponents, joint_rotation_jacobian, known_scatter, translations
 from .error_statistics import ErrorStatistics
 from .folds import are_different, order_folds, repeated_pose_numbers, workspace_folds
 from .groups import SAME_COMMAND, ErrorGroups, block_columns, group_numbers, occurrence
 from .variance_components import TRANSMISSION, LinearFit
+from .whitening import Whitening
 
 __all__ = [
     "SAME_COMMAND",
@@ -11,6 +12,7 @@ __all__ = [
     "ErrorGroups",
     "ErrorStatistics",
     "LinearFit",
+    "Whitening",
     "are_different",
     "block_columns",
     "group_numbers",
@@ -20,6 +22,5 @@ __all__ = [
     "order_folds",
     "repeated_pose_numbers",
     "translations",
-    "whitened",
     "workspace_folds",
 ]

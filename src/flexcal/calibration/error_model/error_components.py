@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexcal.calibration.error_model.groups import ErrorGroups
+from flexcal.calibration.error_model.groups import ErrorGroups, occurrence
 from flexcal.calibration.error_model.incidence_matrices import incidence
-from flexcal.calibration.measurement import METRES, RADIANS, PredictedMeasurements
+from flexcal.calibration.error_model.whitening import Whitening
+from flexcal.calibration.measurement import METRES, RADIANS, PredictedMeasurements, Readings
 from flexcal.model.robot import RobotModel
 
 _SMALLEST = 1e-6
@@ -55,53 +56,57 @@ class ErrorComponents:
         turned = all(abs(a - b) <= tolerance * (a + _SMALLEST_TURN) for a, b in angles)
         return bool(same) and turned and abs(self.share - before.share) <= tolerance
 
-    def independent(self, sigma: np.ndarray, turns: np.ndarray, unit: np.ndarray | None = None) -> np.ndarray:
-        """Covariance (R, 3, 3), m² or rad², of instrument and repeatability at each reading.
+    def independent(self, readings: Readings, turns: np.ndarray) -> np.ndarray:
+        """Covariance (R, 3, 3), m² or rad², of instrument and repeatability at each of the `readings`.
 
-        `sigma` (R, 3), m or rad, is the stated one, `turns` (R, 3, r) how the revolute joints move the readings, per rad, `unit` (R, 3)
-        that of the coordinates, metres by default.
+        `turns` (R, 3, r) is how the revolute joints move the readings, per rad.
         """
-        diagonal = self._alone(sigma, unit) + self.pose**2 * _in(METRES, sigma, unit)
-        return diagonal[:, :, None] * np.eye(3) + self.angular**2 * turns @ np.swapaxes(turns, 1, 2)
+        diagonal = self._scattered(readings) + self.pose**2 * (readings.unit == METRES)
+        own = self.share**2 * readings.blocks + diagonal[:, :, None] * np.eye(3)
+        return own + self.angular**2 * turns @ np.swapaxes(turns, 1, 2)
 
-    def _alone(self, sigma: np.ndarray, unit: np.ndarray | None) -> np.ndarray:
-        """Variances (R, 3) of what is independent from reading to reading."""
-        diagonal = (self.share * sigma) ** 2 + self.robot**2 * _in(METRES, sigma, unit)
-        return diagonal + self.orientation**2 * _in(RADIANS, sigma, unit) + _SMALLEST**2
+    def _scattered(self, readings: Readings) -> np.ndarray:
+        """Variances (R, 3) of what is independent from reading to reading besides what is stated."""
+        metres, radians = readings.unit == METRES, readings.unit == RADIANS
+        return self.robot**2 * metres + self.orientation**2 * radians + _SMALLEST**2
 
-    def jointly(
-        self, sigma: np.ndarray, turns: np.ndarray, cells: ErrorGroups, unit: np.ndarray | None = None
-    ) -> np.ndarray:
+    def jointly(self, readings: Readings, turns: np.ndarray, cells: ErrorGroups) -> np.ndarray:
         """Joint covariance (G, 3 T, 3 T) of all readings of a visit to a pose, independent of other visits.
 
         The diagonal is 1 where a visit lacks a reading.
         """
-        diagonal = cells.gathered(self._alone(sigma, unit))
+        diagonal = cells.gathered(self._scattered(readings))
+        stated = self.share**2 * stated_covariance(readings, cells)
+        if stated.ndim == 2:
+            diagonal = diagonal + stated
         single = np.where(diagonal > 0, diagonal, 1.0)[:, :, None] * np.eye(diagonal.shape[1])
-        common = cells.gathered(self.common(turns, unit))
+        if stated.ndim == 3:
+            single += stated
+        common = cells.gathered(self.common(readings, turns))
         return single + common @ np.swapaxes(common, 1, 2)
 
-    def common(self, turns: np.ndarray, unit: np.ndarray | None = None) -> np.ndarray:
+    def common(self, readings: Readings, turns: np.ndarray) -> np.ndarray:
         """Columns (R, 3, 3 + r) of the repeatability shared by the readings of a visit, each times a standard normal variable."""
-        moved = np.eye(3) * _in(METRES, turns[:, :, :1], unit)
-        return np.concatenate([self.pose * moved, self.angular * turns], axis=2)
+        return np.concatenate([self.pose * translations(readings), self.angular * turns], axis=2)
 
-    def whitening(self, sigma: np.ndarray, turns: np.ndarray, unit: np.ndarray | None = None) -> np.ndarray:
-        """Whitening matrix W (R, 3, 3) with WᵀW the inverse of the total variance of single readings."""
-        whole = self.independent(sigma, turns, unit)
-        whole = whole + self.model**2 * _in(METRES, sigma, unit)[:, :, None] * np.eye(3)
-        return np.linalg.inv(np.linalg.cholesky(whole))
+    def whitening(self, readings: Readings, turns: np.ndarray) -> Whitening:
+        """Whitening by the total variance of single readings, and what is stated of a point with its orientation."""
+        whole = self.independent(readings, turns)
+        whole = whole + self.model**2 * (readings.unit == METRES)[:, :, None] * np.eye(3)
+        across = None if readings.across is None else self.share**2 * readings.across
+        return Whitening.of(whole, across, readings.beside)
 
-    def weights(self, sigma: np.ndarray, turns: np.ndarray, unit: np.ndarray | None = None) -> np.ndarray:
-        """Whitening matrix (R, 3, 3) with the repeatability of the joints averaged over readings and directions.
+    def weights(self, readings: Readings, turns: np.ndarray) -> Whitening:
+        """Whitening with the repeatability of the joints averaged over readings and directions.
 
         What is taken for it may be an error of the model, and weights that follow it would fit the points of short levers only.
         """
-        points = _in(METRES, sigma, unit).any(axis=1)
-        turned = float(np.mean((turns[~points] ** 2).sum(axis=2))) if turns[~points].size else 0.0
+        own = turns[~readings.points]
+        turned = float(np.mean((own**2).sum(axis=2))) if own.size else 0.0
         orientation = float(np.hypot(self.orientation, self.angular * np.sqrt(turned)))
-        even = replace(self, robot=self.evenly(turns[points]), pose=0.0, angular=0.0, orientation=orientation)
-        return even.whitening(sigma, turns, unit)
+        robot = self.evenly(turns[readings.points])
+        even = replace(self, robot=robot, pose=0.0, angular=0.0, orientation=orientation)
+        return even.whitening(readings, turns)
 
     def evenly(self, turns: np.ndarray) -> float:
         """Standard deviation of a coordinate of points, m, due to the robot's repeatability, root mean square over the points."""
@@ -120,23 +125,23 @@ class ErrorComponents:
         return np.concatenate(sums).reshape(-1, rows.shape[2])
 
 
-def translations(unit: np.ndarray) -> np.ndarray:
+def translations(readings: Readings) -> np.ndarray:
     """Columns (R, 3, 3) of a displacement of the tool in the coordinates that are in metres."""
-    return np.eye(3) * (unit == METRES)[:, :, None]
+    return np.eye(3) * (readings.unit == METRES)[:, :, None]
 
 
-def _in(wanted: int, like: np.ndarray, unit: np.ndarray | None) -> np.ndarray:
-    """1 where a coordinate has the unit, else 0; of the shape of `like`, whose coordinates are in metres where no `unit` is given."""
-    if unit is None:
-        return np.full(like.shape, float(wanted == METRES))
-    return (unit == wanted).astype(float).reshape(*unit.shape, *(1,) * (like.ndim - 2))
-
-
-def whitened(whitening: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Product of W (N, 3, 3) with `rows` (N, 3) or (N, 3, m), stacked: (3 N,) or (3 N, m)."""
-    if rows.ndim == 2:
-        return np.matmul(whitening, rows[:, :, None]).ravel()
-    return np.matmul(whitening, rows).reshape(3 * len(rows), rows.shape[2])
+def stated_covariance(readings: Readings, cells: ErrorGroups) -> np.ndarray:
+    """Stated covariance (G, 3 T, 3 T) of the readings of every visit, or its diagonal (G, 3 T) where it is diagonal."""
+    if readings.stated is None or readings.across is None:
+        return cells.gathered(readings.sigma**2)
+    visits, places = cells.visits.shape
+    visit, place = cells.pose, occurrence(cells.pose)
+    blocks = np.zeros((visits, places, 3, places, 3))
+    blocks[visit, place, :, place] = readings.stated
+    turned, beside = np.flatnonzero(~readings.points), readings.beside
+    blocks[visit[turned], place[turned], :, place[beside]] = readings.across
+    blocks[visit[turned], place[beside], :, place[turned]] = np.swapaxes(readings.across, 1, 2)
+    return blocks.reshape(visits, 3 * places, 3 * places)
 
 
 def known_scatter(model: RobotModel, *, stated: bool) -> ErrorComponents | None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from flexcal.calibration.error_model.arrowhead_matrix import Arrowhead
 from flexcal.calibration.error_model.command_sums import CommandSums
-from flexcal.calibration.error_model.error_components import translations
+from flexcal.calibration.error_model.error_components import stated_covariance, translations
 from flexcal.calibration.error_model.groups import COMMAND
 from flexcal.calibration.error_model.incidence_matrices import added, by_axes, incidence, pairs_of
 from flexcal.calibration.measurement import METRES, RADIANS
@@ -47,11 +47,11 @@ class PointSums:
             np.concatenate([fit.free, fit.tied, fit.waves, more, fit.residual[:, :, None]], axis=2)
         )
         turned = cells.gathered(fit.turns)
-        together = cells.gathered(translations(fit.unit))
+        together = cells.gathered(translations(fit.readings))
         structures = {
-            "robot": cells.gathered((fit.unit == METRES).astype(float)),
-            "orientation": cells.gathered((fit.unit == RADIANS).astype(float)),
-            "share": cells.gathered(fit.sigma**2),
+            "robot": cells.gathered((fit.readings.unit == METRES).astype(float)),
+            "orientation": cells.gathered((fit.readings.unit == RADIANS).astype(float)),
+            "share": stated_covariance(fit.readings, cells),
             "pose": together @ np.swapaxes(together, 1, 2),
             "angular": turned @ np.swapaxes(turned, 1, 2),
         }

@@ -39,7 +39,7 @@ class RestrictedLikelihood:
     def of(cls, sums: PointSums, names: Sequence[str], scatter: ErrorComponents) -> RestrictedLikelihood:
         """Likelihood at a scatter, with derivatives by the variances of the components `names`."""
         fit = sums.fit
-        own = scatter.jointly(fit.sigma, fit.turns, fit.cells, fit.unit)
+        own = scatter.jointly(fit.readings, fit.turns, fit.cells)
         if sums.commands is not None and COMMAND in names:
             diagonal = np.arange(own.shape[1])
             own[:, diagonal, diagonal] += scatter.command**2 * sums.commands.once

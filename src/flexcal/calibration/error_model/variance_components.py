@@ -11,7 +11,7 @@ from flexcal.calibration.error_model.error_components import ErrorComponents
 from flexcal.calibration.error_model.groups import ErrorGroups
 from flexcal.calibration.error_model.point_sums import PointSums
 from flexcal.calibration.error_model.restricted_likelihood import RestrictedLikelihood
-from flexcal.calibration.measurement import METRES, RADIANS
+from flexcal.calibration.measurement import METRES, RADIANS, Readings
 
 _CLEAR_GAIN = 3.0
 """Gain in log-likelihood from which a stated sigma counts as too large (p = 0.01, one parameter at its bound)."""
@@ -38,24 +38,18 @@ _ARMIJO = 1e-4
 class LinearFit:
     """Fit linearised at its solution: `residual` (R, 3) = `free` x + `tied` z + error, z standard normal a priori.
 
-    `unit` (R, 3) says which coordinates are in m and which in rad; `free` (R, 3, p) and `tied` (R, 3, t) are in these; `waves` (R, 3, w),
-    per rad, move the readings with the waves of transmission errors, `turns` (R, 3, r) with rotations of the joints; `sigma` (R, 3) as
-    stated; `cells` say which readings share an error.
+    `readings` says what is in m and what in rad, and what is stated of their noise; `free` (R, 3, p) and `tied` (R, 3, t) are in these
+    units; `waves` (R, 3, w), per rad, move the readings with the waves of transmission errors, `turns` (R, 3, r) with rotations of the
+    joints; `cells` say which readings share an error.
     """
 
     residual: np.ndarray
     free: np.ndarray
     tied: np.ndarray
     waves: np.ndarray
-    sigma: np.ndarray
+    readings: Readings
     turns: np.ndarray
     cells: ErrorGroups
-    unit: np.ndarray
-
-    @property
-    def points(self) -> np.ndarray:
-        """Readings (R,) that are points."""
-        return (self.unit == METRES).any(axis=1)
 
     def products(self, scatter: ErrorComponents, columns: np.ndarray) -> np.ndarray:
         """Scalar products (k + 1, k + 1) of further `columns` (N, 3, k) m and, last, the residual, after projection off the parameters.
@@ -75,12 +69,12 @@ class LinearFit:
         Where a sigma is `stated`, the instrument's part is that, or less where the points scatter clearly less than it says.
         """
         shared = [*([TRANSMISSION] if self.waves.size else []), *self.cells.blocks]
-        angles = ["orientation"] if (self.unit == RADIANS).any() else []
+        angles = ["orientation"] if (self.readings.unit == RADIANS).any() else []
         names = ["robot", *angles, *(["pose"] if self._several else []), "angular", *shared]
         totals = self._mean_squares()
         total = totals[METRES]
         levers = {
-            name: _lever(moved[self.points])
+            name: _lever(moved[self.readings.points])
             for name, moved in (("angular", self.turns), (TRANSMISSION, self.waves))
         }
         sizes = {"orientation": totals.get(RADIANS, 0.0)}
@@ -90,7 +84,7 @@ class LinearFit:
         if stated:
             # the points may scatter less than the instrument alone should, even if nothing else errs
             own = np.concatenate([scale[1 : 1 + len(angles)], scale[len(names) - len(shared) :]])
-            sizes = np.append(own, total / float(np.mean(self.sigma[self.points] ** 2)))
+            sizes = np.append(own, total / float(np.mean(self.readings.sigma[self.readings.points] ** 2)))
             alone = self._maximum([*angles, *shared, "share"], sizes, None, favour=False)[1]
             if alone - self._maximum(names, scale, share, favour=False)[1] > _CLEAR_GAIN:
                 names, scale = ["robot", *angles, *shared], np.append(total, own)
@@ -140,11 +134,15 @@ class LinearFit:
     @property
     def _several(self) -> bool:
         """Whether any visit to a pose has several points."""
-        return bool(np.bincount(self.cells.pose[self.points]).max(initial=0) > 1)
+        return bool(np.bincount(self.cells.pose[self.readings.points]).max(initial=0) > 1)
 
     def _mean_squares(self) -> dict[int, float]:
         """Residual variance of a coordinate by its unit, with the parameters' degrees of freedom deducted."""
-        units = {unit: self.unit.ravel() == unit for unit in (METRES, RADIANS) if (self.unit == unit).any()}
+        units = {
+            unit: self.readings.unit.ravel() == unit
+            for unit in (METRES, RADIANS)
+            if (self.readings.unit == unit).any()
+        }
         rows, size = self.residual.size, self.free.shape[2]
         residual, free = self.residual.ravel(), self.free.reshape(rows, size)
         weight = np.ones(rows)

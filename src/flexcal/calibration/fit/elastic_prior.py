@@ -10,6 +10,7 @@ import numpy as np
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameter, Parameters
 from flexcal.model.robot import (
+    LENS,
     SPRINGS,
     RobotModel,
     declared_parameter,
@@ -52,6 +53,22 @@ class ElasticPrior:
         covariance = np.diag(np.concatenate([np.zeros(size), own**2]))
         covariance[:size, :size] = self.covariance
         return ElasticPrior(self.parameters + items, covariance)
+
+
+def with_lenses(prior: ElasticPrior, poses: PoseSet) -> ElasticPrior:
+    """Prior with the intrinsic parameters of the cameras that measured, as their free views determine them."""
+    for name, lens in poses.lenses.items():
+        if poses.camera is None or not (poses.camera == name).any():
+            continue
+        items = Parameters(
+            Parameter(f"camera.{name}.{key}", unit_of(key), float(value))
+            for key, value in zip(LENS, lens.values, strict=True)
+        )
+        size = len(prior.parameters)
+        covariance = np.zeros((size + len(items), size + len(items)))
+        covariance[:size, :size], covariance[size:, size:] = prior.covariance, lens.covariance
+        prior = ElasticPrior(prior.parameters + items, covariance)
+    return prior
 
 
 NOTHING_ELASTIC = ElasticPrior(Parameters(), np.zeros((0, 0)))

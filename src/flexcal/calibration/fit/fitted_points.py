@@ -14,9 +14,8 @@ from flexcal.calibration.error_model import (
     LinearFit,
     are_different,
     joint_rotation_jacobian,
-    whitened,
 )
-from flexcal.calibration.fit.elastic_prior import ElasticPrior
+from flexcal.calibration.fit.elastic_prior import ElasticPrior, with_lenses
 from flexcal.calibration.fit.least_squares_problem import GeometryProblem, PlainLoss
 from flexcal.calibration.fit.marginalised_elasticity import marginalised
 from flexcal.calibration.fit.practical_identifiability import Undetermined, undetermined
@@ -43,7 +42,7 @@ from flexcal.calibration.measurement import (
 )
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import RANK_TOLERANCE, Estimate, Identifiability, Loss, Parameter, Parameters
-from flexcal.model.robot import SCATTER, SOCKET_SCALE, RobotModel, unit_of
+from flexcal.model.robot import BOARD_SCALE, SCATTER, SOCKET_SCALE, RobotModel, unit_of
 from flexcal.progress import Progress
 
 _FLANK_PASSES = 4
@@ -95,10 +94,12 @@ class PointFit:
         """
         if not are_different(poses.q, LEAST_POSES):
             terms = tuple(term for term in terms if term != TRANSMISSION)
+        model = model.with_lenses({name: lens.values for name, lens in poses.lenses.items()})
         bare = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
         start = register(model, poses, predict_measurements(bare, poses, elastic=elastic).position)
         start = with_target_axes(start, poses)
         require_orientations(start, poses)
+        prior = with_lenses(prior, poses)
         if "backlash" in terms:
             require_both_flanks(model, predict_measurements(start, poses, elastic=elastic).rest.flank)
         geometric = geometric_parameters(start, poses, terms)
@@ -148,12 +149,15 @@ class PointFit:
 
     @property
     def known(self) -> Parameters:
-        """Parameters that are held at what is declared, within its standard deviation: the scale of the distances between sockets.
+        """Parameters that are held at what is declared, within its standard deviation: the scale of sockets' distances, and of a board.
 
         Errors of the joints grow with the robot, so a fit would make a smaller robot of fewer errors, and shorter distances.
         """
-        std = declared_size(self.start, SOCKET_SCALE) if self.poses.in_socket.any() else None
-        return Parameters([] if std is None else [Parameter(SOCKET_SCALE, "1", 0.0, prior_std=std)])
+        there = {SOCKET_SCALE: self.poses.in_socket.any(), BOARD_SCALE: self.poses.seen.any()}
+        sizes = {name: declared_size(self.start, name) for name, own in there.items() if own}
+        return Parameters(
+            Parameter(name, "1", 0.0, prior_std=std) for name, std in sizes.items() if std is not None
+        )
 
     def solved(
         self,
@@ -178,8 +182,7 @@ class PointFit:
             kept = Parameters(
                 replace(p, value=near.estimate.values.get(p.name, p.value), prior_mean=p.value) for p in kept
             )
-        readings = at.readings
-        whitening = scatter.weights(readings.sigma, turns, readings.unit)
+        whitening = scatter.weights(at.readings, turns)
         flank, prior = at.rest.flank, self.prior.beside(self.waves, scatter.transmission)
         passes = 0
         while True:
@@ -261,10 +264,9 @@ class FittedPoints:
             basis.reshape(int(rows.sum()), 3, -1),
             tied[rows],
             (waves * np.array(list(self.fit.waves.values())))[rows],
-            readings.sigma[rows],
+            readings.subset(rows),
             self.turns[rows],
             self.fit.cells.subset(rows),
-            readings.unit[rows],
         )
 
     def estimated_scatter(self) -> tuple[ErrorComponents, dict[str, float]]:
@@ -276,7 +278,7 @@ class FittedPoints:
         rows = self.at.residual.size
         spread = rows / max(rows - self.fit.identifiability.rank, 1) / _CHI_MEDIAN
         squares = (self.at.residual**2).sum(axis=1)
-        angles = (self.at.readings.unit == RADIANS).any(axis=1)
+        angles = ~self.at.readings.points
         robot, orientation = (
             float(np.sqrt(np.median(own) * spread)) if len(own) else 0.0
             for own in (squares[~angles], squares[angles])
@@ -287,8 +289,7 @@ class FittedPoints:
         """Parameters that the poses do not determine under a given scatter."""
         fit = self.fit
         kept = Parameters(p for p in fit.free if not np.isfinite(p.prior_std))
-        readings = self.at.readings
-        whitening = scatter.whitening(readings.sigma, self.turns, readings.unit)
+        whitening = scatter.whitening(self.at.readings, self.turns)
         return undetermined(fit.straight, kept, whitening, fit.hidden)
 
     @property
@@ -296,9 +297,8 @@ class FittedPoints:
         """Whether single points deviate by more than the scatter of most others allows."""
         from scipy.special import chdtri
 
-        readings = self.at.readings
-        whitening = self.scatter.whitening(readings.sigma, self.turns, readings.unit)
-        squares = (whitened(whitening, self.at.residual).reshape(-1, 3) ** 2).sum(axis=1)
+        whitening = self.scatter.whitening(self.at.readings, self.turns)
+        squares = (whitening(self.at.residual).reshape(-1, 3) ** 2).sum(axis=1)
         limit = float(chdtri(3, _SUSPICION / len(squares))) * _SLACK
         return bool(squares.max() > limit * np.median(squares) / _CHI_MEDIAN)
 
@@ -309,7 +309,9 @@ class FittedPoints:
         if poses.sigma_given:
             return poses
         variances = np.diagonal(
-            replace(scatter, share=0.0).independent(poses.sigma, self.turns[: len(poses)]), axis1=1, axis2=2
+            replace(scatter, share=0.0).independent(self.at.readings, self.turns)[: len(poses)],
+            axis1=1,
+            axis2=2,
         )
         return replace(poses, sigma=np.sqrt(variances + scatter.model**2))
 
@@ -354,10 +356,10 @@ class FittedPoints:
         slopes = estimate.parameters.natural_slope(estimate.parameters.coordinates())
         own = task.columns(self.at, estimate.parameters.names) * slopes
         white = own.reshape(-1, 3, len(slopes))[self.inliers] @ estimate.covariance
-        respond = np.swapaxes(task.whitening[self.inliers], 1, 2) @ white
+        respond = task.whitening.subset(self.inliers).transposed(white)
         linear = self.linear
         together = scatter.shared(linear.cells, respond)
-        jointly = scatter.jointly(linear.sigma, linear.turns, linear.cells, linear.unit)
+        jointly = scatter.jointly(linear.readings, linear.turns, linear.cells)
         visits = linear.cells.gathered(respond)
         spread = np.einsum("gip,gij,gjq->pq", visits, jointly, visits, optimize=True)
         taken = np.einsum("nip,niq->pq", white, white, optimize=True)

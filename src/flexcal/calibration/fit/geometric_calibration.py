@@ -91,11 +91,14 @@ class GeometricFit:
         `instrument_mm` is null where no sigma is stated: the robot's part then holds it. `robot_mm` has the repeatability of the
         joints at the measured points in it. `stated_mm` is the sigma of the files, root mean square.
         """
-        scatter, sigma = self.scatter, float(np.sqrt(np.mean(self.linear.sigma[self.linear.points] ** 2)))
+        scatter, sigma = (
+            self.scatter,
+            float(np.sqrt(np.mean(self.linear.readings.sigma[self.linear.readings.points] ** 2))),
+        )
         stated = self.poses.sigma_given
         return {
             "instrument_mm": scatter.share * sigma / MILLIMETRE if stated else None,
-            "robot_mm": scatter.evenly(self.linear.turns[self.linear.points]) / MILLIMETRE,
+            "robot_mm": scatter.evenly(self.linear.turns[self.linear.readings.points]) / MILLIMETRE,
             "model_mm": scatter.model / MILLIMETRE,
             "stated_mm": sigma / MILLIMETRE if stated else None,
         }

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from flexcal.calibration.error_model import whitened
+from flexcal.calibration.error_model import Whitening
 from flexcal.calibration.fit.elastic_prior import ElasticPrior
 from flexcal.calibration.measurement import PredictedMeasurements, Readings, predict_measurements
 from flexcal.data.poses import PoseSet
@@ -24,8 +24,8 @@ LossName = Literal["auto", "squares", "huber", "cauchy"]
 class GeometryProblem:
     """Problem of fitting the geometric parameters `kept` of the robot `start` to `poses` on the backlash flanks `flank` (N, n).
 
-    `prior` is what is known of stiffness and inertia beforehand; `elastic` says whether the arm deflects at all; `whitening` W (R, 3, 3)
-    weighs the readings: WᵀW is the inverse covariance of each.
+    `prior` is what is known of stiffness and inertia beforehand; `elastic` says whether the arm deflects at all; `whitening` weighs
+    the readings.
     """
 
     start: RobotModel
@@ -34,7 +34,7 @@ class GeometryProblem:
     prior: ElasticPrior
     flank: np.ndarray
     elastic: bool
-    whitening: np.ndarray
+    whitening: Whitening
 
     def predicted(self, values: Mapping[str, float], *, jacobians: bool = False) -> PredictedMeasurements:
         """Predicted measurements of the robot with the given named values, on the flanks of this fit."""
@@ -45,11 +45,11 @@ class GeometryProblem:
 
     def residual(self, at: PredictedMeasurements) -> np.ndarray:
         """Whitened residual (3 R,), measured minus predicted coordinates, Eq. (28)."""
-        return whitened(self.whitening, at.residual)
+        return self.whitening(at.residual)
 
     def columns(self, at: PredictedMeasurements, names: tuple[str, ...]) -> np.ndarray:
         """Whitened Jacobian of all coordinates (3 R, p) by some parameters, natural units."""
-        return whitened(self.whitening, at.jacobian(names))
+        return self.whitening(at.jacobian(names))
 
     def reestimated(self, *, loss: Loss | PlainLoss, progress: Progress) -> Estimate:
         """Levenberg-Marquardt (29) on geometry, stiffness and inertia together; the latter keep their prior."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.error_model import whitened
+from flexcal.calibration.error_model import Whitening
 from flexcal.calibration.fit.terms import plausible_size
 from flexcal.calibration.measurement import PredictedMeasurements
 from flexcal.data.poses import PoseSet
@@ -33,17 +33,17 @@ class Undetermined:
 
 
 def undetermined(
-    at: PredictedMeasurements, kept: Parameters, whitening: np.ndarray, hidden: tuple[str, ...]
+    at: PredictedMeasurements, kept: Parameters, whitening: Whitening, hidden: tuple[str, ...]
 ) -> tuple[Undetermined, ...]:
     """Parameters whose standard deviation from the data alone exceeds their plausible size.
 
-    Judged on the kinematic Jacobian `at` the nominal robot without deflection, weighed by W (N, 3, 3): what is seen only because the
+    Judged on the kinematic Jacobian `at` the nominal robot without deflection, weighed by the `whitening`: what is seen only because the
     errors themselves, once estimated, turn the tool or bend the arm is not determined. `kept` are those of full rank on these poses;
     those that are `hidden`, which random poses would determine and these do not, are undetermined too.
     """
     start, poses = at.model, at.poses
     sizes = np.array([plausible_size(start, name) for name in kept.names])
-    columns = whitened(whitening, at.jacobian(kept.names))
+    columns = whitening(at.jacobian(kept.names))
     largest = np.linalg.norm(columns * sizes, axis=0).max()
     identifiability = analyse(columns, kept.names, scale=sizes, tolerance=1 / max(largest, 1.0))
     lost = [item.name for item in identifiability.dropped]

@@ -9,7 +9,7 @@ import numpy as np
 from flexcal.calibration.measurement import left_jacobian, predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameter, Parameters
-from flexcal.model.robot import GEOMETRY, LATERAL, SOCKET_SCALE, STATION, RobotModel, unit_of
+from flexcal.model.robot import BOARD_SCALE, GEOMETRY, LATERAL, SOCKET_SCALE, STATION, RobotModel, unit_of
 from flexcal.model.statics import carried_mass, gravity_moments, gravity_torque
 
 LEAST_POSES = 20
@@ -204,8 +204,14 @@ def declared_size(model: RobotModel, name: str) -> float | None:
     """Standard deviation of a geometric parameter in robot.yaml's `prior:`, by name or by kind; None if not given."""
     prior, (owner, _, key) = model.prior, name.rpartition(".")
     if name == SOCKET_SCALE:
-        fixtures = [item for item in model.config.measurements.values() if item.extent > 0]
+        fixtures = [
+            item for item in model.config.measurements.values() if item.kind == "sockets" and item.extent > 0
+        ]
         return fixtures[0].std / fixtures[0].extent if fixtures else None
+    if name == BOARD_SCALE:
+        return next(
+            (item.board.std for item in model.config.measurements.values() if item.kind == "camera"), None
+        )
     if name in prior.parameters:
         return prior.parameters[name]
     if owner not in model.joint_names or key not in GEOMETRY:

@@ -13,7 +13,16 @@ from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import PointKinematics
 from flexcal.model.parts import rotation_vector, skew_matrix, vector_rotation, wxyz_rotation
-from flexcal.model.robot import GEOMETRY, LATERAL, SOCKET_SCALE, SPRINGS, STATION, RobotModel
+from flexcal.model.robot import (
+    BOARD_SCALE,
+    GEOMETRY,
+    LATERAL,
+    LENS,
+    SOCKET_SCALE,
+    SPRINGS,
+    STATION,
+    RobotModel,
+)
 from flexcal.model.statics import (
     Equilibrium,
     carried_mass,
@@ -58,7 +67,32 @@ class PredictedMeasurements:
         """Measured minus predicted (R, 3): points, m, and the rotation vector from predicted to measured axes, rad, both in the
         instrument's frame.
         """
-        return np.concatenate([self.poses.position - self.position, self._rotations])
+        residual = np.concatenate([self.poses.position - self.position, self._rotations])
+        scale = self.model.stations.scale[1]
+        if self.poses.seen.any():
+            residual[: len(self.poses)] += scale * self.poses.position * self.poses.seen[:, None]
+            residual += self._lens_shift
+        return residual
+
+    @cached_property
+    def _lens_shift(self) -> np.ndarray:
+        """Change (R, 3) of the measured poses with the intrinsic parameters, from those that they were measured with.
+
+        None for a camera whose parameters the robot does not have, as before a calibration.
+        """
+        shift = np.zeros((len(self.readings.row), 3))
+        for name, lens in self.poses.lenses.items():
+            if name in self.model.lenses.names:
+                values = self.model.lenses.values[self.model.lenses.names.index(name)]
+                shift += np.matmul(self._by_lenses(name), values - lens.values)
+        return shift
+
+    def _by_lenses(self, camera: str) -> np.ndarray:
+        """Change (R, 3, 9) of the measured poses with the intrinsic parameters of a camera."""
+        own = self.poses.by_lens
+        assert own is not None and self.poses.camera is not None
+        mine = np.where((self.poses.camera == camera)[:, None, None], own, 0.0)
+        return np.concatenate([mine[:, :3], mine[self.poses.turned, 3:]])
 
     @cached_property
     def orientation(self) -> np.ndarray:
@@ -90,14 +124,14 @@ class PredictedMeasurements:
     def _by_tool(self, columns: np.ndarray) -> np.ndarray:
         """Readings (R, 3, k) from motions of the targets, `columns` (N, 6, k) in the base frame."""
         moved = np.matmul(self.base, columns[:, :3])
-        if self.readings.only_points:
+        if not self.readings.turns:
             return moved
         own = self.poses.turned
         return np.concatenate([moved, np.matmul(self._rotating @ self.base[own], columns[own, 3:])])
 
     def _by_row(self, values: np.ndarray) -> np.ndarray:
         """Values (N, …) of the poses at each reading, (R, …)."""
-        return values if self.readings.only_points else values[self.readings.row]
+        return values if not self.readings.turns else values[self.readings.row]
 
     def jacobian(self, names: Sequence[str]) -> np.ndarray:
         """∂reading/∂parameter (R, 3, len(names)) in natural units, the motion of the deflection included.
@@ -121,6 +155,10 @@ class PredictedMeasurements:
             owner, _, key = name.rpartition(".")
             if name == SOCKET_SCALE:
                 result[:samples, :, k] = -np.where(self.poses.in_socket[:, None], self.poses.position, 0.0)
+            elif name == BOARD_SCALE:
+                result[:samples, :, k] = -self.poses.position * self.poses.seen[:, None]
+            elif owner.startswith("camera."):
+                result[:, :, k] = -self._by_lenses(owner.removeprefix("camera."))[:, :, LENS.index(key)]
             elif owner.startswith("station.") and key in STATION:
                 result[:, :, k] = self._by_station(owner.removeprefix("station."), key)
             elif owner.startswith("point.") and key in STATION[3:]:

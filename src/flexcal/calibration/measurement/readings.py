@@ -14,15 +14,18 @@ METRES, RADIANS = 1, 2
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """R readings of three coordinates: every measured point in the order of the pose set, then every measured orientation.
+    """R readings of three coordinates: every measured point in the order of the pose set, then each of M measured orientations.
 
-    `row` (R,) is the row of the pose set that a reading belongs to, `unit` (R, 3) that of each coordinate, METRES or RADIANS, and
-    `sigma` (R, 3) its stated standard deviation, m or rad; 0 where none is stated of an orientation.
+    `row` (R,) is the row of the pose set that a reading belongs to, `unit` (R, 3) that of each coordinate, METRES or RADIANS, and `sigma`
+    (R, 3) its stated standard deviation, m or rad; 0 where none is stated of an orientation. `stated` (R, 3, 3) and `across` (M, 3, 3),
+    between an orientation and its point, are the stated covariance where it is not diagonal; None where it is.
     """
 
     row: np.ndarray
     unit: np.ndarray
     sigma: np.ndarray
+    stated: np.ndarray | None = None
+    across: np.ndarray | None = None
 
     @classmethod
     def of(cls, poses: PoseSet) -> Readings:
@@ -31,13 +34,49 @@ class Readings:
         row = np.concatenate([points, turned])
         unit = np.full((len(row), 3), METRES)
         unit[len(points) :] = RADIANS
-        stated = poses.orientation_sigma
-        angular = np.zeros(len(turned)) if stated is None else stated[turned]
-        return cls(
-            row, unit, np.concatenate([poses.sigma, np.broadcast_to(angular[:, None], (len(turned), 3))])
+        angular = (
+            np.zeros(len(turned)) if poses.orientation_sigma is None else poses.orientation_sigma[turned]
+        )
+        sigma = np.concatenate([poses.sigma, np.broadcast_to(angular[:, None], (len(turned), 3))])
+        if poses.covariance is None or not len(turned):
+            return cls(row, unit, sigma)
+        stated, across = sigma[:, :, None] ** 2 * np.eye(3), np.zeros((len(turned), 3, 3))
+        joint = np.array(np.isfinite(poses.covariance).all(axis=(1, 2)))
+        stated[points[joint]] = poses.covariance[joint, :3, :3]
+        own = joint[turned]
+        stated[len(points) :][own] = poses.covariance[turned[own], 3:, 3:]
+        across[own] = poses.covariance[turned[own], 3:, :3]
+        return cls(row, unit, sigma, stated, across)
+
+    def subset(self, rows: np.ndarray) -> Readings:
+        """The readings of a mask (R,) that keeps point and orientation of a pose together."""
+        turned = rows[len(rows) - self.turns :]
+        return Readings(
+            self.row[rows],
+            self.unit[rows],
+            self.sigma[rows],
+            None if self.stated is None else self.stated[rows],
+            None if self.across is None else self.across[turned],
         )
 
     @property
-    def only_points(self) -> bool:
-        """Whether every row of the pose set is a point and nothing else."""
-        return not (self.unit == RADIANS).any()
+    def turns(self) -> int:
+        """Number of orientations M."""
+        return int((self.unit[:, 0] == RADIANS).sum())
+
+    @property
+    def points(self) -> np.ndarray:
+        """Readings (R,) that are points."""
+        return self.unit[:, 0] == METRES
+
+    @property
+    def beside(self) -> np.ndarray:
+        """Numbers (M,) of the points' readings beside the orientations."""
+        first = np.zeros(int(self.row.max(initial=-1)) + 1, dtype=int)
+        first[self.row[self.points]] = np.arange(int(self.points.sum()))
+        return first[self.row[~self.points]]
+
+    @property
+    def blocks(self) -> np.ndarray:
+        """Stated covariances (R, 3, 3) of the readings."""
+        return self.sigma[:, :, None] ** 2 * np.eye(3) if self.stated is None else self.stated

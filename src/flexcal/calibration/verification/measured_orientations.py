@@ -70,9 +70,8 @@ def orientation_errors(
         *(f"point.{t}.r{axis}" for t in known for axis in "xyz"),
     ]
     roots = (at.jacobian(names) @ covariance_root(standing, names))[len(own) :]
-    readings = at.readings
     scatter = replace(scatter, orientation=standing.value("scatter.orientation"))
-    noise = scatter.independent(readings.sigma, joint_rotation_jacobian(at), readings.unit)[len(own) :]
+    noise = scatter.independent(at.readings, joint_rotation_jacobian(at))[len(own) :]
     squares = (roots**2).sum(axis=(1, 2)) + np.trace(noise, axis1=1, axis2=2)
     return OrientationErrors(rotations, float(np.sqrt(np.mean(squares))))
 

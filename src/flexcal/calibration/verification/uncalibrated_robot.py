@@ -87,6 +87,7 @@ def uncalibrated_model(model: RobotModel, poses: PoseSet) -> UncalibratedRobot:
     Kabsch (1976) for the registration; Gauss-Newton on the 6 parameters of every station and 3 of every measured point for the robot's own
     error. Raises `FlexcalError` for an unknown target or station.
     """
+    model = model.with_stations(poses.boards)
     for station in poses.stations:
         model.station_index(station)
     poses = poses.without_orientations()

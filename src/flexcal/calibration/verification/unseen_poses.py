@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from flexcal.calibration.error_model import (
 )
 from flexcal.calibration.measurement import (
     PredictedMeasurements,
+    Readings,
     ambiguous_poses,
     covariance_root,
     moving_parameters,
@@ -156,7 +157,7 @@ def prediction_errors_with_covariance(
     scatter = None if noise_free else known_scatter(model, stated=poses.sigma_given)
     independent = None if scatter is None else _independent(model, scatter, at, poses)
     common = (
-        scatter.common(joint_rotation_jacobian(at))
+        scatter.common(at.readings, joint_rotation_jacobian(at))
         if scatter is not None and len(np.unique(cells.pose)) < len(poses)
         else None
     )
@@ -212,4 +213,4 @@ def _independent(
     sigma = (
         poses.sigma if poses.sigma_given else np.full(poses.sigma.shape, model.value("scatter.instrument"))
     )
-    return scatter.independent(sigma, joint_rotation_jacobian(at))
+    return scatter.independent(Readings.of(replace(poses, sigma=sigma)), joint_rotation_jacobian(at))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexcal.data.poses.camera_tables import measures_images, read_views
 from flexcal.data.poses.candidate_pool import PosePool
 from flexcal.data.poses.checks import check_metres, check_motion, check_same_pose
 from flexcal.data.poses.columns import (
@@ -171,6 +172,8 @@ def _read(path: Path, model: RobotModel, further: tuple[str, ...]) -> PoseSet:
     file = open_table(path)
     if measures_sockets(file):
         return read_sockets(file, model, further)
+    if measures_images(file):
+        return read_views(file, model, further)
     texts = tuple(dict.fromkeys(name for name in (*_TEXTS, *further) if name in file.columns))
     place = _place(file, model)
     _check_measured(file, model, place)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
 
+from flexcal.data.camera import Lens
 from flexcal.errors import FlexcalError
 
 DEFAULT_SIGMA = 1e-4
@@ -40,6 +41,15 @@ class PoseSet:
         Measured orientations (N, 4) of the target's axes in the instrument's frame, unit norm; NaN where only the point is measured.
     orientation_sigma : ndarray, optional
         Standard deviations (N,) of a measured orientation about each axis, rad.
+    covariance : ndarray, optional
+        Joint covariances (N, 6, 6) of a measured point and its orientation, m and rad in the instrument's axes, in place of `sigma` and
+        `orientation_sigma`; NaN where these hold.
+    camera : ndarray, optional
+        Names (N,) of the cameras that measured; empty where none did.
+    by_lens : ndarray, optional
+        Change (N, 6, 9) of a measured point and orientation with the intrinsic parameters of its camera, in the order of `LENS`.
+    lenses : mapping of Lens
+        Intrinsic parameters of the cameras by name, with which the poses were measured.
     length : ndarray, optional
         Lengths (N,) of a draw-wire, m.
     time : ndarray, optional
@@ -67,6 +77,10 @@ class PoseSet:
     pose: np.ndarray
     quaternion_wxyz: np.ndarray | None = None
     orientation_sigma: np.ndarray | None = None
+    covariance: np.ndarray | None = None
+    camera: np.ndarray | None = None
+    by_lens: np.ndarray | None = None
+    lenses: Mapping[str, Lens] = field(default_factory=dict)
     length: np.ndarray | None = None
     time: np.ndarray | None = None
     socket: np.ndarray | None = None
@@ -89,6 +103,9 @@ class PoseSet:
             "pose": (n_rows,),
             "quaternion_wxyz": (n_rows, 4),
             "orientation_sigma": (n_rows,),
+            "covariance": (n_rows, 6, 6),
+            "camera": (n_rows,),
+            "by_lens": (n_rows, 6, 9),
             "length": (n_rows,),
             "time": (n_rows,),
             "socket": (n_rows,),
@@ -127,8 +144,18 @@ class PoseSet:
         return (
             self
             if self.quaternion_wxyz is None
-            else replace(self, quaternion_wxyz=None, orientation_sigma=None)
+            else replace(self, quaternion_wxyz=None, orientation_sigma=None, covariance=None)
         )
+
+    @property
+    def seen(self) -> np.ndarray:
+        """Rows (N,) that a camera measured."""
+        return np.zeros(len(self), bool) if self.camera is None else np.array(self.camera != "")
+
+    @property
+    def boards(self) -> tuple[str, ...]:
+        """Places of a camera's board, or of a camera in the cell, in the order in which they first appear."""
+        return tuple(dict.fromkeys(self.station[self.seen].tolist()))
 
     @property
     def fixtures(self) -> tuple[str, ...]:
@@ -184,41 +211,54 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
             f"the pose sets have different numbers of joints ({counts}); use sets of one robot.",
         )
     joined: dict[str, Any] = {}
-    for field in fields(PoseSet):
-        values = [getattr(poses, field.name) for poses in sets]
+    for entry in fields(PoseSet):
+        values = [getattr(poses, entry.name) for poses in sets]
         present = [value is not None for value in values]
-        if field.name == "sigma_given":
+        if entry.name == "sigma_given":
             if any(values) and not all(values):
                 raise FlexcalError(
                     "E-POSES-025",
                     f"only {sum(values)} of {len(sets)} pose sets have sigma; give it for all, or for none.",
                 )
-            joined[field.name] = all(values)
-        elif field.name == "socket" and any(present):
-            joined[field.name] = np.concatenate(
-                [np.full(len(s), "") if s.socket is None else s.socket for s in sets]
-            )
-        elif field.name == "quaternion_wxyz" and any(present):
-            joined[field.name] = np.concatenate(
+            joined[entry.name] = all(values)
+        elif entry.name == "lenses":
+            joined[entry.name] = {name: lens for one in values for name, lens in one.items()}
+        elif entry.name in _PARTIAL and any(present):
+            joined[entry.name] = np.concatenate(
                 [
-                    np.full((len(s), 4), np.nan) if s.quaternion_wxyz is None else s.quaternion_wxyz
+                    _absent(entry.name, len(s)) if getattr(s, entry.name) is None else getattr(s, entry.name)
                     for s in sets
                 ]
             )
-        elif field.name == "orientation_sigma" and any(present):
-            joined[field.name] = _orientation_sigmas(sets)
-        elif field.name == "pose":
-            joined[field.name] = _numbered_on(values)
+        elif entry.name == "orientation_sigma" and any(present):
+            joined[entry.name] = _orientation_sigmas(sets)
+        elif entry.name == "pose":
+            joined[entry.name] = _numbered_on(values)
         elif all(present):
-            joined[field.name] = np.concatenate(values)
+            joined[entry.name] = np.concatenate(values)
         elif any(present):
             raise FlexcalError(
                 "E-POSES-026",
-                f"only {sum(present)} of {len(sets)} pose sets have {field.name}; give it for all, or for none.",
+                f"only {sum(present)} of {len(sets)} pose sets have {entry.name}; give it for all, or for none.",
             )
         else:
-            joined[field.name] = None
+            joined[entry.name] = None
     return PoseSet(**joined)
+
+
+_PARTIAL: dict[str, tuple[tuple[int, ...], float | str]] = {
+    "socket": ((), ""),
+    "camera": ((), ""),
+    "quaternion_wxyz": ((4,), np.nan),
+    "covariance": ((6, 6), np.nan),
+    "by_lens": ((6, 9), 0.0),
+}
+"""Fields that some sets may lack: shape of a row, and its value there."""
+
+
+def _absent(field: str, rows: int) -> np.ndarray:
+    shape, value = _PARTIAL[field]
+    return np.full((rows, *shape), value)
 
 
 def _orientation_sigmas(sets: Sequence[PoseSet]) -> np.ndarray:

@@ -75,14 +75,15 @@ def read_sockets(file: TableFile, model: RobotModel, further: Sequence[str] = ()
 
 
 def _declared(file: TableFile, model: RobotModel) -> SocketsConfig:
-    if not model.config.measurements:
+    sockets = [item for item in model.config.measurements.values() if item.kind == "sockets"]
+    if not sockets:
         raise file.error(
             "E-POSES-039",
             "there are columns 'fixture' and 'socket', but robot.yaml declares no sockets; add "
             "`measurements: {fixture: {kind: sockets, sockets: {a: [0, 0, 0], b: [0.05, 0, 0]}}}` with their positions in m.",
         )
-    if len(model.config.measurements) > 1:
+    if len(sockets) > 1:
         raise file.error(
             "E-POSES-040", "robot.yaml declares several fixtures under `measurements:`; keep one."
         )
-    return next(iter(model.config.measurements.values()))
+    return sockets[0]

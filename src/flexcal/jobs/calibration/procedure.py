@@ -108,7 +108,7 @@ def calibrate(
     _require_uncalibrated(model)
     require_points(poses)
     nominal, measured = model, poses
-    model = model.with_stations(poses.fixtures)
+    model = model.with_stations((*poses.fixtures, *poses.boards))
     sample = StratifiedSample.of(measured)
     poses = measured if sample is None else measured.subset(sample.rows)
     requested = _terms(model, terms)

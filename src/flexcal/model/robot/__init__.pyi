@@ -1,11 +1,21 @@
 from .arm_sensor import ArmSensor, mounting_names, sensitivity_name, sensor_column, sensor_delay_name
 from .attached_payload import carried_inertias, last_frame, with_payload, with_point_at_frame
-from .config import AcceptanceConfig, DynamicsConfig, RobotConfig, SignalConfig, SocketsConfig
+from .config import (
+    AcceptanceConfig,
+    BoardConfig,
+    CameraConfig,
+    DynamicsConfig,
+    RobotConfig,
+    SignalConfig,
+    SocketsConfig,
+)
 from .parameter_groups import Links, Stations
 from .parameter_names import (
+    BOARD_SCALE,
     FRICTION_PARAMETERS,
     GEOMETRY,
     LATERAL,
+    LENS,
     MASS_AND_COM,
     MOMENTS,
     PARALLEL,
@@ -39,12 +49,14 @@ from .stored_estimates import NUISANCE, PAYLOAD_FRAME, with_blocks
 
 __all__ = [
     "ANGLE_TOLERANCE",
+    "BOARD_SCALE",
     "FRICTION_LOG_STD",
     "FRICTION_PARAMETERS",
     "FRICTION_TOLERANCE",
     "GEOMETRY",
     "LATERAL",
     "LENGTH_TOLERANCE",
+    "LENS",
     "MASS_AND_COM",
     "MOMENTS",
     "NUISANCE",
@@ -57,6 +69,8 @@ __all__ = [
     "STATION",
     "AcceptanceConfig",
     "ArmSensor",
+    "BoardConfig",
+    "CameraConfig",
     "DynamicsConfig",
     "Links",
     "Posterior",

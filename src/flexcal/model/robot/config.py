@@ -317,6 +317,56 @@ class SocketsConfig:
 
 
 @dataclass(frozen=True)
+class BoardConfig:
+    """Printed board: a chessboard or ChArUco board of `columns` × `rows` squares with edges of `square` m, or `tags` at that pitch.
+
+    marker: edge of the markers, m; dictionary: OpenCV's name of their set. std: relative standard deviation of the board's size.
+    """
+
+    kind: Literal["charuco", "chessboard", "tags"]
+    columns: int
+    rows: int
+    square: float
+    marker: float = 0.0
+    dictionary: str = "DICT_4X4_50"
+    std: float = 1e-3
+
+    def __post_init__(self) -> None:
+        least = 1 if self.kind == "tags" else 3
+        if self.columns < least or self.rows < least or not self.square > 0:
+            raise FlexcalError(
+                "E-ROBOT-052",
+                f"a board needs at least {least} columns and rows, and a positive size of its squares.",
+            )
+        if self.kind != "chessboard" and not 0 < self.marker < self.square:
+            raise FlexcalError(
+                "E-ROBOT-053",
+                f"the markers of a board are smaller than its squares of {self.square:g} m; correct `marker:` ({self.marker:g} m).",
+            )
+        if not self.std > 0:
+            raise FlexcalError("E-ROBOT-054", f"std of a board must be positive, not {self.std:g}.")
+
+
+@dataclass(frozen=True)
+class CameraConfig:
+    """Camera that sees a board: on the hand, the board anywhere in the cell, or in the cell, the board on the hand.
+
+    size: width and height of its images, pixels.
+    """
+
+    kind: Literal["camera"]
+    board: BoardConfig
+    size: tuple[int, int]
+    mounted: Literal["hand", "cell"] = "hand"
+
+    def __post_init__(self) -> None:
+        if min(self.size) < 1:
+            raise FlexcalError(
+                "E-ROBOT-055", "size of a camera is the width and height of its images in pixels."
+            )
+
+
+@dataclass(frozen=True)
 class BoxConfig:
     """Corners of a box in the robot's base frame, m."""
 
@@ -396,7 +446,7 @@ class RobotConfig:
     geometry: GeometryConfig = GeometryConfig()
     dynamics: DynamicsConfig = DynamicsConfig()
     stations: dict[str, StationConfig] = field(default_factory=dict)
-    measurements: dict[str, SocketsConfig] = field(default_factory=dict)
+    measurements: dict[str, SocketsConfig | CameraConfig] = field(default_factory=dict)
     obstacles: tuple[str, ...] = ()
     limits: LimitsConfig = LimitsConfig()
     working_volume: BoxConfig | None = None

@@ -95,8 +95,8 @@ class Links:
 class Stations:
     """Poses of the measuring instrument: `names`, and `pose` (stations, 6) as x, y, z, m, and the rotation vector rx, ry, rz, rad.
 
-    Each place of a fixture with sockets is a station too, which measures where the ball is in the fixture. `scale` (1,): relative
-    deviation of the distances between sockets from the declared ones.
+    Each place of a fixture with sockets is a station too, which measures where the ball is in the fixture. `scale` (2,): relative
+    deviation of the distances between sockets, and of the size of a camera's board, from the declared ones.
     """
 
     names: tuple[str, ...]
@@ -106,7 +106,7 @@ class Stations:
     @classmethod
     def at_base(cls, names: Sequence[str]) -> Stations:
         """Stations in the robot's base frame."""
-        return cls(tuple(names), np.zeros((len(names), 6)), np.zeros(1))
+        return cls(tuple(names), np.zeros((len(names), 6)), np.zeros(2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +116,15 @@ class Scatter:
     std: np.ndarray
 
 
-Group = Literal["geometry", "springs", "drives", "links", "stations", "scatter"]
+@dataclass(frozen=True, eq=False)
+class Lenses:
+    """Intrinsic parameters of cameras: `names`, and `values` (cameras, 9) in the order of `LENS`, pixels and 1."""
+
+    names: tuple[str, ...]
+    values: np.ndarray
+
+
+Group = Literal["geometry", "springs", "drives", "links", "stations", "scatter", "lenses"]
 """Groups of arrays of a robot model."""
 
 

@@ -32,6 +32,10 @@ MOMENTS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 STATION = ("x", "y", "z", "rx", "ry", "rz")
 SOCKET_SCALE = "sockets.scale"
 """Relative deviation of the distances between a fixture's sockets from the declared ones."""
+BOARD_SCALE = "board.scale"
+"""Relative deviation of the size of a camera's board from the declared one."""
+LENS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
+"""Intrinsic parameters of a camera."""
 SCATTER = (
     "instrument",
     "instrument_share",
@@ -55,6 +59,7 @@ _UNITS = {
     "held_inertia": "kg m²", "arm_inertia": "kg m²", "arm_viscous": "N m s/rad", "arm_coulomb": "N m", "gap_torque": "N m",
     **_FRICTION_UNITS, "mc_x": "kg m", "mc_y": "kg m", "mc_z": "kg m",
     **dict.fromkeys(("position_x", "position_y", "position_z"), "m"), "direction_1": "rad", "direction_2": "rad",
+    **dict.fromkeys(("fx", "fy", "cx", "cy"), "px"),
     "instrument": "m", "robot": "m", "angular": "rad", "model": "m", "pose": "m", "transmission": "rad", "orientation": "rad",
 }  # fmt: skip
 
@@ -123,6 +128,10 @@ def parameter_locations(model: RobotModel) -> dict[str, Location]:
         for k, key in enumerate(STATION):
             table[f"station.{name}.{key}"] = Location("stations", "pose", (s, k))
     table[SOCKET_SCALE] = Location("stations", "scale", (0,))
+    table[BOARD_SCALE] = Location("stations", "scale", (1,))
+    for c, name in enumerate(model.lenses.names):
+        for k, key in enumerate(LENS):
+            table[f"camera.{name}.{key}"] = Location("lenses", "values", (c, k))
     elastic = {e.index: e for e in model.elastic}
     for i, joint in enumerate(model.joints):
         for k, key in enumerate(GEOMETRY):

@@ -36,6 +36,7 @@ from flexcal.model.robot.parameter_groups import (
     Drives,
     Geometry,
     Group,
+    Lenses,
     Links,
     Location,
     Scatter,
@@ -91,6 +92,8 @@ class RobotModel:
         Joint covariance of the parameters that were estimated.
     sensors : mapping of ArmSensor
         Sensors on the arm by name.
+    lenses : Lenses
+        Intrinsic parameters of cameras.
 
     Examples
     --------
@@ -122,6 +125,7 @@ class RobotModel:
     force_sensor: ForceSensor | None
     posterior: Posterior = NOTHING_ESTIMATED
     sensors: Mapping[str, ArmSensor] = field(default_factory=dict)
+    lenses: Lenses = field(default_factory=lambda: Lenses((), np.zeros((0, 9))))
 
     @classmethod
     def from_yaml(
@@ -185,6 +189,25 @@ class RobotModel:
         more = [name for name in dict.fromkeys(names) if name not in self.stations.names]
         pose = np.concatenate([self.stations.pose, np.zeros((len(more), 6))])
         return replace(self, stations=replace(self.stations, names=(*self.stations.names, *more), pose=pose))
+
+    def with_lenses(self, lenses: Mapping[str, np.ndarray]) -> RobotModel:
+        """Robot with the intrinsic parameters of further cameras.
+
+        Parameters
+        ----------
+        lenses : mapping of ndarray
+            Values (9,) by name of the camera.
+
+        Returns
+        -------
+        RobotModel
+            The changed robot.
+        """
+        more = {name: values for name, values in lenses.items() if name not in self.lenses.names}
+        if not more:
+            return self
+        values = np.concatenate([self.lenses.values, np.array(list(more.values())).reshape(-1, 9)])
+        return replace(self, lenses=Lenses((*self.lenses.names, *more), values))
 
     def with_bearings(self, bearings: Bearings) -> RobotModel:
         """Robot with bearing springs before or after the joint's rotation; parameters and posterior are kept.

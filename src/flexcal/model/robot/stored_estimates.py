@@ -59,6 +59,12 @@ def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path)
                 for n in estimate.parameters.names
                 if n.startswith("station.") and n.endswith(".x")
             )
+        cameras = [
+            n.split(".")[1]
+            for n in estimate.parameters.names
+            if n.startswith("camera.") and n.endswith(".fx")
+        ]
+        model = model.with_lenses({name: np.zeros(9) for name in cameras})
         unknown = [
             n for n in estimate.parameters.names if n not in model.values and not NUISANCE.fullmatch(n)
         ]

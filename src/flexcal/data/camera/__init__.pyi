@@ -1,0 +1,17 @@
+from .board import board_corners
+from .bundle import FreeViews, View, free_views
+from .detection import detected_views
+from .lens import Lens, projected
+from .view_poses import ViewPoses, view_poses
+
+__all__ = [
+    "FreeViews",
+    "Lens",
+    "View",
+    "ViewPoses",
+    "board_corners",
+    "detected_views",
+    "free_views",
+    "projected",
+    "view_poses",
+]

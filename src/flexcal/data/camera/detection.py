@@ -1,0 +1,102 @@
+"""Corners of a board in images, found by OpenCV (extra `camera`)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from flexcal.data.camera.board import board_corners
+from flexcal.data.camera.bundle import FEWEST_CORNERS, View
+from flexcal.errors import FlexcalError, InputError
+
+if TYPE_CHECKING:
+    from flexcal.model.robot import BoardConfig, CameraConfig
+
+
+def detected_views(camera: CameraConfig, paths: Sequence[Path]) -> tuple[list[View], np.ndarray]:
+    """Views of the board in images, one each, and the size (2,) of these, pixels.
+
+    Raises `FlexcalError` without OpenCV, and `InputError` for an image that is not there, is of another size, or does not show the board.
+    """
+    try:
+        import cv2
+    except ImportError:
+        raise FlexcalError(
+            "E-POSES-069",
+            "images need OpenCV: pip install 'flexcal[camera]'; or give the corners: columns corner, u, v.",
+        ) from None
+    find, board = _detector(cv2, camera.board), board_corners(camera.board)
+    views = []
+    for path in paths:
+        image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) if path.exists() else None
+        if image is None:
+            raise InputError("E-POSES-070", f"{path} is no image that can be read; check the column 'image'.")
+        width, height = camera.size
+        if image.shape != (height, width):
+            raise InputError(
+                "E-POSES-071",
+                f"{path} has {image.shape[1]} × {image.shape[0]} pixels, but robot.yaml says {width} × {height}; correct `size:`.",
+            )
+        numbers, pixels = find(image)
+        if len(numbers) < FEWEST_CORNERS:
+            raise InputError(
+                "E-POSES-072",
+                f"{path} shows {len(numbers)} corners of the board that robot.yaml declares; take out its line, or correct `board:`.",
+            )
+        views.append(View(path.name, board[numbers], pixels))
+    return views, np.array(camera.size, dtype=float)
+
+
+def _detector(cv2: Any, board: BoardConfig) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    if board.kind == "chessboard":
+        return lambda image: _chessboard(cv2, board, image)
+    known = getattr(cv2.aruco, board.dictionary, None)
+    if known is None:
+        raise FlexcalError(
+            "E-POSES-073", f"OpenCV has no dictionary '{board.dictionary}'; it is called as DICT_4X4_50."
+        )
+    dictionary = cv2.aruco.getPredefinedDictionary(known)
+    if board.kind == "tags":
+        markers = cv2.aruco.ArucoDetector(dictionary)
+        return lambda image: _tags(markers, board, image)
+    printed = cv2.aruco.CharucoBoard((board.columns, board.rows), board.square, board.marker, dictionary)
+    charuco = cv2.aruco.CharucoDetector(printed)
+
+    def find(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        corners, numbers, _, _ = charuco.detectBoard(image)
+        return _none() if numbers is None else (numbers.ravel(), _refined(cv2, image, corners.reshape(-1, 2)))
+
+    return find
+
+
+def _chessboard(cv2: Any, board: BoardConfig, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    found, corners = cv2.findChessboardCornersSB(image, (board.columns - 1, board.rows - 1))
+    return (np.arange(len(corners)), corners.reshape(-1, 2).astype(float)) if found else _none()
+
+
+def _tags(markers: Any, board: BoardConfig, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    corners, numbers, _ = markers.detectMarkers(image)
+    if numbers is None:
+        return _none()
+    seen = [
+        (k, own) for k, own in zip(numbers.ravel(), corners, strict=True) if k < board.columns * board.rows
+    ]
+    if not seen:
+        return _none()
+    return (
+        np.concatenate([4 * k + np.arange(4) for k, _ in seen]),
+        np.concatenate([own.reshape(4, 2) for _, own in seen]).astype(float),
+    )
+
+
+def _refined(cv2: Any, image: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-3)
+    start = np.ascontiguousarray(corners, dtype=np.float32)
+    return cv2.cornerSubPix(image, start, (5, 5), (-1, -1), stop).reshape(-1, 2).astype(float)
+
+
+def _none() -> tuple[np.ndarray, np.ndarray]:
+    return np.zeros(0, dtype=int), np.zeros((0, 2))

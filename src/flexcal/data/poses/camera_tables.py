@@ -1,0 +1,156 @@
+"""Files of joint positions at which a camera saw a board: CSV or Parquet, with images or with corners that were found in them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexcal.data.camera import FreeViews, Lens, View, board_corners, detected_views, free_views, view_poses
+from flexcal.data.poses.checks import check_same_pose
+from flexcal.data.poses.columns import first_point, payload_column, target_column, whole_numbers
+from flexcal.data.poses.pose_set import PoseSet
+from flexcal.data.tables import Table, TableFile, assign, check_joint_units
+from flexcal.files.structuring import suggestion
+
+if TYPE_CHECKING:
+    from flexcal.model.robot import CameraConfig, RobotModel
+
+CAMERA_COLUMNS = ("camera", "image")
+_BLURRED = 5.0
+"""Ratio of a view's residual to the median of all views from which it is not used."""
+_CORNERS = ("corner", "u", "v")
+
+
+def measures_images(file: TableFile) -> bool:
+    """Whether a file has images, or corners found in images."""
+    return "image" in file.columns or set(_CORNERS) <= set(file.columns)
+
+
+def read_views(file: TableFile, model: RobotModel, further: Sequence[str] = ()) -> PoseSet:
+    """Read rows of `pose`, q1…qn and `image`, the path of an image beside the file, or of `pose`, q1…qn, `corner`, `u` and `v`, pixels.
+
+    Optional are `camera`, a name under `measurements:` of robot.yaml, `station`, the place of the board or of the camera in the cell,
+    `target`, `payload`, and the `further` columns, which are not used. Raises `InputError` where robot.yaml declares no camera, for an
+    unknown one, for a corner that the board does not have, for an image that cannot be read or shows no board, for corners of which no
+    camera makes sense, and for a mirrored board.
+    """
+    images = "image" in file.columns
+    texts = (*CAMERA_COLUMNS, "station", "target", *further)
+    texts = tuple(dict.fromkeys(name for name in texts if name in file.columns))
+    signals = assign(file, model, ("pose", "q"), ("payload",), (*texts, *(() if images else _CORNERS)))
+    table = file.read(texts)
+    values = {name: signal.values(table) for name, signal in signals.items()}
+    check_joint_units(model, table, signals["q"], values["q"])
+    pose = whole_numbers(table, signals["pose"].columns[0], values["pose"][:, 0])
+    check_same_pose(pose, values["q"], table)
+    name, camera = _camera(table, model)
+    first = np.unique(pose, return_index=True)[1]
+    first = first[np.argsort(first)]
+    if images:
+        paths = [file.path.parent / text for text in table.columns["image"][first].tolist()]
+        views, size = detected_views(camera, paths)
+    else:
+        views, size = _tabled_views(table, camera, pose, first), np.array(camera.size, dtype=float)
+    found = free_views(views, size)
+    usable = _usable(file, views, found)
+    rows = first[usable]
+    _check_side(file, found)
+    poses = view_poses(found, on_hand=camera.mounted == "hand")
+    payload = payload_column(table, signals, model)
+    covariance = poses.covariance[usable]
+    spread = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    return PoseSet(
+        q=values["q"][rows],
+        position=poses.position[usable],
+        sigma=spread[:, :3],
+        torque=None,
+        payload=None if payload is None else payload[rows],
+        target=target_column(table, model)[rows]
+        if "target" in texts
+        else np.full(len(rows), first_point(file, model)),
+        station=table.columns["station"][rows] if "station" in texts else np.full(len(rows), name),
+        temperature=None,
+        pose=pose[rows],
+        quaternion_wxyz=poses.quaternion_wxyz[usable],
+        orientation_sigma=np.sqrt(np.mean(spread[:, 3:] ** 2, axis=1)),
+        covariance=covariance,
+        camera=np.full(len(rows), name),
+        by_lens=poses.by_lens[usable],
+        lenses={name: Lens(found.lens, found.covariance)},
+    )
+
+
+def _camera(table: Table, model: RobotModel) -> tuple[str, CameraConfig]:
+    cameras = {name: item for name, item in model.config.measurements.items() if item.kind == "camera"}
+    if not cameras:
+        raise table.file.error(
+            "E-POSES-062",
+            "there are images of a board, but robot.yaml declares no camera; add `measurements: {camera: {kind: camera, size: [1280, 960], "
+            "board: {kind: charuco, columns: 9, rows: 7, square: 0.03, marker: 0.022}}}` with the sizes in m.",
+        )
+    if "camera" not in table.columns:
+        return next(iter(cameras.items()))
+    named = dict.fromkeys(table.columns["camera"].tolist())
+    for name in named:
+        if name not in cameras:
+            hint = suggestion(name, list(cameras)) or f"; known are {', '.join(cameras)}."
+            row = int(np.argmax(table.columns["camera"] == name))
+            raise table.error(
+                "E-POSES-063", row, "camera", f"there is no camera '{name}' in robot.yaml{hint}"
+            )
+    if len(named) > 1:
+        raise table.file.error("E-POSES-064", "there are several cameras; give a file for each.")
+    name = next(iter(named))
+    return name, cameras[name]
+
+
+def _tabled_views(table: Table, camera: CameraConfig, pose: np.ndarray, first: np.ndarray) -> list[View]:
+    board = board_corners(camera.board)
+    numbers = [np.asarray(table.columns[name], dtype=float) for name in _CORNERS]
+    corner = whole_numbers(table, "corner", numbers[0])
+    known = (corner >= 0) & (corner < len(board))
+    if not known.all():
+        row = int(np.argmin(known))
+        raise table.error(
+            "E-POSES-065", row, "corner", f"the board has corners 0 to {len(board) - 1}, not {corner[row]}."
+        )
+    pixels = np.column_stack(numbers[1:])
+    outside = (pixels < -1).any(axis=1) | (pixels > np.array(camera.size) + 1).any(axis=1)
+    if outside.any():
+        row = int(np.argmax(outside))
+        width, height = camera.size
+        raise table.error(
+            "E-POSES-066",
+            row,
+            "u",
+            f"the corner lies at {pixels[row, 0]:g}, {pixels[row, 1]:g}, outside the image of {width} × {height} pixels.",
+        )
+    views = []
+    for row in first:
+        own = pose == pose[row]
+        views.append(View(f"pose {pose[row]}", board[corner[own]], pixels[own]))
+    return views
+
+
+def _usable(file: TableFile, views: Sequence[View], found: FreeViews) -> np.ndarray:
+    """Numbers of the views that are not blurred; raises `InputError` where most corners fit no camera."""
+    wrong, corners = int(found.wrong.sum()), sum(len(view.points) for view in views)
+    if wrong > corners // 4:
+        raise file.error(
+            "E-POSES-067",
+            f"{wrong} of {corners} corners fit no camera; check columns, rows and corner numbers of the board.",
+        )
+    return np.flatnonzero(found.residuals <= _BLURRED * np.median(found.residuals))
+
+
+def _check_side(file: TableFile, found: FreeViews) -> None:
+    """Raise `InputError` where the board is seen from behind, as with corners that are numbered mirrored."""
+    towards = np.einsum("vi,vi->v", found.rotation[:, :, 2], found.translation)
+    if np.median(np.sign(towards)) < 0:
+        raise file.error(
+            "E-POSES-068",
+            "the board is mirrored: its corners run clockwise where robot.yaml says anticlockwise; reverse the columns of the corner "
+            "numbers, or check the images.",
+        )

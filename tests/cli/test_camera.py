@@ -1,0 +1,184 @@
+"""Calibration with a camera and a printed board; OpenCV projects and renders, and the robot shares no code with the package."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from refusals import assert_refusal
+from scipy.spatial.transform import Rotation
+from test_full_poses import Arm, urdf
+
+from flexcal import RobotModel, calibrate, read_poses, verify
+from flexcal.cli.main import main
+from flexcal.data.camera import projected
+
+CAMERA = np.array([[1100, 0, 630], [0, 1090, 490], [0, 0, 1.0]])
+DISTORTION = np.array([-0.2, 0.1, 0.001, -0.0005, 0.02])
+SIZE = (1280, 960)
+SQUARE = 0.03
+BOARD = np.array([[c * SQUARE, r * SQUARE, 0] for r in range(1, 7) for c in range(1, 9)])
+MIDDLE = np.array([0.135, 0.105, 0])
+START = np.array([0.3, -0.5, 0.9, 0.2, 0.7, 0.1])
+ROBOT = """robot: six.urdf
+points: {{camera: {{frame: l6, xyz: [0.05, 0.03, 0.12]}}}}
+measurements:
+  eye: {{kind: camera, size: [1280, 960], board: {{kind: charuco, columns: 9, rows: 7, square: {square}, marker: 0.022, std: 1.0e-4}}}}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    urdf(tmp_path / "six.urdf")
+    (tmp_path / "robot.yaml").write_text(ROBOT.format(square=SQUARE))
+    return tmp_path
+
+
+class Cell:
+    """An arm with a camera on its hand, and a board somewhere before it."""
+
+    def __init__(self, seed: int) -> None:
+        self.rng = np.random.default_rng(seed)
+        self.arm = Arm(self.rng)
+        self.arm.mounted = Rotation.from_rotvec(0.05 * self.rng.normal(size=3)).as_matrix()
+        at, axes = self.camera(START)
+        self.axes = axes @ Rotation.from_rotvec(0.2 * self.rng.normal(size=3)).as_matrix()
+        self.at = at + 0.5 * axes[:, 2] - self.axes @ MIDDLE
+
+    def camera(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Place (3,) and axes (3, 3) of the camera in the robot's base."""
+        at, axes = self.arm.measured(q)
+        return self.arm.seen.T @ (at - self.arm.from_), self.arm.seen.T @ axes
+
+    def view(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """Rotation vector and translation of the board before the camera, None where it is not well in sight."""
+        at, axes = self.camera(q)
+        corners = (BOARD @ self.axes.T + self.at - at) @ axes
+        if corners[:, 2].min() < 0.2 or corners[:, 2].max() > 0.9 or self.axes[:, 2] @ axes[:, 2] < 0.6:
+            return None
+        turn = Rotation.from_matrix(axes.T @ self.axes).as_rotvec()
+        pixels = cv2.projectPoints(BOARD, turn, axes.T @ (self.at - at), CAMERA, DISTORTION)[0][:, 0]
+        inside = ((pixels > 5) & (pixels < np.array(SIZE) - 5)).all(axis=1)
+        return (turn, axes.T @ (self.at - at)) if inside.sum() >= 24 else None
+
+    def poses(self, count: int) -> list[np.ndarray]:
+        found: list[np.ndarray] = []
+        while len(found) < count:
+            q = START + self.rng.uniform(-1, 1, 6) * [0.4, 0.3, 0.3, 0.7, 0.7, 1.2]
+            if self.view(q) is not None:
+                found.append(q)
+        return found
+
+    def corners(self, path: Path, count: int, *, noise: float = 0.2, mirrored: bool = False) -> Path:
+        """Write a file of corners with pixel noise."""
+        rows = ["pose,q1,q2,q3,q4,q5,q6,corner,u,v"]
+        for k, q in enumerate(self.poses(count)):
+            view = self.view(q)
+            assert view is not None
+            pixels = cv2.projectPoints(BOARD, *view, CAMERA, DISTORTION)[0][:, 0] + noise * self.rng.normal(
+                size=(48, 2)
+            )
+            for i in np.flatnonzero(((pixels > 0) & (pixels < SIZE)).all(axis=1)):
+                number = i // 8 * 8 + 7 - i % 8 if mirrored else i
+                rows.append(",".join(map(repr, [k + 1, *q.tolist(), int(number), *pixels[i].tolist()])))
+        path.write_text("\n".join(rows) + "\n")
+        return path
+
+
+def test_projection_is_that_of_opencv() -> None:
+    points = np.random.default_rng(0).normal(size=(20, 3)) * [0.2, 0.2, 0.1] + [0, 0, 1]
+    lens = np.array([1100, 1090, 630, 490, *DISTORTION])
+    seen = cv2.projectPoints(points, np.zeros(3), np.zeros(3), CAMERA, DISTORTION)[0][:, 0]
+    np.testing.assert_allclose(projected(points, lens)[0], seen, atol=1e-9)
+
+
+def test_a_camera_on_the_hand_calibrates_robot_camera_and_board(folder: Path) -> None:
+    cell = Cell(1)
+    model = RobotModel.from_yaml(folder / "robot.yaml")
+    poses = read_poses(cell.corners(folder / "views.csv", 60), model)
+    found = calibrate(model, poses)
+    assert found.estimate.reduced_chi2 == pytest.approx(1, abs=0.3)
+    for key, true in zip(("fx", "fy", "cx", "cy", "k1"), (1100, 1090, 630, 490, -0.2), strict=True):
+        low, high = found.estimate.interval(f"camera.eye.{key}")  # type: ignore[misc]
+        assert low - 0.5 * (high - low) < true < high + 0.5 * (high - low)
+    order = np.random.default_rng(0).permutation(len(poses))
+    again = calibrate(model, poses.subset(order), terms=["kinematic"])
+    before = calibrate(model, poses, terms=["kinematic"])
+    np.testing.assert_allclose(again.residuals, before.residuals[order], atol=1e-8)
+
+
+def test_the_command_line_takes_corners_and_verifies_others(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cell, robot = Cell(2), str(folder / "robot.yaml")
+    cell.corners(folder / "views.csv", 50), cell.corners(folder / "fresh.csv", 30)
+    assert main(["calibrate", robot, str(folder / "views.csv"), "--out", str(folder / "out")]) == 0
+    assert "by a camera" in capsys.readouterr().out
+    assert (
+        main(["verify", robot, str(folder / "fresh.csv"), "--estimates", str(folder / "out"), "--json"]) == 0
+    )
+    document = json.loads(capsys.readouterr().out)
+    assert document["rms_mm"]["measured"] == pytest.approx(document["rms_mm"]["expected"], rel=0.35)
+
+
+def test_images_give_what_their_corners_do(folder: Path) -> None:
+    cell = Cell(3)
+    model = RobotModel.from_yaml(folder / "robot.yaml")
+    printed = cv2.aruco.CharucoBoard(
+        (9, 7), SQUARE, 0.022, cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+    )
+    texture = cv2.cvtColor(printed.generateImage((1800, 1400)), cv2.COLOR_GRAY2BGR)[:, :, 0]
+    rows = ["pose,q1,q2,q3,q4,q5,q6,image"]
+    rays = cv2.undistortPoints(
+        np.stack(np.meshgrid(np.arange(1280.0), np.arange(960.0)), -1).reshape(-1, 1, 2), CAMERA, DISTORTION
+    )[:, 0]
+    for k, q in enumerate(cell.poses(12)):
+        view = cell.view(q)
+        assert view is not None
+        turn = Rotation.from_rotvec(view[0]).as_matrix()
+        plane = (
+            np.linalg.inv(np.column_stack([turn[:, :2], view[1]]))
+            @ np.column_stack([rays, np.ones(len(rays))]).T
+        )
+        on_board = (plane[:2] / plane[2]).T / SQUARE * 200 - 0.5
+        image = cv2.remap(
+            texture,
+            *np.ascontiguousarray(on_board.reshape(960, 1280, 2).transpose(2, 0, 1), dtype=np.float32),
+            cv2.INTER_AREA,
+            borderValue=(255,),
+        )
+        cv2.imwrite(str(folder / f"{k}.png"), image)
+        rows.append(",".join([*map(repr, [k + 1, *q.tolist()]), f"{k}.png"]))
+    (folder / "images.csv").write_text("\n".join(rows) + "\n")
+    poses = read_poses(folder / "images.csv", model)
+    for pose, q in zip(poses.position, poses.q, strict=True):
+        at, _ = cell.camera(q)
+        np.testing.assert_allclose(pose, cell.axes.T @ (at - cell.at), atol=4e-3)
+
+
+def test_bad_boards_and_images_are_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cell, robot = Cell(4), str(folder / "robot.yaml")
+    cell.corners(folder / "mirrored.csv", 12, mirrored=True)
+    assert main(["calibrate", robot, str(folder / "mirrored.csv")]) == 2
+    assert_refusal(capsys.readouterr().err, "E-POSES-068", "mirrored")
+    cv2.imwrite(str(folder / "empty.png"), np.full((960, 1280), 200, np.uint8))
+    (folder / "empty.csv").write_text("pose,q1,q2,q3,q4,q5,q6,image\n1,0,0,0,0,0,0,empty.png\n")
+    assert main(["calibrate", robot, str(folder / "empty.csv")]) == 2
+    assert_refusal(capsys.readouterr().err, "E-POSES-072", "empty.png")
+    (folder / "none.csv").write_text("pose,q1,q2,q3,q4,q5,q6,image\n1,0,0,0,0,0,0,none.png\n")
+    assert main(["calibrate", robot, str(folder / "none.csv")]) == 2
+    assert_refusal(capsys.readouterr().err, "E-POSES-070", "none.png")
+
+
+@pytest.mark.slow
+def test_the_predicted_error_of_fresh_views_is_true(folder: Path) -> None:
+    model, ratio = RobotModel.from_yaml(folder / "robot.yaml"), []
+    for seed in range(300, 320):
+        cell = Cell(seed)
+        found = calibrate(model, read_poses(cell.corners(folder / "views.csv", 60), model))
+        fresh = verify(found.robot, read_poses(cell.corners(folder / "fresh.csv", 60), model))
+        ratio.append(float(np.sum(fresh.residuals**2) / np.sum(fresh.predicted.expected_rms**2)))
+    assert np.mean(ratio) == pytest.approx(1, abs=0.1)
