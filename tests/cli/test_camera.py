@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import cv2
@@ -171,6 +172,15 @@ def test_bad_boards_and_images_are_refused(folder: Path, capsys: pytest.CaptureF
     (folder / "none.csv").write_text("pose,q1,q2,q3,q4,q5,q6,image\n1,0,0,0,0,0,0,none.png\n")
     assert main(["calibrate", robot, str(folder / "none.csv")]) == 2
     assert_refusal(capsys.readouterr().err, "E-POSES-070", "none.png")
+
+
+def test_a_board_of_another_size_is_told(folder: Path) -> None:
+    cell = Cell(5)
+    (folder / "robot.yaml").write_text(ROBOT.format(square=1.04 * SQUARE))
+    model = RobotModel.from_yaml(folder / "robot.yaml")
+    found = calibrate(model, read_poses(cell.corners(folder / "views.csv", 40), model), terms=["kinematic"])
+    said = re.search(r"the board is (.*)% smaller than declared", found.summary())
+    assert said is not None and float(said[1]) == pytest.approx(100 * (1 - 1 / 1.04), abs=0.5)
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from flexcal.calibration.measurement import (
     with_target_axes,
 )
 from flexcal.data.poses import PoseSet
-from flexcal.model.robot import RobotModel
+from flexcal.model.robot import LENS, RobotModel
 from flexcal.units import DEGREE
 
 
@@ -65,8 +65,10 @@ def orientation_errors(
     scatter = known_scatter(standing, stated=own.sigma_given)
     if placed or scatter is None:
         return OrientationErrors(rotations, None, placed)
+    cameras = [f"camera.{camera}.{key}" for camera in own.lenses for key in LENS]
     names = [
         *moving_parameters(standing, elastic=elastic),
+        *(name for name in cameras if name in standing.posterior.parameters),
         *(f"point.{t}.r{axis}" for t in known for axis in "xyz"),
     ]
     roots = (at.jacobian(names) @ covariance_root(standing, names))[len(own) :]

@@ -24,7 +24,7 @@ from flexcal.calibration.measurement import (
     require_points,
 )
 from flexcal.data.poses import PoseSet
-from flexcal.model.robot import RobotModel
+from flexcal.model.robot import BOARD_SCALE, LENS, RobotModel
 from flexcal.units import MILLIMETRE
 
 
@@ -150,7 +150,7 @@ def prediction_errors_with_covariance(
     require_points(poses)
     poses = poses.without_orientations()
     at = predict_measurements(model, poses, elastic=elastic, jacobians=True)
-    used = moving_parameters(model, elastic=elastic)
+    used = [*moving_parameters(model, elastic=elastic), *_of_cameras(model, poses)]
     roots = at.jacobian(used) @ covariance_root(model, used)
     cells = ErrorGroups.of(poses)
     shared = _shared_errors(model, cells)
@@ -166,7 +166,7 @@ def prediction_errors_with_covariance(
         squares = squares + np.trace(independent, axis1=1, axis2=2)
     verification = PredictionErrors(
         position=at.position,
-        errors=poses.position - at.position,
+        errors=at.residual,
         parameter_rms=np.sqrt((roots**2).sum(axis=(1, 2))),
         scatter_rms=np.sqrt(squares),
         ambiguous=ambiguous_poses(model, at),
@@ -182,6 +182,14 @@ def prediction_errors_with_covariance(
         None if common is None else cells.pose,
         common,
     )
+
+
+def _of_cameras(model: RobotModel, poses: PoseSet) -> list[str]:
+    """Names of the calibrated parameters of the cameras that measured, and of their board."""
+    if not poses.seen.any():
+        return []
+    names = [f"camera.{name}.{key}" for name in poses.lenses for key in LENS]
+    return [name for name in (*names, BOARD_SCALE) if name in model.posterior.parameters]
 
 
 def _freedom(model: RobotModel, at: PredictedMeasurements, poses: PoseSet, predicted: float) -> float:

@@ -7,7 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.diagnostics import Drift, implausible_shifts, is_implausible, residuals_implausible
+from flexcal.calibration.diagnostics import (
+    Drift,
+    board_size,
+    implausible_shifts,
+    is_implausible,
+    residuals_implausible,
+)
 from flexcal.calibration.fit import GeometricFit
 from flexcal.jobs.calibration.ignored_columns import ignored_columns_remarks
 from flexcal.units import MILLIMETRE
@@ -20,6 +26,9 @@ _LOOK = (
 
 _OVERSTATED, _UNDERSTATED = 0.5, 2.0
 """Ratio of estimated noise to the stated sigma, below and above which a remark is made."""
+
+_ANOTHER_SIZE = 0.01
+"""Relative deviation of a board's size from the nominal robot's above which the declared size is doubtful."""
 
 _SHOWN = 3
 _LISTED = 20
@@ -124,7 +133,17 @@ def _views(fit: GeometricFit) -> Sequence[str]:
         float(np.sqrt(np.mean(np.sum(rows[seen] ** 2, axis=1)))) / MILLIMETRE
         for rows in (fit.poses.sigma, fit.residuals)
     )
+    size = board_size(fit)
+    wrong = (
+        ()
+        if size is None or abs(size - 1) < _ANOTHER_SIZE
+        else (
+            f"against the nominal robot the board is {abs(size - 1):.1%} {'larger' if size > 1 else 'smaller'} than declared: measure "
+            "its squares, and correct `square:` in robot.yaml; the calibrated robot takes its lengths from the board",
+        )
+    )
     return (
+        *wrong,
         f"{seen.sum()} poses were measured by a camera, each with the noise of its own view: {noise:.3f} mm rms expected, {found:.3f} mm "
         "found; the fit weighs the views by their noise, so the calibrated robot is far more accurate than one view",
     )
