@@ -2,7 +2,7 @@ from .board import board_corners
 from .bundle import FreeViews, View, free_views
 from .detection import detected_views
 from .lens import Lens, projected
-from .view_poses import ViewPoses, view_poses
+from .poses_of_views import ViewPoses, view_poses
 
 __all__ = [
     "FreeViews",
