@@ -92,7 +92,8 @@ def produced(model: RobotModel) -> dict[str, str]:
 
 def test_every_name_is_in_the_table_with_its_unit(root: Path, tx90l: RobotModel) -> None:
     tx40 = RobotModel.from_yaml(root / "examples" / "tx40" / "robot.yaml", estimates=False)
-    table, names = documented(root), {name: unit_of(name) for name in tx40.values} | produced(tx90l)
+    seen = tx40.with_lenses({"eye": np.zeros(9)})
+    table, names = documented(root), {name: unit_of(name) for name in seen.values} | produced(tx90l)
     for name, unit in names.items():
         units = [known for written, known in table.items() if re.fullmatch(pattern(written), name)]
         assert units == [unit], name
