@@ -13,7 +13,7 @@ SIX = range(1, 7)
 XYZ = ["x", "y", "z"]
 HEADERS = [
     ("pose|J*|x|y|z", {"pose": "pose", "q": "J1", "xyz": "x"}),
-    ("A*|X|Y|Z|A|B|C", {"q": "A1", "xyz": "X"}),
+    ("A*|X|Y|Z|A|B|C", {"q": "A1", "xyz": "X", "angles": "A"}),
     ("q_#|x_mm|y_mm|z_mm", {"q": "q_0", "xyz": "x_mm"}),
     ("time|position[#]|effort[#]", {"t": "time", "q": "position[0]", "tau": "effort[0]"}),
     ("Time [s]|axis*_pos|axis*_vel", {"t": "Time [s]", "q": "axis1_pos", "dq": "axis1_vel"}),

@@ -41,6 +41,10 @@ def first_rows_table(imported: ImportedFile) -> Table:
                 placed.why if not i else "″",
             )
     given = {"pose": "rows are numbered", "sigma": "--sigma"}
+    if imported.orientations is not None:
+        given |= dict.fromkeys(
+            ("qw", "qx", "qy", "qz"), ", ".join(imported.orientations.source.placed.columns)
+        )
     for name in imported.columns:
         if name not in listed:
             table.add_row(name, "", "", *_first(imported, name), given.get(name, "its name"))

@@ -52,6 +52,10 @@ class Import:
         MaybeNumber, arg(metavar="MM", help_behavior_hint="(default: as in the file, else unknown)")
     ] = None
     """The instrument's 1σ per coordinate, mm, for a file that does not state it."""
+    orientation: Annotated[
+        MaybeText, arg(metavar="NAME", help_behavior_hint="(default: as the nominal robot tells)")
+    ] = None
+    """Convention of measured orientations: xyz-extrinsic, zyx-intrinsic …, rotation-vector, wxyz, xyzw; each also with -transposed."""
     sheet: Annotated[
         MaybeText,
         arg(metavar="NAME", help_behavior_hint="(default: the first)"),
@@ -86,6 +90,7 @@ class Import:
             sigma=None if self.sigma is None else self.sigma * MILLIMETRE,
             sheet=self.sheet,
             topic=self.topic,
+            orientation=self.orientation,
             unchecked=self.unchecked,
         )
         console.show(first_rows_table(imported))

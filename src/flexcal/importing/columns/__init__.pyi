@@ -1,4 +1,4 @@
-from .assignment import ColumnAssignment
+from .assignment import ORIENTATIONS, ColumnAssignment
 from .excitation_records import ExcitationSource, ResponseRecords, read_response_records, record_paths
 from .map_option import apply_map
 from .nominal_consistency import NominalMismatch, check_nominal
@@ -6,6 +6,7 @@ from .recognition import RecognisedColumns, UnusedColumn, guess_columns, reasons
 from .rtde_names import TOOL
 
 __all__ = [
+    "ORIENTATIONS",
     "TOOL",
     "ColumnAssignment",
     "ExcitationSource",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +12,26 @@ from flexcal.data.tables import UNITS, Signal, Table, standard_columns
 
 NUMBERED = ("pose",)
 """Quantities that `signals:` does not map: files have them under their own names."""
+ORIENTATIONS = {
+    "rxyz": ("rx", "ry", "rz"),
+    "angles": ("angle1", "angle2", "angle3"),
+    "components": ("component1", "component2", "component3", "component4"),
+}
+"""Columns of orientations whose convention the nominal robot tells: of numbers about x, y and z, of angles in the order of turning, and of
+quaternions in either order.
+"""
+
+
+def assigned_names(quantity: str, n: int) -> tuple[str, ...]:
+    """The names that --map has for a quantity's columns in a file of an n-joint robot."""
+    return ORIENTATIONS.get(quantity) or standard_columns(quantity, n)
+
+
+def units_of(quantity: str) -> Mapping[str, float]:
+    """Units of a quantity, and their factors to SI; numbers of an orientation are converted with their convention."""
+    if quantity in ("rxyz", "angles"):
+        return {"deg": 1.0, "rad": 1.0}
+    return UNITS.get(quantity, {})
 
 
 @dataclass(frozen=True)
@@ -75,4 +96,4 @@ class ColumnAssignment:
 
 
 def _factor(quantity: str, unit: str | None) -> float:
-    return 1.0 if unit is None else UNITS.get(quantity, {}).get(unit, 1.0)
+    return 1.0 if unit is None else units_of(quantity).get(unit, 1.0)

@@ -6,10 +6,16 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from flexcal.data.tables import UNITS, standard_columns
+from flexcal.data.tables import UNITS
 from flexcal.errors import InputError
 from flexcal.files.structuring import suggestion
-from flexcal.importing.columns.assignment import NUMBERED, ColumnAssignment
+from flexcal.importing.columns.assignment import (
+    NUMBERED,
+    ORIENTATIONS,
+    ColumnAssignment,
+    assigned_names,
+    units_of,
+)
 from flexcal.importing.columns.recognition import RecognisedColumns, UnusedColumn, place
 from flexcal.importing.tables import ForeignTable, parse_name, unit_of
 
@@ -31,7 +37,7 @@ def apply_map(
     it a unit in brackets and an offset in that unit. NAME=none takes a guess back. Raises `InputError` that names the entry where it
     is not of that form, names what there is not, or leaves a quantity without some of its columns.
     """
-    names = {quantity: standard_columns(quantity, model.n) for quantity in (*NUMBERED, *UNITS)}
+    names = {quantity: assigned_names(quantity, model.n) for quantity in (*NUMBERED, *UNITS, *ORIENTATIONS)}
     placed, texts = dict(guess.placed), dict(guess.texts)
     said: dict[str, dict[int, tuple[str, str | None, float, float]]] = {}
     for entry in _entries(given):
@@ -107,10 +113,10 @@ def _source(
         rest, offset = behind[1], float(behind[2].replace(" ", ""))
     if rest not in foreign.numbers and (bracket := _UNIT.match(rest)):
         rest, unit = bracket[1], bracket[2]
-        if unit not in UNITS.get(quantity, {}):
+        if unit not in units_of(quantity):
             unit = unit_of(unit)
-        if unit not in UNITS.get(quantity, {}):
-            possible = ", ".join(UNITS.get(quantity, {})) or "none"
+        if unit not in units_of(quantity):
+            possible = ", ".join(units_of(quantity)) or "none"
             raise InputError(
                 "E-IMPORT-017",
                 f"--map {entry}: the unit '{bracket[2]}' does not fit; possible are {possible}.",
@@ -158,7 +164,7 @@ def _said(
             assigned.append((guessed.columns[i], guessed.units[i], guessed.gains[i], guessed.offsets[i]))
     columns, units, gains, offsets = zip(*assigned, strict=True)
     usual = guessed.units if guessed is not None else place(foreign, model, quantity, columns, "").units
-    known = UNITS.get(quantity, {})
+    known = units_of(quantity)
     named = [parse_name(column, foreign.units.get(column)).unit for column in columns]
     either = tuple(
         unit or (name if name in known else other)

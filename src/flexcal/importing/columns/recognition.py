@@ -9,9 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.data.tables import TIMESTAMP, UNITS, VECTORS
-from flexcal.importing.columns.assignment import ColumnAssignment
+from flexcal.data.tables import TIMESTAMP, VECTORS
+from flexcal.importing.columns.assignment import ORIENTATIONS, ColumnAssignment, units_of
 from flexcal.importing.columns.joints import joint_quantities
+from flexcal.importing.columns.orientation_names import (
+    numbered_quaternion,
+    orientation_groups,
+    orientation_of,
+)
 from flexcal.importing.columns.rtde_names import rtde_columns
 from flexcal.importing.columns.unit_inference import joint_units, point_unit, pose_time_unit, time_unit
 from flexcal.importing.tables import (
@@ -81,14 +86,20 @@ def guess_columns(foreign: ForeignTable, model: RobotModel) -> RecognisedColumns
     names = [parse_name(column, foreign.units.get(column)) for column in foreign.numbers]
     reasons: dict[str, str] = {}
     placed = rtde_columns(foreign, model, reasons)
-    for quantity, columns in joint_quantities(_left(names, placed, reasons), model, reasons).items():
+    unnamed = numbered_quaternion(_left(names, placed, reasons), foreign)
+    others = [name for name in _left(names, placed, reasons) if name.column not in unnamed]
+    for quantity, columns in joint_quantities(others, model, reasons).items():
         if quantity in placed:
             reasons |= dict.fromkeys(columns, f"{placed[quantity].columns[0]} … are taken as {quantity}")
         else:
             placed[quantity] = place(foreign, model, quantity, columns, "their names")
     rest = _left(names, placed, reasons)
+    turns = orientation_groups(rest) | ({("components", ()): unnamed} if unnamed else {})
+    turning = {column for columns in turns.values() for column in columns}
+    rest = [name for name in rest if name.column not in turning]
     vectors, singles = _vectors(rest, reasons), _singles(rest, foreign, reasons)
-    for quantity, columns in (vectors | singles).items():
+    turned = orientation_of(turns, rest, vectors.get("xyz", ()), reasons)
+    for quantity, columns in (vectors | singles | turned).items():
         other = placed.get(quantity)
         if other is not None and quantity != "xyz":
             reasons |= dict.fromkeys(columns, f"{other.columns[0]} is taken as {quantity}")
@@ -155,20 +166,16 @@ def _by_order(foreign: ForeignTable, model: RobotModel) -> RecognisedColumns:
 
 
 def _vectors(names: Sequence[ColumnName], reasons: dict[str, str]) -> dict[str, tuple[str, ...]]:
-    """Columns of points, their standard deviations and quaternions."""
-    groups: dict[str, dict[tuple[str, ...], dict[str, str]]] = {"xyz": {}, "sigma_xyz": {}, "quaternion": {}}
+    """Columns of points and their standard deviations."""
+    groups: dict[str, dict[tuple[str, ...], dict[str, str]]] = {"xyz": {}, "sigma_xyz": {}}
     for name in names:
         words = set(name.words)
-        parts = [POINT.get(word, word) for word in name.words if word in POINT or word == "w"]
-        fused = [word for word in name.words if word in VECTORS["quaternion"]]
-        rest = tuple(word for word in name.words if word not in (*parts, *fused, *POINT))
+        parts = [POINT[word] for word in name.words if word in POINT]
+        rest = tuple(word for word in name.words if word not in POINT)
         rest += () if name.number is None else (str(name.number),)
-        if fused or (words & (TURN | {"q"}) and parts):
-            axis = fused[0] if fused else f"q{parts[-1]}"
-            groups["quaternion"].setdefault(rest, {})[axis] = name.column
-        elif parts and parts[-1] != "w" and words & SIGMA:
+        if parts and words & SIGMA:
             groups["sigma_xyz"].setdefault(rest, {})[f"sigma_{parts[-1]}"] = name.column
-        elif parts and parts[-1] != "w" and not words & NO_POINT:
+        elif parts and not words & (NO_POINT | TURN | {"q"}):
             groups["xyz"].setdefault(rest, {})[parts[-1]] = name.column
     vectors: dict[str, tuple[str, ...]] = {}
     for quantity, of_it in groups.items():
@@ -234,7 +241,9 @@ def place(
             quantity, columns, (TIMESTAMP,), "timestamps, as seconds from the first"
         )
     said = [parse_name(column, foreign.units.get(column)).unit for column in columns]
-    known = UNITS.get(quantity, {})
+    known = units_of(quantity)
+    if quantity in ORIENTATIONS and not (known and len(set(said)) == 1 and said[0] in known):
+        return ColumnAssignment.plain(quantity, columns, (None,) * len(columns), why)
     if all(unit in known for unit in said):
         return ColumnAssignment.plain(quantity, columns, tuple(said), f"{why}; the unit stands there")
     values = np.stack([foreign.numbers[column] for column in columns], axis=1)

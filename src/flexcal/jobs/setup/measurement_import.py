@@ -14,12 +14,12 @@ from flexcal.data.poses import (
     check_metres,
     check_positive,
     check_same_pose,
-    unit_quaternions,
     whole_numbers,
 )
 from flexcal.data.tables import JOINT_QUANTITIES, Table, check_joint_units, standard_columns, write_table
 from flexcal.errors import InputError
 from flexcal.importing.columns import (
+    ORIENTATIONS,
     TOOL,
     ColumnAssignment,
     NominalMismatch,
@@ -30,8 +30,16 @@ from flexcal.importing.columns import (
     guess_columns,
     reasons_unused,
 )
+from flexcal.importing.orientations import NominalPoses
 from flexcal.importing.readers import read_foreign
 from flexcal.importing.tables import ForeignTable
+from flexcal.jobs.setup.orientation_import import (
+    ImportedOrientations,
+    OrientationColumns,
+    import_orientations,
+)
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.parts import rotation_wxyz
 from flexcal.model.robot import RobotModel
 from flexcal.units import LARGEST, MILLIMETRE
 
@@ -41,6 +49,7 @@ _POSES = (
     "xyz",
     "length",
     "quaternion",
+    *ORIENTATIONS,
     "sigma",
     "sigma_xyz",
     "tau",
@@ -48,6 +57,7 @@ _POSES = (
     "temperature",
     "t",
 )
+_TURNS = ("quaternion", *ORIENTATIONS)
 _LOG = ("t", *JOINT_QUANTITIES, "temperature", "payload")
 
 
@@ -56,7 +66,8 @@ class ImportedFile:
     """Interpretation of a file's columns, and the values that were or would be written.
 
     kind: poses were measured, a log of joints, or joint positions only, from which poses can be chosen. columns: in flexcal's names and
-    SI units. misfit: how the nominal robot goes with the points, None where there are none or too few.
+    SI units. misfit: how the nominal robot goes with the points, None where there are none or too few. orientations: None where there are
+    none, or points that do not fit.
     """
 
     file: Path
@@ -65,6 +76,7 @@ class ImportedFile:
     left_out: tuple[UnusedColumn, ...]
     columns: dict[str, np.ndarray]
     misfit: NominalMismatch | None
+    orientations: ImportedOrientations | None
     remarks: tuple[str, ...]
     out: Path | None
     model: RobotModel
@@ -108,6 +120,7 @@ class ImportedFile:
                 "proposal": self.misfit.proposal,
                 "map": list(self.misfit.options),
             },
+            "orientation": None if self.orientations is None else self.orientations.document(),
             "signals": self.signals,
             "remarks": list(self.remarks),
             "out": self.out,
@@ -123,13 +136,15 @@ def import_file(
     sigma: float | None = None,
     sheet: str | None = None,
     topic: str | None = None,
+    orientation: str | None = None,
     unchecked: bool = False,
 ) -> ImportedFile:
     """Recognise the columns of `file`, with `mapped` overriding the guess, and write them in flexcal's format to `out`.
 
-    `sigma` (m) is the instrument's 1σ a coordinate where the file does not say it. Nothing is written without `out`, nor, unless
-    `unchecked`, where the nominal robot cannot go with the points. Raises `InputError` where the file cannot be read, joint positions are
-    not recognised, or a value is missing or cannot be, and for a `sigma` that is not positive or has no place.
+    `sigma` (m) is the instrument's 1σ a coordinate where the file does not say it, and `orientation` the convention of its orientations.
+    Nothing is written without `out`, nor, unless `unchecked`, where the nominal robot cannot go with the points or the orientations. Raises
+    `InputError` where the file cannot be read, joint positions are not recognised, the convention of orientations is not certain, or a
+    value is missing or cannot be, and for a `sigma` that is not positive or has no place.
     """
     model = RobotModel.from_yaml(robot_file, estimates=False)
     foreign = read_foreign(file, model.joint_names, sheet=sheet, topic=topic)
@@ -158,8 +173,25 @@ def import_file(
     if "xyz" in values and misfit is None:
         why = "there are too few poses" if model.points else "robot.yaml declares no point under `points:`"
         remarks.append(f"{why}, so they were not compared with the nominal robot")
+    placed = tuple(guess.placed.values())
+    turns = [item for item in placed if item.quantity in _TURNS]
+    if orientation is not None and not turns:
+        raise InputError(
+            "E-IMPORT-077",
+            f"--orientation is of measured orientations, but none were recognised in {file}; name their columns with --map rx=COLUMN "
+            "and so on.",
+        )
     imported = ImportedFile(
-        file, kind, tuple(guess.placed.values()), guess.left_out, columns, misfit, tuple(remarks), None, model
+        file,
+        kind,
+        tuple(item for item in placed if item.quantity not in _TURNS),
+        guess.left_out,
+        columns,
+        misfit,
+        None,
+        tuple(remarks),
+        None,
+        model,
     )
     if misfit is not None and misfit.proposal and not unchecked:
         return imported
@@ -168,9 +200,14 @@ def import_file(
         _check_poses(foreign, guess, model, columns, values)
     elif kind == "log":
         _check_time(foreign, guess, values["t"][:, 0])
+    if turns and (imported.trusted or unchecked):
+        source = OrientationColumns(foreign, turns[0], values[turns[0].quantity])
+        groups = _nominal_poses(model, columns, values, misfit) if imported.trusted else []
+        turned = import_orientations(source, groups, orientation, unchecked=unchecked)
+        imported = _with_orientations(imported, turned)
     if out is None or not (imported.trusted or unchecked):
         return imported
-    write_table(out, columns)
+    write_table(out, imported.columns)
     return replace(imported, out=out)
 
 
@@ -194,14 +231,13 @@ def _kind(
     kind = "poses" if {"xyz", "length"} & guess.placed.keys() else "log" if "t" in guess.placed else "joints"
     wanted = {"poses": _POSES, "log": _LOG, "joints": ("pose", "q", "payload")}[kind]
     placed = {quantity: guess.placed[quantity] for quantity in wanted if quantity in guess.placed}
-    reasons = {
-        "payload": "robot.yaml declares no payload",
-        "quaternion": "calibrate takes points alone; --map qw=… and so on keeps it",
-    }
+    reasons = {"payload": "robot.yaml declares no payload"}
     if model.payload is None:
         placed.pop("payload", None)
-    if "quaternion" in placed and placed["quaternion"].why != "--map":
-        placed.pop("quaternion")
+    if "xyz" not in placed:
+        for quantity in _TURNS:
+            placed.pop(quantity, None)
+            reasons[quantity] = "there are no points x, y, z with these orientations"
     what = {"poses": "measured poses", "log": "a log of joints", "joints": "joint positions only"}[kind]
     left = [
         UnusedColumn(column, reasons.get(quantity, f"it looks like {quantity}, which is no part of {what}"))
@@ -241,12 +277,10 @@ def _converted(
                     column,
                     f"{what}; complete or remove the line, or discard the column with --map {quantity}=none.",
                 )
-        quantity_values = placed.values(foreign.table)
-        if quantity == "quaternion":
-            quantity_values = unit_quaternions(foreign.table, placed.signal(), quantity_values)
-        values[quantity] = quantity_values
-        names = standard_columns(quantity, model.n)
-        columns |= {name: quantity_values[:, i] for i, name in enumerate(names)}
+        values[quantity] = placed.values(foreign.table)
+        if quantity not in _TURNS:
+            names = standard_columns(quantity, model.n)
+            columns |= {name: values[quantity][:, i] for i, name in enumerate(names)}
     if "pose" in columns:
         if "pose" in guess.placed:
             columns["pose"] = whole_numbers(foreign.table, guess.placed["pose"].columns[0], columns["pose"])
@@ -307,15 +341,57 @@ def _check_time(foreign: ForeignTable, guess: RecognisedColumns, t: np.ndarray) 
         )
 
 
+def _with_orientations(imported: ImportedFile, turned: ImportedOrientations) -> ImportedFile:
+    """The file with the columns qw, qx, qy and qz behind those of the points."""
+    quaternion = dict(zip(standard_columns("quaternion", 0), rotation_wxyz(turned.rotations).T, strict=True))
+    columns: dict[str, np.ndarray] = {}
+    for name, values in imported.columns.items():
+        columns[name] = values
+        if name == "z":
+            columns |= quaternion
+    linear = turned.assignment()
+    return replace(
+        imported,
+        placed=imported.placed if linear is None else (*imported.placed, linear),
+        columns=columns,
+        orientations=turned,
+        remarks=(*imported.remarks, *turned.remarks),
+    )
+
+
+def _groups(columns: dict[str, np.ndarray], n: int) -> list[tuple[np.ndarray, str | None]]:
+    """Rows (M,) of every station and target, and the target's name where there is one, the largest first."""
+    places = np.stack([columns.get(name, np.full(n, "")) for name in ("station", "target")], axis=1)
+    groups, inverse, counts = np.unique(places, axis=0, return_inverse=True, return_counts=True)
+    return [
+        (np.flatnonzero(inverse.ravel() == group), str(groups[group, 1]) or None)
+        for group in np.argsort(-counts, kind="stable")
+    ]
+
+
+def _nominal_poses(
+    model: RobotModel,
+    columns: dict[str, np.ndarray],
+    values: dict[str, np.ndarray],
+    misfit: NominalMismatch | None,
+) -> list[tuple[np.ndarray, NominalPoses]]:
+    """Rows (M,) of every station and target with the nominal robot's poses; none where these were not compared with the points."""
+    if misfit is None:
+        return []
+    nominal = []
+    for rows, target in _groups(columns, len(values["q"])):
+        at = point_kinematics(model, values["q"][rows], point=target, jacobians=False)
+        shift = misfit.moved - misfit.declared if model.point(target).name == misfit.point else np.zeros(3)
+        poses = NominalPoses(at.position, at.orientation, values["xyz"][rows], model.reach, shift)
+        nominal.append((rows, poses))
+    return nominal
+
+
 def _misfit(
     guess: RecognisedColumns, model: RobotModel, columns: dict[str, np.ndarray], values: dict[str, np.ndarray]
 ) -> NominalMismatch | None:
     """Misfit of the largest group of rows with one station and target."""
     if "xyz" not in values or not model.points:
         return None
-    n = len(values["q"])
-    places = np.stack([columns.get(name, np.full(n, "")) for name in ("station", "target")], axis=1)
-    groups, inverse, counts = np.unique(places, axis=0, return_inverse=True, return_counts=True)
-    rows = inverse.ravel() == int(np.argmax(counts))
-    target = str(groups[int(np.argmax(counts)), 1]) or None
+    rows, target = _groups(columns, len(values["q"]))[0]
     return check_nominal(model, values["q"][rows], values["xyz"][rows], guess.placed["q"], point=target)
