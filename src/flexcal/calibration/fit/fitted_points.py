@@ -132,7 +132,8 @@ class PointFit:
     def first_scatter(self) -> ErrorComponents:
         """Initial error model: stated values, and typical ones of robots."""
         share = 1.0 if self.poses.sigma_given else 0.0
-        return ErrorComponents(share=share, robot=_FIRST_SCATTER, orientation=_FIRST_ORIENTATION)
+        orientation = _FIRST_ORIENTATION if self.poses.turned.any() else 0.0
+        return ErrorComponents(share=share, robot=_FIRST_SCATTER, orientation=orientation)
 
     @property
     def hidden(self) -> tuple[str, ...]:
