@@ -164,14 +164,14 @@ def test_bad_boards_and_images_are_refused(folder: Path, capsys: pytest.CaptureF
     cell, robot = Cell(4), str(folder / "robot.yaml")
     cell.corners(folder / "mirrored.csv", 12, mirrored=True)
     assert main(["calibrate", robot, str(folder / "mirrored.csv")]) == 2
-    assert_refusal(capsys.readouterr().err, "E-POSES-068", "mirrored")
+    assert_refusal(capsys.readouterr().err, "E-POSES-051", "mirrored")
     cv2.imwrite(str(folder / "empty.png"), np.full((960, 1280), 200, np.uint8))
     (folder / "empty.csv").write_text("pose,q1,q2,q3,q4,q5,q6,image\n1,0,0,0,0,0,0,empty.png\n")
     assert main(["calibrate", robot, str(folder / "empty.csv")]) == 2
-    assert_refusal(capsys.readouterr().err, "E-POSES-072", "empty.png")
+    assert_refusal(capsys.readouterr().err, "E-POSES-055", "empty.png")
     (folder / "none.csv").write_text("pose,q1,q2,q3,q4,q5,q6,image\n1,0,0,0,0,0,0,none.png\n")
     assert main(["calibrate", robot, str(folder / "none.csv")]) == 2
-    assert_refusal(capsys.readouterr().err, "E-POSES-070", "none.png")
+    assert_refusal(capsys.readouterr().err, "E-POSES-053", "none.png")
 
 
 def test_a_board_of_another_size_is_told(folder: Path) -> None:

@@ -78,26 +78,26 @@ def test_what_is_refused_and_why(tmp_path: Path) -> None:
     mixed = angles.copy()
     mixed[20:25] = np.rad2deg([turned_xyz(frame) for frame in cell.frames[20:25]])
     error = refused(tmp_path, cell, "rx,ry,rz", mixed)
-    assert error.code == "E-IMPORT-075" and "line 22" in str(error) and "turned axes" in str(error)
+    assert error.code == "E-IMPORT-066" and "line 22" in str(error) and "turned axes" in str(error)
     wrong = angles.copy()
     wrong[4] += [30.0, 10.0, 0.0]
-    assert refused(tmp_path, cell, "rx,ry,rz", wrong).code == "E-IMPORT-076"
+    assert refused(tmp_path, cell, "rx,ry,rz", wrong).code == "E-IMPORT-067"
     shuffled = np.random.default_rng(1).permutation(angles)
-    assert refused(tmp_path, cell, "rx,ry,rz", shuffled).code == "E-IMPORT-073"
+    assert refused(tmp_path, cell, "rx,ry,rz", shuffled).code == "E-IMPORT-064"
     error = refused(tmp_path, cell, "rx,ry,rz", angles, orientation="xyz-intrinsic")
-    assert error.code == "E-IMPORT-074" and "--orientation xyz-extrinsic" in str(error)
+    assert error.code == "E-IMPORT-065" and "--orientation xyz-extrinsic" in str(error)
     error = refused(tmp_path, cell, "rz,ry,rx", angles)
-    assert error.code == "E-IMPORT-072" and "--map 'angle1=" in str(error)
+    assert error.code == "E-IMPORT-063" and "--map 'angle1=" in str(error)
     norms = np.array([quaternion(frame) for frame in cell.frames])
     norms[7] *= 0.7
     error = refused(tmp_path, cell, "qw,qx,qy,qz", norms)
-    assert error.code == "E-IMPORT-068" and "line 9" in str(error)
+    assert error.code == "E-IMPORT-059" and "line 9" in str(error)
 
 
 def test_few_poses_need_the_option(tmp_path: Path) -> None:
     cell = Cell.measured(6, 5, 8)
     angles = np.rad2deg([kuka_abc(frame) for frame in cell.frames])
-    assert refused(tmp_path, cell, "A,B,C", angles).code == "E-IMPORT-069"
+    assert refused(tmp_path, cell, "A,B,C", angles).code == "E-IMPORT-060"
     outcome = imported(tmp_path, cell, "A[deg],B[deg],C[deg]", angles, orientation="zyx-intrinsic")
     assert outcome.orientations is not None and outcome.orientations.compared is None
     np.testing.assert_allclose(outcome.orientations.rotations, cell.frames, atol=5e-5)

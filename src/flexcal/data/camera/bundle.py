@@ -67,12 +67,12 @@ def free_views(views: Sequence[View], size: np.ndarray) -> FreeViews:
     for view in views:
         if len(view.points) < FEWEST_CORNERS:
             raise FlexcalError(
-                "E-POSES-060",
+                "E-POSES-043",
                 f"{view.name} shows {len(view.points)} corners of the board; at least {FEWEST_CORNERS} are needed.",
             )
     if len(views) < 3:
         raise FlexcalError(
-            "E-POSES-061", f"there are {len(views)} views of the board; a camera needs at least 3, better 30."
+            "E-POSES-044", f"there are {len(views)} views of the board; a camera needs at least 3, better 30."
         )
     maps = np.array([homography(view.points[:, :2], view.pixels) for view in views])
     start = first_lens(maps, size)

@@ -25,7 +25,7 @@ def detected_views(camera: CameraConfig, paths: Sequence[Path]) -> tuple[list[Vi
         import cv2
     except ImportError:
         raise FlexcalError(
-            "E-POSES-069",
+            "E-POSES-052",
             "images need OpenCV: pip install 'flexcal[camera]'; or give the corners: columns corner, u, v.",
         ) from None
     find, board = _detector(cv2, camera.board), board_corners(camera.board)
@@ -33,17 +33,17 @@ def detected_views(camera: CameraConfig, paths: Sequence[Path]) -> tuple[list[Vi
     for path in paths:
         image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) if path.exists() else None
         if image is None:
-            raise InputError("E-POSES-070", f"{path} is no image that can be read; check the column 'image'.")
+            raise InputError("E-POSES-053", f"{path} is no image that can be read; check the column 'image'.")
         width, height = camera.size
         if image.shape != (height, width):
             raise InputError(
-                "E-POSES-071",
+                "E-POSES-054",
                 f"{path} has {image.shape[1]} × {image.shape[0]} pixels, but robot.yaml says {width} × {height}; correct `size:`.",
             )
         numbers, pixels = find(image)
         if len(numbers) < FEWEST_CORNERS:
             raise InputError(
-                "E-POSES-072",
+                "E-POSES-055",
                 f"{path} shows {len(numbers)} corners of the board that robot.yaml declares; take out its line, or correct `board:`.",
             )
         views.append(View(path.name, board[numbers], pixels))
@@ -56,7 +56,7 @@ def _detector(cv2: Any, board: BoardConfig) -> Callable[[np.ndarray], tuple[np.n
     known = getattr(cv2.aruco, board.dictionary, None)
     if known is None:
         raise FlexcalError(
-            "E-POSES-073", f"OpenCV has no dictionary '{board.dictionary}'; it is called as DICT_4X4_50."
+            "E-POSES-056", f"OpenCV has no dictionary '{board.dictionary}'; it is called as DICT_4X4_50."
         )
     dictionary = cv2.aruco.getPredefinedDictionary(known)
     if board.kind == "tags":

@@ -86,7 +86,7 @@ def _camera(table: Table, model: RobotModel) -> tuple[str, CameraConfig]:
     cameras = {name: item for name, item in model.config.measurements.items() if item.kind == "camera"}
     if not cameras:
         raise table.file.error(
-            "E-POSES-062",
+            "E-POSES-045",
             "there are images of a board, but robot.yaml declares no camera; add `measurements: {camera: {kind: camera, size: [1280, 960], "
             "board: {kind: charuco, columns: 9, rows: 7, square: 0.03, marker: 0.022}}}` with the sizes in m.",
         )
@@ -98,10 +98,10 @@ def _camera(table: Table, model: RobotModel) -> tuple[str, CameraConfig]:
             hint = suggestion(name, list(cameras)) or f"; known are {', '.join(cameras)}."
             row = int(np.argmax(table.columns["camera"] == name))
             raise table.error(
-                "E-POSES-063", row, "camera", f"there is no camera '{name}' in robot.yaml{hint}"
+                "E-POSES-046", row, "camera", f"there is no camera '{name}' in robot.yaml{hint}"
             )
     if len(named) > 1:
-        raise table.file.error("E-POSES-064", "there are several cameras; give a file for each.")
+        raise table.file.error("E-POSES-047", "there are several cameras; give a file for each.")
     name = next(iter(named))
     return name, cameras[name]
 
@@ -114,7 +114,7 @@ def _tabled_views(table: Table, camera: CameraConfig, pose: np.ndarray, first: n
     if not known.all():
         row = int(np.argmin(known))
         raise table.error(
-            "E-POSES-065", row, "corner", f"the board has corners 0 to {len(board) - 1}, not {corner[row]}."
+            "E-POSES-048", row, "corner", f"the board has corners 0 to {len(board) - 1}, not {corner[row]}."
         )
     pixels = np.column_stack(numbers[1:])
     outside = (pixels < -1).any(axis=1) | (pixels > np.array(camera.size) + 1).any(axis=1)
@@ -122,7 +122,7 @@ def _tabled_views(table: Table, camera: CameraConfig, pose: np.ndarray, first: n
         row = int(np.argmax(outside))
         width, height = camera.size
         raise table.error(
-            "E-POSES-066",
+            "E-POSES-049",
             row,
             "u",
             f"the corner lies at {pixels[row, 0]:g}, {pixels[row, 1]:g}, outside the image of {width} × {height} pixels.",
@@ -139,7 +139,7 @@ def _usable(file: TableFile, views: Sequence[View], found: FreeViews) -> np.ndar
     wrong, corners = int(found.wrong.sum()), sum(len(view.points) for view in views)
     if wrong > corners // 4:
         raise file.error(
-            "E-POSES-067",
+            "E-POSES-050",
             f"{wrong} of {corners} corners fit no camera; check columns, rows and corner numbers of the board.",
         )
     return np.flatnonzero(found.residuals <= _BLURRED * np.median(found.residuals))
@@ -150,7 +150,7 @@ def _check_side(file: TableFile, found: FreeViews) -> None:
     towards = np.einsum("vi,vi->v", found.rotation[:, :, 2], found.translation)
     if np.median(np.sign(towards)) < 0:
         raise file.error(
-            "E-POSES-068",
+            "E-POSES-051",
             "the board is mirrored: its corners run clockwise where robot.yaml says anticlockwise; reverse the columns of the corner "
             "numbers, or check the images.",
         )

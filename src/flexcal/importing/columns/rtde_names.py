@@ -34,7 +34,7 @@ _REASONS = {
     "actual_TCP_speed": "of the tool, not of the joints",
     "actual_TCP_force": "of the tool, not of the joints",
 }
-_TURN = "the rotation vector of the tool; calibrate takes points alone"
+_TURN = "the rotation vector of the tool by the controller's own kinematics; it is not measured"
 _IN_LOG = "tool pose computed by the controller from the joints, not measured"
 _SLOWEST = 1.1
 """Longest time step of a log, s; rarer samples are poses."""

@@ -134,11 +134,11 @@ def parse_convention(option: str, numbers: int, unit: AngleUnit, *, by_axis: boo
         convention = EulerAngles(transposed, axes, euler[2] == "intrinsic", columns, unit)
     if convention is None:
         raise InputError(
-            "E-IMPORT-066", f"--orientation {option}: there is no such convention; it is {_KNOWN}."
+            "E-IMPORT-057", f"--orientation {option}: there is no such convention; it is {_KNOWN}."
         )
     if isinstance(convention, Quaternion) != (numbers == 4):
         raise InputError(
-            "E-IMPORT-067",
+            "E-IMPORT-058",
             f"--orientation {option}: the file has {numbers} columns of orientation, which are no {convention.words}.",
         )
     return convention

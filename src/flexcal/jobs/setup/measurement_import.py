@@ -177,7 +177,7 @@ def import_file(
     turns = [item for item in placed if item.quantity in _TURNS]
     if orientation is not None and not turns:
         raise InputError(
-            "E-IMPORT-077",
+            "E-IMPORT-068",
             f"--orientation is of measured orientations, but none were recognised in {file}; name their columns with --map rx=COLUMN "
             "and so on.",
         )

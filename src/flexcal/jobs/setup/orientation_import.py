@@ -168,7 +168,7 @@ def _checked_norm(columns: OrientationColumns) -> float:
     if usual == 0 or odd.any():
         row = int(np.argmax(odd))
         raise columns.foreign.table.error(
-            "E-IMPORT-068",
+            "E-IMPORT-059",
             row,
             columns.placed.columns[0],
             f"the quaternion {columns.listed} has the norm {norms[row]:.4g}, others {usual:.4g}; correct it, or leave "
@@ -185,7 +185,7 @@ def _not_compared(
         allowed = [convention for convention in allowed if not convention.transposed] or allowed
     if len(allowed) > 1 or abs(norm - 1) > _NORM:
         raise columns.error(
-            "E-IMPORT-069",
+            "E-IMPORT-060",
             f"the convention of the orientations {columns.listed} cannot be told, because they cannot be compared with the nominal robot; "
             f"say it, as in --orientation {_examples(columns)}, or leave them out with {columns.left_out}.",
         )
@@ -207,21 +207,21 @@ def _uncertain(
         more = len(choice.rivals) - len(others)
         further = f", and {more} more conventions" if more else ""
         return columns.error(
-            "E-IMPORT-070",
+            "E-IMPORT-061",
             f"the orientations {columns.listed} fit the robot about as well as {named}{further}; say which it is with --orientation, "
             f"or leave them out with {columns.left_out}.",
         )
     if choice.steady:
         return columns.error(
-            "E-IMPORT-071",
+            "E-IMPORT-062",
             f"the orientations {columns.listed} vary by {choice.spread / DEGREE:.2g} deg only, so that their "
             f"convention cannot be told; {either}.",
         )
     explained = _explained(columns, nominal, values)
     if explained:
-        return columns.error("E-IMPORT-072", f"the orientations {columns.listed} {explained}.")
+        return columns.error("E-IMPORT-063", f"the orientations {columns.listed} {explained}.")
     return columns.error(
-        "E-IMPORT-073",
+        "E-IMPORT-064",
         f"the orientations {columns.listed} fit the robot in no known convention: the best, {_named(choice.best)}; {either}.",
     )
 
@@ -256,7 +256,7 @@ def _contradicted(
     other = choose_convention(nominal, columns.candidates(values), values)
     advice = f"; as {_named(other.best)} they fit" if other.certain else ""
     return columns.error(
-        "E-IMPORT-074",
+        "E-IMPORT-065",
         f"the orientations {columns.listed}, read as --orientation {option}, are {choice.best.rms / DEGREE:.2g} deg (rms) off the nominal "
         f"robot{advice}; correct the option, or write them with --unchecked.",
     )
@@ -276,7 +276,7 @@ def _check_rows(columns: OrientationColumns, rows: np.ndarray, fit: OrientationF
         apart = _angles(predicted @ convention.rotations(values))
         if (apart < limit).mean() > 0.5:
             raise table.error(
-                "E-IMPORT-075",
+                "E-IMPORT-066",
                 row,
                 columns.placed.columns[0],
                 f"{many} {convention.words}, but the others {fit.convention.words}; import the rows of each "
@@ -284,7 +284,7 @@ def _check_rows(columns: OrientationColumns, rows: np.ndarray, fit: OrientationF
             )
     worst = float(fit.angles[fit.odd][0]) / DEGREE
     raise table.error(
-        "E-IMPORT-076",
+        "E-IMPORT-067",
         row,
         columns.placed.columns[0],
         f"the orientation is {worst:.3g} deg off the nominal robot, but most are {fit.rms / DEGREE:.2g} deg off it"
