@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -11,11 +12,12 @@ import numpy as np
 import pytest
 from refusals import assert_refusal
 from scipy.spatial.transform import Rotation
-from test_full_poses import Arm, urdf
+from test_full_poses import Arm, recorded, urdf
 
-from flexcal import RobotModel, calibrate, read_poses, verify
+from flexcal import RobotModel, calibrate, prediction_errors, read_poses, verify
 from flexcal.cli.main import main
 from flexcal.data.camera import projected
+from flexcal.data.poses import concatenate
 
 CAMERA = np.array([[1100, 0, 630], [0, 1090, 490], [0, 0, 1.0]])
 DISTORTION = np.array([-0.2, 0.1, 0.001, -0.0005, 0.02])
@@ -125,6 +127,40 @@ def test_the_command_line_takes_corners_and_verifies_others(
     assert document["rms_mm"]["measured"] == pytest.approx(document["rms_mm"]["expected"], rel=0.35)
 
 
+def test_a_camera_in_the_cell_calibrates_a_robot_that_holds_the_board(folder: Path) -> None:
+    text = ROBOT.format(square=SQUARE).replace("kind: camera,", "kind: camera, mounted: cell,")
+    (folder / "robot.yaml").write_text(text.replace("points: {camera:", "points: {board:"))
+    model, cell, rows = (
+        RobotModel.from_yaml(folder / "robot.yaml"),
+        Cell(7),
+        ["pose,q1,q2,q3,q4,q5,q6,corner,u,v"],
+    )
+    at, axes = cell.camera(START)  # of the board, which the hand holds now
+    eye = axes @ Rotation.from_rotvec([0.1, -0.15, 0.2]).as_matrix()
+    place, pose = at + axes @ MIDDLE - 0.6 * eye[:, 2], 0
+    while pose < 50:
+        q = START + cell.rng.uniform(-1, 1, 6) * [0.3, 0.25, 0.25, 0.7, 0.6, 1.2]
+        at, axes = cell.camera(q)
+        turn, move = eye.T @ axes, eye.T @ (at - place)
+        corners = BOARD @ turn.T + move
+        if corners[:, 2].min() < 0.25 or turn[2, 2] < 0.6:
+            continue
+        pixels = cv2.projectPoints(BOARD, Rotation.from_matrix(turn).as_rotvec(), move, CAMERA, DISTORTION)[
+            0
+        ][:, 0]
+        inside = np.flatnonzero(((pixels > 5) & (pixels < np.array(SIZE) - 5)).all(axis=1))
+        if len(inside) < 24:
+            continue
+        pose, pixels = pose + 1, pixels + 0.2 * cell.rng.normal(size=(48, 2))
+        rows += [",".join(map(repr, [pose, *q.tolist(), int(i), *pixels[i].tolist()])) for i in inside]
+    (folder / "views.csv").write_text("\n".join(rows) + "\n")
+    found = calibrate(model, read_poses(folder / "views.csv", model))
+    assert found.estimate.reduced_chi2 == pytest.approx(1, abs=0.3)
+    assert found.estimate.values["camera.eye.fx"] == pytest.approx(1100, abs=1.5)
+    mounted = Rotation.from_rotvec([found.model.value(f"point.board.r{axis}") for axis in "xyz"]).inv()
+    assert np.rad2deg((mounted * Rotation.from_matrix(cell.arm.mounted)).magnitude()) < 0.6
+
+
 def test_images_give_what_their_corners_do(folder: Path) -> None:
     cell = Cell(3)
     model = RobotModel.from_yaml(folder / "robot.yaml")
@@ -192,3 +228,27 @@ def test_the_predicted_error_of_fresh_views_is_true(folder: Path) -> None:
         fresh = verify(found.robot, read_poses(cell.corners(folder / "fresh.csv", 60), model))
         ratio.append(float(np.sum(fresh.residuals**2) / np.sum(fresh.predicted.expected_rms**2)))
     assert np.mean(ratio) == pytest.approx(1, abs=0.1)
+
+
+@pytest.mark.slow
+def test_a_camera_beside_a_tracker_makes_the_robot_more_accurate(folder: Path) -> None:
+    both = "points: {smr: {frame: l6, xyz: [0.05, 0.03, 0.12]}, "
+    (folder / "robot.yaml").write_text(ROBOT.format(square=SQUARE).replace("points: {", both))
+    model, squares = RobotModel.from_yaml(folder / "robot.yaml"), []
+    for seed in range(500, 508):
+        cell = Cell(seed)
+        lines = cell.corners(folder / "views.csv", 40).read_text().splitlines()
+        rows = [f"{lines[0]},target", *(f"{line},camera" for line in lines[1:])]
+        (folder / "views.csv").write_text("\n".join(rows) + "\n")
+        tracked = read_poses(recorded(folder / "points.csv", cell.arm, cell.rng, 30, turned=False), model)
+        fresh = read_poses(recorded(folder / "fresh.csv", cell.arm, cell.rng, 150, turned=False), model)
+        fresh = replace(fresh, position=np.array([cell.arm.measured(q)[0] for q in fresh.q]))
+        together = concatenate([tracked, read_poses(folder / "views.csv", model)])
+        fits = [calibrate(model, poses, terms=["kinematic"]) for poses in (tracked, together)]
+        errors = [prediction_errors(fit.model, fresh, noise_free=True) for fit in fits]
+        squares.append(
+            [float(np.sum(e.errors**2)) for e in errors] + [float(np.sum(errors[1].parameter_rms ** 2))]
+        )
+    alone, mixed, expected = np.sum(squares, axis=0)
+    assert mixed < alone
+    assert mixed == pytest.approx(expected, rel=0.3)
