@@ -187,7 +187,7 @@ def test_any_orientation_of_the_tracker(simulate: Callable, tx90l: RobotModel) -
 
 
 def test_a_second_station_gets_its_own_frame(simulate: Callable, tx90l: RobotModel) -> None:
-    two = replace(tx90l, stations=replace(tx90l.stations, names=("tracker", "window"), pose=np.zeros((2, 6))))
+    two = tx90l.with_stations(["window"])
     simulated = simulate(8, 80)
     turn, shift = vector_rotation(np.array([0.1, 0.2, -2.0])), np.array([1.0, 2.0, 0.3])
     names, points = simulated.poses.station.copy(), simulated.poses.position.copy()
@@ -288,8 +288,8 @@ def test_stations_and_measurements_that_are_not_known_are_named(
     for call in (fit_geometry, prediction_errors):
         with refused("E-ROBOT-042", "window", "tracker"):
             call(tx90l, elsewhere)
-        with refused("E-CAL-011"):
-            call(tx90l, replace(poses, length=np.ones(len(poses))))
+    with refused("E-CAL-011"):
+        prediction_errors(tx90l, replace(poses, kind=np.full(len(poses), "distance")))
 
 
 def test_a_fit_that_turned_an_axis_round_is_remarked(ur5: RobotModel, examples: Path) -> None:

@@ -198,7 +198,7 @@ def test_draw_wire_lengths_are_refused_by_name(run, ur5_folder: Path) -> None:
     file = write_csv(ur5_folder / "wire.csv", [*header[:7], "length"], rows[:, :8] ** 2 + 0.1)
     rows[:, 7] = 1.0
     assert_refusal(
-        refused_run(run, ur5_folder, "calibrate", ur5_folder / "robot.yaml", file), "E-CAL-011", "wire"
+        refused_run(run, ur5_folder, "calibrate", ur5_folder / "robot.yaml", file), "E-POSES-059", "wire"
     )
 
 

@@ -104,7 +104,7 @@ def test_defaults(tmp_path: Path, robot: Any) -> None:
         is poses.temperature
         is poses.time
         is poses.quaternion_wxyz
-        is poses.length
+        is poses.kind
         is None
     )
     assert poses.pose.tolist() == [1, 2, 3]
@@ -124,7 +124,7 @@ def test_defaults(tmp_path: Path, robot: Any) -> None:
         (HEADER + ",sigm_x", GOOD, ["E-TABLE-004", "line 1", "sigm_x", "sigma_x"]),
         (HEADER + ",sigma_x", GOOD, ["E-TABLE-006", "line 1", "sigma_y"]),
         (HEADER + ",qw,qx,qy", GOOD, ["E-TABLE-006", "line 1", "qz"]),
-        (HEADER + ",length", GOOD, ["E-POSES-018", "line 1"]),
+        (HEADER + ",length", GOOD, ["E-POSES-057", "line 1"]),
         (HEADER + ",sigma,sigma_x,sigma_y,sigma_z", GOOD, ["E-POSES-017", "line 1"]),
         ("pose,q1,x,y,z", GOOD, ["E-TABLE-007", "line 1", "1", "q1…q1", "2"]),
         ("pose,q1,q2,q3,x,y,z", GOOD, ["E-TABLE-007", "line 1", "3", "q1…q3", "2"]),

@@ -95,6 +95,6 @@ def test_bad_input(found, measured, rng):
     with refused("E-DESIGN-031", "station", "door"):
         select_next_poses(found, replace(measured, station=np.full(14, "door")), 2, rng=rng)
     with refused("E-DESIGN-030"):
-        select_next_poses(found, replace(measured, length=np.ones(14)), 2, rng=rng)
+        select_next_poses(found, replace(measured, kind=np.full(14, "distance")), 2, rng=rng)
     with refused("E-DESIGN-017", "121", "120"):
         select_next_poses(found, measured, 121, rng=rng)

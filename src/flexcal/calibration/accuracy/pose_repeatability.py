@@ -47,7 +47,7 @@ def visit_statistics(poses: PoseSet) -> list[PoseRepeatability]:
     Rows belong to one pose where joint positions, target, station and payload are the same, whatever number they have. Raises
     `FlexcalError` for measured lengths, and where no pose was visited twice.
     """
-    if poses.length is not None:
+    if poses.kind is not None:
         raise FlexcalError(
             "E-CAL-001", "lengths of a wire do not show where a point is; give points x, y, z."
         )

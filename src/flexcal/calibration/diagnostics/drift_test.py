@@ -58,17 +58,17 @@ class Drift:
         """Score test (Rao) on the residuals of a fit: first-order estimate of a drift with three further coordinates.
 
         The covariance of the errors is that of the fit without what stretches of the measuring order share, scaled by the chi-square
-        that is left. Rows are in measuring order; outliers do not count, nor do points in sockets, which take a drift for another place of
-        the fixture: at least one point must be of an instrument.
+        that is left. Rows are in measuring order; outliers do not count, nor do points in sockets, distances and touches, which take a
+        drift for another place of fixture, wire or face: at least one point must be of an instrument.
         """
         poses = fit.poses
-        share = np.linspace(-0.5, 0.5, len(poses)) * ~poses.in_socket
+        share = np.linspace(-0.5, 0.5, len(poses)) * poses.located
         row = Readings.of(poses).row
         kept = ~np.isin(row, fit.estimate.outliers)
         ramp = share[row[kept]][:, None, None] * translations(fit.linear.readings)
         products = fit.linear.products(replace(fit.scatter, order=0.0), ramp)
         covariance = np.linalg.inv(products[:-1, :-1])
         travel = covariance @ products[:-1, -1]
-        freedom = fit.linear.residual.size - fit.linear.free.shape[2] - len(travel)
+        freedom = int(fit.linear.readings.present.sum()) - fit.linear.free.shape[2] - len(travel)
         left = float(products[-1, -1] - products[:-1, -1] @ travel)
         return cls(travel, covariance * max(1.0, left / max(freedom, 1)), freedom)

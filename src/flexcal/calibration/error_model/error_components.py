@@ -66,9 +66,9 @@ class ErrorComponents:
         return own + self.angular**2 * turns @ np.swapaxes(turns, 1, 2)
 
     def _scattered(self, readings: Readings) -> np.ndarray:
-        """Variances (R, 3) of what is independent from reading to reading besides what is stated."""
+        """Variances (R, 3) of what is independent from reading to reading besides what is stated; 1 where there is no reading."""
         metres, radians = readings.unit == METRES, readings.unit == RADIANS
-        return self.robot**2 * metres + self.orientation**2 * radians + _SMALLEST**2
+        return self.robot**2 * metres + self.orientation**2 * radians + np.where(readings.present, _SMALLEST**2, 1.0)
 
     def jointly(self, readings: Readings, turns: np.ndarray, cells: ErrorGroups) -> np.ndarray:
         """Joint covariance (G, 3 T, 3 T) of all readings of a visit to a pose, independent of other visits.
@@ -104,13 +104,13 @@ class ErrorComponents:
         own = turns[~readings.points]
         turned = float(np.mean((own**2).sum(axis=2))) if own.size else 0.0
         orientation = float(np.hypot(self.orientation, self.angular * np.sqrt(turned)))
-        robot = self.evenly(turns[readings.points])
+        robot = self.evenly(turns[readings.unit == METRES])
         even = replace(self, robot=robot, pose=0.0, angular=0.0, orientation=orientation)
         return even.whitening(readings, turns)
 
     def evenly(self, turns: np.ndarray) -> float:
-        """Standard deviation of a coordinate of points, m, due to the robot's repeatability, root mean square over the points."""
-        turned = float(np.mean((turns**2).sum(axis=2))) if turns.size else 0.0
+        """Standard deviation of coordinates, m, that move by `turns` (K, r), m/rad, due to the robot's repeatability, root mean square."""
+        turned = float(np.mean((turns**2).sum(axis=1))) if turns.size else 0.0
         return float(np.sqrt(self.robot**2 + self.pose**2 + self.angular**2 * turned))
 
     def shared(self, cells: ErrorGroups, rows: np.ndarray) -> np.ndarray:
@@ -127,7 +127,10 @@ class ErrorComponents:
 
 def translations(readings: Readings) -> np.ndarray:
     """Columns (R, 3, 3) of a displacement of the tool in the coordinates that are in metres."""
-    return np.eye(3) * (readings.unit == METRES)[:, :, None]
+    moved = np.eye(3) * (readings.unit == METRES)[:, :, None]
+    if readings.slopes is not None:
+        moved[readings.points] = readings.slopes
+    return moved
 
 
 def stated_covariance(readings: Readings, cells: ErrorGroups) -> np.ndarray:

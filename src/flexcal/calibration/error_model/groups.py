@@ -96,9 +96,10 @@ def _numbered_again(labels: np.ndarray) -> np.ndarray:
 def _regions(poses: PoseSet, visit: np.ndarray, count: int) -> np.ndarray | None:
     """Labels (N,) of `count` cells of the workspace, of whole visits (N,), for points of an instrument; None where there are none.
 
-    Points in sockets are each alone: an error common to those at one place of the fixture is taken for where it stands.
+    Points in sockets are each alone: an error common to those at one place of the fixture is taken for where it stands. So are distances
+    and touches, whose directions differ.
     """
-    measured = ~poses.in_socket
+    measured = poses.located
     if not measured.any():
         return None
     labels = group_numbers(visit[measured])

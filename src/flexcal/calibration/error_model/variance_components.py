@@ -74,7 +74,7 @@ class LinearFit:
         totals = self._mean_squares()
         total = totals[METRES]
         levers = {
-            name: _lever(moved[self.readings.points])
+            name: _lever(moved[self.readings.unit == METRES])
             for name, moved in (("angular", self.turns), (TRANSMISSION, self.waves))
         }
         sizes = {"orientation": totals.get(RADIANS, 0.0)}
@@ -84,7 +84,7 @@ class LinearFit:
         if stated:
             # the points may scatter less than the instrument alone should, even if nothing else errs
             own = np.concatenate([scale[1 : 1 + len(angles)], scale[len(names) - len(shared) :]])
-            sizes = np.append(own, total / float(np.mean(self.readings.sigma[self.readings.points] ** 2)))
+            sizes = np.append(own, total / float(np.mean(self.readings.sigma[self.readings.unit == METRES] ** 2)))
             alone = self._maximum([*angles, *shared, "share"], sizes, None, favour=False)[1]
             if alone - self._maximum(names, scale, share, favour=False)[1] > _CLEAR_GAIN:
                 names, scale = ["robot", *angles, *shared], np.append(total, own)
@@ -224,8 +224,8 @@ class LinearFit:
 
 
 def _lever(moved: np.ndarray) -> float:
-    """Mean square of a coordinate (m²) due to columns (N, 3, k) together; 1 where there are none."""
-    return float((moved**2).sum()) / (3 * len(moved)) or 1.0
+    """Mean square of K coordinates (m²) due to columns (K, k) together; 1 where there are none."""
+    return float((moved**2).sum()) / len(moved) or 1.0
 
 
 def _step(x: np.ndarray, slope: np.ndarray, information: np.ndarray, largest: np.ndarray) -> np.ndarray:

@@ -16,6 +16,7 @@ from flexcal.calibration.error_model import (
     joint_rotation_jacobian,
 )
 from flexcal.calibration.fit.elastic_prior import ElasticPrior, with_lenses
+from flexcal.calibration.fit.held_size import held_lengths
 from flexcal.calibration.fit.least_squares_problem import GeometryProblem, PlainLoss
 from flexcal.calibration.fit.marginalised_elasticity import marginalised
 from flexcal.calibration.fit.practical_identifiability import Undetermined, undetermined
@@ -42,7 +43,7 @@ from flexcal.calibration.measurement import (
 )
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import RANK_TOLERANCE, Estimate, Identifiability, Loss, Parameter, Parameters
-from flexcal.model.robot import BOARD_SCALE, SCATTER, SOCKET_SCALE, RobotModel, unit_of
+from flexcal.model.robot import BOARD_SCALE, SCATTER, SOCKET_SCALE, WIRE_SCALE, RobotModel, unit_of
 from flexcal.progress import Progress
 
 _FLANK_PASSES = 4
@@ -50,8 +51,8 @@ _FIRST_SCATTER = 1e-4
 """Initial scatter (m) of a fit: its size matters relative to priors only."""
 _FIRST_ORIENTATION = 2e-4
 """Initial scatter (rad) of measured orientations."""
-_CHI_MEDIAN = 2.366
-"""Median of chi-square with three degrees of freedom."""
+_CHI_MEDIAN = np.array([1.0, 0.455, 1.386, 2.366])
+"""Medians of chi-square by degrees of freedom, up to three."""
 _SUSPICION = 1e-3
 """Probability of suspecting an outlier without one."""
 _SLACK = 1.5
@@ -63,12 +64,13 @@ _FREE_STIFFNESS = 0.3
 
 @dataclass(frozen=True, eq=False)
 class PointFit:
-    """Input of a fit: the registered robot `start`, its `geometric` parameters, their rank on the `poses`, the elastic `prior`."""
+    """Input of a fit: the registered robot `start`, its `geometric` parameters, the length that is held for its `size`, their rank on the `poses`, the elastic `prior`."""
 
     start: RobotModel
     poses: PoseSet
     terms: tuple[str, ...]
     geometric: Parameters
+    size: tuple[str, ...]
     identifiability: Identifiability
     structural: Identifiability
     prior: ElasticPrior
@@ -96,22 +98,24 @@ class PointFit:
             terms = tuple(term for term in terms if term != TRANSMISSION)
         model = model.with_lenses({name: lens.values for name, lens in poses.lenses.items()})
         bare = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
-        start = register(model, poses, predict_measurements(bare, poses, elastic=elastic).position)
+        start = register(model, poses, predict_measurements(bare, poses, elastic=elastic).located)
         start = with_target_axes(start, poses)
         require_orientations(start, poses)
         prior = with_lenses(prior, poses)
         if "backlash" in terms:
             require_both_flanks(model, predict_measurements(start, poses, elastic=elastic).rest.flank)
+        held = held_lengths(start, poses)
         geometric = geometric_parameters(start, poses, terms)
+        geometric = Parameters(item for item in geometric if item.name not in held)
         seen = kinematic_identifiability(start, poses, geometric)
         require_enough(start, poses, geometric, seen)
         structural = random_identifiability(start, poses, geometric, seen)
-        if structural.rank > seen.rank:
+        if structural.rank > seen.rank or poses.kind is not None:
             # these poses hide something: what may be off most, as the place of the instrument, is to take it up
             sizes = np.array([plausible_size(start, name) for name in geometric.names])
             seen = kinematic_identifiability(start, poses, geometric, scale=sizes)
             structural = random_identifiability(start, poses, geometric, seen, scale=sizes)
-        return cls(start, poses, terms, geometric, seen, structural, prior, elastic, marginalised, progress)
+        return cls(start, poses, terms, geometric, held[:1], seen, structural, prior, elastic, marginalised, progress)
 
     @cached_property
     def waves(self) -> dict[str, float]:
@@ -142,6 +146,15 @@ class PointFit:
         declared = [p.name for p in self.geometric if np.isfinite(p.prior_std)]
         return tuple(name for name in self.structural.kept_names if name not in (*seen, *declared))
 
+    @cached_property
+    def plausible(self) -> dict[str, float]:
+        """Plausible deviation of every geometric parameter, a kept one with that of the dropped ones that it takes up."""
+        every = self.identifiability
+        sizes = {name: plausible_size(self.start, name) for name in self.geometric.names}
+        own = np.array([sizes[name] for name in every.names])
+        taken_up = np.linalg.norm(every.regrouping * own, axis=1)
+        return sizes | dict(zip(every.kept_names, taken_up.tolist(), strict=True))
+
     @property
     def free(self) -> Parameters:
         """Parameters determined by rank or a declared prior."""
@@ -150,15 +163,23 @@ class PointFit:
 
     @property
     def known(self) -> Parameters:
-        """Parameters that are held at what is declared, within its standard deviation: the scale of sockets' distances, and of a board.
+        """Parameters that are held at what is declared, within its standard deviation: scales of sockets' distances, boards and wires, and
+        the length of the robot that gives its size where no reading does.
 
         Errors of the joints grow with the robot, so a fit would make a smaller robot of fewer errors, and shorter distances.
         """
-        there = {SOCKET_SCALE: self.poses.in_socket.any(), BOARD_SCALE: self.poses.seen.any()}
+        there = {
+            SOCKET_SCALE: self.poses.in_socket.any(),
+            BOARD_SCALE: self.poses.seen.any(),
+            WIRE_SCALE: bool((self.poses.far & (self.poses.position[:, 0] != 0)).any()),
+        }
         sizes = {name: declared_size(self.start, name) for name, own in there.items() if own}
-        return Parameters(
-            Parameter(name, "1", 0.0, prior_std=std) for name, std in sizes.items() if std is not None
-        )
+        scales = [Parameter(name, "1", 0.0, prior_std=std) for name, std in sizes.items() if std is not None]
+        lengths = [
+            Parameter(name, "m", self.start.value(name), prior_std=plausible_size(self.start, name))
+            for name in self.size
+        ]
+        return Parameters([*scales, *lengths])
 
     def solved(
         self,
@@ -276,9 +297,10 @@ class FittedPoints:
 
     def robust_scatter(self) -> ErrorComponents:
         """Common scatter of all coordinates of a unit, from the median of the residuals' distances."""
-        rows = self.at.residual.size
-        spread = rows / max(rows - self.fit.identifiability.rank, 1) / _CHI_MEDIAN
-        squares = (self.at.residual**2).sum(axis=1)
+        present = self.at.readings.present
+        rows = int(present.sum())
+        spread = rows / max(rows - self.fit.identifiability.rank, 1)
+        squares = (self.at.residual**2).sum(axis=1) / _CHI_MEDIAN[present.sum(axis=1)]
         angles = ~self.at.readings.points
         robot, orientation = (
             float(np.sqrt(np.median(own) * spread)) if len(own) else 0.0
@@ -291,7 +313,7 @@ class FittedPoints:
         fit = self.fit
         kept = Parameters(p for p in fit.free if not np.isfinite(p.prior_std))
         whitening = scatter.whitening(self.at.readings, self.turns)
-        return undetermined(fit.straight, kept, whitening, fit.hidden)
+        return undetermined(fit.straight, kept, whitening, fit.hidden, fit.plausible)
 
     @property
     def suspects_outliers(self) -> bool:
@@ -300,8 +322,9 @@ class FittedPoints:
 
         whitening = self.scatter.whitening(self.at.readings, self.turns)
         squares = (whitening(self.at.residual).reshape(-1, 3) ** 2).sum(axis=1)
-        limit = float(chdtri(3, _SUSPICION / len(squares))) * _SLACK
-        return bool(squares.max() > limit * np.median(squares) / _CHI_MEDIAN)
+        freedom = self.at.readings.present.sum(axis=1)
+        limits = chdtri(freedom, _SUSPICION / len(squares)) * _SLACK
+        return bool((squares > limits * np.median(squares / _CHI_MEDIAN[freedom])).any())
 
     @property
     def poses(self) -> PoseSet:
@@ -386,7 +409,7 @@ class FittedPoints:
 
     def _scatter_parameters(self) -> tuple[Parameters, np.ndarray]:
         scatter = self.scatter
-        instrument = scatter.share * float(np.sqrt(np.mean(self.fit.poses.sigma**2)))
+        instrument = scatter.share * float(np.sqrt(np.mean(self.fit.poses.sigma[self.fit.poses.present] ** 2)))
         robot, robot_std = self._together("robot", "pose")
         model, model_std = self._together("workspace", "order", "command")
         values = (

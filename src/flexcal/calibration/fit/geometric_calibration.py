@@ -13,7 +13,7 @@ from flexcal.calibration.fit.elastic_prior import NOTHING_ELASTIC, ElasticPrior
 from flexcal.calibration.fit.fitted_points import FittedPoints, PointFit
 from flexcal.calibration.fit.least_squares_problem import LossName
 from flexcal.calibration.fit.practical_identifiability import Undetermined
-from flexcal.calibration.measurement import ambiguous_poses, require_points
+from flexcal.calibration.measurement import METRES, ambiguous_poses
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate, Identifiability, Loss, Squares, loss_named
@@ -91,14 +91,12 @@ class GeometricFit:
         `instrument_mm` is null where no sigma is stated: the robot's part then holds it. `robot_mm` has the repeatability of the
         joints at the measured points in it. `stated_mm` is the sigma of the files, root mean square.
         """
-        scatter, sigma = (
-            self.scatter,
-            float(np.sqrt(np.mean(self.linear.readings.sigma[self.linear.readings.points] ** 2))),
-        )
+        scatter, lengths = self.scatter, self.linear.readings.unit == METRES
+        sigma = float(np.sqrt(np.mean(self.linear.readings.sigma[lengths] ** 2)))
         stated = self.poses.sigma_given
         return {
             "instrument_mm": scatter.share * sigma / MILLIMETRE if stated else None,
-            "robot_mm": scatter.evenly(self.linear.turns[self.linear.readings.points]) / MILLIMETRE,
+            "robot_mm": scatter.evenly(self.linear.turns[lengths]) / MILLIMETRE,
             "model_mm": scatter.model / MILLIMETRE,
             "stated_mm": sigma / MILLIMETRE if stated else None,
         }
@@ -154,7 +152,7 @@ def fit_geometry(
     Raises
     ------
     FlexcalError
-        For measured lengths, fewer rows than identifiable parameters, poses that are all equal, joints that
+        For fewer rows than identifiable parameters, poses that are all equal, joints that
         do not move, a backlash seen from one flank only, stations that robot.yaml does not know, and a robust loss with
         marginalised elasticity.
 
@@ -173,7 +171,6 @@ def fit_geometry(
             "E-CAL-005",
             "a robust loss weights poses individually, but marginalised elasticity correlates them; use re-estimated elasticity instead.",
         )
-    require_points(poses)
     _check_variety(model, poses)
     prior = ElasticPrior.of(model, poses, secant_scale=secant_scale) if elastic else NOTHING_ELASTIC
     fit = PointFit.of(

@@ -58,15 +58,19 @@ class GeometryProblem:
         def values(x: np.ndarray) -> dict[str, float]:
             return dict(zip(parameters.names, parameters.natural(x), strict=True))
 
+        readings = Readings.of(self.poses)
+        there = readings.present.ravel()
+
         def linearise(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             at = self.predicted(values(x), jacobians=True)
-            return self.residual(at), -self.columns(at, parameters.names) * parameters.natural_slope(x)
+            columns = self.columns(at, parameters.names)[there]
+            return self.residual(at)[there], -columns * parameters.natural_slope(x)
 
         def residual(x: np.ndarray) -> np.ndarray:
-            return self.residual(self.predicted(values(x)))
+            return self.residual(self.predicted(values(x)))[there]
 
         covariance = np.diag(parameters.prior_std() ** 2)
         covariance[len(self.kept) :, len(self.kept) :] = self.prior.covariance
-        groups = np.repeat(Readings.of(self.poses).row, 3)
+        groups = np.repeat(readings.row, 3)[there]
         problem = Problem(parameters, linearise, residual, covariance, groups)
         return solve(problem, loss=loss, progress=progress)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from flexcal.calibration.error_model import Whitening
-from flexcal.calibration.fit.terms import plausible_size
 from flexcal.calibration.measurement import PredictedMeasurements
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameters, analyse
@@ -33,16 +33,21 @@ class Undetermined:
 
 
 def undetermined(
-    at: PredictedMeasurements, kept: Parameters, whitening: Whitening, hidden: tuple[str, ...]
+    at: PredictedMeasurements,
+    kept: Parameters,
+    whitening: Whitening,
+    hidden: tuple[str, ...],
+    plausible: Mapping[str, float],
 ) -> tuple[Undetermined, ...]:
     """Parameters whose standard deviation from the data alone exceeds their plausible size.
 
     Judged on the kinematic Jacobian `at` the nominal robot without deflection, weighed by the `whitening`: what is seen only because the
     errors themselves, once estimated, turn the tool or bend the arm is not determined. `kept` are those of full rank on these poses;
-    those that are `hidden`, which random poses would determine and these do not, are undetermined too.
+    those that are `hidden`, which random poses would determine and these do not, are undetermined too. `plausible` are the sizes of
+    them all, by name.
     """
     start, poses = at.model, at.poses
-    sizes = np.array([plausible_size(start, name) for name in kept.names])
+    sizes = np.array([plausible[name] for name in kept.names])
     columns = whitening(at.jacobian(kept.names))
     largest = np.linalg.norm(columns * sizes, axis=0).max()
     identifiability = analyse(columns, kept.names, scale=sizes, tolerance=1 / max(largest, 1.0))
@@ -50,7 +55,7 @@ def undetermined(
     lost += hidden
     partners = {item.name: item.absorbed_by for item in identifiability.dropped}
     return tuple(
-        Undetermined(name, plausible_size(start, name), _cause(start, poses, name, partners.get(name, ())))
+        Undetermined(name, plausible[name], _cause(start, poses, name, partners.get(name, ())))
         for name in lost
     )
 
@@ -67,7 +72,7 @@ def _cause(start: RobotModel, poses: PoseSet, name: str, partners: tuple[tuple[s
         extent = float(np.ptp(poses.q[:, i]))
         if joint.kind == "revolute" and extent < _SMALL_RANGE:
             return f"{joint.name} moved {np.rad2deg(extent):.1f}° only"
-    shape = "" if poses.in_socket.any() else _shape(poses.position)
+    shape = _shape(poses.position) if poses.located.all() else ""
     if shape:
         return shape
     with_ = " and ".join(partner for partner, _ in partners[:2])

@@ -36,8 +36,8 @@ def kinematic_identifiability(
     preferred += [
         name for name in parameters.names if name.startswith("point.") and name.endswith(("rx", "ry", "rz"))
     ]
-    if poses.in_socket.all():
-        # where the fixture stands is to take up what moves the whole robot, not a joint
+    if not poses.located.any():
+        # where fixture, wire or face stand is to take up what moves the whole robot, not a joint
         preferred += [name for name in parameters.names if name.startswith("station.")]
     if np.isfinite(parameters.prior_std()).any():
         # a declared prior must not stand against what the points tell of a parameter without
@@ -71,12 +71,12 @@ def require_enough(
     model: RobotModel, poses: PoseSet, parameters: Parameters, identifiability: Identifiability
 ) -> None:
     """Raise `FlexcalError` if there are too few rows for the parameters that many random poses would determine."""
-    rows = 3 * (len(poses) + int(poses.turned.sum()))
+    rows = int(poses.present.sum()) + 3 * int(poses.turned.sum())
     if identifiability.rank < rows:
         return
     rank = random_identifiability(model, poses, parameters, identifiability).rank
     raise FlexcalError(
         "E-CAL-009",
         f"{len(poses)} poses give {rows} coordinates, too few for {rank} identifiable parameters; "
-        f"measure at least {rank // 3 + 1} poses, better three times as many.",
+        f"measure at least {rank * len(poses) // rows + 1} poses, better three times as many.",
     )

@@ -7,9 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from flexcal.calibration.measurement import left_jacobian, predict_measurements
-from flexcal.data.poses import PoseSet
+from flexcal.data.poses import DISTANCE, PLANE, PoseSet
 from flexcal.estimation import Parameter, Parameters
-from flexcal.model.robot import BOARD_SCALE, GEOMETRY, LATERAL, SOCKET_SCALE, STATION, RobotModel, unit_of
+from flexcal.model.robot import (
+    BOARD_SCALE,
+    GEOMETRY,
+    LATERAL,
+    SOCKET_SCALE,
+    STATION,
+    WIRE_SCALE,
+    RobotModel,
+    unit_of,
+)
 from flexcal.model.statics import carried_mass, gravity_moments, gravity_torque
 
 LEAST_POSES = 20
@@ -38,8 +47,8 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
 
     `kinematic`: a place for every station, and a rotation for all but the first, whose rotation the first joint's errors span; six
     errors for every joint that moves a measured target, six for the tool, three for each further target, and a rotation for each target
-    whose orientation was measured. Sockets alone do not tell where
-    the robot's base is: all places of the fixture may turn, and errors of joints that move the whole robot as one are left out.
+    whose orientation was measured. A wire has a place and a zero, a touched
+    plane a height and two tilts. Without an instrument of points nothing tells where the robot's base is: all places may turn, and errors of joints that move the whole robot as one are left out.
     `backlash`: the joints declared with it; `transmission` none, its waves being random effects (`random_waves`).
     `gravity_compliance`, `lateral_compliance`, `transmission_1`…: one or two for every revolute joint on the way, compliances only where
     no spring is declared in their place and gravity loads the axis: by moments that vary by more than 1 % of those that vary most.
@@ -47,12 +56,10 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
     """
     joints = moving_joints(model, poses)
     names: list[str] = []
-    unplaced = bool(poses.in_socket.all())
-    for k, station in enumerate(dict.fromkeys(poses.station)):
-        names += [f"station.{station}.{key}" for key in ("x", "y", "z")]
-        names += (
-            [f"station.{station}.{key}" for key in _turns(model, poses, station)] if k or unplaced else []
-        )
+    unplaced = not poses.located.any()
+    known = next(iter(poses.station[poses.located].tolist()), None)
+    for station in poses.stations:
+        names += [f"station.{station}.{key}" for key in _place(model, poses, station, turned=station != known)]
     errors = [f"{model.joints[i].name}.{key}" for i in joints for key in GEOMETRY]
     names += _moving_parts(model, poses, errors) if unplaced else errors
     names += [f"tool.{key}" for key in GEOMETRY]
@@ -97,6 +104,25 @@ def _moving_parts(model: RobotModel, poses: PoseSet, names: Sequence[str]) -> li
     ]
 
 
+def _place(model: RobotModel, poses: PoseSet, station: str, *, turned: bool) -> Sequence[str]:
+    """Numbers of a station's place that its readings tell, with its rotation where it may be `turned`."""
+    kind = "" if poses.kind is None else str(poses.kind[poses.station == station][0])
+    if kind == DISTANCE:
+        return (*STATION[:3], "zero")
+    if kind:
+        # a rotation about the normal of a plane, or about a line, and motions along them change nothing
+        vector = model.stations.pose[model.station_index(station), 3:]
+        tilts = _without_turn_about(vector, np.array([0.0, 0.0, 1.0]))
+        return ("z", *tilts) if kind == PLANE else ("x", "y", *tilts)
+    return (*STATION[:3], *(_turns(model, poses, station) if turned else ()))
+
+
+def _without_turn_about(vector: np.ndarray, axis: np.ndarray) -> list[str]:
+    """Two coordinates of a rotation `vector` (3,), without the one that is most like a rotation about an `axis` (3,)."""
+    about = np.linalg.solve(left_jacobian(vector), axis)
+    return [key for k, key in enumerate(STATION[3:]) if k != int(np.argmax(np.abs(about)))]
+
+
 def _turns(model: RobotModel, poses: PoseSet, station: str) -> Sequence[str]:
     """Rotations of a station that its points tell: none of a fixture with one socket, two of one whose sockets lie on a line."""
     keys = STATION[3:]
@@ -108,10 +134,8 @@ def _turns(model: RobotModel, poses: PoseSet, station: str) -> Sequence[str]:
         return ()
     if len(places) > 2 and sizes[1] > _FLAT * sizes[0]:
         return keys
-    # a rotation about the line changes nothing; the most similar of the three is left out
-    vector = model.stations.pose[model.station_index(station), 3:]
-    about = np.linalg.solve(left_jacobian(vector), axes[0])
-    return [key for k, key in enumerate(keys) if k != int(np.argmax(np.abs(about)))]
+    # a rotation about the line changes nothing
+    return _without_turn_about(model.stations.pose[model.station_index(station), 3:], axes[0])
 
 
 def random_waves(model: RobotModel, poses: PoseSet, free: Parameters) -> dict[str, float]:
@@ -212,6 +236,8 @@ def declared_size(model: RobotModel, name: str) -> float | None:
         return next(
             (item.board.std for item in model.config.measurements.values() if item.kind == "camera"), None
         )
+    if name == WIRE_SCALE:
+        return next((item.scale_std for item in model.config.measurements.values() if item.kind == "wire"), None)
     if name in prior.parameters:
         return prior.parameters[name]
     if owner not in model.joint_names or key not in GEOMETRY:

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from flexcal.calibration.measurement.instrument_readings import instrument_readings, reading_slopes
 from flexcal.calibration.measurement.readings import Readings
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
@@ -21,6 +22,7 @@ from flexcal.model.robot import (
     SOCKET_SCALE,
     SPRINGS,
     STATION,
+    WIRE_SCALE,
     RobotModel,
 )
 from flexcal.model.statics import (
@@ -35,10 +37,12 @@ from flexcal.progress import Progress, silent
 
 
 def require_points(poses: PoseSet, where: str = "the poses") -> None:
-    """Raise `FlexcalError` for measured lengths, which would be ignored; `where` names the files."""
-    if poses.length is not None:
+    """Raise `FlexcalError` for measurements that are not of whole points; `where` names the files."""
+    if poses.kind is not None and (poses.kind != "").any():
         raise FlexcalError(
-            "E-CAL-011", f"{where}: lengths of a wire cannot be used yet; give points x, y, z."
+            "E-CAL-011",
+            f"{where}: distances and touches alone do not tell where a point is; give points x, y, z, or compare by "
+            "'flexcal calibrate --hold-out COLUMN'.",
         )
 
 
@@ -48,10 +52,15 @@ _BLOCK = 20_000
 
 @dataclass(frozen=True, eq=False)
 class PredictedMeasurements:
-    """Predicted points (N, 3) in the instrument's frame at the poses, with the data for their derivatives and for all R `readings`."""
+    """Predicted points at the poses, with the data for their derivatives and for all R `readings`.
+
+    `located` (N, 3), m, are the targets in the instruments' frames, `position` (N, 3) what the instruments read of them: the same where
+    they measure coordinates.
+    """
 
     model: RobotModel
     poses: PoseSet
+    located: np.ndarray
     position: np.ndarray
     base: np.ndarray
     rest: Equilibrium
@@ -60,7 +69,12 @@ class PredictedMeasurements:
     @cached_property
     def readings(self) -> Readings:
         """What was measured at the poses."""
-        return Readings.of(self.poses)
+        return Readings.of(self.poses, reading_slopes(self.poses, self.located))
+
+    def _read(self, moved: np.ndarray) -> np.ndarray:
+        """Change (N, 3, …) of what the instruments read with displacements of the targets (N, 3, …) in their axes."""
+        slopes = self.readings.slopes
+        return moved if slopes is None else np.matmul(slopes, moved.reshape(len(moved), 3, -1)).reshape(moved.shape)
 
     @cached_property
     def residual(self) -> np.ndarray:
@@ -123,7 +137,7 @@ class PredictedMeasurements:
 
     def _by_tool(self, columns: np.ndarray) -> np.ndarray:
         """Readings (R, 3, k) from motions of the targets, `columns` (N, 6, k) in the base frame."""
-        moved = np.matmul(self.base, columns[:, :3])
+        moved = self._read(np.matmul(self.base, columns[:, :3]))
         if not self.readings.turns:
             return moved
         own = self.poses.turned
@@ -155,10 +169,15 @@ class PredictedMeasurements:
             owner, _, key = name.rpartition(".")
             if name == SOCKET_SCALE:
                 result[:samples, :, k] = -np.where(self.poses.in_socket[:, None], self.poses.position, 0.0)
+            elif name == WIRE_SCALE:
+                result[:samples, :, k] = -np.where(self.poses.far[:, None], self.poses.position, 0.0)
             elif name == BOARD_SCALE:
                 result[:samples, :, k] = -self.poses.position * self.poses.seen[:, None]
             elif owner.startswith("camera."):
                 result[:, :, k] = -self._by_lenses(owner.removeprefix("camera."))[:, :, LENS.index(key)]
+            elif owner.startswith("station.") and key == "zero":
+                own = self.poses.far & (self.poses.station == owner.removeprefix("station."))
+                result[np.flatnonzero(own), 0, k] = -1.0
             elif owner.startswith("station.") and key in STATION:
                 result[:, :, k] = self._by_station(owner.removeprefix("station."), key)
             elif owner.startswith("point.") and key in STATION[3:]:
@@ -210,13 +229,13 @@ class PredictedMeasurements:
         """Derivative (R, 3) of the readings by one number of a station's pose."""
         own, turned = self.poses.station == station, self.poses.turned
         if key in ("x", "y", "z"):
-            moved = own[:, None] * np.eye(3)["xyz".index(key)]
+            moved = self._read(own[:, None] * np.eye(3)["xyz".index(key)])
             return np.concatenate([moved, np.zeros((int(turned.sum()), 3))])
         values = [self.model.value(f"station.{station}.{k}") for k in STATION]
-        arm = self.position - np.array(values[:3]) + _socket_shift(self.model, self.poses)
+        arm = self.located - np.array(values[:3])
         axis = left_jacobian(np.array(values[3:]))[:, "xyz".index(key[1])]
         return np.concatenate(
-            [own[:, None] * np.cross(axis, arm), own[turned][:, None] * (self._rotating @ axis)]
+            [self._read(own[:, None] * np.cross(axis, arm)), own[turned][:, None] * (self._rotating @ axis)]
         )
 
     def _by_turn(self, target: str, key: str) -> np.ndarray:
@@ -256,9 +275,10 @@ class PredictedMeasurements:
         raise FlexcalError("E-CAL-013", f"the position of a point does not depend on '{name}'.")
 
 
-def _socket_shift(model: RobotModel, poses: PoseSet) -> np.ndarray:
-    """Shift (N, 3), m, of the sockets from their declared positions in the fixture, by the scale of their distances."""
-    return np.where(poses.in_socket[:, None], model.stations.scale[0] * poses.position, 0.0)
+def _scaled(model: RobotModel, poses: PoseSet) -> np.ndarray:
+    """Shift (N, 3), m, of sockets from their declared positions in the fixture, and of lengths, by the deviation of their scales."""
+    sockets, _, wires = model.stations.scale
+    return (sockets * poses.in_socket + wires * poses.far)[:, None] * poses.position
 
 
 def left_jacobian(vector: np.ndarray) -> np.ndarray:
@@ -301,9 +321,11 @@ def predict_measurements(
     for name in poses.stations:
         own, place = poses.station == name, model.stations.pose[model.station_index(name)]
         at[own], base[own] = place[:3], vector_rotation(place[3:])
-    position = np.matmul(base, tool.kinematics.position[:, :, None])[:, :, 0] + at
-    position -= _socket_shift(model, poses)
-    return PredictedMeasurements(model, poses, position, base, tool.rest, tool.kinematics)
+    located = np.matmul(base, tool.kinematics.position[:, :, None])[:, :, 0] + at
+    position = instrument_readings(model, poses, located)
+    if model.stations.scale.any():
+        position = position - _scaled(model, poses)
+    return PredictedMeasurements(model, poses, located, position, base, tool.rest, tool.kinematics)
 
 
 def predicted_positions(

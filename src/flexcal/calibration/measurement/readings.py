@@ -8,8 +8,8 @@ import numpy as np
 
 from flexcal.data.poses import PoseSet
 
-METRES, RADIANS = 1, 2
-"""Units of a coordinate."""
+ABSENT, METRES, RADIANS = 0, 1, 2
+"""Units of a coordinate, and of one that was not measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,8 +17,9 @@ class Readings:
     """R readings of three coordinates: every measured point in the order of the pose set, then each of M measured orientations.
 
     `row` (R,) is the row of the pose set that a reading belongs to, `unit` (R, 3) that of each coordinate, METRES or RADIANS, and `sigma`
-    (R, 3) its stated standard deviation, m or rad; 0 where none is stated of an orientation. `stated` (R, 3, 3) and `across` (M, 3, 3),
-    between an orientation and its point, are the stated covariance where it is not diagonal; None where it is.
+    (R, 3) its stated standard deviation, m or rad; 0 where it is absent or none is stated of an orientation. `stated` (R, 3, 3) and `across` (M, 3, 3),
+    between an orientation and its point, are the stated covariance where it is not diagonal; None where it is. `slopes` (N, 3, 3): change
+    of the N points' readings with a displacement of the target in the instrument's axes; None where each reads its coordinates.
     """
 
     row: np.ndarray
@@ -26,27 +27,29 @@ class Readings:
     sigma: np.ndarray
     stated: np.ndarray | None = None
     across: np.ndarray | None = None
+    slopes: np.ndarray | None = None
 
     @classmethod
-    def of(cls, poses: PoseSet) -> Readings:
-        """Readings of a pose set."""
+    def of(cls, poses: PoseSet, slopes: np.ndarray | None = None) -> Readings:
+        """Readings of a pose set, with their `slopes` (N, 3, 3)."""
         points, turned = np.arange(len(poses)), np.flatnonzero(poses.turned)
         row = np.concatenate([points, turned])
-        unit = np.full((len(row), 3), METRES)
-        unit[len(points) :] = RADIANS
+        unit = np.full((len(row), 3), RADIANS)
+        unit[: len(points)] = np.where(poses.present, METRES, ABSENT)
         angular = (
             np.zeros(len(turned)) if poses.orientation_sigma is None else poses.orientation_sigma[turned]
         )
-        sigma = np.concatenate([poses.sigma, np.broadcast_to(angular[:, None], (len(turned), 3))])
+        stated_of_points = np.where(poses.present, poses.sigma, 0.0)
+        sigma = np.concatenate([stated_of_points, np.broadcast_to(angular[:, None], (len(turned), 3))])
         if poses.covariance is None or not len(turned):
-            return cls(row, unit, sigma)
+            return cls(row, unit, sigma, slopes=slopes)
         stated, across = sigma[:, :, None] ** 2 * np.eye(3), np.zeros((len(turned), 3, 3))
         joint = np.array(np.isfinite(poses.covariance).all(axis=(1, 2)))
         stated[points[joint]] = poses.covariance[joint, :3, :3]
         own = joint[turned]
         stated[len(points) :][own] = poses.covariance[turned[own], 3:, 3:]
         across[own] = poses.covariance[turned[own], 3:, :3]
-        return cls(row, unit, sigma, stated, across)
+        return cls(row, unit, sigma, stated, across, slopes)
 
     def subset(self, rows: np.ndarray) -> Readings:
         """The readings of a mask (R,) that keeps point and orientation of a pose together."""
@@ -57,17 +60,23 @@ class Readings:
             self.sigma[rows],
             None if self.stated is None else self.stated[rows],
             None if self.across is None else self.across[turned],
+            None if self.slopes is None else self.slopes[rows[: len(self.slopes)]],
         )
 
     @property
     def turns(self) -> int:
         """Number of orientations M."""
-        return int((self.unit[:, 0] == RADIANS).sum())
+        return int((~self.points).sum())
 
     @property
     def points(self) -> np.ndarray:
         """Readings (R,) that are points."""
-        return self.unit[:, 0] == METRES
+        return (self.unit != RADIANS).all(axis=1)
+
+    @property
+    def present(self) -> np.ndarray:
+        """Coordinates (R, 3) that were measured."""
+        return self.unit != ABSENT
 
     @property
     def beside(self) -> np.ndarray:

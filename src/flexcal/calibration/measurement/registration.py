@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from flexcal.calibration.measurement.prediction import predict_measurements
+from flexcal.calibration.measurement.station_start import start_of_station
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.model.parts import rotation_vector, wxyz_rotation
@@ -21,7 +22,7 @@ ALREADY_ALIGNED = 0.010
 def register(model: RobotModel, poses: PoseSet, predicted: np.ndarray) -> RobotModel:
     """Register every station of `poses` by the rigid motion that best maps `predicted` (N, 3) to the measured points (Kabsch).
 
-    A station whose points already agree to a centimetre is left at the base frame. The rotation of the first station stays where it
+    Instruments of distances and touched faces are placed by `start_of_station`. A station whose points already agree to a centimetre is left at the base frame. The rotation of the first station stays where it
     is put here, for the first joint's errors span it; the rest is refined by the fit. Raises `FlexcalError` for a station that
     robot.yaml does not know, or with fewer than three poses that do not lie on a line.
     """
@@ -30,6 +31,10 @@ def register(model: RobotModel, poses: PoseSet, predicted: np.ndarray) -> RobotM
         model.station_index(station)
         own = poses.station == station
         measured, expected = poses.position[own], predicted[own]
+        if poses.kind is not None and (kind := str(poses.kind[own][0])):
+            start = start_of_station(kind, station, expected, measured)
+            values |= {f"station.{station}.{key}": value for key, value in start.items()}
+            continue
         if np.median(np.linalg.norm(measured - expected, axis=1)) < ALREADY_ALIGNED:
             rotation, offset = np.eye(3), np.zeros(3)
         else:

@@ -72,7 +72,8 @@ def _folds(poses: PoseSet) -> tuple[tuple[np.ndarray, ...], int]:
     """Folds (N,) in measuring order, in the workspace, and of single poses, and the number of single poses."""
     alone = repeated_pose_numbers(poses.q)
     held = poses.in_socket
-    order, workspace = order_folds(len(poses), FOLDS), workspace_folds(poses.position, FOLDS)
+    order = order_folds(len(poses), FOLDS)
+    workspace = workspace_folds(poses.position if poses.located.all() else poses.q[:, :3], FOLDS)
     if held.any():
         # a place of a fixture is left out with all its rows: the rest of them would tell where it stands
         place = FOLDS + np.unique(poses.station, return_inverse=True)[1]

@@ -140,7 +140,7 @@ class TermTrials:
 
     def _criterion(self, old: LeaveOutErrors, new: LeaveOutErrors) -> float:
         """Change of the Bayesian information criterion of the coordinates that the base terms leave free (Schwarz 1978)."""
-        free = max(self._residual.size - self.fit(self._base).freedom, 1.0)
+        free = max(self._coordinates - self.fit(self._base).freedom, 1.0)
         return free * np.log(new.squares / old.squares) + (new.freedom - old.freedom) * np.log(free)
 
     def _gain(self, old: LeaveOutErrors, new: LeaveOutErrors, kind: int) -> tuple[float, float]:
@@ -168,17 +168,22 @@ class TermTrials:
     @cached_property
     def _lever(self) -> np.ndarray:
         """Factors (R, 1), m/rad for orientations, that make all readings scatter alike."""
-        unit, residual = self._prediction.readings.unit[:, 0], self.rigid.readings
-        points, angles = unit == METRES, unit == RADIANS
-        lever = np.ones(len(unit))
+        unit, residual = self._prediction.readings.unit, self.rigid.readings
+        lengths, angles = unit == METRES, unit == RADIANS
+        lever = np.ones(unit.shape)
         if angles.any():
-            lever[angles] = np.sqrt(np.mean(residual[points] ** 2) / (np.mean(residual[angles] ** 2) + _TINY))
-        return lever[:, None]
+            lever[angles] = np.sqrt(np.mean(residual[lengths] ** 2) / (np.mean(residual[angles] ** 2) + _TINY))
+        return lever[:, :1]
 
     @cached_property
     def _residual(self) -> np.ndarray:
         """Residuals (R, 3) of the base fit, as lengths, m."""
         return self.rigid.readings * self._lever
+
+    @cached_property
+    def _coordinates(self) -> int:
+        """Number of measured coordinates."""
+        return int(self._prediction.readings.present.sum())
 
     @cached_property
     def _row_folds(self) -> tuple[np.ndarray, ...]:
@@ -187,7 +192,7 @@ class TermTrials:
 
     @cached_property
     def _noise(self) -> float:
-        freedom = max(self._residual.size - self.rigid.identifiability.rank, 1)
+        freedom = max(self._coordinates - self.rigid.identifiability.rank, 1)
         return float((self._residual**2).sum()) / freedom
 
     @cached_property
@@ -204,7 +209,7 @@ class TermTrials:
         if term not in self._columns:
             if term == "kinematic":
                 kept = self.rigid.identifiability.kept_names
-                names = tuple(n for n in kept if n.rpartition(".")[2] in (*GEOMETRY, *STATION))
+                names = tuple(n for n in kept if n.rpartition(".")[2] in (*GEOMETRY, *STATION, "zero"))
             else:
                 names = geometric_parameters(self.model, self.rigid.poses, [term]).names
             self._columns[term] = self._seen(names)

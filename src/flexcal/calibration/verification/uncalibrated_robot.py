@@ -7,14 +7,14 @@ point on the tool (3 a point) are fitted, and no geometric parameter of the robo
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from flexcal.calibration.error_model import ErrorStatistics
-from flexcal.calibration.measurement import predict_measurements, predicted_positions
+from flexcal.calibration.measurement import predict_measurements, predicted_positions, register
 from flexcal.calibration.verification.best_fit_registration import (
     best_placement,
     can_register,
@@ -22,9 +22,14 @@ from flexcal.calibration.verification.best_fit_registration import (
     rigid_placement,
 )
 from flexcal.data.poses import PoseSet
-from flexcal.model.robot import RobotModel
+from flexcal.model.robot import STATION, RobotModel
 
 _BLOCK = 20_000
+_STEPS = 20
+_RANK = 1e-6
+_CAUCHY = 3.5
+"""Constant of the Cauchy loss in median misfits: 2.4 standard deviations of normal errors."""
+_SMALLEST = 1e-9
 DECLARED_WITHIN = 0.05
 """Median distance between nominal and measured points, relative to the reach, above which the instrument's frame is not the declared
 one.
@@ -87,11 +92,13 @@ def uncalibrated_model(model: RobotModel, poses: PoseSet) -> UncalibratedRobot:
     Kabsch (1976) for the registration; Gauss-Newton on the 6 parameters of every station and 3 of every measured point for the robot's own
     error. Raises `FlexcalError` for an unknown target or station.
     """
-    model = model.with_stations(poses.boards)
+    model = model.with_stations(poses.places)
     for station in poses.stations:
         model.station_index(station)
     poses = poses.without_orientations()
     at_base = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
+    if not (poses.located | poses.in_socket).all():
+        return _placed_by_readings(at_base, poses)
     declared = _declared(at_base, poses)
     if not can_register(poses):
         return UncalibratedRobot(declared, None, None)
@@ -102,6 +109,30 @@ def uncalibrated_model(model: RobotModel, poses: PoseSet) -> UncalibratedRobot:
         placement = best_placement(poses, position, orientation)
         own = at_base.with_values(placement.values(at_base))
     return UncalibratedRobot(declared, registered, own)
+
+
+def _placed_by_readings(at_base: RobotModel, poses: PoseSet) -> UncalibratedRobot:
+    """Robot whose stations, some of which read distances or touches, are placed by all readings, and then the measured points too."""
+    located = predict_measurements(at_base, poses, elastic=False).located
+    registered = register(at_base, poses, located)
+    numbers = [name for s in poses.stations for name in (*(f"station.{s}.{k}" for k in STATION), f"station.{s}.zero")]
+    points = [f"point.{target}.{axis}" for target in poses.targets for axis in "xyz"]
+    return UncalibratedRobot(None, _refined(registered, poses, numbers), _refined(registered, poses, [*numbers, *points]))
+
+
+def _refined(model: RobotModel, poses: PoseSet, names: Sequence[str]) -> RobotModel:
+    """Robot with some parameters by Gauss-Newton, with the weights of the Cauchy loss; what is not determined stays."""
+    for _ in range(_STEPS):
+        at = predict_measurements(model, poses, elastic=False, jacobians=True)
+        misfit = np.linalg.norm(at.residual, axis=1)
+        scale = _CAUCHY * float(np.median(misfit)) + _SMALLEST
+        root = 1 / np.sqrt(1 + (misfit / scale) ** 2)
+        columns = (root[:, None, None] * at.jacobian(names)).reshape(-1, len(names))
+        step = np.linalg.lstsq(columns, (root[:, None] * at.residual).ravel(), rcond=_RANK)[0]
+        model = model.with_values({name: model.value(name) + float(s) for name, s in zip(names, step, strict=True)})
+        if np.abs(step).max() < _SMALLEST:
+            break
+    return model
 
 
 def _tools(model: RobotModel, poses: PoseSet) -> tuple[np.ndarray, np.ndarray]:

@@ -2,13 +2,16 @@ from .candidate_pool import PosePool
 from .checks import check_metres, check_same_pose
 from .columns import check_positive, unit_quaternions, whole_numbers
 from .measured_tables import column_labels, read_pose_pool, read_poses, write_poses
-from .pose_set import DEFAULT_SIGMA, PoseSet, concatenate
+from .pose_set import DEFAULT_SIGMA, DISTANCE, LINE, PLANE, PoseSet, concatenate
 from .target_files import read_commands, read_targets, write_commands, write_targets
 from .tool_targets import ToolTargets
 from .working_files import read_working
 
 __all__ = [
     "DEFAULT_SIGMA",
+    "DISTANCE",
+    "LINE",
+    "PLANE",
     "PosePool",
     "PoseSet",
     "ToolTargets",

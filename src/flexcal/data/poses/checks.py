@@ -64,7 +64,7 @@ def check_metres(poses: PoseSet, model: RobotModel, table: Table, signal: Signal
     stands no farther than ten times the reach (at least 60 m) away: what lies beyond twice that is refused.
     """
     reach = float(model.reach)
-    values = poses.position if poses.length is None else poses.length[:, None]
+    values = poses.position if poses.kind is None else poses.position[:, :1]
     distance = np.linalg.norm(values, axis=1)
     spread = np.zeros(len(poses))
     for station in poses.stations:

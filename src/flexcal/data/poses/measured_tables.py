@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +19,8 @@ from flexcal.data.poses.columns import (
     unit_quaternions,
     whole_numbers,
 )
-from flexcal.data.poses.pose_set import DEFAULT_SIGMA, PoseSet, concatenate
+from flexcal.data.poses.distance_tables import LENGTH, READING, TOUCHED, WIRE, measures_distances, read_distances
+from flexcal.data.poses.pose_set import DEFAULT_SIGMA, PLANE, PoseSet, concatenate
 from flexcal.data.poses.socket_tables import SOCKET_COLUMNS, measures_sockets, read_sockets
 from flexcal.data.tables import (
     TableFile,
@@ -56,7 +57,8 @@ def read_poses(
         CSV or Parquet tables with the columns q1…qn (rad or m) and x, y, z (m). Without a column `target` the point is
         the first under `points:`; without `station` the instrument stands at the robot's first station; without `sigma` it is
         0.1 mm and `sigma_given` is False. A file with `fixture`, `socket` and q1…qn has a ball on the tool in sockets, as declared
-        under `measurements:`, at places of the fixture that are not known.
+        under `measurements:`, at places of the fixture that are not known; one with `length` those of a draw-wire, one with `touched`
+        contacts with a plane, line or sphere.
     model : RobotModel
         Robot whose joints, points and stations the columns name.
     require_motion : bool
@@ -123,13 +125,17 @@ def write_poses(path: str | Path, poses: PoseSet) -> None:
     """Write poses as CSV or Parquet by the file's suffix, atomically, under the standard columns in SI units."""
     columns: dict[str, np.ndarray] = {"pose": poses.pose}
     vectors = [("q", poses.q)]
-    vectors.append(("xyz", poses.position) if poses.length is None else ("length", poses.length[:, None]))
+    read = _read_by_one(path, poses)
+    if read:
+        columns |= dict(read)
+    else:
+        vectors.append(("xyz", poses.position))
     if poses.quaternion_wxyz is not None:
         vectors.append(("quaternion", poses.quaternion_wxyz))
     if poses.orientation_sigma is not None:
         vectors.append(("sigma_angle", poses.orientation_sigma[:, None]))
     if poses.sigma_given:
-        vectors.append(("sigma_xyz", poses.sigma) if poses.length is None else ("sigma", poses.sigma[:, :1]))
+        vectors.append(("sigma", poses.sigma[:, :1]) if read else ("sigma_xyz", poses.sigma))
     if poses.torque is not None:
         vectors.append(("tau", poses.torque))
     for quantity, values in vectors:
@@ -141,13 +147,25 @@ def write_poses(path: str | Path, poses: PoseSet) -> None:
             )
         names = standard_columns(quantity, poses.q.shape[1])
         columns |= {name: values[:, i] for i, name in enumerate(names)}
-    for name in ("payload", "target", "station", "temperature"):
+    for name in ("payload", "target", *(() if read else ("station",)), "temperature"):
         values = getattr(poses, name)
         if values is not None:
             columns[name] = values
     if poses.time is not None:
         columns["t"] = poses.time
     write_table(path, columns)
+
+
+def _read_by_one(path: str | Path, poses: PoseSet) -> Mapping[str, np.ndarray]:
+    """Columns of lengths or touches; empty for points. Raises `InputError` where there are several of these."""
+    if poses.kind is None:
+        return {}
+    wires = poses.far & (poses.position[:, 0] > 0)
+    if wires.all():
+        return {LENGTH: poses.position[:, 0], WIRE: poses.station}
+    if wires.any() or poses.located.any():
+        raise InputError("E-POSES-062", f"{path}: write points, lengths and touches to a file each.")
+    return {TOUCHED: poses.station, READING: np.where(poses.kind == PLANE, poses.position[:, 2], 0.0)}
 
 
 def column_labels(paths: Sequence[Path], column: str) -> np.ndarray:
@@ -165,7 +183,8 @@ def column_labels(paths: Sequence[Path], column: str) -> np.ndarray:
 
 def _named_texts(file: TableFile, further: Sequence[str]) -> tuple[str, ...]:
     """Columns of a file that hold texts, beside the `further` ones."""
-    return tuple(dict.fromkeys(name for name in (*_TEXTS, *SOCKET_COLUMNS, *further) if name in file.columns))
+    named = (*_TEXTS, *SOCKET_COLUMNS, WIRE, TOUCHED, *further)
+    return tuple(dict.fromkeys(name for name in named if name in file.columns))
 
 
 def _read(path: Path, model: RobotModel, further: tuple[str, ...]) -> PoseSet:
@@ -174,10 +193,11 @@ def _read(path: Path, model: RobotModel, further: tuple[str, ...]) -> PoseSet:
         return read_sockets(file, model, further)
     if measures_images(file):
         return read_views(file, model, further)
+    if measures_distances(file, model):
+        return read_distances(file, model, further)
     texts = tuple(dict.fromkeys(name for name in (*_TEXTS, *further) if name in file.columns))
-    place = _place(file, model)
-    _check_measured(file, model, place)
-    signals = assign(file, model, ("pose", "q", place), _NUMBERS, texts)
+    _check_measured(file, model)
+    signals = assign(file, model, ("pose", "q", "xyz"), _NUMBERS, texts)
     if "sigma" in signals and "sigma_xyz" in signals:
         raise file.error("E-POSES-017", "sigma and sigma_x, sigma_y, sigma_z are both there; keep one.")
     stamps = timestamp_columns(signals)
@@ -185,16 +205,15 @@ def _read(path: Path, model: RobotModel, further: tuple[str, ...]) -> PoseSet:
     values = {name: signal.values(table) for name, signal in signals.items()}
     check_joint_units(model, table, signals["q"], values["q"])
     rows = len(table)
-    position = values["xyz"] if place == "xyz" else np.full((rows, 3), np.nan)
     sigma = values.get("sigma_xyz", values.get("sigma"))
-    for name in ("sigma", "sigma_xyz", "sigma_angle", "length"):
+    for name in ("sigma", "sigma_xyz", "sigma_angle"):
         if name in values:
             check_positive(table, signals[name], values[name], zero=False)
     target = target_column(table, model) if "target" in texts else np.full(rows, first_point(file, model))
     station = table.columns["station"] if "station" in texts else np.full(rows, _first_station(model))
     poses = PoseSet(
         q=values["q"],
-        position=position,
+        position=values["xyz"],
         sigma=np.broadcast_to(DEFAULT_SIGMA if sigma is None else sigma, (rows, 3)).copy(),
         torque=values.get("tau"),
         payload=payload_column(table, signals, model),
@@ -207,27 +226,14 @@ def _read(path: Path, model: RobotModel, further: tuple[str, ...]) -> PoseSet:
         if "quaternion" in values
         else None,
         orientation_sigma=values["sigma_angle"][:, 0] if "sigma_angle" in values else None,
-        length=values["length"][:, 0] if "length" in values else None,
         sigma_given=sigma is not None,
     )
     check_same_pose(poses.pose, poses.q, table)
-    check_metres(poses, model, table, signals[place])
+    check_metres(poses, model, table, signals["xyz"])
     return poses
 
 
-def _place(file: TableFile, model: RobotModel) -> str:
-    """Whether the file measures points or the length of a wire."""
-    mapped = model.config.signals
-    length = mapped["length"].columns if "length" in mapped else ()
-    wire = "length" in file.columns or (length and set(length) <= set(file.columns))
-    if wire and {"x", "y", "z"} & set(file.columns):
-        raise file.error(
-            "E-POSES-018", "there are both 'length' and x, y, z; keep the columns of one instrument."
-        )
-    return "length" if wire else "xyz"
-
-
-def _check_measured(file: TableFile, model: RobotModel, place: str) -> None:
+def _check_measured(file: TableFile, model: RobotModel) -> None:
     """Raise `InputError` where a file is evidently another program's, or a plan that is still to be measured."""
 
     def there(quantity: str) -> bool:
@@ -240,7 +246,7 @@ def _check_measured(file: TableFile, model: RobotModel, place: str) -> None:
             "E-POSES-019",
             f"there is no column pose, nor q1 … q{model.n}; 'flexcal import' makes such a file of one with other columns.",
         )
-    if there("q") and not there(place):
+    if there("q") and not there("xyz"):
         raise file.error(
             "E-POSES-020",
             "there are joint positions, but no measured points x, y, z; measure these poses, and convert the measurements with "

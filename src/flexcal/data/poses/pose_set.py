@@ -11,6 +11,9 @@ import numpy as np
 from flexcal.data.camera import Lens
 from flexcal.errors import FlexcalError
 
+DISTANCE, PLANE, LINE = "distance", "plane", "line"
+"""Kinds of measurements that are not of three coordinates."""
+_COORDINATES = {DISTANCE: (True, False, False), PLANE: (False, False, True), LINE: (True, True, False)}
 DEFAULT_SIGMA = 1e-4
 """Default 1σ of a measured coordinate (m); only its size relative to priors matters."""
 
@@ -24,7 +27,7 @@ class PoseSet:
     q : ndarray
         Motor positions (N, n) referred to the joint, rad (m where prismatic).
     position : ndarray
-        Measured points (N, 3) in the instrument's frame, m; NaN where only `length` is measured.
+        Measured points (N, 3) in the instrument's frame, m; of the other kinds what the instrument reads, see `kind`.
     sigma : ndarray
         Standard deviations (N, 3) of the measured coordinates, m.
     torque : ndarray or None
@@ -50,8 +53,10 @@ class PoseSet:
         Change (N, 6, 9) of a measured point and orientation with the intrinsic parameters of its camera, in the order of `LENS`.
     lenses : mapping of Lens
         Intrinsic parameters of the cameras by name, with which the poses were measured.
-    length : ndarray, optional
-        Lengths (N,) of a draw-wire, m.
+    kind : ndarray, optional
+        Kinds (N,) of measurements that are not of three coordinates, empty for points. "distance": the first coordinate is the distance
+        from the instrument's origin, as by a draw-wire or a touched sphere; "plane": the third is the distance from the plane z = 0 of its
+        frame, as by a dial gauge or contact with a table; "line": the first and second are those from its z axis. The others are zero.
     time : ndarray, optional
         Times (N,) of the measurements, s.
     socket : ndarray, optional
@@ -81,7 +86,7 @@ class PoseSet:
     camera: np.ndarray | None = None
     by_lens: np.ndarray | None = None
     lenses: Mapping[str, Lens] = field(default_factory=dict)
-    length: np.ndarray | None = None
+    kind: np.ndarray | None = None
     time: np.ndarray | None = None
     socket: np.ndarray | None = None
     sigma_given: bool = True
@@ -106,7 +111,7 @@ class PoseSet:
             "covariance": (n_rows, 6, 6),
             "camera": (n_rows,),
             "by_lens": (n_rows, 6, 9),
-            "length": (n_rows,),
+            "kind": (n_rows,),
             "time": (n_rows,),
             "socket": (n_rows,),
         }
@@ -124,6 +129,40 @@ class PoseSet:
     def in_socket(self) -> np.ndarray:
         """Rows (N,) whose target was held by a socket."""
         return np.zeros(len(self), bool) if self.socket is None else self.socket != ""
+
+    @property
+    def present(self) -> np.ndarray:
+        """Coordinates (N, 3) of `position` that were measured."""
+        result = np.ones((len(self), 3), bool)
+        if self.kind is not None:
+            for name, coordinates in _COORDINATES.items():
+                result[self.kind == name] = coordinates
+        return result
+
+    @property
+    def far(self) -> np.ndarray:
+        """Rows (N,) whose distance from the instrument was measured."""
+        return np.zeros(len(self), bool) if self.kind is None else self.kind == DISTANCE
+
+    @property
+    def located(self) -> np.ndarray:
+        """Rows (N,) whose point was measured with all three coordinates by an instrument, which sockets are not."""
+        return ~self.in_socket if self.kind is None else ~self.in_socket & (self.kind == "")
+
+    @property
+    def tells_lengths(self) -> bool:
+        """Whether any reading tells how large the robot is, which contacts do not, nor sockets without a known distance."""
+        read = self.far & (self.position[:, 0] > 0)
+        known = any(
+            len(np.unique(self.position[self.in_socket & (self.station == name)], axis=0)) > 1
+            for name in self.fixtures
+        )
+        return bool(self.located.any() or read.any() or known)
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Fixtures, camera's boards, wires and touched faces: stations that robot.yaml does not list, in the order in which they appear."""
+        return tuple(dict.fromkeys(self.station[self.seen | ~self.located].tolist()))
 
     @property
     def turned(self) -> np.ndarray:
@@ -199,8 +238,8 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
     """The rows of all sets, in order.
 
     Where a later set uses a pose number again, its numbers are shifted past the largest so far. Raises `FlexcalError`
-    where there is nothing to join, joint counts differ, or only some sets have sigma, torques, payload, temperature,
-    time or length. Orientations are NaN where a set has none.
+    where there is nothing to join, joint counts differ, or only some sets have sigma, torques, payload, temperature
+    or time. Orientations are NaN where a set has none.
     """
     if not sets:
         raise FlexcalError("E-POSES-023", "there are no poses to join; give at least one set.")
@@ -249,6 +288,7 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
 _PARTIAL: dict[str, tuple[tuple[int, ...], float | str]] = {
     "socket": ((), ""),
     "camera": ((), ""),
+    "kind": ((), ""),
     "quaternion_wxyz": ((4,), np.nan),
     "covariance": ((6, 6), np.nan),
     "by_lens": ((6, 9), 0.0),

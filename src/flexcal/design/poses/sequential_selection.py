@@ -110,7 +110,7 @@ def _rows(candidates: PoseCandidates, measured: PoseSet) -> tuple[np.ndarray, np
 
 def _check(model: RobotModel, measured: PoseSet, setup: MeasuringSetup) -> None:
     target, station = model.point(setup.point).name, setup.station or model.stations.names[0]
-    if measured.length is not None:
+    if measured.kind is not None:
         raise FlexcalError(
             "E-DESIGN-030", "the next poses are chosen after measured points, not after lengths of a wire."
         )

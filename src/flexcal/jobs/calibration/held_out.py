@@ -79,7 +79,7 @@ def held_out_errors(
 
 
 def _compared(model: RobotModel, poses: PoseSet, known: set[str]) -> HeldOutGroup:
-    model = model.with_stations(poses.fixtures)
+    model = model.with_stations(poses.places)
     at = predict_measurements(model, poses)
     errors = poses.position - at.position
     measured = ~poses.in_socket
@@ -89,7 +89,7 @@ def _compared(model: RobotModel, poses: PoseSet, known: set[str]) -> HeldOutGrou
             bare = model.with_values(
                 {f"station.{station}.{key}": 0.0 for key in ("x", "y", "z", "rx", "ry", "rz")}
             )
-            placed = register(bare, own, predict_measurements(bare, own).position)
+            placed = register(bare, own, predict_measurements(bare, own).located)
             errors[measured & (poses.station == station)] = (
                 own.position - predict_measurements(placed, own).position
             )

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Literal
 
 from flexcal.calibration.fit import LossName
-from flexcal.calibration.measurement import require_points
 from flexcal.data.poses import column_labels, read_poses
 from flexcal.files.formats import provenance, read_estimates
 from flexcal.jobs.calibration.procedure import calibrate
@@ -50,7 +49,6 @@ def calibrate_robot(
     target = estimates_target(source, out, "calibration")
     model = with_blocks(bare, blocks, source)
     poses = read_poses(list(files), model, further=() if hold_out is None else (hold_out,))
-    require_points(poses, " and ".join(str(file) for file in files))
     progress("reading", 1.0)
     calibration = calibrate(
         model,

@@ -20,7 +20,6 @@ from flexcal.calibration.fit import (
     all_errors,
     fit_geometry,
 )
-from flexcal.calibration.measurement import require_points
 from flexcal.calibration.term_selection import (
     cross_validated,
     select_terms,
@@ -91,7 +90,7 @@ def calibrate(
     Raises
     ------
     FlexcalError
-        For a robot that has been calibrated already, an unknown term, measured lengths, fewer coordinates than
+        For a robot that has been calibrated already, an unknown term, fewer coordinates than
         parameters, joints that never move, and stations that robot.yaml does not know.
 
     Examples
@@ -106,9 +105,8 @@ def calibrate(
     0.1 mm at 77 poses
     """
     _require_uncalibrated(model)
-    require_points(poses)
     nominal, measured = model, poses
-    model = model.with_stations((*poses.fixtures, *poses.boards))
+    model = model.with_stations(poses.places)
     sample = StratifiedSample.of(measured)
     poses = measured if sample is None else measured.subset(sample.rows)
     requested = _terms(model, terms)

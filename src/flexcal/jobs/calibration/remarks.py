@@ -78,7 +78,7 @@ def calibration_remarks(fit: GeometricFit, cause: Sequence[str] = ()) -> tuple[s
         more = f" and {len(outliers) - _LISTED} more" if len(outliers) > _LISTED else ""
         remarks.append(f"{len(outliers)} outliers: {listed}{more}")
     remarks += [*_undetermined(fit), *_views(fit), *_noise(fit)]
-    drift = None if fit.poses.in_socket.all() else Drift.of(fit)
+    drift = Drift.of(fit) if fit.poses.located.any() else None
     if drift is not None and drift.certain:
         remarks.append(
             f"residuals drift with time (p = {drift.probability:.1g}), by {drift.distance / MILLIMETRE:.3f} mm from first to last pose: "

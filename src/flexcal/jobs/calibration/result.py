@@ -187,7 +187,7 @@ class Calibration(Identification):
     def _numbers(self) -> dict[str, Any]:
         selected, chosen, before = self.selected, self.selection, self.before.document()
         identifiability = selected.identifiability
-        drift = None if selected.poses.in_socket.all() else Drift.of(selected)
+        drift = Drift.of(selected) if selected.poses.located.any() else None
         bearings = bearing_remarks(self.bearings, selected)
         blamed = self.bearings is not None and self.bearings.contradicted
         misfit = None if self.stiffness is None else self.stiffness.misfit

@@ -367,6 +367,42 @@ class CameraConfig:
 
 
 @dataclass(frozen=True)
+class WireConfig:
+    """Draw-wire sensor, or another instrument of distances from a point that stands anywhere in the cell.
+
+    std: standard deviation of a length, m; None where it is not known. scale_std: relative standard deviation of all its lengths together.
+    """
+
+    kind: Literal["wire"]
+    std: float | None = None
+    scale_std: float = 1e-3
+
+    def __post_init__(self) -> None:
+        _require_std(self.std)
+        if not self.scale_std > 0:
+            raise FlexcalError("E-ROBOT-057", f"scale_std must be positive, not {self.scale_std:g}.")
+
+
+@dataclass(frozen=True)
+class FaceConfig:
+    """Plane, line or sphere anywhere in the cell that the measured point touches; a plane may be read by a dial gauge.
+
+    std: standard deviation of a contact, m; None where it is not known.
+    """
+
+    kind: Literal["plane", "line", "sphere"]
+    std: float | None = None
+
+    def __post_init__(self) -> None:
+        _require_std(self.std)
+
+
+def _require_std(std: float | None) -> None:
+    if std is not None and not std > 0:
+        raise FlexcalError("E-ROBOT-056", f"std must be positive, not {std:g} m.")
+
+
+@dataclass(frozen=True)
 class BoxConfig:
     """Corners of a box in the robot's base frame, m."""
 
@@ -446,7 +482,7 @@ class RobotConfig:
     geometry: GeometryConfig = GeometryConfig()
     dynamics: DynamicsConfig = DynamicsConfig()
     stations: dict[str, StationConfig] = field(default_factory=dict)
-    measurements: dict[str, SocketsConfig | CameraConfig] = field(default_factory=dict)
+    measurements: dict[str, SocketsConfig | CameraConfig | WireConfig | FaceConfig] = field(default_factory=dict)
     obstacles: tuple[str, ...] = ()
     limits: LimitsConfig = LimitsConfig()
     working_volume: BoxConfig | None = None

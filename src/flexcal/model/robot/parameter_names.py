@@ -34,6 +34,8 @@ SOCKET_SCALE = "sockets.scale"
 """Relative deviation of the distances between a fixture's sockets from the declared ones."""
 BOARD_SCALE = "board.scale"
 """Relative deviation of the size of a camera's board from the declared one."""
+WIRE_SCALE = "wires.scale"
+"""Relative deviation of the lengths that draw-wires read from the true ones."""
 LENS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 """Intrinsic parameters of a camera."""
 SCATTER = (
@@ -49,7 +51,7 @@ SCATTER = (
 
 _UNITS = {
     "offset": "rad", "misalignment_1": "rad", "misalignment_2": "rad", "length_x": "m", "length_y": "m", "length_z": "m",
-    "x": "m", "y": "m", "z": "m", "rx": "rad", "ry": "rad", "rz": "rad", "backlash": "rad", "gravity_compliance": "rad/(N m)",
+    "x": "m", "y": "m", "z": "m", "zero": "m", "rx": "rad", "ry": "rad", "rz": "rad", "backlash": "rad", "gravity_compliance": "rad/(N m)",
     "gravity_compliance_1": "rad/(N m)", "gravity_compliance_2": "rad/(N m)",
     "stiffness": "N m/rad", "damping": "N m s/rad",
     "rotor_inertia": "kg m²", "viscous": "N m s/rad", "coulomb": "N m",
@@ -127,8 +129,10 @@ def parameter_locations(model: RobotModel) -> dict[str, Location]:
     for s, name in enumerate(model.stations.names):
         for k, key in enumerate(STATION):
             table[f"station.{name}.{key}"] = Location("stations", "pose", (s, k))
+        table[f"station.{name}.zero"] = Location("stations", "zero", (s,))
     table[SOCKET_SCALE] = Location("stations", "scale", (0,))
     table[BOARD_SCALE] = Location("stations", "scale", (1,))
+    table[WIRE_SCALE] = Location("stations", "scale", (2,))
     for c, name in enumerate(model.lenses.names):
         for k, key in enumerate(LENS):
             table[f"camera.{name}.{key}"] = Location("lenses", "values", (c, k))

@@ -188,7 +188,13 @@ class RobotModel:
         """
         more = [name for name in dict.fromkeys(names) if name not in self.stations.names]
         pose = np.concatenate([self.stations.pose, np.zeros((len(more), 6))])
-        return replace(self, stations=replace(self.stations, names=(*self.stations.names, *more), pose=pose))
+        stations = replace(
+            self.stations,
+            names=(*self.stations.names, *more),
+            pose=pose,
+            zero=np.concatenate([self.stations.zero, np.zeros(len(more))]),
+        )
+        return replace(self, stations=stations)
 
     def with_lenses(self, lenses: Mapping[str, np.ndarray]) -> RobotModel:
         """Robot with the intrinsic parameters of further cameras.

@@ -55,9 +55,9 @@ def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path)
         model = model.with_estimated_springs(estimate.values)
         if model.config.measurements:
             model = model.with_stations(
-                n.removeprefix("station.").removesuffix(".x")
+                n.removeprefix("station.").rpartition(".")[0]
                 for n in estimate.parameters.names
-                if n.startswith("station.") and n.endswith(".x")
+                if n.startswith("station.")
             )
         cameras = [
             n.split(".")[1]
