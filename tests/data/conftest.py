@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from flexcal.files.formats import read_yaml_file
-from flexcal.model.robot import SignalConfig, Stations
+from flexcal.model.robot import SignalConfig, Stations, WireConfig
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,7 @@ class JointStandIn:
 @dataclass(frozen=True)
 class ConfigStandIn:
     signals: dict[str, SignalConfig] = field(default_factory=dict)
+    measurements: dict[str, WireConfig] = field(default_factory=lambda: {"rope": WireConfig("wire")})
 
 
 @dataclass(frozen=True)

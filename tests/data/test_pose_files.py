@@ -80,7 +80,8 @@ def test_optional_columns_round_trip(
     changes: dict[str, Any] = {"quaternion_wxyz": None, "sigma_given": sigma}
     rng = np.random.default_rng(seed)
     if wire:
-        changes |= {"position": np.full((rows, 3), np.nan), "length": rng.uniform(0.1, 2, rows)}
+        changes |= {"position": np.column_stack([rng.uniform(0.1, 2, rows), np.zeros((rows, 2))])}
+        changes |= {"kind": np.full(rows, "distance"), "station": np.full(rows, "rope")}
         changes["sigma"] = np.repeat(rng.uniform(1e-5, 1e-4, (rows, 1)), 3, axis=1)
     if not sigma:
         changes["sigma"] = np.full((rows, 3), 1e-4)

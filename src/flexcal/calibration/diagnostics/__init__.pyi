@@ -2,16 +2,19 @@ from .bearing_axes import BearingAxes, compare_bearings
 from .drift_test import Drift
 from .gravity_residuals import GravityLoads, gravity_loads
 from .plausibility import implausible_shifts, is_implausible, residuals_implausible
+from .reading_jumps import ReadingJump, reading_jumps
 from .size_of_board import board_size
 
 __all__ = [
     "BearingAxes",
     "Drift",
     "GravityLoads",
+    "ReadingJump",
     "board_size",
     "compare_bearings",
     "gravity_loads",
     "implausible_shifts",
     "is_implausible",
+    "reading_jumps",
     "residuals_implausible",
 ]

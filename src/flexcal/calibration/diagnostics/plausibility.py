@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.calibration.fit import GeometricFit, manufacturing_tolerances
+from flexcal.calibration.measurement import predict_measurements
 from flexcal.model.parts import vector_rotation
 
 FAR = 50.0
@@ -52,8 +53,10 @@ def residuals_implausible(calibration: GeometricFit) -> bool:
 
 
 def _in_base(calibration: GeometricFit) -> np.ndarray:
-    """Measured points (N, 3), m, in the robot's base frame, where the stations are as fitted."""
+    """Measured points (N, 3), m, in the robot's base frame, where the stations are as fitted; predicted ones where some were not."""
     model, poses = calibration.model, calibration.poses
+    if poses.kind is not None:
+        return predict_measurements(model, poses, elastic=False).kinematics.position
     result = np.empty_like(poses.position)
     for station in poses.stations:
         own, place = poses.station == station, model.stations.pose[model.station_index(station)]
@@ -88,4 +91,8 @@ def _has_size(name: str) -> bool:
     for a compliance.
     """
     mounted = name.startswith("point.") and name.endswith(("rx", "ry", "rz"))
-    return not mounted and not name.startswith(("station.", "sockets.")) and ".gravity_compliance" not in name
+    return (
+        not mounted
+        and not name.startswith(("station.", "sockets.", "wires."))
+        and ".gravity_compliance" not in name
+    )

@@ -68,7 +68,11 @@ class ErrorComponents:
     def _scattered(self, readings: Readings) -> np.ndarray:
         """Variances (R, 3) of what is independent from reading to reading besides what is stated; 1 where there is no reading."""
         metres, radians = readings.unit == METRES, readings.unit == RADIANS
-        return self.robot**2 * metres + self.orientation**2 * radians + np.where(readings.present, _SMALLEST**2, 1.0)
+        return (
+            self.robot**2 * metres
+            + self.orientation**2 * radians
+            + np.where(readings.present, _SMALLEST**2, 1.0)
+        )
 
     def jointly(self, readings: Readings, turns: np.ndarray, cells: ErrorGroups) -> np.ndarray:
         """Joint covariance (G, 3 T, 3 T) of all readings of a visit to a pose, independent of other visits.

@@ -84,7 +84,9 @@ class LinearFit:
         if stated:
             # the points may scatter less than the instrument alone should, even if nothing else errs
             own = np.concatenate([scale[1 : 1 + len(angles)], scale[len(names) - len(shared) :]])
-            sizes = np.append(own, total / float(np.mean(self.readings.sigma[self.readings.unit == METRES] ** 2)))
+            sizes = np.append(
+                own, total / float(np.mean(self.readings.sigma[self.readings.unit == METRES] ** 2))
+            )
             alone = self._maximum([*angles, *shared, "share"], sizes, None, favour=False)[1]
             if alone - self._maximum(names, scale, share, favour=False)[1] > _CLEAR_GAIN:
                 names, scale = ["robot", *angles, *shared], np.append(total, own)

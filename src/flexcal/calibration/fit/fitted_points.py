@@ -64,7 +64,10 @@ _FREE_STIFFNESS = 0.3
 
 @dataclass(frozen=True, eq=False)
 class PointFit:
-    """Input of a fit: the registered robot `start`, its `geometric` parameters, the length that is held for its `size`, their rank on the `poses`, the elastic `prior`."""
+    """Input of a fit: the registered robot `start`, its `geometric` parameters, their rank on the `poses`, the elastic `prior`.
+
+    `size` is the length that is held where no reading tells how large the robot is.
+    """
 
     start: RobotModel
     poses: PoseSet
@@ -115,7 +118,9 @@ class PointFit:
             sizes = np.array([plausible_size(start, name) for name in geometric.names])
             seen = kinematic_identifiability(start, poses, geometric, scale=sizes)
             structural = random_identifiability(start, poses, geometric, seen, scale=sizes)
-        return cls(start, poses, terms, geometric, held[:1], seen, structural, prior, elastic, marginalised, progress)
+        return cls(
+            start, poses, terms, geometric, held[:1], seen, structural, prior, elastic, marginalised, progress
+        )
 
     @cached_property
     def waves(self) -> dict[str, float]:
@@ -409,7 +414,9 @@ class FittedPoints:
 
     def _scatter_parameters(self) -> tuple[Parameters, np.ndarray]:
         scatter = self.scatter
-        instrument = scatter.share * float(np.sqrt(np.mean(self.fit.poses.sigma[self.fit.poses.present] ** 2)))
+        instrument = scatter.share * float(
+            np.sqrt(np.mean(self.fit.poses.sigma[self.fit.poses.present] ** 2))
+        )
         robot, robot_std = self._together("robot", "pose")
         model, model_std = self._together("workspace", "order", "command")
         values = (

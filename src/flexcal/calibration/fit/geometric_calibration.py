@@ -34,7 +34,8 @@ class GeometricFit:
     identifiable), stiffness and inertia as `prior` and points together have them, and the `scatter`; `identifiability` is that of
     the kinematic Jacobian, `undetermined` what has full rank and is hidden by noise or the choice of poses; `readings` (R, 3),
     measured minus predicted, m of the points, then rad of the orientations; `linear` the fit linearised at its solution, without outliers;
-    `flank` (N, n); `ambiguous` (N,) poses whose flank is not certain; `terms` those fitted.
+    `flank` (N, n); `ambiguous` (N,) poses whose flank is not certain; `terms` those fitted;
+    `size` the length that is held where no reading tells how large the robot is.
     """
 
     model: RobotModel
@@ -49,6 +50,7 @@ class GeometricFit:
     flank: np.ndarray
     ambiguous: np.ndarray
     terms: tuple[str, ...]
+    size: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.model.name}: {self.errors}>"
@@ -224,6 +226,7 @@ def _calibration(fitted: FittedPoints) -> GeometricFit:
         flank=fitted.flank,
         ambiguous=ambiguous_poses(calibrated, fitted.at),
         terms=fit.terms,
+        size=fit.size,
     )
 
 

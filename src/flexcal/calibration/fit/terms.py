@@ -47,8 +47,8 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
 
     `kinematic`: a place for every station, and a rotation for all but the first, whose rotation the first joint's errors span; six
     errors for every joint that moves a measured target, six for the tool, three for each further target, and a rotation for each target
-    whose orientation was measured. A wire has a place and a zero, a touched
-    plane a height and two tilts. Without an instrument of points nothing tells where the robot's base is: all places may turn, and errors of joints that move the whole robot as one are left out.
+    whose orientation was measured. A wire has a place and a zero, a touched plane a height and two tilts. Without an instrument of points
+    nothing tells where the robot's base is: all places may turn, and errors of joints that move the whole robot as one are left out.
     `backlash`: the joints declared with it; `transmission` none, its waves being random effects (`random_waves`).
     `gravity_compliance`, `lateral_compliance`, `transmission_1`…: one or two for every revolute joint on the way, compliances only where
     no spring is declared in their place and gravity loads the axis: by moments that vary by more than 1 % of those that vary most.
@@ -59,7 +59,9 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
     unplaced = not poses.located.any()
     known = next(iter(poses.station[poses.located].tolist()), None)
     for station in poses.stations:
-        names += [f"station.{station}.{key}" for key in _place(model, poses, station, turned=station != known)]
+        names += [
+            f"station.{station}.{key}" for key in _place(model, poses, station, turned=station != known)
+        ]
     errors = [f"{model.joints[i].name}.{key}" for i in joints for key in GEOMETRY]
     names += _moving_parts(model, poses, errors) if unplaced else errors
     names += [f"tool.{key}" for key in GEOMETRY]
@@ -237,7 +239,9 @@ def declared_size(model: RobotModel, name: str) -> float | None:
             (item.board.std for item in model.config.measurements.values() if item.kind == "camera"), None
         )
     if name == WIRE_SCALE:
-        return next((item.scale_std for item in model.config.measurements.values() if item.kind == "wire"), None)
+        return next(
+            (item.scale_std for item in model.config.measurements.values() if item.kind == "wire"), None
+        )
     if name in prior.parameters:
         return prior.parameters[name]
     if owner not in model.joint_names or key not in GEOMETRY:

@@ -74,7 +74,11 @@ class PredictedMeasurements:
     def _read(self, moved: np.ndarray) -> np.ndarray:
         """Change (N, 3, …) of what the instruments read with displacements of the targets (N, 3, …) in their axes."""
         slopes = self.readings.slopes
-        return moved if slopes is None else np.matmul(slopes, moved.reshape(len(moved), 3, -1)).reshape(moved.shape)
+        return (
+            moved
+            if slopes is None
+            else np.matmul(slopes, moved.reshape(len(moved), 3, -1)).reshape(moved.shape)
+        )
 
     @cached_property
     def residual(self) -> np.ndarray:

@@ -16,10 +16,11 @@ ABSENT, METRES, RADIANS = 0, 1, 2
 class Readings:
     """R readings of three coordinates: every measured point in the order of the pose set, then each of M measured orientations.
 
-    `row` (R,) is the row of the pose set that a reading belongs to, `unit` (R, 3) that of each coordinate, METRES or RADIANS, and `sigma`
-    (R, 3) its stated standard deviation, m or rad; 0 where it is absent or none is stated of an orientation. `stated` (R, 3, 3) and `across` (M, 3, 3),
-    between an orientation and its point, are the stated covariance where it is not diagonal; None where it is. `slopes` (N, 3, 3): change
-    of the N points' readings with a displacement of the target in the instrument's axes; None where each reads its coordinates.
+    `row` (R,) is the row of the pose set that a reading belongs to, `unit` (R, 3) that of each coordinate, METRES, RADIANS or ABSENT, and
+    `sigma` (R, 3) its stated standard deviation, m or rad; 0 where it is absent, or none is stated of an orientation. `stated`
+    (R, 3, 3) and `across` (M, 3, 3), between an orientation and its point, are the stated covariance where it is not diagonal; None where
+    it is. `slopes` (N, 3, 3): change of the N points' readings with a displacement of the target in the instrument's axes; None where each
+    reads its coordinates.
     """
 
     row: np.ndarray

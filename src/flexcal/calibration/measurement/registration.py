@@ -22,9 +22,10 @@ ALREADY_ALIGNED = 0.010
 def register(model: RobotModel, poses: PoseSet, predicted: np.ndarray) -> RobotModel:
     """Register every station of `poses` by the rigid motion that best maps `predicted` (N, 3) to the measured points (Kabsch).
 
-    Instruments of distances and touched faces are placed by `start_of_station`. A station whose points already agree to a centimetre is left at the base frame. The rotation of the first station stays where it
-    is put here, for the first joint's errors span it; the rest is refined by the fit. Raises `FlexcalError` for a station that
-    robot.yaml does not know, or with fewer than three poses that do not lie on a line.
+    Instruments of distances and touched faces are placed by `start_of_station`. A station whose points already agree to a centimetre is
+    left at the base frame. The rotation of the first station stays where it is put here, for the first joint's errors span it; the rest is
+    refined by the fit. Raises `FlexcalError` for a station that robot.yaml does not know, or with fewer than three poses that do not lie
+    on a line.
     """
     values: dict[str, float] = {}
     for station in poses.stations:

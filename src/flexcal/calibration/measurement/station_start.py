@@ -49,7 +49,8 @@ def start_of_station(kind: str, name: str, targets: np.ndarray, readings: np.nda
     else:
         if extents[1] < _FLAT * extents[0] and kind == PLANE:
             raise FlexcalError(
-                "E-CAL-022", f"the points touched on '{name}' lie on a line; touch the plane where it is wide."
+                "E-CAL-022",
+                f"the points touched on '{name}' lie on a line; touch the plane where it is wide.",
             )
         find = _plane if kind == PLANE else _line
         normal, through, misfit = find(targets, readings[:, 2])
@@ -101,30 +102,36 @@ def _plane(points: np.ndarray, readings: np.ndarray) -> tuple[np.ndarray, np.nda
 
     The normal has a positive largest coordinate where the readings do not tell its sign.
     """
-    fits = []
-    for sign in (1.0, -1.0):
-        normal, weights = _least_direction(points, np.ones(len(points))), np.ones(len(points))
-        normal = normal * sign * np.sign(normal[np.argmax(np.abs(normal))])
-        for _ in range(_PASSES):
-            inside = points - readings[:, None] * normal
-            found = _least_direction(inside, weights)
-            normal = found if found @ normal > 0 else -found
-            through = np.average(inside, axis=0, weights=weights)
-            misfit = (points - through) @ normal - readings
-            weights = _weights(misfit)
-        fits.append((normal, through, misfit))
+    first = _directions(points, np.ones(len(points)))[2]
+    first = first * np.sign(first[np.argmax(np.abs(first))])
+    fits = [_plane_about(points, readings, sign * first) for sign in (1.0, -1.0)]
     return min(fits, key=lambda fit: float(np.median(np.abs(fit[2]))))
+
+
+def _plane_about(
+    points: np.ndarray, readings: np.ndarray, normal: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """As `_plane`, with a normal on the side of a given one."""
+    through = (points - readings[:, None] * normal).mean(axis=0)
+    misfit = np.zeros(len(points))
+    for _ in range(_PASSES):
+        inside, weights = points - readings[:, None] * normal, _weights(misfit)
+        found = _directions(inside, weights)[2]
+        normal = found if found @ normal > 0 else -found
+        through = np.average(inside, axis=0, weights=weights)
+        misfit = (points - through) @ normal - readings
+    return normal, through, misfit
 
 
 def _line(points: np.ndarray, _readings: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Direction (3,) of a line, a point (3,) on it, and the distances (N,) of the points from it."""
-    weights = np.ones(len(points))
+    direction, through, misfit = np.zeros(3), points.mean(axis=0), np.zeros(len(points))
     for _ in range(_PASSES):
+        weights = _weights(misfit)
         through = np.average(points, axis=0, weights=weights)
-        direction = _directions(points - through, weights)[0]
+        direction = _directions(points, weights)[0]
         away = points - through
         misfit = np.linalg.norm(away - np.outer(away @ direction, direction), axis=1)
-        weights = _weights(misfit)
     return direction, through, misfit
 
 
@@ -136,11 +143,8 @@ def _turn_to_z(direction: np.ndarray) -> np.ndarray:
     return angle * (axis / size if size > _SMALLEST else np.array([1.0, 0.0, 0.0]))
 
 
-def _least_direction(points: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    return _directions(points - np.average(points, axis=0, weights=weights), weights)[2]
-
-
-def _directions(away: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Principal directions (3, 3), the rows, of weighted vectors (N, 3), the longest first."""
+def _directions(points: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Principal directions (3, 3), the rows, of weighted points (N, 3) about their mean, the longest first."""
+    away = points - np.average(points, axis=0, weights=weights)
     values, vectors = np.linalg.eigh((weights[:, None] * away).T @ away)
     return vectors[:, np.argsort(-values)].T

@@ -172,7 +172,9 @@ class TermTrials:
         lengths, angles = unit == METRES, unit == RADIANS
         lever = np.ones(unit.shape)
         if angles.any():
-            lever[angles] = np.sqrt(np.mean(residual[lengths] ** 2) / (np.mean(residual[angles] ** 2) + _TINY))
+            lever[angles] = np.sqrt(
+                np.mean(residual[lengths] ** 2) / (np.mean(residual[angles] ** 2) + _TINY)
+            )
         return lever[:, :1]
 
     @cached_property

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexcal.calibration.error_model import ErrorStatistics
+from flexcal.calibration.measurement import predict_measurements
 from flexcal.calibration.verification.uncalibrated_robot import UncalibratedErrors
 from flexcal.calibration.verification.unseen_poses import PredictionErrors
 from flexcal.data.poses import PoseSet
+
+if TYPE_CHECKING:
+    from flexcal.calibration.fit import GeometricFit
 
 DECLARED, NOMINAL, OWN = "declared", "nominal", "own"
 """Names of the uncalibrated robot: as declared, best-fit registered, and registered with the measured points fitted too."""
@@ -32,6 +37,20 @@ class MeasuredPoints:
     ambiguous: np.ndarray
     parameter_rms: np.ndarray | None = None
     scatter_rms: np.ndarray | None = None
+
+    @classmethod
+    def of_fit(cls, fit: GeometricFit, errors: Mapping[str, np.ndarray]) -> MeasuredPoints:
+        """Points of a fit with what every model leaves of their readings, (N, 3) m.
+
+        Distances and contacts are put where the calibrated robot has its point, and their errors in the direction that they measure.
+        """
+        poses = fit.poses
+        if poses.kind is not None:
+            at = predict_measurements(fit.model, poses)
+            slopes = np.eye(3) if at.readings.slopes is None else at.readings.slopes
+            errors = {name: np.matmul(left[:, None], slopes)[:, 0] for name, left in errors.items()}
+            poses = replace(poses, position=at.located + errors[CALIBRATED])
+        return cls(poses, errors, fit.ambiguous)
 
     @property
     def calibrated(self) -> np.ndarray:

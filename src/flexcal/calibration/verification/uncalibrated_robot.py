@@ -115,9 +115,13 @@ def _placed_by_readings(at_base: RobotModel, poses: PoseSet) -> UncalibratedRobo
     """Robot whose stations, some of which read distances or touches, are placed by all readings, and then the measured points too."""
     located = predict_measurements(at_base, poses, elastic=False).located
     registered = register(at_base, poses, located)
-    numbers = [name for s in poses.stations for name in (*(f"station.{s}.{k}" for k in STATION), f"station.{s}.zero")]
+    numbers = [
+        name for s in poses.stations for name in (*(f"station.{s}.{k}" for k in STATION), f"station.{s}.zero")
+    ]
     points = [f"point.{target}.{axis}" for target in poses.targets for axis in "xyz"]
-    return UncalibratedRobot(None, _refined(registered, poses, numbers), _refined(registered, poses, [*numbers, *points]))
+    return UncalibratedRobot(
+        None, _refined(registered, poses, numbers), _refined(registered, poses, [*numbers, *points])
+    )
 
 
 def _refined(model: RobotModel, poses: PoseSet, names: Sequence[str]) -> RobotModel:
@@ -129,7 +133,9 @@ def _refined(model: RobotModel, poses: PoseSet, names: Sequence[str]) -> RobotMo
         root = 1 / np.sqrt(1 + (misfit / scale) ** 2)
         columns = (root[:, None, None] * at.jacobian(names)).reshape(-1, len(names))
         step = np.linalg.lstsq(columns, (root[:, None] * at.residual).ravel(), rcond=_RANK)[0]
-        model = model.with_values({name: model.value(name) + float(s) for name, s in zip(names, step, strict=True)})
+        model = model.with_values(
+            {name: model.value(name) + float(s) for name, s in zip(names, step, strict=True)}
+        )
         if np.abs(step).max() < _SMALLEST:
             break
     return model

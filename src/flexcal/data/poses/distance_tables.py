@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -27,8 +27,7 @@ from flexcal.data.tables import (
 from flexcal.files.structuring import suggestion
 
 if TYPE_CHECKING:
-    from flexcal.model.robot import RobotModel
-    from flexcal.model.robot.config import FaceConfig, WireConfig
+    from flexcal.model.robot import FaceConfig, RobotModel, WireConfig
 
 WIRE, TOUCHED, READING, LENGTH = "wire", "touched", "reading", "length"
 _KINDS = {"wire": DISTANCE, "sphere": DISTANCE, "plane": PLANE, "line": LINE}
@@ -81,7 +80,9 @@ def read_distances(file: TableFile, model: RobotModel, further: Sequence[str] = 
     for own, coordinate in _COORDINATE.items():
         position[kind == own, coordinate] = read[kind == own]
     sigma = values["sigma"][:, 0] if "sigma" in values else _declared_sigma(declared, names)
-    pose = whole_numbers(table, signals["pose"].columns[0], values["pose"][:, 0]) if "pose" in values else None
+    pose = (
+        whole_numbers(table, signals["pose"].columns[0], values["pose"][:, 0]) if "pose" in values else None
+    )
     poses = PoseSet(
         q=values["q"],
         position=position,
@@ -102,9 +103,9 @@ def read_distances(file: TableFile, model: RobotModel, further: Sequence[str] = 
     return poses
 
 
-def _declared(file: TableFile, model: RobotModel, *, touched: bool) -> dict[str, WireConfig | FaceConfig]:
+def _declared(file: TableFile, model: RobotModel, *, touched: bool) -> Mapping[str, WireConfig | FaceConfig]:
     """Instruments under `measurements:` of robot.yaml that such a file may name."""
-    measurements = model.config.measurements
+    measurements = cast("Mapping[str, Any]", model.config.measurements)
     if touched:
         faces = {k: item for k, item in measurements.items() if item.kind in ("plane", "line", "sphere")}
         if not faces:
@@ -113,7 +114,7 @@ def _declared(file: TableFile, model: RobotModel, *, touched: bool) -> dict[str,
                 f"there is a column '{TOUCHED}', but robot.yaml declares nothing to touch; add `measurements: {{table: {{kind: plane}}}}` "
                 "(or line, or sphere) with the names in that column.",
             )
-        return dict(faces)
+        return faces
     wires = {k: item for k, item in measurements.items() if item.kind == "wire"}
     if not wires:
         raise file.error(
@@ -125,11 +126,11 @@ def _declared(file: TableFile, model: RobotModel, *, touched: bool) -> dict[str,
             "E-POSES-060",
             f"robot.yaml declares the wires {', '.join(wires)}; add a column '{WIRE}' with the name of that which was read.",
         )
-    return dict(wires)
+    return wires
 
 
 def _names(
-    table: Table, declared: dict[str, WireConfig | FaceConfig], column: str, rows: int
+    table: Table, declared: Mapping[str, WireConfig | FaceConfig], column: str, rows: int
 ) -> np.ndarray:
     """Names (N,) of the instruments of every row."""
     if column not in table.columns:
@@ -145,7 +146,7 @@ def _names(
     return names
 
 
-def _declared_sigma(declared: dict[str, WireConfig | FaceConfig], names: np.ndarray) -> np.ndarray | None:
+def _declared_sigma(declared: Mapping[str, WireConfig | FaceConfig], names: np.ndarray) -> np.ndarray | None:
     """Standard deviations (N,), m, as declared; None where one is not."""
     known = {name: declared[name].std for name in dict.fromkeys(names.tolist())}
     if any(std is None for std in known.values()):

@@ -19,7 +19,14 @@ from flexcal.data.poses.columns import (
     unit_quaternions,
     whole_numbers,
 )
-from flexcal.data.poses.distance_tables import LENGTH, READING, TOUCHED, WIRE, measures_distances, read_distances
+from flexcal.data.poses.distance_tables import (
+    LENGTH,
+    READING,
+    TOUCHED,
+    WIRE,
+    measures_distances,
+    read_distances,
+)
 from flexcal.data.poses.pose_set import DEFAULT_SIGMA, PLANE, PoseSet, concatenate
 from flexcal.data.poses.socket_tables import SOCKET_COLUMNS, measures_sockets, read_sockets
 from flexcal.data.tables import (

@@ -12,10 +12,12 @@ from flexcal.calibration.diagnostics import (
     board_size,
     implausible_shifts,
     is_implausible,
+    reading_jumps,
     residuals_implausible,
 )
 from flexcal.calibration.fit import GeometricFit
 from flexcal.jobs.calibration.ignored_columns import ignored_columns_remarks
+from flexcal.model.robot import WIRE_SCALE
 from flexcal.units import MILLIMETRE
 
 _LOOK = (
@@ -77,7 +79,7 @@ def calibration_remarks(fit: GeometricFit, cause: Sequence[str] = ()) -> tuple[s
         listed = ", ".join(str(outlier) for outlier in outliers[:_LISTED])
         more = f" and {len(outliers) - _LISTED} more" if len(outliers) > _LISTED else ""
         remarks.append(f"{len(outliers)} outliers: {listed}{more}")
-    remarks += [*_undetermined(fit), *_views(fit), *_noise(fit)]
+    remarks += [*_undetermined(fit), *_views(fit), *_size(fit), *_noise(fit), *_jumps(fit)]
     drift = Drift.of(fit) if fit.poses.located.any() else None
     if drift is not None and drift.certain:
         remarks.append(
@@ -146,6 +148,43 @@ def _views(fit: GeometricFit) -> Sequence[str]:
         *wrong,
         f"{seen.sum()} poses were measured by a camera, each with the noise of its own view: {noise:.3f} mm rms expected, {found:.3f} mm "
         "found; the fit weighs the views by their noise, so the calibrated robot is far more accurate than one view",
+    )
+
+
+def _size(fit: GeometricFit) -> Sequence[str]:
+    """Remark on what tells the size of the robot where an instrument of points does not."""
+    if fit.size:
+        name = fit.size[0]
+        std = fit.estimate.parameters[name].prior_std
+        return (
+            f"none of these readings tells how large the robot is: it has its size from {name} at the nominal value, taken as known to "
+            f"{std / MILLIMETRE:.2g} mm, and all its lengths are off in the same ratio as that; measure with a wire, sockets at a known "
+            "distance or an instrument of points too where that matters",
+        )
+    held = [name for name in (WIRE_SCALE,) if name in fit.estimate.parameters.names]
+    if held and not fit.poses.located.any():
+        std = fit.estimate.parameters[WIRE_SCALE].prior_std
+        return (
+            f"all lengths of the robot are known to {1e3 * std:.2g} per mille, which is the `scale_std` of the wire in robot.yaml",
+        )
+    return ()
+
+
+def _jumps(fit: GeometricFit) -> Sequence[str]:
+    """Remark on instruments that were zeroed or moved between two measurements."""
+    jumps = reading_jumps(fit)
+    if not jumps:
+        return ()
+    listed = ", ".join(
+        f"{jump.station} by {jump.size / MILLIMETRE:+.2f} mm between poses {jump.before} and {jump.after}"
+        for jump in jumps[:_SHOWN]
+    )
+    more = (
+        f" and {len(jumps) - _SHOWN} smaller ones, which may follow from these" if len(jumps) > _SHOWN else ""
+    )
+    return (
+        f"the readings jump: {listed}{more}. What is zeroed, hung up again or moved between measurements is another instrument: declare "
+        "one for each part under `measurements:` in robot.yaml, and name it in the column `wire` or `touched`",
     )
 
 

@@ -156,7 +156,7 @@ class Calibration(Identification):
         errors = errors_before(self.before) | {RIGID: self.rigid.residuals, CALIBRATED: fit.residuals}
         if self.rigid is fit:
             del errors[RIGID]
-        return MeasuredPoints(fit.poses, errors, fit.ambiguous)
+        return MeasuredPoints.of_fit(fit, errors)
 
     @cached_property
     def trust(self) -> Trust:

@@ -149,4 +149,4 @@ def stored_estimates(nominal: RobotModel, estimates: Path | None) -> Path:
 
 def is_station_identified(model: RobotModel, station: str) -> bool:
     """Whether the calibration estimated the placement of this station."""
-    return f"station.{station}.x" in model.posterior.parameters
+    return any(name.startswith(f"station.{station}.") for name in model.posterior.parameters.names)

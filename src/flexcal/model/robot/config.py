@@ -482,7 +482,9 @@ class RobotConfig:
     geometry: GeometryConfig = GeometryConfig()
     dynamics: DynamicsConfig = DynamicsConfig()
     stations: dict[str, StationConfig] = field(default_factory=dict)
-    measurements: dict[str, SocketsConfig | CameraConfig | WireConfig | FaceConfig] = field(default_factory=dict)
+    measurements: dict[str, SocketsConfig | CameraConfig | WireConfig | FaceConfig] = field(
+        default_factory=dict
+    )
     obstacles: tuple[str, ...] = ()
     limits: LimitsConfig = LimitsConfig()
     working_volume: BoxConfig | None = None
