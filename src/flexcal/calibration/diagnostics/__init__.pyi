@@ -1,8 +1,8 @@
 from .bearing_axes import BearingAxes, compare_bearings
 from .drift_test import Drift
 from .gravity_residuals import GravityLoads, gravity_loads
+from .jumps_in_readings import ReadingJump, reading_jumps
 from .plausibility import implausible_shifts, is_implausible, residuals_implausible
-from .reading_jumps import ReadingJump, reading_jumps
 from .size_of_board import board_size
 
 __all__ = [

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from flexcal.data.poses import (
+    DISTANCE,
     PoseSet,
     check_metres,
     check_positive,
@@ -305,7 +306,7 @@ def _check_poses(
     place = "xyz" if "xyz" in values else "length"
     poses = PoseSet(
         q=values["q"],
-        position=values.get("xyz", np.full((n, 3), np.nan)),
+        position=values["xyz"] if place == "xyz" else values["length"] * [1.0, 0.0, 0.0],
         sigma=np.ones((n, 3)),
         torque=None,
         payload=None,
@@ -313,7 +314,7 @@ def _check_poses(
         station=columns.get("station", np.full(n, "")),
         temperature=None,
         pose=values["pose"],
-        length=None if "length" not in values else values["length"][:, 0],
+        kind=None if place == "xyz" else np.full(n, DISTANCE),
     )
     check_metres(poses, model, table, guess.placed[place].signal())
 
