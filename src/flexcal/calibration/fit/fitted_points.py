@@ -99,6 +99,7 @@ class PointFit:
         """
         if not are_different(poses.q, LEAST_POSES):
             terms = tuple(term for term in terms if term != TRANSMISSION)
+        model = model.with_stations(poses.places)
         model = model.with_lenses({name: lens.values for name, lens in poses.lenses.items()})
         bare = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
         start = register(model, poses, predict_measurements(bare, poses, elastic=elastic).located)
