@@ -9,6 +9,7 @@ from .prediction import (
 from .propagated_covariance import Propagation, covariance_root, moving_parameters, propagation
 from .readings import METRES, RADIANS, Readings
 from .registration import best_motion, register, require_orientations, rigid_motion, with_target_axes
+from .station_start import turn_to_z
 
 __all__ = [
     "METRES",
@@ -29,5 +30,6 @@ __all__ = [
     "require_orientations",
     "require_points",
     "rigid_motion",
+    "turn_to_z",
     "with_target_axes",
 ]

@@ -54,7 +54,7 @@ def start_of_station(kind: str, name: str, targets: np.ndarray, readings: np.nda
             )
         find = _plane if kind == PLANE else _line
         normal, through, misfit = find(targets, readings[:, 2])
-        turn, zero = _turn_to_z(normal), 0.0
+        turn, zero = turn_to_z(normal), 0.0
         offset = -vector_rotation(turn) @ through
     away, extent = float(np.median(np.abs(misfit))), float(extents[0]) / np.sqrt(len(targets))
     if away > _FOREIGN * extent:
@@ -135,7 +135,7 @@ def _line(points: np.ndarray, _readings: np.ndarray) -> tuple[np.ndarray, np.nda
     return direction, through, misfit
 
 
-def _turn_to_z(direction: np.ndarray) -> np.ndarray:
+def turn_to_z(direction: np.ndarray) -> np.ndarray:
     """Rotation vector (3,) of the smallest rotation of a direction (3,) to the z axis."""
     axis = np.cross(direction, [0.0, 0.0, 1.0])
     size = float(np.linalg.norm(axis))

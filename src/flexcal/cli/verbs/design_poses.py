@@ -27,6 +27,8 @@ from flexcal.errors import InputError
 from flexcal.units import MILLIMETRE
 
 Planned = TypeVar("Planned")
+_UNSEEN = 0.1
+"""Share of the error from noise above which an error that no reading tells is said."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,10 @@ class DesignPoses:
         MaybeNumber, arg(metavar="KG", help_behavior_hint="(default: as robot.yaml declares)")
     ] = None
     """Payload in these poses, kg."""
+    measure: Annotated[
+        MaybeText, arg(metavar="NAME", help_behavior_hint="(default: a tracker of points)")
+    ] = None
+    """What will measure: a name under measurements: of robot.yaml that says where it stands, or pose for a tracker of orientations too."""
     seed: Annotated[int, arg(metavar="N")] = 0
     """Seed of the random poses."""
     json: Json = False
@@ -85,6 +91,8 @@ class DesignPoses:
             raise InputError("E-CLI-022", f"--wanted is {self.wanted:g}; it must be a positive number of mm.")
         if self.random and self.pool is not None:
             raise InputError("E-CLI-023", "--random and --from exclude each other; give one of them.")
+        if self.measure is not None and (self.random or self.measured or self.pool is not None):
+            raise InputError("E-CLI-042", "--measure goes with none of --random, --measured and --from.")
         if self.random and self.measured:
             raise InputError("E-CLI-024", "--random and --measured exclude each other; give one of them.")
         console = Console(self.json)
@@ -122,6 +130,7 @@ class DesignPoses:
             desired_error=None if self.wanted is None else self.wanted * MILLIMETRE,
             payload=self.payload,
             seed=self.seed,
+            measure=self.measure,
         )
         files = PoseRequestFiles(self.pool, self.working)
         with console.progress() as progress:
@@ -134,13 +143,26 @@ class DesignPoses:
         document = design.document()
         seen = document["identifiability"]
         console.say(
-            f"{seen['rank']} of {seen['parameters']} parameters are identifiable from position measurements"
+            f"{seen['rank']} of {seen['parameters']} parameters are identifiable from "
+            + (
+                "position measurements"
+                if self.measure is None
+                else f"the readings of {document['instrument']}"
+            )
         )
         console.say(
-            f"predicted tool error from tracker noise alone: {document['tool_error_mm']:.4f} mm (rms over {_where(document)}); "
+            f"predicted tool error from the noise of {document['instrument']} alone: {document['tool_error_mm']:.4f} mm "
+            f"(rms over {_where(document)}); "
             f"lower bound for this number of poses: {document['least_possible_mm']:.4f} mm; from "
             f"{document['enough_poses']} poses on further ones only average noise"
         )
+        if self.measure is not None:
+            unseen, tracked = document["unseen_mm"], document["with_tracker_mm"]
+            console.say(f"with a tracker of points and as many poses: {tracked:.4f} mm")
+            if unseen > _UNSEEN * document["tool_error_mm"]:
+                console.say(
+                    f"besides, {unseen:.3f} mm are what these readings cannot tell, as how large the robot is, from typical tolerances"
+                )
         others = {name: value for name, value in document["criteria"].items() if name != "c"}
         console.say("criteria: " + ", ".join(f"{name} {value:.4g}" for name, value in others.items()))
         self._say_pool(console, document)

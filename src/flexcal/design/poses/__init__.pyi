@@ -4,7 +4,15 @@ from .feasibility import PoseCandidates, pose_candidates
 from .geometry_sensitivity import GeometricTolerances, base_sensitivity, geometry_jacobian, pose_sensitivity
 from .gravity_preload import preloaded
 from .ordering import MeasurementOrder, measurement_order
-from .selection import CriterionName, PoseDesign, choose_poses, fewest_poses, random_poses, select_poses
+from .selection import (
+    CriterionName,
+    PoseDesign,
+    choose_poses,
+    fewest_poses,
+    random_poses,
+    select_poses,
+    tool_error,
+)
 from .sequential_selection import NextPoses, select_next_poses
 from .working_volume import WorkingVolume, working_box, working_points
 
@@ -30,6 +38,7 @@ __all__ = [
     "random_poses",
     "select_next_poses",
     "select_poses",
+    "tool_error",
     "working_box",
     "working_points",
 ]

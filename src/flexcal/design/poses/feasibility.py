@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,8 +16,11 @@ from flexcal.design.poses.geometry_sensitivity import (
     pose_sensitivity,
 )
 from flexcal.design.poses.gravity_preload import preload_joints, preloaded
+from flexcal.design.poses.instrument_sensitivity import instrument_sensitivity
+from flexcal.design.poses.instruments import Instrument
 from flexcal.design.scene import STANDARD, CollisionChecker, MeasuringSetup, visible
 from flexcal.errors import FlexcalError
+from flexcal.model.kinematics import point_kinematics
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import gravity_torque
 from flexcal.progress import Progress, silent
@@ -30,7 +34,8 @@ class PoseCandidates:
     """Candidate poses that can be measured with `setup`.
 
     `base` holds the rows of all poses of the `pool`; `tool_error_weight` (rank, rank), m², turns a covariance into the mean square of the
-    tool error over the working poses. `hidden` are the numbers of a given pool's poses that the instrument does not see.
+    tool error over the working poses. `hidden` are the numbers of a given pool's poses that the instrument does not see; `unseen`, m, is
+    the root mean square of the tool error due to what no pose tells, as the size of the robot at contacts, by the tolerances.
     """
 
     model: RobotModel
@@ -39,6 +44,7 @@ class PoseCandidates:
     base: BaseSensitivity
     tool_error_weight: np.ndarray
     hidden: np.ndarray
+    unseen: float = 0.0
 
 
 def pose_candidates(
@@ -70,23 +76,85 @@ def pose_candidates(
         pool = _usable(checker, candidates, seen, least, setup)
     else:
         q = random_candidates(checker, candidates, rng, setup, preload=True, progress=progress)
+        if setup.measure is not None:
+            q = _at_instrument(checker, q, least, setup)
         pool, hidden = PosePool(q, np.arange(1, len(q) + 1)), np.zeros(0, dtype=int)
     _check_flanks(model, pool.q, setup.payload)
-    base = base_sensitivity(pose_sensitivity(model, pool.q, setup))
+    sensitivity = pose_sensitivity if setup.measure is None else instrument_sensitivity
+    full = sensitivity(model, pool.q, setup)
+    base = base_sensitivity(full)
     if working is None:
-        anywhere = replace(setup, acceptance=None)
+        anywhere = replace(setup, acceptance=None, measure=None)
         working = random_candidates(checker, WORKING_POSES, rng, anywhere)
-    return PoseCandidates(model, setup, pool, base, tool_error_weight(base, model, working, setup), hidden)
+    rows = tool_motions(base.identifiability.names, model, working, setup)
+    weight = tool_error_weight(base, rows)
+    return PoseCandidates(
+        model, setup, pool, base, weight, hidden, unseen_error(base, rows, full.parameters.prior_std())
+    )
 
 
-def tool_error_weight(
-    base: BaseSensitivity, model: RobotModel, working: np.ndarray, setup: MeasuringSetup = STANDARD
+def _at_instrument(checker: CollisionChecker, q: np.ndarray, least: int, setup: MeasuringSetup) -> np.ndarray:
+    """Configurations (M, n) at contact with the instrument, from some near by; raises `FlexcalError` where they are too few."""
+    model, target = checker.model, checker.model.point(setup.point).name
+    instrument = Instrument.declared(model, str(setup.measure))
+    q = instrument.reached(model, q, target)
+    if instrument.touched:
+        q = q[~checker.collides(q)]
+        q = q[preloaded(model, q, setup.payload)]
+    if len(q) < least:
+        raise FlexcalError(
+            "E-DESIGN-056",
+            f"only {len(q)} poses reach {instrument.name} where robot.yaml puts it, and {least} are to be chosen; correct its place, or "
+            "give more --candidates.",
+        )
+    return q
+
+
+def tool_motions(
+    names: Sequence[str], model: RobotModel, working: np.ndarray, setup: MeasuringSetup = STANDARD
 ) -> np.ndarray:
-    """W = mean over the `working` poses (W, n) of JᵀJ (rank, rank), m²: tr(W Σ) is the mean square error of the tool position."""
-    names, jacobian = geometry_jacobian(model, working, setup)
-    assert names == base.identifiability.names
-    rows = base.columns(jacobian).reshape(-1, len(base.scale))
-    return rows.T @ rows / len(jacobian)
+    """Motions (W, 3, p) of the tool at the `working` poses (W, n) with parameters by their names; none with those of an instrument.
+
+    Without what moves all working poses as one body where the instrument does not tell where the base is.
+    """
+    known, jacobian = geometry_jacobian(model, working, setup)
+    if tuple(names) == known:
+        return jacobian
+    every = np.zeros((len(jacobian), 3, len(names)))
+    for k, name in enumerate(names):
+        if name in known:
+            every[:, :, k] = jacobian[:, :, known.index(name)]
+    if setup.measure is None or Instrument.declared(model, setup.measure).tells_base:
+        return every
+    return _wherever_the_base_is(model, working, every, setup.point)
+
+
+def tool_error_weight(base: BaseSensitivity, motions: np.ndarray) -> np.ndarray:
+    """W = mean over the working poses of JᵀJ (rank, rank), m²: tr(W Σ) is the mean square error of the tool position."""
+    rows = base.columns(motions).reshape(-1, len(base.scale))
+    return rows.T @ rows / len(motions)
+
+
+def unseen_error(base: BaseSensitivity, motions: np.ndarray, tolerance: np.ndarray) -> float:
+    """Root mean square tool error, m, of the directions that no candidate sees, conditional on the combinations that are seen."""
+    regrouping = base.identifiability.regrouping * tolerance
+    # the prior, in units of the tolerances, without the span of the seen combinations
+    basis = np.linalg.qr(regrouping.T)[0]
+    rows = (motions * tolerance).reshape(-1, motions.shape[2])
+    left = rows - (rows @ basis) @ basis.T
+    return float(np.sqrt((left**2).sum() / len(motions)))
+
+
+def _wherever_the_base_is(
+    model: RobotModel, working: np.ndarray, rows: np.ndarray, point: str | None
+) -> np.ndarray:
+    """Motions (W, 3, p) of the tool without what moves all working poses as one body."""
+    at = point_kinematics(model, working, point=point, jacobians=False).position
+    rigid = np.zeros((len(at), 3, 6))
+    rigid[:, :, :3], rigid[:, :, 3:] = np.eye(3), np.cross(np.eye(3)[:, None], at).transpose(1, 2, 0)
+    basis = np.linalg.qr(rigid.reshape(-1, 6))[0]
+    flat = rows.reshape(len(basis), -1)
+    return (flat - basis @ (basis.T @ flat)).reshape(rows.shape)
 
 
 def _usable(

@@ -23,6 +23,12 @@ class GeometricTolerances:
     angle: float = 0.5e-3
     station: float = 10 * MILLIMETRE
 
+    def of(self, name: str) -> float:
+        """Tolerance of a parameter by its name."""
+        if name.startswith("station."):
+            return self.station
+        return self.angle if unit_of(name) == "rad" else self.length
+
 
 BLOCK = 512
 """Number of poses whose rows are computed together, sized for the processor's cache."""
@@ -68,7 +74,7 @@ def pose_sensitivity(
     names, _ = geometry_jacobian(model, q[:1], setup)
     std = measuring_noise(model, q, setup)
     parameters = Parameters(
-        Parameter(name, unit_of(name), 0.0, prior_std=_tolerance(name, tolerances)) for name in names
+        Parameter(name, unit_of(name), 0.0, prior_std=tolerances.of(name)) for name in names
     )
     whitened = np.empty((len(q), 3, len(names)))
     for first in range(0, len(q), BLOCK):
@@ -83,12 +89,6 @@ def measuring_noise(model: RobotModel, q: np.ndarray, setup: MeasuringSetup = ST
     position = point_kinematics(model, q, point=setup.point, jacobians=False).position
     apart = np.full(len(q), 2 * model.reach) if origin is None else np.linalg.norm(position - origin, axis=1)
     return setup.noise.std(apart)
-
-
-def _tolerance(name: str, tolerances: GeometricTolerances) -> float:
-    if name.startswith("station."):
-        return tolerances.station
-    return tolerances.angle if unit_of(name) == "rad" else tolerances.length
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,7 +42,7 @@ class PoseDesign:
     `candidates` are what there was to choose from, `selection` what was chosen by `criterion`; `base` holds the rows of all candidates;
     `tool_error_weight` (rank, rank), m², turns a covariance into the mean square of the tool error over the working poses; `flank`
     (N, joints with backlash) is the sign of the gravity torque at `flank_joints`; `hidden` are the numbers of given poses that the
-    instrument does not see.
+    instrument does not see; `unseen`, m, is the tool error due to what no pose tells.
     """
 
     plan: PosePlan
@@ -54,6 +54,7 @@ class PoseDesign:
     flank_joints: tuple[str, ...]
     flank: np.ndarray
     hidden: np.ndarray
+    unseen: float = 0.0
 
     @classmethod
     def of(
@@ -72,6 +73,7 @@ class PoseDesign:
             flank_joints=tuple(candidates.model.joint_names[i] for i in loose),
             flank=np.sign(gravity_torque(candidates.model, chosen, candidates.setup.payload))[:, loose],
             hidden=candidates.hidden,
+            unseen=candidates.unseen,
         )
 
     def in_order(self, order: np.ndarray) -> PoseDesign:
@@ -97,7 +99,7 @@ class PoseDesign:
     def tool_error(self) -> float:
         """Predicted error of the calibrated tool position, m: root mean square of its length over the working poses.
 
-        From tracker noise alone; what deflection, backlash near its crossing or repeatability add is not in it.
+        From the instrument's noise alone; what deflection, backlash near its crossing or repeatability add is not in it.
         """
         return tool_error(self.base, self.tool_error_weight, self.selection.chosen)
 
@@ -180,12 +182,12 @@ def choose_poses(
     progress: Progress = silent,
 ) -> PoseDesign:
     """As `select_poses`, from given candidates; `rng` draws the plan's seed."""
-    rank = candidates.base.identifiability.rank
-    if 3 * count < rank:
+    rank, rows = candidates.base.identifiability.rank, candidates.base.sensitivity.jacobian.shape[1]
+    if rows * count < rank:
         raise FlexcalError(
             "E-DESIGN-026",
-            f"{count} poses cannot determine {rank} geometric parameters of {candidates.model.name}; "
-            f"choose at least {-(-rank // 3)}, better twice as many.",
+            f"{count} poses cannot determine {rank} parameters of {candidates.model.name} and the instrument; "
+            f"choose at least {-(-rank // rows)}, better twice as many.",
         )
     optimality = criterion_named(criterion, candidates.tool_error_weight)
     selection = exchange_on_shortlist(candidates.base.sensitivity, count, optimality, progress=progress)
@@ -198,14 +200,14 @@ def fewest_poses(candidates: PoseCandidates, most: int, desired_error: float) ->
     """
     weight, sensitivity = candidates.tool_error_weight, candidates.base.sensitivity
     order = greedy(sensitivity, most, TraceOptimal(weight, "c")).chosen
-    least = -(-candidates.base.identifiability.rank // 3)
+    least = -(-candidates.base.identifiability.rank // sensitivity.jacobian.shape[1])
     for count in range(least, most + 1):
         if tool_error(candidates.base, weight, order[:count]) <= desired_error:
             return count
     reached = tool_error(candidates.base, weight, order)
     raise FlexcalError(
         "E-DESIGN-027",
-        f"{most} poses predict a tool error of {reached / MILLIMETRE:.4f} mm from tracker noise alone, not "
+        f"{most} poses predict a tool error of {reached / MILLIMETRE:.4f} mm from the instrument's noise alone, not "
         f"{desired_error / MILLIMETRE:.4f} mm; "
         "allow more poses, or a larger error.",
     )

@@ -37,6 +37,8 @@ class MeasuringSetup:
         Noise of the instrument.
     acceptance : AcceptanceConfig, optional
         Acceptance of the reflector; without, it is turned by hand and seen from everywhere.
+    measure : str, optional
+        Name of the instrument under `measurements:`, or "pose" for a tracker of orientations too; by default a tracker of points.
     """
 
     point: str | None = None
@@ -44,9 +46,12 @@ class MeasuringSetup:
     payload: float | None = None
     noise: TrackerNoise = TrackerNoise()
     acceptance: AcceptanceConfig | None = None
+    measure: str | None = None
 
     @classmethod
-    def declared(cls, model: RobotModel, payload: float | None = None) -> MeasuringSetup:
+    def declared(
+        cls, model: RobotModel, payload: float | None = None, measure: str | None = None
+    ) -> MeasuringSetup:
         """Measuring setup with the first point as robot.yaml declares it, and the acceptance of its reflector.
 
         Parameters
@@ -55,6 +60,8 @@ class MeasuringSetup:
             The robot.
         payload : float, optional
             Mass, kg; by default as declared.
+        measure : str, optional
+            Name of the instrument; by default a tracker.
 
         Returns
         -------
@@ -62,8 +69,11 @@ class MeasuringSetup:
             The setup.
         """
         point = next(iter(model.config.points), None)
+        shown = point is not None and measure in (None, "pose")
         return cls(
-            payload=payload, acceptance=None if point is None else model.config.points[point].acceptance
+            payload=payload,
+            acceptance=model.config.points[point].acceptance if shown and point is not None else None,
+            measure=measure,
         )
 
 

@@ -49,6 +49,8 @@ class PoseRequest:
         Mass, kg; by default that of the pool, else the declared one.
     seed : int
         Seed of the random poses.
+    measure : str, optional
+        What will measure: a name under `measurements:`, or "pose" for a tracker of orientations too; by default a tracker of points.
     """
 
     count: int = 40
@@ -58,6 +60,7 @@ class PoseRequest:
     desired_error: float | None = None
     payload: float | None = None
     seed: int = 0
+    measure: str | None = None
 
     def volume(self, checker: CollisionChecker) -> WorkingVolume | None:
         """Working volume of the robot; None for anywhere. Raises `FlexcalError` for a box that it does not reach."""
@@ -99,7 +102,7 @@ class CandidatePoses:
             rng=rng,
             candidates=given,
             least=request.count,
-            setup=MeasuringSetup.declared(model, request.payload),
+            setup=MeasuringSetup.declared(model, request.payload, request.measure),
             working=None if place is None else place.q,
             checker=checker,
             progress=progress,

@@ -11,6 +11,7 @@ import numpy as np
 
 from flexcal.data.plans import PosePlan, page_beside, write_plan
 from flexcal.data.poses import PosePool
+from flexcal.design.optimality import TraceOptimal, greedy
 from flexcal.design.poses import (
     MeasurementOrder,
     PoseCurve,
@@ -21,6 +22,7 @@ from flexcal.design.poses import (
     measurement_order,
     pose_curve,
     random_poses,
+    tool_error,
 )
 from flexcal.design.scene import MeasuringSetup
 from flexcal.errors import naming
@@ -41,6 +43,8 @@ from flexcal.units import MILLIMETRE
 
 VERIFICATION = "verification"
 """Name of a plan of random poses."""
+_FEW = 1000
+"""Number of candidates for the comparison with a tracker."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +92,10 @@ class DesignedPoses(PlottedResult):
         File of the plan, where it was written.
     record : RunRecord
         What the result comes from.
+    measure : str or None
+        What is to measure, as requested; None for a tracker of points.
+    with_tracker : float or None
+        Predicted tool error, m, of as many poses with a tracker of points, where something else is to measure.
     """
 
     plan: PosePlan
@@ -99,11 +107,21 @@ class DesignedPoses(PlottedResult):
     pool: PosePool | None = None
     file: Path | None = None
     record: RunRecord = NOT_RECORDED
+    measure: str | None = None
+    with_tracker: float | None = None
 
     @property
     def headline(self) -> str:
         """Number of poses and predicted tool error."""
-        return f"{len(self.plan)} poses, predicted tool error {self.design.tool_error / MILLIMETRE:.4f} mm from tracker noise alone"
+        error = self.design.tool_error / MILLIMETRE
+        return f"{len(self.plan)} poses, predicted tool error {error:.4f} mm from the noise of {self.instrument} alone"
+
+    @property
+    def instrument(self) -> str:
+        """What is to measure, in words."""
+        return {None: "a tracker", "pose": "a tracker of orientations too"}.get(
+            self.measure, str(self.measure)
+        )
 
     def summary(self) -> str:
         """Predicted tool error, rank, and the number of poses beyond which more only average noise."""
@@ -133,6 +151,10 @@ class DesignedPoses(PlottedResult):
                 "candidates": len(design.candidates),
                 "tool_error_mm": design.tool_error / MILLIMETRE,
                 "least_possible_mm": design.least_possible / MILLIMETRE,
+                "measure": self.measure,
+                "instrument": self.instrument,
+                "unseen_mm": design.unseen / MILLIMETRE,
+                "with_tracker_mm": None if self.with_tracker is None else self.with_tracker / MILLIMETRE,
                 "working": working_block(self.working),
                 "criteria": design.criteria,
                 "identifiability": identifiability_block(design.identifiability),
@@ -230,9 +252,25 @@ def _designed(
     design = design.in_order(way.order)
     curve = pose_curve(design, rng=np.random.default_rng([request.seed, 5]), progress=progress)
     plan = replace(design.plan, name="calibration")
-    return DesignedPoses(
+    designed = DesignedPoses(
         choice.checker.model, plan, design, curve, way, request.seed, choice.working, choice.pool
     )
+    if request.measure is None:
+        return designed
+    return replace(
+        designed, measure=request.measure, with_tracker=_with_tracker(choice, request, len(plan), progress)
+    )
+
+
+def _with_tracker(choice: CandidatePoses, request: PoseRequest, count: int, progress: Progress) -> float:
+    """Predicted tool error, m, of `count` poses for a tracker of points, chosen one by one from few candidates."""
+    rng = np.random.default_rng([request.seed, 7])
+    few = replace(request, measure=None, candidates=max(_FEW, 2 * count), working=choice.working)
+    candidates = CandidatePoses.of(choice.checker.model, few, rng, progress).candidates
+    chosen = greedy(
+        candidates.base.sensitivity, count, TraceOptimal(candidates.tool_error_weight, "c")
+    ).chosen
+    return tool_error(candidates.base, candidates.tool_error_weight, chosen)
 
 
 def plan_calibration_poses(

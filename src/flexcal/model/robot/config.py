@@ -296,11 +296,13 @@ class SocketsConfig:
     """Sockets of a fixture, which hold a ball on the tool: their positions by name in the fixture's own axes, m.
 
     The fixture stands anywhere, and is moved from place to place. std: standard deviation of the distances between its sockets, m.
+    at: where it is to stand, m in the base frame with its axes, for design.
     """
 
     kind: Literal["sockets"]
     sockets: dict[str, Triple]
     std: float = 1e-4
+    at: tuple[Triple, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.sockets:
@@ -371,11 +373,13 @@ class WireConfig:
     """Draw-wire sensor, or another instrument of distances from a point that stands anywhere in the cell.
 
     std: standard deviation of a length, m; None where it is not known. scale_std: relative standard deviation of all its lengths together.
+    xyz: where it is roughly, m in the base frame, for design.
     """
 
     kind: Literal["wire"]
     std: float | None = None
     scale_std: float = 1e-3
+    xyz: Triple | None = None
 
     def __post_init__(self) -> None:
         _require_std(self.std)
@@ -387,11 +391,15 @@ class WireConfig:
 class FaceConfig:
     """Plane, line or sphere anywhere in the cell that the measured point touches; a plane may be read by a dial gauge.
 
-    std: standard deviation of a contact, m; None where it is not known.
+    std: standard deviation of a contact, m; None where it is not known. For design: xyz, roughly a point of the plane or line, or the
+    centre, m in the base frame; normal of the plane, or direction of the line; radius of the sphere with that of the probe, m.
     """
 
     kind: Literal["plane", "line", "sphere"]
     std: float | None = None
+    xyz: Triple | None = None
+    normal: Triple = (0.0, 0.0, 1.0)
+    radius: float = 0.02
 
     def __post_init__(self) -> None:
         _require_std(self.std)

@@ -109,8 +109,8 @@ def pose_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
 def _sentence(results: Mapping[str, Any]) -> str:
     if "measured" not in results:
         return (
-            f"Measured with a tracker, they predict a tool error of {significant(results['tool_error_mm'], 3)} mm from its noise alone; no "
-            f"choice of as many reaches less than {significant(results['least_possible_mm'], 3)} mm."
+            f"Measured with {results['instrument']}, they predict a tool error of {significant(results['tool_error_mm'], 3)} mm from its "
+            f"noise alone; no choice of as many reaches less than {significant(results['least_possible_mm'], 3)} mm."
         )
     errors, poses = results["tool_error_mm"], results["poses"]
     end = "then stop" if results["stop_after"] is not None else "go on after them"

@@ -1,0 +1,195 @@
+"""Instruments that a plan of poses may be for, other than a tracker of points: where they stand, and what they read at a pose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from flexcal.calibration.measurement import predict_measurements, turn_to_z
+from flexcal.data.poses import DEFAULT_SIGMA, DISTANCE, LINE, PLANE, PoseSet
+from flexcal.errors import FlexcalError
+from flexcal.files.structuring import suggestion
+from flexcal.model.kinematics import joint_ranges, point_kinematics
+from flexcal.model.parts import vector_rotation
+from flexcal.model.robot import SOCKET_SCALE, STATION, WIRE_SCALE, RobotModel
+
+POSE = "pose"
+"""Name of a tracker that measures orientations too."""
+_TURN_SIGMA = 1e-4
+"""Standard deviation, rad, of a measured orientation."""
+_STEPS, _REACHED = 25, 1e-9
+_KINDS = {"wire": DISTANCE, "sphere": DISTANCE, "plane": PLANE, "line": LINE}
+_DISTANT, _TILTED = 0.02, 0.02
+"""Standard deviations, m and rad, of a place that was measured with a tape."""
+
+
+@dataclass(frozen=True, eq=False)
+class Instrument:
+    """Instrument by the `name` under `measurements:`, or `POSE`, with its places `at` (k, 3), m, and `normals` (3,) in the base frame.
+
+    `kind` is that of its readings ("" for whole points, "sockets" for points at known places of a fixture), `sockets` (s, 3) the places
+    in it, `radius` of a sphere, m, `sigma`, m, of a reading, and `scale_std` of all lengths together, relative.
+    """
+
+    name: str
+    kind: str
+    sigma: float
+    at: np.ndarray = field(default_factory=lambda: np.zeros((1, 3)))
+    normal: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    sockets: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    radius: float = 0.0
+    touched: bool = False
+    scale_std: float = 0.0
+
+    @classmethod
+    def declared(cls, model: RobotModel, name: str) -> Instrument:
+        """Instrument that robot.yaml declares under a name.
+
+        Raises `FlexcalError` for an unknown name, for a camera, and where robot.yaml does not say where the instrument stands.
+        """
+        if name == POSE:
+            return cls(name, "", DEFAULT_SIGMA / 4)
+        if name not in model.config.measurements:
+            known = [*model.config.measurements, POSE]
+            hint = suggestion(name, known) or f"; known are {', '.join(known)}."
+            raise FlexcalError(
+                "E-DESIGN-053", f"there is no '{name}' under `measurements:` of robot.yaml{hint}"
+            )
+        item = model.config.measurements[name]
+        if item.kind == "camera":
+            raise FlexcalError(
+                "E-DESIGN-054",
+                f"poses for the camera {name} cannot be designed yet; move it so that the board fills the image at many angles.",
+            )
+        places = item.at if item.kind == "sockets" else (item.xyz,)
+        if not places or places[0] is None:
+            key = "at: [[0.5, 0, 0.1], [0.5, 0.3, 0.1]]" if item.kind == "sockets" else "xyz: [0.5, 0, 0.1]"
+            raise FlexcalError(
+                "E-DESIGN-055",
+                f"robot.yaml does not say roughly where {name} stands, m in the base frame; add `{key}` to it under `measurements:`.",
+            )
+        if item.kind == "sockets":
+            return cls(
+                name,
+                "sockets",
+                DEFAULT_SIGMA,
+                np.array(places, dtype=float),
+                sockets=np.array(list(item.sockets.values()), dtype=float),
+                touched=True,
+                scale_std=item.std / item.extent if item.extent > 0 else 0.0,
+            )
+        sigma = DEFAULT_SIGMA if item.std is None else item.std
+        if item.kind == "wire":
+            return cls(name, DISTANCE, sigma, np.array(places, dtype=float), scale_std=item.scale_std)
+        normal = np.array(item.normal) / np.linalg.norm(item.normal)
+        return cls(
+            name,
+            _KINDS[item.kind],
+            sigma,
+            np.array(places, dtype=float),
+            normal,
+            radius=item.radius,
+            touched=True,
+        )
+
+    @property
+    def tells_base(self) -> bool:
+        """Whether the readings tell where the base of the robot is."""
+        return self.name == POSE
+
+    @property
+    def stations(self) -> tuple[str, ...]:
+        """Names of the places."""
+        return (
+            tuple(f"{self.name}_{k + 1}" for k in range(len(self.at)))
+            if self.kind == "sockets"
+            else (self.name,)
+        )
+
+    @property
+    def nuisances(self) -> dict[str, float]:
+        """Parameters of the instrument with their standard deviations beforehand."""
+        stds = dict.fromkeys(("x", "y", "z"), _DISTANT)
+        tilts = dict.fromkeys(("rx", "ry", "rz"), _TILTED)
+        if self.name == POSE:
+            return {}
+        if self.kind == DISTANCE:
+            stds["zero"] = _DISTANT
+        elif self.kind == PLANE:
+            stds = {"z": _DISTANT, "rx": _TILTED, "ry": _TILTED}
+        elif self.kind == LINE:
+            stds = {"x": _DISTANT, "y": _DISTANT, "rx": _TILTED, "ry": _TILTED}
+        else:
+            stds |= tilts if len(self.sockets) > 1 else {}
+        scale = SOCKET_SCALE if self.kind == "sockets" else WIRE_SCALE
+        placed = {f"station.{station}.{key}": std for station in self.stations for key, std in stds.items()}
+        return placed | ({scale: self.scale_std} if self.scale_std > 0 else {})
+
+    def placed(self, model: RobotModel) -> RobotModel:
+        """Robot with the instrument's places as stations."""
+        model, values = model.with_stations(self.stations), {}
+        turn = turn_to_z(self.normal) if self.kind in (PLANE, LINE) else np.zeros(3)
+        rotation = vector_rotation(turn)
+        for station, place in zip(self.stations, self.at, strict=True):
+            numbers = zip(STATION, (*(-rotation @ place), *turn), strict=True)
+            values |= {f"station.{station}.{key}": float(value) for key, value in numbers}
+        if self.kind == DISTANCE:
+            values[f"station.{self.name}.zero"] = self.radius
+        return model.with_values(values)
+
+    def poses(self, model: RobotModel, q: np.ndarray, target: str, spot: np.ndarray | None = None) -> PoseSet:
+        """Pose set of readings at `q` (N, n), of which only their kind counts; `spot` (N,) numbers socket and place, else the nearest."""
+        held, tracked, rows = self.kind == "sockets", self.name == POSE, len(q)
+        if held:
+            spots = (self.at[:, None] + self.sockets).reshape(-1, 3)
+            if spot is None:
+                point = point_kinematics(model, q, point=target, jacobians=False).position
+                spot = np.argmin(np.linalg.norm(point[:, None] - spots, axis=2), axis=1)
+            names, position = (
+                np.array(self.stations)[spot // len(self.sockets)],
+                self.sockets[spot % len(self.sockets)],
+            )
+        else:
+            names = np.full(rows, model.stations.names[0] if tracked else self.name)
+            position = np.zeros((rows, 3))
+            if self.scale_std > 0:
+                at = point_kinematics(model, q, point=target, jacobians=False).position
+                position[:, 0] = np.linalg.norm(at - self.at[0], axis=1)
+        return PoseSet(
+            q=q,
+            position=position,
+            sigma=np.full((rows, 3), self.sigma),
+            torque=None,
+            payload=None,
+            target=np.full(rows, target),
+            station=names,
+            temperature=None,
+            pose=np.arange(rows),
+            quaternion_wxyz=np.tile([1.0, 0.0, 0.0, 0.0], (rows, 1)) if tracked else None,
+            orientation_sigma=np.full(rows, _TURN_SIGMA) if tracked else None,
+            socket=np.full(rows, "held") if held else None,
+            kind=np.full(rows, self.kind) if self.kind in (DISTANCE, PLANE, LINE) else None,
+        )
+
+    def reached(self, model: RobotModel, q: np.ndarray, target: str) -> np.ndarray:
+        """Configurations (M, n) near `q` (N, n), without those that fail, at contact, by Newton's method with the shortest steps.
+
+        All of `q` where nothing is touched.
+        """
+        if not self.touched:
+            return q
+        placed, (lower, upper) = self.placed(model), joint_ranges(model)
+        spots = np.arange(len(q)) % max(len(self.at) * len(self.sockets), 1)
+        good = np.ones(len(q), dtype=bool)
+        for _ in range(_STEPS):
+            at = predict_measurements(
+                placed, self.poses(model, q, target, spots), elastic=False, jacobians=True
+            )
+            missing = at.residual
+            good = np.linalg.norm(missing, axis=1) < _REACHED
+            if good.all():
+                break
+            columns = at.jacobian([f"{name}.offset" for name in model.joint_names])
+            q = q + (np.linalg.pinv(columns, rcond=1e-6) @ missing[:, :, None])[:, :, 0]
+        return q[good & (q >= lower).all(axis=1) & (q <= upper).all(axis=1)]
