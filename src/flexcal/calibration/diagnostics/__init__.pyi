@@ -2,19 +2,27 @@ from .bearing_axes import BearingAxes, compare_bearings
 from .drift_test import Drift
 from .gravity_residuals import GravityLoads, gravity_loads
 from .jumps_in_readings import ReadingJump, reading_jumps
+from .nearest_socket import NearestSocket, nearest_sockets
+from .place_agreement import FEWEST_PLACES, Disagreement, PlaceAgreement, PlaceErrors
 from .plausibility import implausible_shifts, is_implausible, residuals_implausible
 from .size_of_board import board_size
 
 __all__ = [
+    "FEWEST_PLACES",
     "BearingAxes",
+    "Disagreement",
     "Drift",
     "GravityLoads",
+    "NearestSocket",
+    "PlaceAgreement",
+    "PlaceErrors",
     "ReadingJump",
     "board_size",
     "compare_bearings",
     "gravity_loads",
     "implausible_shifts",
     "is_implausible",
+    "nearest_sockets",
     "reading_jumps",
     "residuals_implausible",
 ]

@@ -9,9 +9,11 @@ import numpy as np
 
 from flexcal.calibration.diagnostics import (
     Drift,
+    NearestSocket,
     board_size,
     implausible_shifts,
     is_implausible,
+    nearest_sockets,
     reading_jumps,
     residuals_implausible,
 )
@@ -40,32 +42,65 @@ _LISTED = 20
 class Outlier:
     """Measurement with a small weight in the robust loss: number of its pose, point, distance from the fit (m), angle from it (rad) where
     the orientation was measured.
+
+    Of a ball in a socket also `place` and `socket`, and the `nearest` of all sockets to the ball.
     """
 
     pose: int
     target: str
     error: float
     angle: float | None = None
+    place: str = ""
+    socket: str = ""
+    nearest: NearestSocket | None = None
+
+    @property
+    def is_mislabelled(self) -> bool:
+        """Whether the ball was nearer to another socket than to that of its row."""
+        own = self.place, self.socket
+        return self.nearest is not None and (self.nearest.place, self.nearest.socket) != own
 
     def __str__(self) -> str:
         turned = "" if self.angle is None else f", {np.rad2deg(self.angle):.2f}°"
-        return f"pose {self.pose} ({self.error / MILLIMETRE:.2f} mm{turned})"
+        where = f", {self.place} {self.socket}" if self.socket else ""
+        return f"pose {self.pose} ({self.error / MILLIMETRE:.2f} mm{turned}{where})"
 
     def document(self) -> dict[str, object]:
         """Entry of results.json."""
         turned = {} if self.angle is None else {"angle_deg": float(np.rad2deg(self.angle))}
-        return {"pose": self.pose, "target": self.target, "error_mm": self.error / MILLIMETRE, **turned}
+        held = (
+            {}
+            if self.nearest is None
+            else {"place": self.place, "socket": self.socket, "nearest": self.nearest.document()}
+        )
+        return {
+            "pose": self.pose,
+            "target": self.target,
+            "error_mm": self.error / MILLIMETRE,
+            **turned,
+            **held,
+        }
 
 
 def outliers_of(fit: GeometricFit) -> tuple[Outlier, ...]:
     """Outliers of a fit, the farthest first."""
-    distance = np.linalg.norm(fit.residuals, axis=1)
+    distance, poses = np.linalg.norm(fit.residuals, axis=1), fit.poses
     rows = sorted(fit.estimate.outliers, key=lambda row: -distance[row])
-    turned = np.flatnonzero(fit.poses.turned).tolist()
+    held = [row for row in rows if poses.in_socket[row]]
+    nearest = dict(zip(held, nearest_sockets(fit, held), strict=True)) if held else {}
+    turned = np.flatnonzero(poses.turned).tolist()
     angle = dict(zip(turned, np.linalg.norm(fit.rotations, axis=1).tolist(), strict=True))
     return tuple(
-        Outlier(int(fit.poses.pose[i]), str(fit.poses.target[i]), float(distance[i]), angle.get(i))
-        for i in rows
+        Outlier(
+            int(poses.pose[row]),
+            str(poses.target[row]),
+            float(distance[row]),
+            angle.get(row),
+            str(poses.station[row]) if row in nearest else "",
+            str(poses.socket[row]) if row in nearest and poses.socket is not None else "",
+            nearest.get(row),
+        )
+        for row in rows
     )
 
 
@@ -79,6 +114,7 @@ def calibration_remarks(fit: GeometricFit, cause: Sequence[str] = ()) -> tuple[s
         listed = ", ".join(str(outlier) for outlier in outliers[:_LISTED])
         more = f" and {len(outliers) - _LISTED} more" if len(outliers) > _LISTED else ""
         remarks.append(f"{len(outliers)} outliers: {listed}{more}")
+        remarks += _mislabelled(outliers)
     remarks += [*_undetermined(fit), *_views(fit), *_size(fit), *_noise(fit), *_jumps(fit)]
     drift = Drift.of(fit) if fit.poses.located.any() else None
     if drift is not None and drift.certain:
@@ -100,6 +136,21 @@ def calibration_remarks(fit: GeometricFit, cause: Sequence[str] = ()) -> tuple[s
             "import' and the nominal geometry in the URDF, take fewer terms under `geometry:`, or measure more poses, farther apart"
         )
     return tuple(remarks)
+
+
+def _mislabelled(outliers: Sequence[Outlier]) -> Sequence[str]:
+    """Remark on rows whose ball was in another socket than they say."""
+    confused = [
+        f"pose {o.pose} ({o.place} {o.socket}; {o.nearest.distance / MILLIMETRE:.2f} mm from {o.nearest.place} {o.nearest.socket})"
+        for o in outliers
+        if o.is_mislabelled and o.nearest is not None
+    ]
+    if not confused:
+        return ()
+    more = f" and {len(confused) - _LISTED} more" if len(confused) > _LISTED else ""
+    return [
+        f"nearer to another socket than to their own, so perhaps mislabelled: {', '.join(confused[:_LISTED])}{more}"
+    ]
 
 
 def _nominal_springs(fit: GeometricFit) -> Sequence[str]:

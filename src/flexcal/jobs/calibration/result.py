@@ -12,6 +12,7 @@ import numpy as np
 from flexcal.calibration.diagnostics import (
     BearingAxes,
     Drift,
+    PlaceAgreement,
     gravity_loads,
     is_implausible,
 )
@@ -41,6 +42,7 @@ from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, json_values
 from flexcal.jobs.calibration.held_out import HeldOut
 from flexcal.jobs.calibration.remarks import calibration_remarks, outliers_of
+from flexcal.jobs.calibration.sockets import place_remarks, scale_document, scale_remark
 from flexcal.jobs.calibration.subsample import calibration_subsample_remark, subsample_document
 from flexcal.jobs.inputs import CalibratedRobot
 from flexcal.jobs.pages import Identification
@@ -188,6 +190,7 @@ class Calibration(Identification):
         selected, chosen, before = self.selected, self.selection, self.before.document()
         identifiability = selected.identifiability
         drift = Drift.of(selected) if selected.poses.located.any() else None
+        agreement, scale = PlaceAgreement.of(selected), scale_document(selected)
         bearings = bearing_remarks(self.bearings, selected)
         blamed = self.bearings is not None and self.bearings.contradicted
         misfit = None if self.stiffness is None else self.stiffness.misfit
@@ -234,13 +237,17 @@ class Calibration(Identification):
             "drift": None if drift is None else drift.document(),
             "sample": subsample_document(self.sample, self.everywhere),
             "outliers": [outlier.document() for outlier in outliers_of(selected)],
+            "places": None if agreement is None else agreement.document(),
+            "scale": scale,
             "bearings": bearings_block(self.bearings),
             "stage1": None if self.stiffness is None else {"misfit": misfit_document(self.stiffness.misfit)},
             "remarks": [
                 *calibration_subsample_remark(self.sample, self.everywhere),
                 *([chosen.remark] if chosen and chosen.remark else []),
+                *scale_remark(scale),
                 *calibration_remarks(selected, bearings if blamed else ()),
                 *(() if blamed else bearings),
+                *place_remarks(agreement),
                 *(
                     []
                     if misfit is None

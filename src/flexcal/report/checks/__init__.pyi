@@ -17,6 +17,7 @@ from .elastic_model import check_misfit, check_responses, misfit_document, misfi
 from .excitation import excitation_checks
 from .measured_responses import limit_of, response_checks, worst_pose
 from .payload import BODILESS, UNLIKE, payload_checks
+from .places import check_places
 from .pose_errors import (
     check_claimed_uncertainty,
     check_drift,
@@ -61,6 +62,7 @@ __all__ = [
     "check_left_out",
     "check_misfit",
     "check_outliers",
+    "check_places",
     "check_rank",
     "check_residual",
     "check_response_bearings",

@@ -157,6 +157,11 @@ PHRASES: dict[str, dict[str, str]] = {
         "else": "the data fit other bearing axes than the declared ones",
     },
     "outliers": {"good": "there are no outliers", "else": "there are outliers"},
+    "places": {
+        "good": "the places of the fixture agree",
+        "unknown": "there are too few places of the fixture to compare",
+        "else": "a place of the fixture disagrees with the others",
+    },
     "springs": {
         "good": "all stiffnesses are determined",
         "else": "the data do not determine every stiffness",

@@ -19,6 +19,7 @@ from flexcal.report.checks import (
     check_left_out,
     check_misfit,
     check_outliers,
+    check_places,
     check_rank,
     read_misfit,
 )
@@ -161,6 +162,7 @@ def calibration_checks(
         check_rank(identifiable.parameters, identifiable.rank, identifiable.gap).named("rank"),
         *([] if results["drift"] is None else [check_drift(results["drift"]).named("drift")]),
         check_outliers(len(estimate.outliers), errors).named("outliers"),
+        *([] if results.get("places") is None else [check_places(results["places"]).named("places")]),
         *check_bearings(results.get("bearings")),
         *_stage_one_checks(results.get("stage1")),
     )

@@ -1,0 +1,259 @@
+"""Agreement of the places of a fixture with sockets: each compared with the robot fitted to all others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Any, Literal
+
+import numpy as np
+
+from flexcal.calibration.error_model import joint_rotation_jacobian
+from flexcal.calibration.fit import GeometricFit, manufacturing_tolerances
+from flexcal.calibration.measurement import predict_measurements
+from flexcal.data.poses import PoseSet
+from flexcal.units import MILLIMETRE
+
+FEWEST_PLACES = 4
+"""Least number of places at which one that disagrees can be told from the others."""
+_CHANCE = 0.01
+"""Probability of naming a place where all agree."""
+_TWICE = 2.0
+"""Ratio of squared errors from which places are not consistent; lower ones are common, as no model of a robot is exact."""
+_KINDS = 3
+"""Number of quantities by which places are compared."""
+
+SocketPair = tuple[str, str]
+Finding = Literal["error", "outliers", "distance"]
+
+
+@dataclass(frozen=True)
+class PlaceErrors:
+    """Errors at one place of a fixture, predicted without its own rows.
+
+    `error` and `typical` are the mean and the median distance, m, of the ball from its mean position in each socket; `outliers` the number
+    of its `poses` that the robust loss gave a small weight; `distances` the found minus the declared distance of each pair of sockets, m;
+    `ratio` the squared errors that its rows add to the fit over those expected from the others' scatter, F-distributed with `p` beyond it
+    (Chow's predictive test, 1960).
+    """
+
+    name: str
+    poses: int
+    error: float
+    typical: float
+    outliers: int
+    distances: Mapping[SocketPair, float]
+    ratio: float
+    p: float
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """A place that differs from the others by more than chance: in `what`, at which `pair` of sockets, with the p-value of all places."""
+
+    place: str
+    what: Finding
+    p: float
+    pair: SocketPair | None = None
+
+
+@dataclass(frozen=True)
+class PlaceAgreement:
+    """Errors at every place, left out of a linearised fit in turn, and the places that disagree with the others."""
+
+    places: tuple[PlaceErrors, ...]
+    disagreements: tuple[Disagreement, ...]
+
+    @property
+    def judged(self) -> bool:
+        """Whether there are enough places to tell which of them disagrees."""
+        return len(self.places) >= FEWEST_PLACES
+
+    @property
+    def inconsistent(self) -> PlaceErrors | None:
+        """Where places are too few to judge, one with twice the squared errors that the others let expect (significantly); else None."""
+        if self.judged:
+            return None
+        worst = min(self.places, key=lambda place: place.p)
+        return worst if worst.ratio > _TWICE and len(self.places) * worst.p < _CHANCE else None
+
+    @property
+    def suspects(self) -> tuple[str, ...]:
+        """Names of the places that disagree."""
+        return tuple(dict.fromkeys(item.place for item in self.disagreements))
+
+    def document(self) -> dict[str, Any]:
+        """Block `places` of results.json."""
+        return {
+            "judged": self.judged,
+            "inconsistent": None if self.inconsistent is None else self.inconsistent.name,
+            "places": {
+                place.name: {
+                    "poses": place.poses,
+                    "mean_mm": place.error / MILLIMETRE,
+                    "median_mm": place.typical / MILLIMETRE,
+                    "outliers": place.outliers,
+                    "ratio": place.ratio,
+                    "p": place.p,
+                    "distances_mm": {
+                        f"{a} to {b}": off / MILLIMETRE for (a, b), off in place.distances.items()
+                    },
+                }
+                for place in self.places
+            },
+            "disagree": [
+                {
+                    "place": item.place,
+                    "what": item.what,
+                    "sockets": None if item.pair is None else list(item.pair),
+                    "p": item.p,
+                }
+                for item in self.disagreements
+            ],
+        }
+
+    @classmethod
+    def of(cls, fit: GeometricFit) -> PlaceAgreement | None:
+        """Agreement of the places of a fit; None with fewer than two places.
+
+        Three quantities of a place are compared with those of the others, at 1 % together for all places. The logarithm of the median
+        error and the distances of the sockets, by Student's t with the standard deviation of the others, so that places may differ as much
+        as these do; several that disagree are found together (Rosner 1983). The number of outliers, by Fisher's exact test.
+        """
+        places = place_errors(fit)
+        if len(places) < 2:
+            return None
+        return cls(places, _disagreements(places) if len(places) >= FEWEST_PLACES else ())
+
+
+def place_errors(fit: GeometricFit) -> tuple[PlaceErrors, ...]:
+    """Errors at every place of a fixture, with the other places and all points of instruments in the fit linearised at its solution.
+
+    Outliers do not count in the fit. Stiffness and inertia keep their estimates, as the error model does.
+    """
+    from scipy.special import fdtrc
+
+    poses, model, estimate = fit.poses, fit.model, fit.estimate
+    at = predict_measurements(model, poses, flank=fit.flank, elastic=bool(model.elastic), jacobians=True)
+    held = [item.name for item in fit.undetermined]
+    names = [name for name in fit.identifiability.kept_names if name not in held]
+    names += [p.name for p in estimate.parameters if _is_random(p.name, fit)]
+    deviation = {name: _prior_std(name, fit) for name in names}
+    known = np.array([np.isfinite(std) for std in deviation.values()])
+    scale = manufacturing_tolerances(estimate.parameters.subset(names))
+    scale = np.where(known, list(deviation.values()), scale)
+    columns = at.jacobian(names) * scale
+    readings, count = at.readings, len(names)
+    whitening = fit.scatter.weights(readings, joint_rotation_jacobian(at))
+    white = whitening(columns).reshape(-1, 3, count)
+    left = whitening(fit.readings).reshape(-1, 3)
+    inside = ~np.isin(np.arange(len(poses)), estimate.outliers)
+    prior = np.eye(count)[known]
+    fitted = estimate.parameters.subset(names)
+    expected = ((fitted.prior_mean() - fitted.coordinates()) / scale)[known]
+
+    def solved(rows: np.ndarray) -> tuple[np.ndarray, float, int]:
+        measured = readings.present & rows[:, None]
+        table = np.concatenate([white[measured], prior])
+        right = np.concatenate([left[measured], expected])
+        change, _, rank, _ = np.linalg.lstsq(table, right, rcond=1e-10)
+        return change, float(np.sum((right - table @ change) ** 2)), len(right) - int(rank)
+
+    kept, result = inside[readings.row], []
+    _, whole, freedom = solved(kept)
+    for fixture in poses.fixtures:
+        own = np.flatnonzero(poses.in_socket & (poses.station == fixture))
+        change, others, degrees = solved(kept & ~np.isin(readings.row, own))
+        change[[name.startswith(f"station.{fixture}.") for name in names]] = 0.0
+        ball = poses.position[own] - (fit.residuals[own] - columns[own] @ change)
+        added = max(freedom - degrees, 1)
+        ratio = max(whole - others, 0.0) / added * degrees / others if degrees > 0 and others > 0 else 0.0
+        p = float(fdtrc(added, max(degrees, 1), ratio))
+        result.append(_errors(poses.subset(own), ball, inside[own], ratio, p))
+    return tuple(result)
+
+
+def _is_random(name: str, fit: GeometricFit) -> bool:
+    """Whether a parameter is a wave of the random effects `transmission`."""
+    return ".transmission_" in name and name not in fit.identifiability.names
+
+
+def _prior_std(name: str, fit: GeometricFit) -> float:
+    """Standard deviation of a parameter beforehand; infinite without one."""
+    if _is_random(name, fit):
+        return fit.scatter.transmission / int(name.split("_")[-2])
+    return fit.estimate.parameters[name].prior_std
+
+
+def _errors(poses: PoseSet, ball: np.ndarray, inside: np.ndarray, ratio: float, p: float) -> PlaceErrors:
+    """Errors at one place: `ball` (N, 3) m are the predicted positions in the fixture, `inside` (N,) the rows that are no outliers."""
+    centres, off = {}, np.empty(len(poses))
+    assert poses.socket is not None
+    for socket in dict.fromkeys(poses.socket.tolist()):
+        rows = poses.socket == socket
+        good = rows & inside if (rows & inside).any() else rows
+        centre = ball[good].mean(axis=0)
+        off[rows] = np.linalg.norm(ball[rows] - centre, axis=1)
+        centres[socket] = centre, poses.position[np.argmax(rows)]
+    distances = {
+        (a, b): float(
+            np.linalg.norm(centres[a][0] - centres[b][0]) - np.linalg.norm(centres[a][1] - centres[b][1])
+        )
+        for a, b in combinations(sorted(centres), 2)
+    }
+    name, outliers = str(poses.station[0]), int((~inside).sum())
+    return PlaceErrors(
+        name, len(poses), float(off.mean()), float(np.median(off)), outliers, distances, ratio, p
+    )
+
+
+def _disagreements(places: Sequence[PlaceErrors]) -> tuple[Disagreement, ...]:
+    """Places that differ from the others, the most certain first."""
+    found = [
+        *_larger({place.name: float(np.log(place.typical)) for place in places}, "error", either=False),
+        *_more_outliers(places),
+    ]
+    for pair in dict.fromkeys(pair for place in places for pair in place.distances):
+        known = {place.name: place.distances[pair] for place in places if pair in place.distances}
+        found += [replace(item, pair=pair) for item in _larger(known, "distance", either=True)]
+    return tuple(sorted(found, key=lambda item: item.p))
+
+
+def _larger(values: Mapping[str, float], what: Finding, *, either: bool) -> list[Disagreement]:
+    """Places whose value is larger than those of the others, or with `either` farther from them to either side.
+
+    The generalised extreme Studentised deviate (Rosner 1983): the farthest place is taken out again and again, and all that were taken
+    out up to the last significant one disagree. They are less than half of the places.
+    """
+    from scipy.special import stdtr
+
+    left, taken = dict(values), []
+    while len(left) >= FEWEST_PLACES and len(taken) < (len(values) - 1) // 2:
+        numbers = np.array(list(left.values()))
+        deviations = np.abs(numbers - numbers.mean()) if either else numbers - numbers.mean()
+        own = int(np.argmax(deviations))
+        others = np.delete(numbers, own)
+        spread = float(others.std(ddof=1)) * np.sqrt(1 + 1 / len(others))
+        distance = abs(numbers[own] - others.mean())
+        tail = float(stdtr(len(others) - 1, -distance / spread)) if spread > 0 else float(distance == 0)
+        name = list(left)[own]
+        taken.append(Disagreement(name, what, min(1.0, (2 if either else 1) * len(left) * tail)))
+        del left[name]
+    certain = [k for k, item in enumerate(taken) if item.p < _CHANCE / _KINDS]
+    last = max(certain, default=-1)
+    return [
+        replace(item, p=min(i.p for i in taken[k : last + 1])) for k, item in enumerate(taken[: last + 1])
+    ]
+
+
+def _more_outliers(places: Sequence[PlaceErrors]) -> list[Disagreement]:
+    """Places with more outliers than the others, by Fisher's exact test."""
+    from scipy.stats import hypergeom
+
+    rows, outliers = sum(place.poses for place in places), sum(place.outliers for place in places)
+    found = []
+    for place in places:
+        tail = float(hypergeom.sf(place.outliers - 1, rows, outliers, place.poses))
+        found.append(Disagreement(place.name, "outliers", min(1.0, len(places) * tail)))
+    return [item for item in found if item.p < _CHANCE / _KINDS]

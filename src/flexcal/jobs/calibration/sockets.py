@@ -1,0 +1,85 @@
+"""Results of measurements with a ball in sockets: agreement of the places, and what the scale of the robot rests on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from flexcal.calibration.diagnostics import FEWEST_PLACES, PlaceAgreement, PlaceErrors
+from flexcal.calibration.fit import GeometricFit
+from flexcal.units import MILLIMETRE
+
+_PER_MILLE = 1e-3
+
+
+def scale_document(fit: GeometricFit) -> dict[str, float] | None:
+    """Block `scale` of results.json: the declared distance that all lengths follow from; null where another instrument measured too."""
+    fixtures = [item for item in fit.model.config.measurements.values() if item.kind == "sockets"]
+    if not fit.poses.in_socket.all() or not fixtures[0].extent:
+        return None
+    return {
+        "relative_std": fixtures[0].std / fixtures[0].extent,
+        "distance_mm": fixtures[0].extent / MILLIMETRE,
+        "std_mm": fixtures[0].std / MILLIMETRE,
+    }
+
+
+def scale_remark(scale: Mapping[str, float] | None) -> tuple[str, ...]:
+    """Remark on what is known of the robot's size."""
+    if scale is None:
+        return ()
+    return (
+        f"all lengths of the robot are known to ± {scale['relative_std'] / _PER_MILLE:.1f} ‰ (1σ) at best, from the "
+        f"{scale['distance_mm']:.4g} mm ± {scale['std_mm']:.2g} mm of the fixture; these measurements do not improve it",
+    )
+
+
+def place_remarks(agreement: PlaceAgreement | None) -> tuple[str, ...]:
+    """Remarks on places of the fixture that disagree with the others, one sentence a place."""
+    if agreement is None:
+        return ()
+    if not agreement.judged:
+        worst = agreement.inconsistent
+        if worst is not None:
+            return (
+                f"the {len(agreement.places)} places of the fixture are not consistent with one robot: predicted from the others, "
+                f"{worst.name} has {worst.ratio:.1f} times the squared errors that their scatter lets expect (p = {worst.p:.1g}). Which "
+                f"place is wrong, or whether the arm errs beyond its model, cannot be told; measure at {FEWEST_PLACES} places or more",
+            )
+        return (
+            f"with {len(agreement.places)} places of the fixture, one that disagrees with the others could not be told from them; measure "
+            f"at {FEWEST_PLACES} or more",
+        )
+    others = [place for place in agreement.places if place.name not in agreement.suspects]
+    by_name = {place.name: place for place in agreement.places}
+    remarks = [_disagrees(agreement, by_name[name], others) for name in agreement.suspects]
+    if remarks:
+        remarks.append(
+            "places that disagree are in the fit, their outliers with small weights: look whether ball and fixture sat firmly there, "
+            "measure again, or take these rows out of the file and compare"
+        )
+    return tuple(remarks)
+
+
+def _disagrees(agreement: PlaceAgreement, place: PlaceErrors, others: Sequence[PlaceErrors]) -> str:
+    own = [item for item in agreement.disagreements if item.place == place.name]
+    parts = []
+    for pair in sorted({item.pair for item in own if item.pair is not None}):
+        off = place.distances[pair]
+        usual = [other.distances[pair] / MILLIMETRE for other in others if pair in other.distances]
+        parts.append(
+            f"its sockets {pair[0]} and {pair[1]} are {abs(off) / MILLIMETRE:.2f} mm {'farther apart' if off > 0 else 'closer'} than "
+            f"declared, those of the others by {min(usual):+.2f} to {max(usual):+.2f} mm"
+        )
+    errors = [other.error for other in others]
+    if place.error > max(errors):
+        parts.append(
+            f"predicted without it, its mean error is {place.error / MILLIMETRE:.2f} mm, at the others "
+            f"{min(errors) / MILLIMETRE:.2f} to {max(errors) / MILLIMETRE:.2f} mm"
+        )
+    if any(item.what == "outliers" for item in own):
+        elsewhere, rows = sum(other.outliers for other in others), sum(other.poses for other in others)
+        parts.append(
+            f"{place.outliers} of its {place.poses} poses are outliers, {elsewhere} of {rows} at the others"
+        )
+    p = min(item.p for item in own)
+    return f"the place {place.name} disagrees with the other {len(others)}: {'; '.join(parts)} (p = {p:.1g})"
