@@ -19,7 +19,13 @@ from flexcal.model.robot import (
     RobotModel,
     unit_of,
 )
-from flexcal.model.statics import carried_mass, gravity_moments, gravity_torque
+from flexcal.model.statics import (
+    carried_mass,
+    force_moments,
+    gravity_moments,
+    gravity_torque,
+    lateral_axes,
+)
 
 LEAST_POSES = 20
 """Least number of different poses for a selection of terms and for the variance of transmission errors."""
@@ -163,11 +169,16 @@ def free_joints(model: RobotModel, kind: str, joints: Sequence[int]) -> list[int
 
 
 def loaded_compliances(model: RobotModel, poses: PoseSet) -> frozenset[str]:
-    """Names of the compliances of all joints whose gravity load varies by more than 1 % of the load that varies most."""
+    """Names of the compliances of joints whose load, of gravity and known forces, varies by more than 1 % of that which varies most."""
     masses = carried_mass(model, poses.payload, len(poses))
     loads = np.concatenate(
         [gravity_torque(model, poses.q, masses)[:, :, None], gravity_moments(model, poses.q, masses)], axis=2
     )
+    if poses.force is not None:
+        at = predict_measurements(model, poses, elastic=False, jacobians=True).kinematics
+        moments = force_moments(at, poses.force)
+        across = np.matmul(lateral_axes(model, poses.q), moments[:, :, :2, None])[:, :, :, 0]
+        loads -= np.concatenate([moments[:, :, 2:], across], axis=2)
     spread = loads.std(axis=0)
     clear = max(_LOADED * float(spread.max(initial=0.0)), _LEAST_LOAD)
     keys = ("gravity_compliance", *LATERAL)

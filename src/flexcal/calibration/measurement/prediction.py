@@ -28,6 +28,8 @@ from flexcal.model.robot import (
 from flexcal.model.statics import (
     Equilibrium,
     carried_mass,
+    force_moments,
+    lateral_axes,
     lateral_slopes,
     tool_at_rest,
     twist_by_hardening,
@@ -227,7 +229,12 @@ class PredictedMeasurements:
     def _lateral(self) -> np.ndarray:
         """Tilt about the bearing's x and y (N, n, axis, 2) of every joint by its lateral compliances, rad per rad/(N m)."""
         masses = carried_mass(self.model, self.poses.payload, len(self.poses))
-        return lateral_slopes(self.model, self.poses.q, masses)
+        slopes = lateral_slopes(self.model, self.poses.q, masses)
+        if self.poses.force is not None:
+            axes = lateral_axes(self.model, self.poses.q)
+            moments = force_moments(self.kinematics, self.poses.force)[:, :, :2]
+            slopes = slopes + np.matmul(axes, moments[:, :, :, None]) * axes
+        return slopes
 
     def _by_station(self, station: str, key: str) -> np.ndarray:
         """Derivative (R, 3) of the readings by one number of a station's pose."""
@@ -319,7 +326,14 @@ def predict_measurements(
     Raises `FlexcalError` for unknown targets and stations, and payloads without a declaration.
     """
     tool = tool_at_rest(
-        model, poses.q, poses.payload, poses.target, flank=flank, elastic=elastic, jacobians=jacobians
+        model,
+        poses.q,
+        poses.payload,
+        poses.target,
+        flank=flank,
+        elastic=elastic,
+        jacobians=jacobians,
+        force=poses.force,
     )
     at, base = np.empty((len(poses), 3)), np.empty((len(poses), 3, 3))
     for name in poses.stations:

@@ -45,7 +45,7 @@ from flexcal.errors import InputError
 if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
 
-_NUMBERS = ("quaternion", "sigma", "sigma_xyz", "sigma_angle", "tau", "payload", "temperature", "t")
+_NUMBERS = ("quaternion", "sigma", "sigma_xyz", "sigma_angle", "tau", "payload", "force", "temperature", "t")
 _TEXTS = ("target", "station")
 
 
@@ -143,6 +143,8 @@ def write_poses(path: str | Path, poses: PoseSet) -> None:
         vectors.append(("sigma_angle", poses.orientation_sigma[:, None]))
     if poses.sigma_given:
         vectors.append(("sigma", poses.sigma[:, :1]) if read else ("sigma_xyz", poses.sigma))
+    if poses.force is not None:
+        vectors.append(("force", poses.force))
     if poses.torque is not None:
         vectors.append(("tau", poses.torque))
     for quantity, values in vectors:
@@ -233,6 +235,7 @@ def _read(path: Path, model: RobotModel, further: tuple[str, ...]) -> PoseSet:
         if "quaternion" in values
         else None,
         orientation_sigma=values["sigma_angle"][:, 0] if "sigma_angle" in values else None,
+        force=values.get("force"),
         sigma_given=sigma is not None,
     )
     check_same_pose(poses.pose, poses.q, table)

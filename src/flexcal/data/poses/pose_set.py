@@ -62,6 +62,8 @@ class PoseSet:
     socket : ndarray, optional
         Names (N,) of the sockets that held the target; empty where an instrument measured it. `position` then is the socket's in
         the fixture, and `station` the place of the fixture.
+    force : ndarray, optional
+        Known forces (N, 3) on the measured points, N in the base frame, as of a wire that pulls; zero where there are none.
     sigma_given : bool
         False where `sigma` is a default.
 
@@ -89,6 +91,7 @@ class PoseSet:
     kind: np.ndarray | None = None
     time: np.ndarray | None = None
     socket: np.ndarray | None = None
+    force: np.ndarray | None = None
     sigma_given: bool = True
 
     def __post_init__(self) -> None:
@@ -114,6 +117,7 @@ class PoseSet:
             "kind": (n_rows,),
             "time": (n_rows,),
             "socket": (n_rows,),
+            "force": (n_rows, 3),
         }
         for name, shape in shapes.items():
             values = getattr(self, name)
@@ -289,6 +293,7 @@ _PARTIAL: dict[str, tuple[tuple[int, ...], float | str]] = {
     "socket": ((), ""),
     "camera": ((), ""),
     "kind": ((), ""),
+    "force": ((3,), 0.0),
     "quaternion_wxyz": ((4,), np.nan),
     "covariance": ((6, 6), np.nan),
     "by_lens": ((6, 9), 0.0),

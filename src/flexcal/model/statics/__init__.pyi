@@ -1,9 +1,11 @@
+from .applied_force import force_moments
 from .deflected_tool import ToolAtRest, carried_mass, points_kinematics, tool_at_rest
 from .equilibrium import (
     Equilibrium,
     elastic_axes,
     gravity_moments,
     gravity_torque,
+    lateral_axes,
     lateral_slopes,
     spring_loads,
     static_equilibrium,
@@ -18,8 +20,10 @@ __all__ = [
     "carried_mass",
     "certain_flank",
     "elastic_axes",
+    "force_moments",
     "gravity_moments",
     "gravity_torque",
+    "lateral_axes",
     "lateral_slopes",
     "points_kinematics",
     "spring_loads",

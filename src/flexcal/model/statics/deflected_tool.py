@@ -9,6 +9,7 @@ import numpy as np
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import PointKinematics, point_kinematics
 from flexcal.model.robot import RobotModel
+from flexcal.model.statics.applied_force import force_moments, under_force
 from flexcal.model.statics.equilibrium import Equilibrium, static_equilibrium
 
 
@@ -68,6 +69,7 @@ def tool_at_rest(
     flank: np.ndarray | None = None,
     elastic: bool = True,
     jacobians: bool = False,
+    force: np.ndarray | None = None,
 ) -> ToolAtRest:
     """Pose of measured points on the robot at rest, deflected by gravity and payload.
 
@@ -87,6 +89,8 @@ def tool_at_rest(
         Whether the arm deflects; without, it is rigid.
     jacobians : bool
         Whether derivatives are computed too.
+    force : ndarray, optional
+        Force (N, 3), N in the base frame, on the points; none by default.
 
     Returns
     -------
@@ -110,10 +114,34 @@ def tool_at_rest(
     (1, 3)
     """
     masses = carried_mass(model, payload, len(q))
-    rest = static_equilibrium(model, q, masses, flank=flank, elastic=elastic, sensitivities=jacobians)
+    if force is None:
+        rest = static_equilibrium(model, q, masses, flank=flank, elastic=elastic, sensitivities=jacobians)
+    else:
+        rest = _pulled(model, q, masses, target, force, flank, elastic=elastic)
     return ToolAtRest(
         model, q, rest, points_kinematics(model, q, rest.deflection, target, jacobians=jacobians)
     )
+
+
+def _pulled(
+    model: RobotModel,
+    q: np.ndarray,
+    masses: np.ndarray,
+    target: np.ndarray,
+    force: np.ndarray,
+    flank: np.ndarray | None,
+    *,
+    elastic: bool,
+) -> Equilibrium:
+    """Equilibrium under gravity and a force on the points, on the flanks of both together where none are given."""
+    rest = static_equilibrium(model, q, masses, flank=flank, elastic=elastic, sensitivities=True)
+    at = points_kinematics(model, q, rest.deflection, target, jacobians=True)
+    moments = force_moments(at, force)
+    if flank is None and model.backlash_joints:
+        sides = np.sign(rest.torque - moments[:, :, 2])
+        if (sides != np.sign(rest.torque))[:, list(model.backlash_joints)].any():
+            rest = static_equilibrium(model, q, masses, flank=sides, elastic=elastic, sensitivities=True)
+    return under_force(model, q, rest, moments)
 
 
 def points_kinematics(
