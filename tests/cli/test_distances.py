@@ -203,6 +203,20 @@ def test_command_line_with_wires_beside_a_tracker(tmp_path: Path, capsys: pytest
     assert "wire" in capsys.readouterr().out
 
 
+def test_a_wire_of_unknown_noise_beside_a_tracker(tmp_path: Path) -> None:
+    """The tracker's sigma is stated, the wire's is not: it has the default, and together they are better than the tracker alone."""
+    arm, robot, file = measured(tmp_path, "wire", 9, SIGMA, 120)
+    robot.write_text(robot.read_text().replace(f"std: {SIGMA}, ", ""))
+    rng = np.random.default_rng(5)
+    q = arm.postures(20, rng)
+    tracker = arm.write_poses(tmp_path / "points.csv", q, arm.measured(q, rng, SIGMA), SIGMA)
+    model = RobotModel.from_yaml(robot)
+    single = away(arm, calibrate(model, read_poses(tracker, model), terms=["kinematic"]).model)
+    both = read_poses([tracker, file], model)
+    assert both.sigma_given
+    assert away(arm, calibrate(model, both, terms=["kinematic"]).model) < single
+
+
 def test_a_wire_that_was_zeroed_again_is_told(tmp_path: Path) -> None:
     """Half of the readings are 2 mm longer: the remark says where; an untouched wire has no such remark."""
     _, robot, file = measured(tmp_path, "wire", 6, SIGMA)

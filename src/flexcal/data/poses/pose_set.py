@@ -242,8 +242,8 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
     """The rows of all sets, in order.
 
     Where a later set uses a pose number again, its numbers are shifted past the largest so far. Raises `FlexcalError`
-    where there is nothing to join, joint counts differ, or only some sets have sigma, torques, payload, temperature
-    or time. Orientations are NaN where a set has none.
+    where there is nothing to join, joint counts differ, or only some sets have torques, payload, temperature or time, or some points of an
+    instrument a sigma: sockets, lengths and contacts without one have the default beside those. Orientations are NaN where a set has none.
     """
     if not sets:
         raise FlexcalError("E-POSES-023", "there are no poses to join; give at least one set.")
@@ -258,12 +258,13 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
         values = [getattr(poses, entry.name) for poses in sets]
         present = [value is not None for value in values]
         if entry.name == "sigma_given":
-            if any(values) and not all(values):
+            unstated = [poses for poses in sets if not poses.sigma_given]
+            if any(values) and any(poses.located.any() for poses in unstated):
                 raise FlexcalError(
                     "E-POSES-025",
                     f"only {sum(values)} of {len(sets)} pose sets have sigma; give it for all, or for none.",
                 )
-            joined[entry.name] = all(values)
+            joined[entry.name] = any(values)
         elif entry.name == "lenses":
             joined[entry.name] = {name: lens for one in values for name, lens in one.items()}
         elif entry.name in _PARTIAL and any(present):
