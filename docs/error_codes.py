@@ -39,6 +39,7 @@ SUBJECTS = {
     "RUN": "Verbs and what they are given",
     "STIFF": "Stiffness",
     "TABLE": "Tables",
+    "TOOL": "Tool and work object",
     "URDF": "URDF",
     "YAML": "YAML",
 }

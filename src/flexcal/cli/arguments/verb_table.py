@@ -217,6 +217,14 @@ STEPS = (
         "3. Check it, and use it",
         (
             Verb(
+                ("identify", "tool"),
+                "identify_tool",
+                "IdentifyTool",
+                "the tool centre point from touches of a fixed point",
+                "flexcal identify tool robot.yaml touches.csv --frame tool0",
+                ("results.json",),
+            ),
+            Verb(
                 ("verify",),
                 "verify",
                 "Verify",

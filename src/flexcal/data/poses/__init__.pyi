@@ -5,6 +5,8 @@ from .measured_tables import column_labels, read_pose_pool, read_poses, write_po
 from .pose_set import DEFAULT_SIGMA, DISTANCE, LINE, PLANE, PoseSet, concatenate
 from .target_files import read_commands, read_targets, write_commands, write_targets
 from .tool_targets import ToolTargets
+from .touch_tables import read_touches
+from .touches import Touches
 from .working_files import read_working
 
 __all__ = [
@@ -15,6 +17,7 @@ __all__ = [
     "PosePool",
     "PoseSet",
     "ToolTargets",
+    "Touches",
     "check_metres",
     "check_positive",
     "check_same_pose",
@@ -24,6 +27,7 @@ __all__ = [
     "read_pose_pool",
     "read_poses",
     "read_targets",
+    "read_touches",
     "read_working",
     "unit_quaternions",
     "whole_numbers",

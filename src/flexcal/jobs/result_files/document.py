@@ -34,6 +34,7 @@ Kind = Literal[
     "repeatability",
     "response",
     "stiffness",
+    "tool",
     "verification",
 ]
 """Kind of document in results.json."""

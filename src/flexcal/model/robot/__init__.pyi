@@ -1,5 +1,5 @@
 from .arm_sensor import ArmSensor, mounting_names, sensitivity_name, sensor_column, sensor_delay_name
-from .attached_payload import carried_inertias, last_frame, with_payload, with_point_at_frame
+from .attached_payload import carried_inertias, last_frame, with_payload, with_point, with_point_at_frame
 from .config import (
     AcceptanceConfig,
     BoardConfig,
@@ -105,5 +105,6 @@ __all__ = [
     "unknown_parallel",
     "with_blocks",
     "with_payload",
+    "with_point",
     "with_point_at_frame",
 ]

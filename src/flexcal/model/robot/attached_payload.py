@@ -70,15 +70,28 @@ def with_point_at_frame(model: RobotModel, frame: str) -> RobotModel:
             "E-ROBOT-002",
             f"{model.path} declares a point '{frame}' that is not at the origin of the frame '{frame}'; rename it there, or give --target.",
         )
+    return with_point(model, frame, frame, np.zeros(3))
+
+
+def with_point(model: RobotModel, name: str, frame: str, xyz: np.ndarray) -> RobotModel:
+    """Robot with the point `name` at `xyz` (3,) m in the URDF frame `frame`, in place of a declared one of that name if there is one.
+
+    Raises `InputError` for a frame that the URDF lacks or that no joint moves.
+    """
     place = _moving_frame(model, frame)
-    point = Point(frame, frame, place.joint, place.rotation, place.translation, np.zeros(3))
+    point = Point(name, frame, place.joint, place.rotation, place.translation, xyz)
+    others = list(model.points)
+    geometry = model.geometry
     errors, turns = (
-        np.vstack([array, np.zeros(3)]) for array in (model.geometry.point_error, model.geometry.point_turn)
+        dict(zip(others, array, strict=True)) | {name: np.zeros(3)}
+        for array in (geometry.point_error, geometry.point_turn)
     )
     return replace(
         model,
-        points=MappingProxyType({**model.points, frame: point}),
-        geometry=replace(model.geometry, point_error=errors, point_turn=turns),
+        points=MappingProxyType(dict(model.points) | {name: point}),
+        geometry=replace(
+            geometry, point_error=np.array(list(errors.values())), point_turn=np.array(list(turns.values()))
+        ),
     )
 
 

@@ -1,0 +1,6 @@
+from .touched_tip import TipFit, fit_tip
+
+__all__ = [
+    "TipFit",
+    "fit_tip",
+]
