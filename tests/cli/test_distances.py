@@ -200,7 +200,34 @@ def test_command_line_with_wires_beside_a_tracker(tmp_path: Path, capsys: pytest
     both = calibrate(model, read_poses([tracker, file], model), terms=["kinematic"])
     assert away(arm, both.model) < 0.8 * single
     assert (tmp_path / "wire" / "report.html").stat().st_size > 1e5
-    assert "wire" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "difference from what was measured" in said
+    assert "--hold-out COLUMN" in said
+
+
+def test_wires_left_out_by_recording(tmp_path: Path, run) -> None:
+    """The errors at recordings that the fit has not seen are those of the noise, without what was typed wrongly."""
+    _, robot, file = measured(tmp_path, "wire", 12, SIGMA, 150)
+    lines = file.read_text().splitlines()
+    cells = lines[20].split(",")
+    lines[20] = ",".join([*cells[:-1], repr(float(cells[-1]) + 0.08)])
+    marked = [lines[0] + ",day", *(f"{line},day{k // 50}" for k, line in enumerate(lines[1:]))]
+    file.write_text("\n".join(marked) + "\n")
+    outcome = run(
+        "calibrate",
+        robot,
+        file,
+        "--hold-out",
+        "day",
+        "--terms",
+        "kinematic",
+        "--out",
+        tmp_path / "o",
+        "--json",
+    )
+    held = json.loads(outcome.out)["held_out"]
+    assert held["outliers"] == 1
+    assert held["mean_mm"] < 0.12
 
 
 def test_a_wire_of_unknown_noise_beside_a_tracker(tmp_path: Path) -> None:

@@ -46,7 +46,8 @@ def reading_jumps(fit: GeometricFit) -> tuple[ReadingJump, ...]:
         size = np.abs(sides)
         while (k := int(np.argmax(size))) >= 0 and size[k] > _CERTAIN * noise * np.sqrt(2 / _WINDOW):
             row = k + _split(left[k : k + 2 * _WINDOW])
-            found.append(ReadingJump(station, *poses.pose[rows[row - 1 : row + 1]].tolist(), float(sides[k])))
+            before, after = poses.pose[rows[row - 1 : row + 1]].tolist()
+            found.append(ReadingJump(station, before, after, float(sides[k])))
             size[max(0, k - _WINDOW) : k + _WINDOW] = 0.0
     return tuple(sorted(found, key=lambda jump: -abs(jump.size)))
 

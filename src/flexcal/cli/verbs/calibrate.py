@@ -119,7 +119,9 @@ class Calibrate:
         )
         labels = {"rigid": "rigid", "selected": f"selected: {terms}"}
         rows = uncalibrated_rows(document) | {label: errors[key] for key, label in labels.items()}
-        console.show(error_table("distance to the measured points", rows))
+        located = calibration.selected.poses.located
+        read = "distance to the measured points" if located.all() else "difference from what was measured"
+        console.show(error_table(read, rows))
         if document["orientation"] is not None:
             console.show(orientation_table(document["orientation"]))
         if calibration.held_out is not None:
@@ -144,6 +146,10 @@ class Calibrate:
             if is_implausible(calibration.selected)
             else f"flexcal verify {self.robot} OTHER_POSES…{where}, on poses outside this fit "
             "(flexcal design poses --random plans some)"
+            if located.any()
+            else f"{command_line()} --hold-out COLUMN, where a column tells recordings apart, for errors outside the fit"
+            if self.hold_out is None
+            else f"flexcal export urdf {self.robot}{where}"
         )
         if calibration.bearings is not None and calibration.bearings.contradicted:
             following = (
@@ -184,7 +190,8 @@ class Calibrate:
 def held_out_line(held_out: Mapping[str, Any]) -> str:
     """A sentence on the errors at groups that were left out."""
     groups = ", ".join(f"{name} {group['mean_mm']:.3f}" for name, group in held_out["groups"].items())
-    line = f"left out by {held_out['by']}, mean error {held_out['mean_mm']:.3f} mm ({groups})"
+    without = f" without the {held_out['outliers']} outliers" if held_out["outliers"] else ""
+    line = f"left out by {held_out['by']}{without}, mean error {held_out['mean_mm']:.3f} mm ({groups})"
     known = held_out["distance_mm"]
     return line if known is None else f"{line}; known distances are off by {known:.3f} mm"
 

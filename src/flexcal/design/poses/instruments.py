@@ -110,7 +110,7 @@ class Instrument:
     @property
     def nuisances(self) -> dict[str, float]:
         """Parameters of the instrument with their standard deviations beforehand."""
-        stds = dict.fromkeys(("x", "y", "z"), _DISTANT)
+        stds: dict[str, float] = dict.fromkeys(("x", "y", "z"), _DISTANT)
         tilts = dict.fromkeys(("rx", "ry", "rz"), _TILTED)
         if self.name == POSE:
             return {}
@@ -142,14 +142,9 @@ class Instrument:
         """Pose set of readings at `q` (N, n), of which only their kind counts; `spot` (N,) numbers socket and place, else the nearest."""
         held, tracked, rows = self.kind == "sockets", self.name == POSE, len(q)
         if held:
-            spots = (self.at[:, None] + self.sockets).reshape(-1, 3)
-            if spot is None:
-                point = point_kinematics(model, q, point=target, jacobians=False).position
-                spot = np.argmin(np.linalg.norm(point[:, None] - spots, axis=2), axis=1)
-            names, position = (
-                np.array(self.stations)[spot // len(self.sockets)],
-                self.sockets[spot % len(self.sockets)],
-            )
+            number = self._nearest(model, q, target) if spot is None else spot
+            names = np.array(self.stations)[number // len(self.sockets)]
+            position = self.sockets[number % len(self.sockets)]
         else:
             names = np.full(rows, model.stations.names[0] if tracked else self.name)
             position = np.zeros((rows, 3))
@@ -171,6 +166,12 @@ class Instrument:
             socket=np.full(rows, "held") if held else None,
             kind=np.full(rows, self.kind) if self.kind in (DISTANCE, PLANE, LINE) else None,
         )
+
+    def _nearest(self, model: RobotModel, q: np.ndarray, target: str) -> np.ndarray:
+        """Numbers (N,) of the sockets at their places that are nearest to the point at `q` (N, n)."""
+        spots = (self.at[:, None] + self.sockets).reshape(-1, 3)
+        point = point_kinematics(model, q, point=target, jacobians=False).position
+        return np.argmin(np.linalg.norm(point[:, None] - spots, axis=2), axis=1)
 
     def reached(self, model: RobotModel, q: np.ndarray, target: str) -> np.ndarray:
         """Configurations (M, n) near `q` (N, n), without those that fail, at contact, by Newton's method with the shortest steps.

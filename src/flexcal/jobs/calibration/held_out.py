@@ -27,10 +27,14 @@ class HeldOutGroup:
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Errors at the `groups` by name, each left out of its own calibration; `by` names what groups the measurements."""
+    """Errors at the `groups` by name, each left out of its own calibration; `by` names what groups the measurements.
+
+    `left_out` wrong readings of distances and contacts are in no group.
+    """
 
     by: str
     groups: Mapping[str, HeldOutGroup]
+    left_out: int = 0
 
     @property
     def mean(self) -> float:
@@ -51,18 +55,25 @@ class HeldOut:
                 name: group.errors.in_millimetres() | {"distance_mm": _millimetres(group.distance)}
                 for name, group in self.groups.items()
             },
+            "outliers": self.left_out,
             "mean_mm": self.mean / MILLIMETRE,
             "distance_mm": _millimetres(self.distance),
         }
 
 
 def held_out_errors(
-    calibrated: Callable[[PoseSet], RobotModel], poses: PoseSet, by: str, labels: np.ndarray
+    calibrated: Callable[[PoseSet], RobotModel],
+    poses: PoseSet,
+    by: str,
+    labels: np.ndarray,
+    *,
+    left_out: int = 0,
 ) -> HeldOut:
     """Leave out every group of equal `labels` (N,) in turn, and compare it with the robot `calibrated` on the rest.
 
     A fixture or an instrument whose rows are all in the group is placed by these: each socket is the mean of the predicted positions of the
-    ball in it; the ball and the robot stay as calibrated on the rest. Raises `FlexcalError` for fewer than two groups.
+    ball in it; the ball and the robot stay as calibrated on the rest. `left_out` is how many wrong readings are not among them. Raises
+    `FlexcalError` for fewer than two groups.
     """
     names = list(dict.fromkeys(labels.tolist()))
     if len(names) < 2:
@@ -75,7 +86,7 @@ def held_out_errors(
         groups[str(name)] = _compared(
             calibrated(poses.subset(~own)), poses.subset(own), set(poses.station[~own])
         )
-    return HeldOut(by, groups)
+    return HeldOut(by, groups, left_out)
 
 
 def _compared(model: RobotModel, poses: PoseSet, known: set[str]) -> HeldOutGroup:

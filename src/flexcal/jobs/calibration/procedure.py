@@ -142,14 +142,17 @@ def calibrate(
     held_out = None
     if hold_out is not None:
         progress("held out", 0.0)
+        kept = _without_wrong_readings(measured, rigid) if sample is None else np.ones(len(measured), bool)
         held_out = held_out_errors(
             lambda rest: (
                 calibrate(
                     nominal, rest, terms=terms, loss=loss, secant_scale=secant_scale, elasticity=elasticity
                 ).model
             ),
-            measured,
-            *hold_out,
+            measured.subset(kept),
+            hold_out[0],
+            hold_out[1][kept],
+            left_out=int((~kept).sum()),
         )
         progress("held out", 1.0)
     elastic = bool(model.elastic)
@@ -184,6 +187,12 @@ def calibrate(
         held_out=held_out,
         orientation_before=uncalibrated_orientations(uncalibrated.registered, poses),
     )
+
+
+def _without_wrong_readings(poses: PoseSet, fit: GeometricFit) -> np.ndarray:
+    """Mask (N,) without the outliers of a fit among distances and contacts, which somebody typed or touched wrongly."""
+    wrong = np.isin(np.arange(len(poses)), fit.estimate.outliers)
+    return np.ones(len(poses), bool) if poses.kind is None else ~(wrong & (poses.kind != ""))
 
 
 def _require_uncalibrated(model: RobotModel) -> None:
