@@ -21,6 +21,7 @@ from flexcal.cli.main import main
 from flexcal.data.poses import read_poses, write_poses
 from flexcal.dynamics.inverse_model import CLASSIC, Observation
 from flexcal.files.formats import sha256_of
+from flexcal.model.kinematics import point_kinematics
 from flexcal.model.robot import RobotModel
 
 ran: list[str] = []
@@ -82,9 +83,24 @@ def calibrated_arm(folder: Path, examples: Path) -> list[str]:
         seen = predict_measurements(model, visits).position + 2e-5 * rng.standard_normal((3 * len(q), 3))
         write_poses(folder / f"{name}.csv", replace(visits, position=seen))
     shutil.copy("compensated.csv", "visits.csv")
+    write_touches(folder / "touches.csv", model)
     run("flexcal verify robot.yaml others.csv --out checked")
     run("flexcal repeatability robot.yaml visits.csv --out repeated")
-    return ["verify", "repeatability", "map", "predict", "certificate", "report", *EXPORTS]
+    return ["identify tool", "verify", "repeatability", "map", "predict", "certificate", "report", *EXPORTS]
+
+
+def write_touches(path: Path, model: RobotModel) -> None:
+    """Poses at which the reflector's place touches one point, in orientations about one posture, by Newton's method."""
+    rng = np.random.default_rng(8)
+    start = np.array([0.2, -1.2, 1.6, -1.5, -1.5, 0.3])
+    place = point_kinematics(model, start, jacobians=False).position[0]
+    found = start + 0.3 * rng.uniform(-1, 1, (8, 6)) * [0.5, 0.5, 0.5, 1, 1, 2]
+    for _ in range(20):
+        at = point_kinematics(model, found)
+        back = np.linalg.pinv(at.motion_jacobian[:, :3, :, 2])
+        found = found + np.matmul(back, (place - at.position)[:, :, None])[:, :, 0]
+    rows = [[k + 1, *row] for k, row in enumerate(found.tolist())]
+    write_csv(path, ["pose", *(f"q{i}" for i in range(1, 7))], rows)
 
 
 def recordings_of_two_payloads(folder: Path, examples: Path) -> list[str]:
@@ -146,6 +162,7 @@ PLACES = {
     own_robot: {"init"},
     foreign_file: {"import", "completion"},
     calibrated_arm: {
+        "identify tool",
         "verify",
         "repeatability",
         "map",

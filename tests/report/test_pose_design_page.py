@@ -19,6 +19,7 @@ def _results(positive: int, blocked: list[list[int]], reached: float) -> dict:
         "plan": "plan.yaml",
         "seed": 3,
         "poses": 20,
+        "instrument": "a laser tracker",
         "tool_error_mm": 0.03,
         "least_possible_mm": 0.025,
         "working": {"poses": 200, "reached_share": reached, "box_m": None},

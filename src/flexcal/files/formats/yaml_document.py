@@ -51,6 +51,8 @@ def parse_document(path: Path, text: str) -> tuple[Any, dict[Keys, int]]:
         mark = problem.problem_mark or problem.context_mark
         place = f"line {mark.line + 1}, column {mark.column + 1}" if mark else "somewhere"
         what = " ".join(str(problem.problem or problem.context or "the text stops").split())
+        if "nesting" in what:  # libyaml's own bound, which it meets in what it reads ahead
+            raise _too_deep(path, mark.line + 1 if mark else 1) from None
         raise InputError(
             "E-YAML-004", f"{path} {place}: not valid YAML ({what}); correct it there."
         ) from None
@@ -110,11 +112,7 @@ class _Document:
         if event.tag not in (None, "!") and event.tag not in _TAGS:
             raise self._error("E-YAML-008", event, f"the tag '{event.tag}' is not understood; remove it.")
         if len(keys) > DEEPEST:
-            raise self._error(
-                "E-YAML-009",
-                event,
-                f"values nest more than {DEEPEST} deep; write them with fewer brackets or indents.",
-            )
+            raise _too_deep(self.path, event.start_mark.line + 1)
         anchored = _Anchored()
         if event.anchor is not None:
             self.anchors[event.anchor] = anchored
@@ -194,3 +192,10 @@ class _Document:
         if _NO_NUMBER.fullmatch(text):
             return float(text.replace(".", ""))
         return text
+
+
+def _too_deep(path: Path, line: int) -> InputError:
+    return InputError(
+        "E-YAML-009",
+        f"{path} line {line}: values nest more than {DEEPEST} deep; write them with fewer brackets or indents.",
+    )
