@@ -100,7 +100,7 @@ def write_touches(path: Path, model: RobotModel) -> None:
         back = np.linalg.pinv(at.motion_jacobian[:, :3, :, 2])
         found = found + np.matmul(back, (place - at.position)[:, :, None])[:, :, 0]
     rows = [[k + 1, *row] for k, row in enumerate(found.tolist())]
-    write_csv(path, ["pose", *(f"q{i}" for i in range(1, 7))], rows)
+    write_csv(path, ["pose", *(f"q{i}" for i in range(1, 7))], np.array(rows))
 
 
 def recordings_of_two_payloads(folder: Path, examples: Path) -> list[str]:
