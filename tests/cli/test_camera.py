@@ -23,8 +23,9 @@ CAMERA = np.array([[1100, 0, 630], [0, 1090, 490], [0, 0, 1.0]])
 DISTORTION = np.array([-0.2, 0.1, 0.001, -0.0005, 0.02])
 SIZE = (1280, 960)
 SQUARE = 0.03
-BOARD = np.array([[c * SQUARE, r * SQUARE, 0] for r in range(1, 7) for c in range(1, 9)])
 MIDDLE = np.array([0.135, 0.105, 0])
+BOARD = np.array([[c * SQUARE, r * SQUARE, 0] for r in range(1, 7) for c in range(1, 9)]) - MIDDLE
+"""Corners from the middle of the board."""
 START = np.array([0.3, -0.5, 0.9, 0.2, 0.7, 0.1])
 ROBOT = """robot: six.urdf
 points: {{camera: {{frame: l6, xyz: [0.05, 0.03, 0.12]}}}}
@@ -49,7 +50,7 @@ class Cell:
         self.arm.mounted = Rotation.from_rotvec(0.05 * self.rng.normal(size=3)).as_matrix()
         at, axes = self.camera(START)
         self.axes = axes @ Rotation.from_rotvec(0.2 * self.rng.normal(size=3)).as_matrix()
-        self.at = at + 0.5 * axes[:, 2] - self.axes @ MIDDLE
+        self.at = at + 0.5 * axes[:, 2]
 
     def camera(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Place (3,) and axes (3, 3) of the camera in the robot's base."""
@@ -137,7 +138,7 @@ def test_a_camera_in_the_cell_calibrates_a_robot_that_holds_the_board(folder: Pa
     )
     at, axes = cell.camera(START)  # of the board, which the hand holds now
     eye = axes @ Rotation.from_rotvec([0.1, -0.15, 0.2]).as_matrix()
-    place, pose = at + axes @ MIDDLE - 0.6 * eye[:, 2], 0
+    place, pose = at - 0.6 * eye[:, 2], 0
     while pose < 50:
         q = START + cell.rng.uniform(-1, 1, 6) * [0.3, 0.25, 0.25, 0.7, 0.6, 1.2]
         at, axes = cell.camera(q)
@@ -180,7 +181,7 @@ def test_images_give_what_their_corners_do(folder: Path) -> None:
             np.linalg.inv(np.column_stack([turn[:, :2], view[1]]))
             @ np.column_stack([rays, np.ones(len(rays))]).T
         )
-        on_board = (plane[:2] / plane[2]).T / SQUARE * 200 - 0.5
+        on_board = ((plane[:2] / plane[2]).T + MIDDLE[:2]) / SQUARE * 200 - 0.5
         image = cv2.remap(
             texture,
             *np.ascontiguousarray(on_board.reshape(960, 1280, 2).transpose(2, 0, 1), dtype=np.float32),

@@ -161,7 +161,8 @@ class DesignPoses:
             console.say(f"with a tracker of points and as many poses: {tracked:.4f} mm")
             if unseen > _UNSEEN * document["tool_error_mm"]:
                 console.say(
-                    f"besides, {unseen:.3f} mm are what these readings cannot tell, as how large the robot is, from typical tolerances"
+                    f"besides, {unseen:.3f} mm are what these readings cannot tell, as how large the robot is, from typical tolerances and "
+                    "the stated accuracy of board, wire or sockets"
                 )
         others = {name: value for name, value in document["criteria"].items() if name != "c"}
         console.say("criteria: " + ", ".join(f"{name} {value:.4g}" for name, value in others.items()))

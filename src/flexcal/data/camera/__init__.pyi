@@ -1,5 +1,5 @@
 from .board import board_corners
-from .bundle import FreeViews, View, free_views
+from .bundle import FreeViews, View, free_views, lens_prior
 from .detection import detected_views
 from .lens import Lens, projected
 from .poses_of_views import ViewPoses, view_poses
@@ -12,6 +12,7 @@ __all__ = [
     "board_corners",
     "detected_views",
     "free_views",
+    "lens_prior",
     "projected",
     "view_poses",
 ]

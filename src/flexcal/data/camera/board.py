@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def board_corners(board: BoardConfig) -> np.ndarray:
-    """Corners (K, 3), m, of a board by number: x to the right and y down as it is read, z into it.
+    """Corners (K, 3), m, of a board by number, from its middle: x to the right and y down as it is read, z into it.
 
     The inner corners of a chessboard or ChArUco board row by row, from its upper left corner as OpenCV counts them; of a grid of tags the
     four corners of each tag, clockwise from its upper left, tag by tag.
@@ -27,4 +27,5 @@ def board_corners(board: BoardConfig) -> np.ndarray:
     else:
         grid = np.meshgrid(np.arange(1, board.columns), np.arange(1, board.rows))
         flat = np.stack(grid, -1).reshape(-1, 2) * board.square
+    flat = flat - (flat.min(axis=0) + flat.max(axis=0)) / 2
     return np.column_stack([flat, np.zeros(len(flat))])

@@ -28,6 +28,13 @@ _PRIOR = np.array([0.5, 0.5, 0.1, 0.1, 0.5, 1.0, 0.02, 0.02, 2.0])
 """Standard deviations of the intrinsic parameters about the start: of focal length and centre relative to the image's larger side."""
 
 
+def lens_prior(size: np.ndarray) -> np.ndarray:
+    """Standard deviations (9,) of the intrinsic parameters of a camera of which only the `size` (2,) of its images is known, pixels."""
+    scale = np.ones(len(LENS))
+    scale[:4] = float(size.max())
+    return scale * _PRIOR
+
+
 @dataclass(frozen=True, eq=False)
 class View:
     """Corners of a board in one image: `points` (K, 3) on the board, m, and `pixels` (K, 2)."""
@@ -108,9 +115,7 @@ class _Bundle:
         self.view = np.repeat(np.arange(len(views)), counts)
         self.first = np.concatenate([[0], np.cumsum(counts)[:-1]])
         self.inside = np.ones(len(self.points), bool) if inside is None else inside
-        scale = np.ones(len(LENS))
-        scale[:4] = float(size.max())
-        self.prior = scale * _PRIOR
+        self.prior = lens_prior(size)
 
     def with_values(self, lens: np.ndarray, rotation: np.ndarray, translation: np.ndarray) -> _Bundle:
         return _Bundle(self.views, lens, rotation, translation, self.start, self.size, self.inside)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.data.poses import PosePool
+from flexcal.design.poses.camera_setup import CameraSetup
 from flexcal.design.poses.candidates import random_candidates
 from flexcal.design.poses.geometry_sensitivity import (
     BaseSensitivity,
@@ -17,7 +18,7 @@ from flexcal.design.poses.geometry_sensitivity import (
 )
 from flexcal.design.poses.gravity_preload import preload_joints, preloaded
 from flexcal.design.poses.instrument_sensitivity import instrument_sensitivity
-from flexcal.design.poses.instruments import Instrument
+from flexcal.design.poses.instruments import declared_instrument
 from flexcal.design.scene import STANDARD, CollisionChecker, MeasuringSetup, visible
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import point_kinematics
@@ -96,11 +97,18 @@ def pose_candidates(
 def _at_instrument(checker: CollisionChecker, q: np.ndarray, least: int, setup: MeasuringSetup) -> np.ndarray:
     """Configurations (M, n) at contact with the instrument, from some near by; raises `FlexcalError` where they are too few."""
     model, target = checker.model, checker.model.point(setup.point).name
-    instrument = Instrument.declared(model, str(setup.measure))
+    instrument = declared_instrument(model, str(setup.measure))
     q = instrument.reached(model, q, target)
     if instrument.touched:
         q = q[~checker.collides(q)]
         q = q[preloaded(model, q, setup.payload)]
+    if len(q) < least and isinstance(instrument, CameraSetup):
+        nearest, farthest = instrument.band
+        raise FlexcalError(
+            "E-DESIGN-054",
+            f"only {len(q)} poses show the board to the camera {instrument.name} from {nearest:.2f} to {farthest:.2f} m, and {least} are "
+            "to be chosen; correct its `xyz`, `normal`, `axis` or `distance`, or give more --candidates.",
+        )
     if len(q) < least:
         raise FlexcalError(
             "E-DESIGN-056",
@@ -124,7 +132,7 @@ def tool_motions(
     for k, name in enumerate(names):
         if name in known:
             every[:, :, k] = jacobian[:, :, known.index(name)]
-    if setup.measure is None or Instrument.declared(model, setup.measure).tells_base:
+    if setup.measure is None or declared_instrument(model, setup.measure).tells_base:
         return every
     return _wherever_the_base_is(model, working, every, setup.point)
 

@@ -122,7 +122,7 @@ def base_sensitivity(full: Sensitivity) -> BaseSensitivity:
             f"{name} has no tolerance; give every parameter a finite prior_std, it sets the scale.",
         )
     # σ_min has a meaning in declared units only: the station is scaled like any other length
-    scale = np.where([p.unit == "rad" for p in full.parameters], tolerance, _length_scale(full.parameters))
+    scale = np.where([p.unit == "m" for p in full.parameters], _length_scale(full.parameters), tolerance)
     identifiability = analyse(_triangle(full.jacobian), full.parameters.names, scale=scale)
     kept = list(identifiability.kept)
     spread = identifiability.regrouping * tolerance / scale[kept][:, None]

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexcal.calibration.measurement import predict_measurements
 from flexcal.design.poses.geometry_sensitivity import TYPICAL, GeometricTolerances, geometry_jacobian
-from flexcal.design.poses.instruments import Instrument
+from flexcal.design.poses.instruments import declared_instrument
 from flexcal.design.scene import STANDARD, MeasuringSetup
 from flexcal.estimation import Parameter, Parameters, Sensitivity
 from flexcal.model.robot import RobotModel, unit_of
@@ -20,22 +19,18 @@ def instrument_sensitivity(
 ) -> Sensitivity:
     """Rows of every pose of `q` (samples, n) in the geometric errors and the instrument's place (SI), whitened by its noise.
 
-    As `pose_sensitivity`, for the instrument `setup.measure`. Raises `FlexcalError` as `Instrument.declared` does.
+    As `pose_sensitivity`, for the instrument `setup.measure`. Raises `FlexcalError` as `declared_instrument` does.
     """
-    instrument = Instrument.declared(model, str(setup.measure))
+    instrument = declared_instrument(model, str(setup.measure))
     target = model.point(setup.point).name
-    placed = instrument.placed(model)
     station = f"station.{model.stations.names[0]}."
     names = [
         name
         for name in geometry_jacobian(model, q[:1], setup)[0]
         if instrument.tells_base or not name.startswith(station)
     ]
-    stds = {name: tolerances.of(name) for name in names} | instrument.nuisances
-    at = predict_measurements(placed, instrument.poses(placed, q, target), elastic=False, jacobians=True)
-    columns, sigma = at.jacobian(tuple(stds)), at.readings.sigma
-    white = np.divide(columns, sigma[:, :, None], out=np.zeros_like(columns), where=sigma[:, :, None] > 0)
+    stds = {name: tolerances.of(name) for name in names} | instrument.nuisances(target)
+    rows = instrument.rows(instrument.placed(model, target), q, target, tuple(stds))
     parameters = Parameters(Parameter(name, unit_of(name), 0.0, prior_std=std) for name, std in stds.items())
-    by_pose = white.reshape(-1, len(q), 3, len(stds)).transpose(1, 0, 2, 3).reshape(len(q), -1, len(stds))
-    seen = np.abs(by_pose).max(axis=(0, 2)) > 0
-    return Sensitivity(by_pose[:, seen], parameters, parameters.prior_information())
+    seen = np.abs(rows).max(axis=(0, 2)) > 0
+    return Sensitivity(rows[:, seen], parameters, parameters.prior_information())

@@ -8,11 +8,20 @@ import numpy as np
 
 from flexcal.calibration.measurement import predict_measurements, turn_to_z
 from flexcal.data.poses import DEFAULT_SIGMA, DISTANCE, LINE, PLANE, PoseSet
+from flexcal.design.poses.camera_setup import CameraSetup
 from flexcal.errors import FlexcalError
 from flexcal.files.structuring import suggestion
 from flexcal.model.kinematics import joint_ranges, point_kinematics
-from flexcal.model.parts import vector_rotation
-from flexcal.model.robot import SOCKET_SCALE, STATION, WIRE_SCALE, RobotModel
+from flexcal.model.parts import rotation_wxyz, vector_rotation
+from flexcal.model.robot import (
+    SOCKET_SCALE,
+    STATION,
+    WIRE_SCALE,
+    FaceConfig,
+    RobotModel,
+    SocketsConfig,
+    WireConfig,
+)
 
 POSE = "pose"
 """Name of a tracker that measures orientations too."""
@@ -43,32 +52,9 @@ class Instrument:
     scale_std: float = 0.0
 
     @classmethod
-    def declared(cls, model: RobotModel, name: str) -> Instrument:
-        """Instrument that robot.yaml declares under a name.
-
-        Raises `FlexcalError` for an unknown name, for a camera, and where robot.yaml does not say where the instrument stands.
-        """
-        if name == POSE:
-            return cls(name, "", DEFAULT_SIGMA / 4)
-        if name not in model.config.measurements:
-            known = [*model.config.measurements, POSE]
-            hint = suggestion(name, known) or f"; known are {', '.join(known)}."
-            raise FlexcalError(
-                "E-DESIGN-053", f"there is no '{name}' under `measurements:` of robot.yaml{hint}"
-            )
-        item = model.config.measurements[name]
-        if item.kind == "camera":
-            raise FlexcalError(
-                "E-DESIGN-054",
-                f"poses for the camera {name} cannot be designed yet; move it so that the board fills the image at many angles.",
-            )
+    def of(cls, name: str, item: SocketsConfig | WireConfig | FaceConfig) -> Instrument:
+        """Instrument that robot.yaml declares, with its place, under a name."""
         places = item.at if item.kind == "sockets" else (item.xyz,)
-        if not places or places[0] is None:
-            key = "at: [[0.5, 0, 0.1], [0.5, 0.3, 0.1]]" if item.kind == "sockets" else "xyz: [0.5, 0, 0.1]"
-            raise FlexcalError(
-                "E-DESIGN-055",
-                f"robot.yaml does not say roughly where {name} stands, m in the base frame; add `{key}` to it under `measurements:`.",
-            )
         if item.kind == "sockets":
             return cls(
                 name,
@@ -107,13 +93,12 @@ class Instrument:
             else (self.name,)
         )
 
-    @property
-    def nuisances(self) -> dict[str, float]:
-        """Parameters of the instrument with their standard deviations beforehand."""
+    def nuisances(self, target: str) -> dict[str, float]:
+        """Parameters of the instrument, and of the axes of a measured target, with their standard deviations beforehand."""
         stds: dict[str, float] = dict.fromkeys(("x", "y", "z"), _DISTANT)
         tilts = dict.fromkeys(("rx", "ry", "rz"), _TILTED)
         if self.name == POSE:
-            return {}
+            return {f"point.{target}.{key}": std for key, std in tilts.items()}
         if self.kind == DISTANCE:
             stds["zero"] = _DISTANT
         elif self.kind == PLANE:
@@ -126,8 +111,10 @@ class Instrument:
         placed = {f"station.{station}.{key}": std for station in self.stations for key, std in stds.items()}
         return placed | ({scale: self.scale_std} if self.scale_std > 0 else {})
 
-    def placed(self, model: RobotModel) -> RobotModel:
+    def placed(self, model: RobotModel, _target: str) -> RobotModel:
         """Robot with the instrument's places as stations."""
+        if self.name == POSE:
+            return model
         model, values = model.with_stations(self.stations), {}
         turn = turn_to_z(self.normal) if self.kind in (PLANE, LINE) else np.zeros(3)
         rotation = vector_rotation(turn)
@@ -161,7 +148,7 @@ class Instrument:
             station=names,
             temperature=None,
             pose=np.arange(rows),
-            quaternion_wxyz=np.tile([1.0, 0.0, 0.0, 0.0], (rows, 1)) if tracked else None,
+            quaternion_wxyz=rotation_wxyz(_axes(model, q, target)) if tracked else None,
             orientation_sigma=np.full(rows, _TURN_SIGMA) if tracked else None,
             socket=np.full(rows, "held") if held else None,
             kind=np.full(rows, self.kind) if self.kind in (DISTANCE, PLANE, LINE) else None,
@@ -180,7 +167,7 @@ class Instrument:
         """
         if not self.touched:
             return q
-        placed, (lower, upper) = self.placed(model), joint_ranges(model)
+        placed, (lower, upper) = self.placed(model, target), joint_ranges(model)
         spots = np.arange(len(q)) % max(len(self.at) * len(self.sockets), 1)
         good = np.ones(len(q), dtype=bool)
         for _ in range(_STEPS):
@@ -194,3 +181,41 @@ class Instrument:
             columns = at.jacobian([f"{name}.offset" for name in model.joint_names])
             q = q + (np.linalg.pinv(columns, rcond=1e-6) @ missing[:, :, None])[:, :, 0]
         return q[good & (q >= lower).all(axis=1) & (q <= upper).all(axis=1)]
+
+    def rows(self, placed: RobotModel, q: np.ndarray, target: str, names: tuple[str, ...]) -> np.ndarray:
+        """Rows (N, r, p) of the readings at `q` (N, n) in the parameters `names`, in standard deviations of a reading."""
+        at = predict_measurements(placed, self.poses(placed, q, target), elastic=False, jacobians=True)
+        columns, sigma = at.jacobian(names), at.readings.sigma
+        white = np.divide(columns, sigma[:, :, None], out=np.zeros_like(columns), where=sigma[:, :, None] > 0)
+        return white.reshape(-1, len(q), 3, len(names)).transpose(1, 0, 2, 3).reshape(len(q), -1, len(names))
+
+
+def declared_instrument(model: RobotModel, name: str) -> Instrument | CameraSetup:
+    """Instrument that robot.yaml declares under a name, or `POSE`.
+
+    Raises `FlexcalError` for an unknown name, and where robot.yaml does not say where the instrument stands.
+    """
+    if name == POSE:
+        return Instrument(name, "", DEFAULT_SIGMA / 4)
+    if name not in model.config.measurements:
+        known = [*model.config.measurements, POSE]
+        hint = suggestion(name, known) or f"; known are {', '.join(known)}."
+        raise FlexcalError("E-DESIGN-053", f"there is no '{name}' under `measurements:` of robot.yaml{hint}")
+    item = model.config.measurements[name]
+    places = item.at if item.kind == "sockets" else (item.xyz,)
+    if not places or places[0] is None:
+        key = "at: [[0.5, 0, 0.1], [0.5, 0.3, 0.1]]" if item.kind == "sockets" else "xyz: [0.5, 0, 0.1]"
+        thing = f"the board of {name}" if item.kind == "camera" and item.mounted == "hand" else name
+        raise FlexcalError(
+            "E-DESIGN-055",
+            f"robot.yaml does not say roughly where {thing} stands, m in the base frame; add `{key}` to {name} under `measurements:`.",
+        )
+    return CameraSetup.of(name, item) if item.kind == "camera" else Instrument.of(name, item)
+
+
+def _axes(model: RobotModel, q: np.ndarray, target: str) -> np.ndarray:
+    """Axes (N, 3, 3) of a target, as the first station sees them."""
+    place = model.stations.pose[0, 3:]
+    turn = vector_rotation(model.geometry.point_turn[list(model.points).index(target)])
+    seen = point_kinematics(model, q, point=target, jacobians=False).orientation
+    return vector_rotation(place) @ seen @ turn

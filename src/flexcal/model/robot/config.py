@@ -353,18 +353,37 @@ class BoardConfig:
 class CameraConfig:
     """Camera that sees a board: on the hand, the board anywhere in the cell, or in the cell, the board on the hand.
 
-    size: width and height of its images, pixels.
+    size: width and height of its images, pixels. For design, of what stands in the cell: xyz, roughly where the middle of the board or
+    the camera is, m in the base frame; normal, where its printed side faces, or where the camera looks; and axis, the same of what is on
+    the hand, in the frame of its point. focal: focal length, pixels; None: as long as the images are wide. std: standard deviation of a
+    found corner, pixels. distance: least and largest distance, m, of a sharp image; None: where the board fills it.
     """
 
     kind: Literal["camera"]
     board: BoardConfig
     size: tuple[int, int]
     mounted: Literal["hand", "cell"] = "hand"
+    xyz: Triple | None = None
+    normal: Triple = (0.0, 0.0, 1.0)
+    axis: Triple = (0.0, 0.0, 1.0)
+    focal: float | None = None
+    std: float = 0.2
+    distance: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if min(self.size) < 1:
             raise FlexcalError(
                 "E-ROBOT-055", "size of a camera is the width and height of its images in pixels."
+            )
+        if not any(self.normal) or not any(self.axis):
+            raise FlexcalError(
+                "E-ROBOT-058", "normal and axis of a camera are directions; not all numbers may be zero."
+            )
+        if not self.std > 0 or (self.focal is not None and not self.focal > 0):
+            raise FlexcalError("E-ROBOT-059", "std and focal of a camera are positive numbers of pixels.")
+        if self.distance is not None and not 0 < self.distance[0] < self.distance[1]:
+            raise FlexcalError(
+                "E-ROBOT-060", "distance of a camera is its least and its largest distance from the board, m."
             )
 
 
