@@ -83,24 +83,43 @@ def calibrated_arm(folder: Path, examples: Path) -> list[str]:
         seen = predict_measurements(model, visits).position + 2e-5 * rng.standard_normal((3 * len(q), 3))
         write_poses(folder / f"{name}.csv", replace(visits, position=seen))
     shutil.copy("compensated.csv", "visits.csv")
-    write_touches(folder / "touches.csv", model)
+    write_touches(folder, model)
     run("flexcal verify robot.yaml others.csv --out checked")
     run("flexcal repeatability robot.yaml visits.csv --out repeated")
-    return ["identify tool", "verify", "repeatability", "map", "predict", "certificate", "report", *EXPORTS]
+    return [
+        "identify tool",
+        "identify frame",
+        "verify",
+        "repeatability",
+        "map",
+        "predict",
+        "certificate",
+        "report",
+        *EXPORTS,
+    ]
 
 
-def write_touches(path: Path, model: RobotModel) -> None:
-    """Poses at which the reflector's place touches one point, in orientations about one posture, by Newton's method."""
+def write_touches(folder: Path, model: RobotModel) -> None:
+    """Poses at which the reflector's place touches one point, in orientations about one posture, and four points of a fixture."""
     rng = np.random.default_rng(8)
     start = np.array([0.2, -1.2, 1.6, -1.5, -1.5, 0.3])
     place = point_kinematics(model, start, jacobians=False).position[0]
-    found = start + 0.3 * rng.uniform(-1, 1, (8, 6)) * [0.5, 0.5, 0.5, 1, 1, 2]
+    joints = [f"q{i}" for i in range(1, 7)]
+    turned = start + 0.3 * rng.uniform(-1, 1, (8, 6)) * [0.5, 0.5, 0.5, 1, 1, 2]
+    rows = [[k + 1, *row] for k, row in enumerate(reached(model, turned, place).tolist())]
+    write_csv(folder / "touches.csv", ["pose", *joints], np.array(rows))
+    holes = np.array([[0, 0, 0], [0.1, 0, 0], [0.08, 0.07, 0], [0.01, 0.09, 0.02]])
+    q = reached(model, np.tile(start, (len(holes), 1)), place + holes)
+    write_csv(folder / "fixture.csv", [*joints, "wx", "wy", "wz"], np.concatenate([q, holes], axis=1))
+
+
+def reached(model: RobotModel, near: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Joint positions (N, n) near others at which the reflector's place is at the places, by Newton's method."""
     for _ in range(20):
-        at = point_kinematics(model, found)
+        at = point_kinematics(model, near)
         back = np.linalg.pinv(at.motion_jacobian[:, :3, :, 2])
-        found = found + np.matmul(back, (place - at.position)[:, :, None])[:, :, 0]
-    rows = [[k + 1, *row] for k, row in enumerate(found.tolist())]
-    write_csv(path, ["pose", *(f"q{i}" for i in range(1, 7))], np.array(rows))
+        near = near + np.matmul(back, (places - at.position)[:, :, None])[:, :, 0]
+    return near
 
 
 def recordings_of_two_payloads(folder: Path, examples: Path) -> list[str]:
@@ -163,6 +182,7 @@ PLACES = {
     foreign_file: {"import", "completion"},
     calibrated_arm: {
         "identify tool",
+        "identify frame",
         "verify",
         "repeatability",
         "map",

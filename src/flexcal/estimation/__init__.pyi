@@ -11,8 +11,8 @@ from .profile_likelihood import profile_cost_increase
 from .sensitivity import Sensitivity
 from .solver import solve
 from .student_t import student_quantile
-from .trimmed_squares import consistent_groups
-from .two_variances import TwoVarianceFit, fit_two_variances
+from .trimmed_squares import consistent_groups, core_size
+from .two_variances import TwoVarianceFit, fit_two_variances, least_squares_of_two_variances
 from .uncertainty import LOG_STD_LIMIT, is_log_identified
 from .vuong_test import vuong_statistic
 
@@ -36,10 +36,12 @@ __all__ = [
     "TwoVarianceFit",
     "analyse",
     "consistent_groups",
+    "core_size",
     "distance_probability",
     "distance_quantile",
     "fit_two_variances",
     "is_log_identified",
+    "least_squares_of_two_variances",
     "loss_named",
     "mean_distance",
     "name_direction",

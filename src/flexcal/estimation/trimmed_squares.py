@@ -55,7 +55,7 @@ def consistent_groups(
         if not near:
             break
         core[near] = True
-    least = np.array([_core_size(int(np.sum(strata == name))) for name in strata])
+    least = np.array([core_size(int(np.sum(strata == name))) for name in strata])
     while True:
         inside = np.array([int(np.sum(core & (strata == name))) for name in strata])
         candidates = np.flatnonzero(core & (inside > least))
@@ -114,7 +114,8 @@ class _Data:
         return distance <= float(fdtri(len(own), fit.noise_freedom, 1 - _FALSE_ALARM / count))
 
 
-def _core_size(groups: int) -> int:
+def core_size(groups: int) -> int:
+    """Number of groups of a stratum of so many that its core has."""
     return min(groups, max(2, (groups + 3) // 2))
 
 
@@ -144,7 +145,7 @@ def _closest(norms: np.ndarray, strata: np.ndarray) -> np.ndarray:
     core = np.zeros(len(norms), dtype=bool)
     for name in dict.fromkeys(strata.tolist()):
         own = np.flatnonzero(strata == name)
-        core[own[np.argsort(norms[own], kind="stable")[: _core_size(len(own))]]] = True
+        core[own[np.argsort(norms[own], kind="stable")[: core_size(len(own))]]] = True
     return core
 
 

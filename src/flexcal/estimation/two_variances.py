@@ -38,6 +38,8 @@ class TwoVarianceFit:
         Standard deviation of the independent noise.
     noise_freedom : float
         Degrees of freedom with which the variance of both together is known.
+    median_noise : float
+        Median of the standard deviation of the noise, which is less than `noise` where few residuals tell it.
     """
 
     values: np.ndarray
@@ -46,6 +48,7 @@ class TwoVarianceFit:
     size: float
     noise: float
     noise_freedom: float
+    median_noise: float
 
     def variance(self, covariance: np.ndarray) -> np.ndarray:
         """Covariance (m, m) of both errors together, where that of the correlated ones of size 1 is `covariance` (m, m)."""
@@ -88,6 +91,32 @@ def fit_two_variances(
     FlexcalError
         Where there are no more observations than unknowns and `noise` is not given.
     """
+    return _fit(design, observed, covariance, sizes, noise, weighted=True)
+
+
+def least_squares_of_two_variances(
+    design: np.ndarray,
+    observed: np.ndarray,
+    covariance: np.ndarray,
+    sizes: Mapping[float, float],
+    noise: float | None = None,
+) -> TwoVarianceFit:
+    """Ordinary least squares, with errors as in `fit_two_variances`, in whose place it stands where residuals shall be least.
+
+    Parameters, result and errors are those of `fit_two_variances`.
+    """
+    return _fit(design, observed, covariance, sizes, noise, weighted=False)
+
+
+def _fit(
+    design: np.ndarray,
+    observed: np.ndarray,
+    covariance: np.ndarray,
+    sizes: Mapping[float, float],
+    noise: float | None,
+    *,
+    weighted: bool,
+) -> TwoVarianceFit:
     rows, count = design.shape
     if rows <= count and noise is None:
         raise FlexcalError(
@@ -119,7 +148,9 @@ def fit_two_variances(
     independent, ordinary = inverse @ inverse.T, inverse @ observed
     values, covariances = np.empty((len(pair), count)), np.empty((len(pair), count, count))
     for k, (size, sigma) in enumerate(pair):
-        gain = size**2 / np.maximum(size**2 * spectrum + sigma**2, _SMALLEST**2)
+        gain = (
+            size**2 / np.maximum(size**2 * spectrum + sigma**2, _SMALLEST**2) if weighted else 0.0 * spectrum
+        )
         values[k] = ordinary - mixed @ (gain * left)
         covariances[k] = size**2 * (correlated - (mixed * gain) @ mixed.T) + sigma**2 * independent
     mean = probability @ values
@@ -134,7 +165,13 @@ def fit_two_variances(
         float(probability @ pair[:, 0]),
         float(np.sqrt(probability @ pair[:, 1] ** 2)),
         float(_freedom(probability, np.maximum(total, _SMALLEST**2)[:, None])[0]),
+        _median(pair[:, 1], probability),
     )
+
+
+def _median(values: np.ndarray, probability: np.ndarray) -> float:
+    order = np.argsort(values)
+    return float(values[order][np.searchsorted(np.cumsum(probability[order]), 0.5)])
 
 
 def _noise_grid(left: np.ndarray) -> np.ndarray:

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.calibration.touching.arm_errors import ArmErrors, arm_errors, touched_frames
+from flexcal.calibration.touching.touch_fit import TouchFit, residual_rms, without
 from flexcal.data.poses import Touches
 from flexcal.errors import FlexcalError
-from flexcal.estimation import TwoVarianceFit, consistent_groups, fit_two_variances
+from flexcal.estimation import consistent_groups, fit_two_variances
 from flexcal.model.robot import RobotModel
 from flexcal.units import DEGREE
 
@@ -19,49 +20,26 @@ _LEAST_TURN = 0.5 * DEGREE
 
 
 @dataclass(frozen=True, eq=False)
-class TipFit:
-    """The tip `xyz` (3,), m, in its frame, and the fixed points that it touched.
+class TipFit(TouchFit):
+    """The tip `xyz` (3,), m, in its frame, and the fixed points that it touched, whose positions in the base frame follow in the `fit`.
+
+    `errors` are in the base frame.
 
     Attributes
     ----------
-    fit : TwoVarianceFit
-        Estimates of the tip, then of every fixed point in the base frame, m.
     points : tuple of str
         Names of the fixed points.
-    errors : ndarray
-        Distances (N, 3), m, of the tip from the fixed point at every touch, in the base frame.
-    kept : ndarray
-        Whether (N,) the touch agrees with the others; the fit is that of these.
-    arm : ArmErrors
-        Errors of the arm at the touches.
     turn : float
         Root-mean-square rotation of the frame about the axis about which it turned least, rad.
-    arm_rms : float
-        Root mean square of the `errors` that is expected of the arm alone, m; of an arm that is not calibrated at the size that fits best.
     """
 
-    fit: TwoVarianceFit
     points: tuple[str, ...]
-    errors: np.ndarray
-    kept: np.ndarray
-    arm: ArmErrors
     turn: float
-    arm_rms: float
 
     @property
     def xyz(self) -> np.ndarray:
         """The tip (3,) in its frame, m."""
         return self.fit.values[:3]
-
-    @property
-    def distances(self) -> np.ndarray:
-        """Distance (N,) of the tip from the fixed point at every touch, m."""
-        return np.linalg.norm(self.errors, axis=1)
-
-    @property
-    def rms(self) -> float:
-        """Root-mean-square distance of the touches that were kept, m."""
-        return float(np.sqrt(np.mean(self.distances[self.kept] ** 2)))
 
 
 def fit_tip(model: RobotModel, touches: Touches, point: str) -> TipFit:
@@ -81,23 +59,15 @@ def fit_tip(model: RobotModel, touches: Touches, point: str) -> TipFit:
     xyz = np.linalg.lstsq(design, observed, rcond=None)[0][:3]
     arm = _errors_at(model, touches, point, xyz)
     kept = consistent_groups(design, observed, arm.covariance, arm.sizes, groups, numbers)
-    turn = _require_turns(frames.rotation[kept], numbers[kept], _without(touches, kept))
+    turn = _require_turns(frames.rotation[kept], numbers[kept], without(touches, kept))
     rows = kept[groups]
     block = np.ix_(rows, rows)
     first = fit_two_variances(design[rows], observed[rows], arm.covariance[block], arm.sizes)
     arm = _errors_at(model, touches, point, first.values[:3])
     fit = fit_two_variances(design[rows], observed[rows], arm.covariance[block], arm.sizes)
     errors = (design @ fit.values - observed).reshape(-1, 3)
-    return TipFit(
-        fit, points, errors, kept, arm, turn, fit.size * residual_rms(design[rows], arm.covariance[block])
-    )
-
-
-def residual_rms(design: np.ndarray, covariance: np.ndarray) -> float:
-    """Root-mean-square residual distance (m) of least squares with errors of this covariance (3 N, 3 N)."""
-    basis = np.linalg.qr(design)[0]
-    left = np.trace(covariance) - np.trace(basis.T @ covariance @ basis)
-    return float(np.sqrt(max(left, 0.0) / (len(design) / 3)))
+    arm_rms = fit.size * residual_rms(design[rows], arm.covariance[block], int(kept.sum()))
+    return TipFit(fit, errors, kept, arm, arm_rms, points, turn)
 
 
 def _design(rotation: np.ndarray, touched: np.ndarray, points: tuple[str, ...]) -> np.ndarray:
@@ -162,10 +132,3 @@ def _direction(axis: np.ndarray) -> str:
         return "the " + "xyz"[largest] + " axis"
     signed = axis * np.sign(axis[largest])
     return "the direction (" + ", ".join(f"{value:.2f}" for value in signed) + ")"
-
-
-def _without(touches: Touches, kept: np.ndarray) -> str:
-    wrong = np.flatnonzero(~kept)
-    if not wrong.size:
-        return ""
-    return " without those that do not agree (" + "; ".join(touches.label(int(i)) for i in wrong) + ")"

@@ -225,6 +225,14 @@ STEPS = (
                 ("results.json",),
             ),
             Verb(
+                ("identify", "frame"),
+                "identify_frame",
+                "IdentifyFrame",
+                "the frame of a work object from touches of its points or faces",
+                "flexcal identify frame robot.yaml fixture.csv",
+                ("results.json",),
+            ),
+            Verb(
                 ("verify",),
                 "verify",
                 "Verify",

@@ -52,7 +52,7 @@ class IdentifyTool:
         found = identify_tool(
             self.robot, self.touches, frame=self.frame, name=self.name, out=self.out, command=command_line()
         )
-        for line in (found.headline, *found.remarks, found.line):
+        for line in (found.headline, *found.remarks, *found.lines):
             console.say(line)
         if self.out is not None:
             console.say(f"wrote {self.out / 'results.json'}")

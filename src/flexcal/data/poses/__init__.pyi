@@ -1,11 +1,12 @@
 from .candidate_pool import PosePool
 from .checks import check_metres, check_same_pose
 from .columns import check_positive, unit_quaternions, whole_numbers
+from .frame_touches import FrameMethod, FrameTouches
 from .measured_tables import column_labels, read_pose_pool, read_poses, write_poses
 from .pose_set import DEFAULT_SIGMA, DISTANCE, LINE, PLANE, PoseSet, concatenate
 from .target_files import read_commands, read_targets, write_commands, write_targets
 from .tool_targets import ToolTargets
-from .touch_tables import read_touches
+from .touch_tables import read_frame_touches, read_touches
 from .touches import Touches
 from .working_files import read_working
 
@@ -14,6 +15,8 @@ __all__ = [
     "DISTANCE",
     "LINE",
     "PLANE",
+    "FrameMethod",
+    "FrameTouches",
     "PosePool",
     "PoseSet",
     "ToolTargets",
@@ -24,6 +27,7 @@ __all__ = [
     "column_labels",
     "concatenate",
     "read_commands",
+    "read_frame_touches",
     "read_pose_pool",
     "read_poses",
     "read_targets",

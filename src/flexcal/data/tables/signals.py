@@ -27,6 +27,7 @@ VECTORS = {
     "xyz": ("x", "y", "z"),
     "quaternion": ("qw", "qx", "qy", "qz"),
     "sigma_xyz": ("sigma_x", "sigma_y", "sigma_z"),
+    "work_xyz": ("wx", "wy", "wz"),
     "force": ("fx", "fy", "fz"),
     "moment": ("mx", "my", "mz"),
 }

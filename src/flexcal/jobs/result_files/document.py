@@ -27,6 +27,7 @@ Kind = Literal[
     "demo",
     "dynamics",
     "excitation",
+    "frame",
     "gains",
     "inertials",
     "measurement",

@@ -39,4 +39,4 @@ def identify_tip(
     first = next(iter(model.points.values()), None)
     chosen = frame or (last_frame(model) if first is None else first.frame)
     placed = with_point(model, name, chosen, np.zeros(3))
-    return ToolIdentification(model, fit_tip(placed, touches, name), touches, chosen, name)
+    return ToolIdentification(model, touches, name, fit=fit_tip(placed, touches, name), frame=chosen)

@@ -30,11 +30,16 @@ class AcceptanceConfig:
 
 @dataclass(frozen=True)
 class PointConfig:
-    """Reflector at the nominal position `xyz` (m) in the URDF frame `frame`; `acceptance` if it does not turn towards the instrument."""
+    """Reflector or tip at the nominal position `xyz` (m) in the URDF frame `frame`.
+
+    `acceptance` is declared if a reflector does not turn towards the instrument. `std` (m) is how well `identify tool` knows a tip, which
+    enters the intervals of `identify frame`.
+    """
 
     frame: str
     xyz: Triple
     acceptance: AcceptanceConfig | None = None
+    std: Triple | None = None
 
 
 @dataclass(frozen=True)
