@@ -86,7 +86,8 @@ def produced(model: RobotModel) -> dict[str, str]:
         joint_covariance=np.tile(1e-6 * np.eye(12, dtype=complex), (lines, 1, 1)),
     )
     gains = [gain_name(joint) for joint in model.joint_names]
-    names = {name: unit_of(name) for name in (*model.values, *gains)}
+    forked = replace(model, joints=(*model.joints[:-1], replace(model.joints[-1], parent=3)))
+    names = {name: unit_of(name) for name in (*model.values, *forked.values, *gains)}
     return names | {item.name: item.unit for item in stiffness_parameters(model, [response], backlash=True)}
 
 

@@ -8,7 +8,6 @@ import pytest
 from refusals import refused
 
 from flexcal.calibration.measurement import predict_measurements
-from flexcal.model.parts import kinematic_tree
 from flexcal.model.robot import GEOMETRY, RobotModel
 
 
@@ -90,8 +89,7 @@ def with_slide(model: RobotModel, joint: int) -> RobotModel:
     """The robot with one joint sliding along its axis in place of turning about it, and no spring there."""
     joints = tuple(replace(j, kind="prismatic") if i == joint else j for i, j in enumerate(model.joints))
     frames = {i: frame for i, frame in model.springs.bearing_frames.items() if i != joint}
-    tree = kinematic_tree(joints, frames, model.config.bearings)
-    return replace(model, springs=replace(model.springs, bearing_frames=frames), joints=joints, tree=tree)
+    return replace(model, springs=replace(model.springs, bearing_frames=frames), joints=joints)
 
 
 @pytest.mark.parametrize("joint", range(6))

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from flexcal.model.kinematics import link_placement, point_kinematics, point_placement
-from flexcal.model.parts import kinematic_tree
 from flexcal.model.robot import GEOMETRY, RobotModel
 
 
@@ -19,7 +18,6 @@ def test_links_and_point_lie_where_the_kernels_put_them(tx90l: RobotModel, slide
         tx90l,
         springs=replace(tx90l.springs, bearing_frames=frames),
         joints=joints,
-        tree=kinematic_tree(joints, frames),
     )
     names = [f"{owner}.{key}" for owner in (*model.joint_names, "tool") for key in GEOMETRY]
     model = model.with_values({name: 0.05 * rng.normal() for name in [*names, "point.smr.x"]})

@@ -7,7 +7,6 @@ import pinocchio as pin
 import pytest
 from refusals import refused
 
-from flexcal.model.parts import kinematic_tree
 from flexcal.model.robot import RobotModel
 from flexcal.model.torques import (
     placed_regressor_adjoint,
@@ -32,7 +31,6 @@ def bent(robot: RobotModel, rng: np.random.Generator) -> RobotModel:
         robot,
         geometry=replace(robot.geometry, errors=geometry),
         springs=replace(robot.springs, bearing_frames=frames),
-        tree=kinematic_tree(robot.joints, frames),
     )
 
 

@@ -170,11 +170,13 @@ def _leave_out(model: RobotModel, term: str) -> RobotModel:
     """Robot without a term; unchanged if it does not have it."""
     geometry, springs, drives = model.geometry, model.springs, model.drives
     if term == GEOMETRY:
-        if not any(part.any() for part in (geometry.errors[:, 1:], geometry.tool, geometry.point_error)):
+        parts = (geometry.errors[:, 1:], geometry.origin_error, geometry.tool, geometry.point_error)
+        if not any(part.any() for part in parts):
             return model
         geometry = replace(
             geometry,
             errors=geometry.errors * (np.arange(6) == 0),
+            origin_error=np.zeros_like(geometry.origin_error),
             tool=np.zeros(6),
             point_error=np.zeros_like(geometry.point_error),
         )

@@ -22,7 +22,11 @@ def board_size(fit: GeometricFit) -> float | None:
     camera = model.config.measurements[str(poses.camera[0])]
     if camera.kind != "camera" or camera.mounted == "cell":
         return None
-    nominal = replace(model, geometry=replace(model.geometry, errors=np.zeros_like(model.geometry.errors)))
+    geometry = model.geometry
+    without = replace(
+        geometry, errors=np.zeros_like(geometry.errors), origin_error=np.zeros_like(geometry.origin_error)
+    )
+    nominal = replace(model, geometry=without)
     at = predict_measurements(nominal, poses, elastic=False)
     places = np.array([poses.station == name for name in poses.stations], dtype=float)
     columns = [poses.position[:, :, None], -np.matmul(at.base, at.kinematics.orientation)]

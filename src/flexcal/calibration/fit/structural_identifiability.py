@@ -60,7 +60,8 @@ def random_identifiability(
 ) -> Identifiability:
     """Rank on random poses over the whole joint ranges, with the parameters kept in `seen` ordered first."""
     limits = np.array([(max(j.lower, -np.pi), min(j.upper, np.pi)) for j in model.joints])
-    many = poses.subset(np.resize(np.arange(len(poses)), _RANDOM_POSES))
+    count = max(_RANDOM_POSES, len(parameters))
+    many = poses.subset(np.linspace(0, len(poses) - 1, count).astype(int))
     spread = np.random.default_rng(0).uniform(limits[:, 0], limits[:, 1], many.q.shape)
     return kinematic_identifiability(
         model, replace(many, q=spread), parameters, scale=scale, prefer=seen.kept_names

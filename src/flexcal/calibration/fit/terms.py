@@ -13,6 +13,7 @@ from flexcal.model.robot import (
     BOARD_SCALE,
     GEOMETRY,
     LATERAL,
+    ORIGIN,
     SOCKET_SCALE,
     STATION,
     WIRE_SCALE,
@@ -51,10 +52,10 @@ _LEAST_LOAD = 1e-6
 def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]) -> Parameters:
     """Geometric parameters of some terms, starting at the model's values (Neubauer et al. 2015, §3).
 
-    `kinematic`: a place for every station, and a rotation for all but the first, whose rotation the first joint's errors span; six
-    errors for every joint that moves a measured target, six for the tool, three for each further target, and a rotation for each target
-    whose orientation was measured. A wire has a place and a zero, a touched plane a height and two tilts. Without an instrument of points
-    nothing tells where the robot's base is: all places may turn, and errors of joints that move the whole robot as one are left out.
+    `kinematic`: a place for every station, and a rotation for all but the first, whose rotation the first joint's errors span; the
+    `joint_errors` of every joint that moves a measured target, six for the tool, three for each further target, and a rotation for each
+    target whose orientation was measured. A wire has a place and a zero, a touched plane a height and two tilts. Without an instrument of
+    points nothing tells where the robot's base is: all places may turn, and errors of joints that move the whole robot as one are left out.
     `backlash`: the joints declared with it; `transmission` none, its waves being random effects (`random_waves`).
     `gravity_compliance`, `lateral_compliance`, `transmission_1`…: one or two for every revolute joint on the way, compliances only where
     no spring is declared in their place and gravity loads the axis: by moments that vary by more than 1 % of those that vary most.
@@ -68,7 +69,7 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
         names += [
             f"station.{station}.{key}" for key in _place(model, poses, station, turned=station != known)
         ]
-    errors = [f"{model.joints[i].name}.{key}" for i in joints for key in GEOMETRY]
+    errors = joint_errors(model, joints)
     names += _moving_parts(model, poses, errors) if unplaced else errors
     names += [f"tool.{key}" for key in GEOMETRY]
     first = next(iter(model.points))
@@ -191,6 +192,17 @@ def moving_joints(model: RobotModel, poses: PoseSet) -> list[int]:
     return sorted({i for target in targets for i in model.path_to(model.point(target).joint)})
 
 
+def joint_errors(model: RobotModel, joints: Sequence[int]) -> list[str]:
+    """Names of the geometric errors of some `joints`, in chain order.
+
+    Where several of them are on one link its length vector places them together, and each but the first has an origin of its own.
+    """
+    parents = [model.joints[i].parent for i in joints]
+    branching = [i for k, i in enumerate(joints) if parents[k] in parents[:k]]
+    names = [f"{model.joints[i].name}.{key}" for i in joints for key in GEOMETRY]
+    return [*names, *(f"{model.joints[i].name}.{key}" for i in branching for key in ORIGIN)]
+
+
 def _keys(kind: str) -> tuple[str, ...]:
     if kind == "lateral_compliance":
         return LATERAL
@@ -231,7 +243,7 @@ def plausible_size(model: RobotModel, name: str) -> float:
         return _PLAUSIBLE_TRANSMISSION
     if key.startswith("gravity_compliance"):
         return _PLAUSIBLE_COMPLIANCE
-    if key.startswith("length"):
+    if key.startswith(("length", "origin")):
         return _PLAUSIBLE_LENGTH
     at_base = owner in model.joint_names and model.joints[model.joint_index(owner)].parent < 0
     return _PLAUSIBLE_STATION if at_base and key != "backlash" else _PLAUSIBLE[key]
@@ -255,6 +267,6 @@ def declared_size(model: RobotModel, name: str) -> float | None:
         )
     if name in prior.parameters:
         return prior.parameters[name]
-    if owner not in model.joint_names or key not in GEOMETRY:
+    if owner not in model.joint_names or key not in (*GEOMETRY, *ORIGIN):
         return None
-    return prior.length if key.startswith("length") else prior.angle
+    return prior.angle if unit_of(name) == "rad" else prior.length

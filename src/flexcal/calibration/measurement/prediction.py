@@ -19,6 +19,7 @@ from flexcal.model.robot import (
     GEOMETRY,
     LATERAL,
     LENS,
+    ORIGIN,
     SOCKET_SCALE,
     SPRINGS,
     STATION,
@@ -195,6 +196,9 @@ class PredictedMeasurements:
                 result[:, :, k] = by_geometry[:, :, 6 * owners.index(owner) + GEOMETRY.index(key)]
                 if owner == "tool" and key.startswith("length"):
                     result[target != first, :, k] = 0.0
+            elif key in ORIGIN:
+                i = self.model.joint_index(owner)
+                result[:, :, k] = self._by_origin(i, ORIGIN.index(key), by_load)
             elif key in ("backlash", "gravity_compliance") or key.startswith("transmission_"):
                 i = self.model.joint_index(owner)
                 result[:, :, k] = self._by_row(self._twist(i, key))[:, None] * by_geometry[:, :, 6 * i]
@@ -208,6 +212,29 @@ class PredictedMeasurements:
             else:
                 result[:, :, k] = np.matmul(by_load, self._by_row(self.load(name))[:, :, None])[:, :, 0]
         return result
+
+    def _by_origin(self, joint: int, axis: int, by_load: np.ndarray) -> np.ndarray:
+        """Derivative (R, 3) of the readings by a displacement of a joint and all beyond it along an axis of its parent link.
+
+        As by that link's length vector for the targets that the joint moves; the load on springs below shifts with the weight.
+        """
+        parent, masses = self.model.joints[joint].parent, self.model.links.mass
+        paths = {name: self.model.path_to(self.model.point(name).joint) for name in self.poses.targets}
+        carried = np.array([joint in paths[name] for name in self.poses.target.tolist()])
+        if parent < 0:
+            moved = np.broadcast_to(np.eye(6)[axis, :, None], (len(carried), 6, 1))
+        else:
+            column = 6 * parent + 3 + axis
+            moved = self.kinematics.geometry_jacobian[:, :, column : column + 1]
+        moved = self._by_tool(np.where(carried[:, None, None], moved, 0.0))[:, :, 0]
+        if parent < 0 or not self.rest.axes.size:
+            return moved
+        beyond = [i for i in range(self.model.n) if joint in self.model.path_to(i)]
+        weight = np.full(len(carried), masses[beyond].sum())
+        if self.model.payload is not None and self.model.payload.joint in beyond:
+            weight += carried_mass(self.model, self.poses.payload, len(self.poses))
+        load = weight[:, None] * self.rest.regressor[:, :, 4 * parent + 1 + axis]
+        return moved + np.matmul(by_load, self._by_row(load)[:, :, None])[:, :, 0]
 
     def _twist(self, joint: int, key: str) -> np.ndarray:
         """Rotation (N,) of a joint by its backlash, gravity compliance, hardening or one wave of its transmission error."""

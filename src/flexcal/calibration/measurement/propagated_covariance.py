@@ -10,7 +10,7 @@ from flexcal.calibration.measurement.prediction import left_jacobian
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.parts import vector_rotation
-from flexcal.model.robot import GEOMETRY, LATERAL, MASS_AND_COM, SPRINGS, STATION, RobotModel
+from flexcal.model.robot import GEOMETRY, LATERAL, MASS_AND_COM, ORIGIN, SPRINGS, STATION, RobotModel
 from flexcal.model.statics import (
     carried_mass,
     elastic_axes,
@@ -22,7 +22,7 @@ from flexcal.model.statics import (
     twist_from_torque,
 )
 
-_GEOMETRIC = (*GEOMETRY, *STATION, "backlash", "gravity_compliance", *LATERAL)
+_GEOMETRIC = (*GEOMETRY, *ORIGIN, *STATION, "backlash", "gravity_compliance", *LATERAL)
 
 
 def moving_parameters(model: RobotModel, *, elastic: bool = True) -> list[str]:
@@ -193,6 +193,16 @@ def propagation(
         elif owner in owners and key in GEOMETRY:
             if owner != "tool" or not key.startswith("length") or name == next(iter(model.points)):
                 rows[6 * owners.index(owner) + GEOMETRY.index(key)] += row
+        elif owner in owners and key in ORIGIN:
+            joint, axis = model.joint_index(owner), ORIGIN.index(key)
+            parent = model.joints[joint].parent
+            if joint in model.path_to(model.point(name).joint) and parent >= 0:
+                rows[6 * parent + 3 + axis] += row
+            elif joint in model.path_to(model.point(name).joint):
+                turn = vector_rotation(model.stations.pose[model.station_index(place), 3:])
+                rows[first_twist + len(twists) : first_twist + len(twists) + 3] += np.outer(
+                    turn[:, axis], row
+                )
         elif (twist := _twisting(model, item)) is not None:
             rows[first_twist + twists.index(twist)] += row
         elif key == "stiffness":

@@ -16,7 +16,7 @@ from flexcal.calibration.measurement import (
     predict_measurements,
 )
 from flexcal.calibration.term_selection.leave_out_errors import LeaveOutErrors, leave_out_fit
-from flexcal.model.robot import GEOMETRY, STATION, RobotModel
+from flexcal.model.robot import GEOMETRY, ORIGIN, STATION, RobotModel
 from flexcal.units import MILLIMETRE
 
 _WORSE = 1.05
@@ -211,7 +211,9 @@ class TermTrials:
         if term not in self._columns:
             if term == "kinematic":
                 kept = self.rigid.identifiability.kept_names
-                names = tuple(n for n in kept if n.rpartition(".")[2] in (*GEOMETRY, *STATION, "zero"))
+                names = tuple(
+                    n for n in kept if n.rpartition(".")[2] in (*GEOMETRY, *ORIGIN, *STATION, "zero")
+                )
             else:
                 names = geometric_parameters(self.model, self.rigid.poses, [term]).names
             self._columns[term] = self._seen(names)

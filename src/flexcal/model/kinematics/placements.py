@@ -18,7 +18,7 @@ def joint_placement(model: RobotModel, joint: int) -> tuple[np.ndarray, np.ndarr
     nominal, (_, first, second) = model.joints[joint], model.geometry.errors[joint, :3]
     length = np.zeros(3) if nominal.parent < 0 else model.geometry.errors[nominal.parent, 3:]
     turn = axis_rotation(nominal.normals[1], second) @ axis_rotation(nominal.normals[0], first)
-    return nominal.translation + length, nominal.rotation @ turn
+    return nominal.translation + model.geometry.origin_error[joint] + length, nominal.rotation @ turn
 
 
 def link_placement(model: RobotModel, joint: int, q: float = 0.0) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ from .rotations import (
     vector_rotation,
     wxyz_rotation,
 )
-from .tree import Bearings, bearing_frame, kinematic_tree, path_to
+from .tree import Bearings, bearing_frame, branching_joints, kinematic_tree, path_to
 
 __all__ = [
     "LINK_PARAMETERS",
@@ -28,6 +28,7 @@ __all__ = [
     "axis_rotation",
     "axis_rotations",
     "bearing_frame",
+    "branching_joints",
     "is_physically_consistent",
     "kinematic_tree",
     "normals_to",

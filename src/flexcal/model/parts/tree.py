@@ -25,6 +25,20 @@ def path_to(joints: Sequence[Joint], joint: int) -> tuple[int, ...]:
     return tuple(reversed(path))
 
 
+def branching_joints(joints: Sequence[Joint]) -> tuple[int, ...]:
+    """Indices of the joints that are not the first of those on their parent's link, as the second shoulder of a torso.
+
+    The length vector of the parent joint places all of these together, so each but the first has a displacement of its own.
+    """
+    seen: set[int] = set()
+    branching = []
+    for i, joint in enumerate(joints):
+        if joint.parent in seen:
+            branching.append(i)
+        seen.add(joint.parent)
+    return tuple(branching)
+
+
 def bearing_frame(joint: Joint) -> np.ndarray:
     """The default bearing frame (3, 3) of a joint: z its axis, x the first axis normal to it."""
     (x, y, z), (a, b, c) = joint.normals[0].tolist(), joint.axis.tolist()
@@ -32,14 +46,21 @@ def bearing_frame(joint: Joint) -> np.ndarray:
 
 
 def kinematic_tree(
-    joints: Sequence[Joint], bearing_frames: Mapping[int, np.ndarray], bearings: Bearings | None = None
+    joints: Sequence[Joint],
+    bearing_frames: Mapping[int, np.ndarray],
+    bearings: Bearings | None = None,
+    origin_error: np.ndarray | None = None,
 ) -> Tree:
-    """Kinematic tree of the given joints for the kernels, with the bearing frames (3, 3) of the elastic ones by joint index."""
+    """Kinematic tree of the given joints for the kernels, with the bearing frames (3, 3) of the elastic ones by joint index.
+
+    `origin_error` (n, 3), m, displaces the joints in their parent links.
+    """
+    origins = np.array([j.translation for j in joints])
     return Tree.build(
         [j.parent for j in joints],
         [j.kind == "prismatic" for j in joints],
         np.array([j.rotation for j in joints]),
-        np.array([j.translation for j in joints]),
+        origins if origin_error is None else origins + origin_error,
         np.array([j.normals for j in joints]),
         np.array([bearing_frames.get(i, bearing_frame(j)) for i, j in enumerate(joints)]),
         bearings == "before",

@@ -17,7 +17,6 @@ from flexcal.model.parts import (
     Payload,
     Point,
     bearing_frame,
-    kinematic_tree,
     path_to,
     rpy_rotation,
 )
@@ -72,9 +71,9 @@ def read_robot(robot_type: type[RobotModel], path: Path) -> RobotModel:
         name=description.name,
         joints=joints,
         points=points,
-        tree=kinematic_tree(joints, springs.bearing_frames, config.bearings),
         geometry=Geometry(
             errors=np.zeros((n, 6)),
+            origin_error=np.zeros((n, 3)),
             tool=np.zeros(6),
             point_error=np.zeros((len(points), 3)),
             point_turn=np.zeros((len(points), 3)),

@@ -15,12 +15,14 @@ from flexcal.model.parts import Inertia
 class Geometry:
     """Geometric deviations from the URDF, and compliances of rigid joints.
 
-    `errors` (n, 6) of every joint and `tool` (6,) in the order of `GEOMETRY`, rad and m; `point_error` (points, 3), m, in the order of
+    `errors` (n, 6) of every joint and `tool` (6,) in the order of `GEOMETRY`, rad and m; `origin_error` (n, 3), m, of joints that branch
+    off, in the parent link, zero for others; `point_error` (points, 3), m, in the order of
     the robot's points; `point_turn` (points, 3), rad, rotation vectors from the points' frames to the axes of a target whose orientation is
     measured; `gravity_compliance` (n,) about the joints' axes and `lateral_compliance` (n, 2) across them, rad/(N m).
     """
 
     errors: np.ndarray
+    origin_error: np.ndarray
     tool: np.ndarray
     point_error: np.ndarray
     point_turn: np.ndarray

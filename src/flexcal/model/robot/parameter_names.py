@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from flexcal.model.robot.robot_model import RobotModel
 
 GEOMETRY = ("offset", "misalignment_1", "misalignment_2", "length_x", "length_y", "length_z")
+ORIGIN = ("origin_x", "origin_y", "origin_z")
+"""Displacement of a joint that branches off, in its parent link."""
 SPRINGS = ("bearing_x", "bearing_y", "drive")
 LATERAL = ("gravity_compliance_1", "gravity_compliance_2")
 _FRICTION_UNITS = {
@@ -51,6 +53,7 @@ SCATTER = (
 
 _UNITS = {
     "offset": "rad", "misalignment_1": "rad", "misalignment_2": "rad", "length_x": "m", "length_y": "m", "length_z": "m",
+    "origin_x": "m", "origin_y": "m", "origin_z": "m",
     "x": "m", "y": "m", "z": "m", "zero": "m", "rx": "rad", "ry": "rad", "rz": "rad", "backlash": "rad", "gravity_compliance": "rad/(N m)",
     "gravity_compliance_1": "rad/(N m)", "gravity_compliance_2": "rad/(N m)",
     "stiffness": "N m/rad", "damping": "N m s/rad",
@@ -136,10 +139,12 @@ def parameter_locations(model: RobotModel) -> dict[str, Location]:
     for c, name in enumerate(model.lenses.names):
         for k, key in enumerate(LENS):
             table[f"camera.{name}.{key}"] = Location("lenses", "values", (c, k))
-    elastic = {e.index: e for e in model.elastic}
+    elastic, branching = {e.index: e for e in model.elastic}, model.branching
     for i, joint in enumerate(model.joints):
         for k, key in enumerate(GEOMETRY):
             table[f"{joint.name}.{key}"] = Location("geometry", "errors", (i, k))
+        for k, key in enumerate(ORIGIN if i in branching else ()):
+            table[f"{joint.name}.{key}"] = Location("geometry", "origin_error", (i, k))
         table[f"{joint.name}.backlash"] = Location("drives", "backlash", (i,))
         table[f"{joint.name}.gravity_compliance"] = Location("geometry", "gravity_compliance", (i,))
         for k, key in enumerate(LATERAL):

@@ -26,6 +26,7 @@ from flexcal.model.parts import (
     Payload,
     Point,
     bearing_frame,
+    branching_joints,
     kinematic_tree,
     parallel_axis,
     path_to,
@@ -70,8 +71,6 @@ class RobotModel:
         The movable joints, nominal.
     points : mapping of Point
         Target points by name.
-    tree : Tree
-        The kernels' view of joints and bearing frames.
     geometry : Geometry
         Deviations from the URDF, and compliances.
     springs : Springs
@@ -114,7 +113,6 @@ class RobotModel:
     name: str
     joints: tuple[Joint, ...]
     points: Mapping[str, Point]
-    tree: Tree
     geometry: Geometry
     springs: Springs
     drives: Drives
@@ -164,14 +162,8 @@ class RobotModel:
         )
 
     def __getstate__(self) -> dict[str, Any]:
-        """State for pickling, without the kernels' view, which is rebuilt on arrival."""
-        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "tree"}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(
-            state,
-            tree=kinematic_tree(state["joints"], state["springs"].bearing_frames, state["config"].bearings),
-        )
+        """State for pickling, without what is derived from it."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     def with_stations(self, names: Iterable[str]) -> RobotModel:
         """Robot with further stations, in the base frame: places of a fixture, which robot.yaml does not list.
@@ -228,9 +220,7 @@ class RobotModel:
         RobotModel
             The changed robot.
         """
-        config = replace(self.config, bearings=bearings)
-        tree = kinematic_tree(self.joints, self.springs.bearing_frames, bearings)
-        return replace(self, config=config, tree=tree)
+        return replace(self, config=replace(self.config, bearings=bearings))
 
     def with_drive_springs(self, springs: Mapping[int, tuple[float, float]]) -> RobotModel:
         """Robot with drive springs at some of its rigid joints.
@@ -270,7 +260,7 @@ class RobotModel:
             damping=damping,
             braked=self.springs.braked | set(springs),
         )
-        return replace(self, springs=widened, tree=kinematic_tree(self.joints, frames, self.config.bearings))
+        return replace(self, springs=widened)
 
     def without_springs(self) -> RobotModel:
         """Robot without elastic joints."""
@@ -321,6 +311,17 @@ class RobotModel:
     def joint_names(self) -> tuple[str, ...]:
         """URDF names of the movable joints."""
         return tuple(joint.name for joint in self.joints)
+
+    @cached_property
+    def tree(self) -> Tree:
+        """The kernels' view of joints and bearing frames."""
+        frames = self.springs.bearing_frames
+        return kinematic_tree(self.joints, frames, self.config.bearings, self.geometry.origin_error)
+
+    @cached_property
+    def branching(self) -> tuple[int, ...]:
+        """Indices of the joints with a displacement of their own in the parent link, because another one places it."""
+        return branching_joints(self.joints)
 
     @property
     def gravity(self) -> np.ndarray:

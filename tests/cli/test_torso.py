@@ -1,0 +1,109 @@
+"""Two arms on one torso: every further joint on a link has an origin of its own, and each arm loads what carries it."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from stranger_torso import StrangerTorso
+
+from flexcal import Calibration, PoseSet, RobotModel, calibrate, read_poses, verify
+from flexcal.calibration.fit import geometric_parameters
+from flexcal.calibration.measurement import predict_measurements
+from flexcal.calibration.verification import error_scale
+from flexcal.export.urdf import render_urdf
+
+SPRINGS = """elastic:
+  - joint: waist_pitch
+    drive: {stiffness: 2e4, damping: 1}
+    bearing_x: {stiffness: 4e4, damping: 1}
+    bearing_y: {stiffness: 3e4, damping: 1}
+  - {joint: left_shoulder_pitch, drive: {stiffness: 9e3, damping: 1}}
+payload: {frame: right_hand, mass: 1.5, com: [0.0, 0.0, -0.1]}
+"""
+
+
+def calibrated(
+    robot: StrangerTorso, folder: Path, count: int, *, terms: tuple[str, ...] | None = None
+) -> tuple[Calibration, PoseSet]:
+    """Calibration with default options on `count` postures of each side, and fresh ones."""
+    rng = np.random.default_rng(robot.seed)
+    model = RobotModel.from_yaml(robot.write(folder), estimates=False)
+    poses = read_poses(robot.write_poses(folder / "poses.csv", count, rng), model)
+    fresh = read_poses(robot.write_poses(folder / "fresh.csv", 150, rng), model)
+    return calibrate(model, poses, terms=terms), fresh
+
+
+def distances(calibration: Calibration, fresh: PoseSet) -> np.ndarray:
+    """Errors (N,), mm, at fresh poses."""
+    return 1e3 * np.linalg.norm(predict_measurements(calibration.model, fresh).residual, axis=1)
+
+
+@pytest.mark.parametrize("waist", [True, False], ids=["on a torso", "on a column"])
+def test_shoulders_that_are_not_where_the_urdf_has_them_relative_to_each_other(
+    waist: bool, tmp_path: Path
+) -> None:
+    robot = StrangerTorso(3, joints=4, waist=waist, yields=0.0)
+    calibration, fresh = calibrated(robot, tmp_path, 60, terms=("kinematic",))
+    noise = 1e3 * np.sqrt(3) * robot.tracker_noise
+    assert distances(calibration, fresh).mean() < 1.5 * noise
+    assert {"right_shoulder_pitch.origin_x", "right_shoulder_pitch.origin_z"} & set(
+        calibration.estimate.values
+    )
+
+
+def test_derivatives_by_an_origin_are_those_of_differences(tmp_path: Path) -> None:
+    """Of a point at rest, the deflection that follows the weight included; and for an arm on the base."""
+    for waist, more in ((True, SPRINGS), (False, "")):
+        robot = StrangerTorso(1, joints=4, waist=waist)
+        model = RobotModel.from_yaml(robot.write(tmp_path / str(waist), more), estimates=False)
+        rng = np.random.default_rng(0)
+        poses = read_poses(robot.write_poses(tmp_path / "poses.csv", 20, rng), model)
+        names = [f"right_shoulder_pitch.origin_{axis}" for axis in "xyz"]
+        assert set(names) <= set(geometric_parameters(model, poses, ["kinematic"]).names)
+        start = {
+            name: 1e-3 * rng.normal() for name in (*names, "waist_pitch.length_x") if name in model.values
+        }
+        model = model.with_values(start | {"station.tracker.rz": 0.4})
+        jacobian = predict_measurements(model, poses, jacobians=True).jacobian(names)
+        for k, name in enumerate(names):
+            up, down = (
+                predict_measurements(model.with_values({name: model.value(name) + h}), poses).position
+                for h in (1e-3, -1e-3)
+            )
+            assert jacobian[:, :, k] == pytest.approx((up - down) / 2e-3, abs=1e-8)
+
+
+def test_default_terms_find_the_compliance_of_every_joint_of_both_arms(tmp_path: Path) -> None:
+    robot = StrangerTorso(1, joints=4)
+    calibration, fresh = calibrated(robot, tmp_path, 80)
+    assert {"lateral_compliance", "gravity_compliance"} <= set(calibration.selected.terms)
+    assert distances(calibration, fresh).mean() < 0.12
+
+
+def test_a_urdf_has_both_shoulders_where_they_are(tmp_path: Path) -> None:
+    robot = StrangerTorso(3, joints=4, yields=0.0)
+    model = RobotModel.from_yaml(robot.write(tmp_path), estimates=False)
+    model = model.with_values({"right_shoulder_pitch.origin_x": 4e-3, "waist_pitch.length_z": 1e-3})
+    (tmp_path / "torso.urdf").write_text(render_urdf(model).text)
+    written = RobotModel.from_yaml(tmp_path / "robot.yaml", estimates=False)
+    shift = written.joints[written.joint_index("right_shoulder_pitch")].translation
+    assert shift - model.joints[model.joint_index("right_shoulder_pitch")].translation == pytest.approx(
+        [4e-3, 0, 1e-3]
+    )
+
+
+@pytest.mark.slow
+def test_four_hundred_poses_of_each_arm_in_a_minute(tmp_path: Path) -> None:
+    errors, inside = [], []
+    for seed in (1, 2, 3, 4):
+        began = time.process_time()
+        calibration, fresh = calibrated(StrangerTorso(seed), tmp_path / str(seed), 400)
+        assert time.process_time() - began < 60
+        errors.append(distances(calibration, fresh).mean())
+        verification = verify(calibration.robot, fresh)
+        inside.append(error_scale(verification.predicted, verification.covariance).inside)
+    assert np.mean(errors) < 0.08
+    assert 0.9 < np.mean(inside) < 0.99
