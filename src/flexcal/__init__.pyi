@@ -1,5 +1,5 @@
 from .calibration.fit import fit_geometry
-from .calibration.measurement import rigid_motion
+from .calibration.kinds import rigid_motion
 from .calibration.verification import prediction_errors
 from .data.plans import MultisinePlan, PosePlan, TrajectoryPlan, read_plan
 from .data.poses import PoseSet, ToolTargets, read_poses, read_targets

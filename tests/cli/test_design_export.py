@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.calibration.measurement import rigid_motion
+from flexcal.calibration.kinds import rigid_motion
 from flexcal.data.plans import PosePlan, read_plan_of
 from flexcal.files.formats import read_estimates
 from flexcal.model.kinematics import point_kinematics

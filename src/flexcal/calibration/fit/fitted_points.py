@@ -32,6 +32,7 @@ from flexcal.calibration.fit.terms import (
     plausible_size,
     random_waves,
 )
+from flexcal.calibration.kinds import KINDS
 from flexcal.calibration.measurement import (
     RADIANS,
     PredictedMeasurements,
@@ -43,7 +44,7 @@ from flexcal.calibration.measurement import (
 )
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import RANK_TOLERANCE, Estimate, Identifiability, Loss, Parameter, Parameters
-from flexcal.model.robot import BOARD_SCALE, SCATTER, SOCKET_SCALE, WIRE_SCALE, RobotModel, unit_of
+from flexcal.model.robot import SCATTER, RobotModel, unit_of
 from flexcal.progress import Progress
 
 _FLANK_PASSES = 4
@@ -174,12 +175,8 @@ class PointFit:
 
         Errors of the joints grow with the robot, so a fit would make a smaller robot of fewer errors, and shorter distances.
         """
-        there = {
-            SOCKET_SCALE: self.poses.in_socket.any(),
-            BOARD_SCALE: self.poses.seen.any(),
-            WIRE_SCALE: bool((self.poses.far & (self.poses.position[:, 0] != 0)).any()),
-        }
-        sizes = {name: declared_size(self.start, name) for name, own in there.items() if own}
+        own = [kind.scale for kind in KINDS if kind.scale and kind.scaled(self.poses).any()]
+        sizes = {name: declared_size(self.start, name) for name in own}
         scales = [Parameter(name, "1", 0.0, prior_std=std) for name, std in sizes.items() if std is not None]
         lengths = [
             Parameter(name, "m", self.start.value(name), prior_std=plausible_size(self.start, name))

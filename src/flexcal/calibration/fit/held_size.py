@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from flexcal.calibration.fit.terms import geometric_parameters, manufacturing_tolerances, plausible_size
+from flexcal.calibration.kinds import tells_lengths
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import analyse
@@ -21,7 +22,7 @@ def held_lengths(model: RobotModel, poses: PoseSet) -> tuple[str, ...]:
     A robot of any size touches planes and spheres of that size: without the length of one link all readings of contacts fit a robot that
     is a point. None where the readings tell lengths.
     """
-    if poses.tells_lengths:
+    if tells_lengths(poses):
         return ()
     parameters = geometric_parameters(model, poses, ["kinematic"])
     parameters = parameters.subset([name for name in parameters.names if not name.startswith("station.")])

@@ -6,17 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexcal.calibration.measurement import left_jacobian, predict_measurements
-from flexcal.data.poses import DISTANCE, PLANE, PoseSet
+from flexcal.calibration.kinds import KINDS, kind_of
+from flexcal.calibration.measurement import predict_measurements
+from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameter, Parameters
 from flexcal.model.robot import (
-    BOARD_SCALE,
     GEOMETRY,
     LATERAL,
     ORIGIN,
-    SOCKET_SCALE,
     STATION,
-    WIRE_SCALE,
     RobotModel,
     unit_of,
 )
@@ -39,8 +37,6 @@ PER_JOINT = ("gravity_compliance", "lateral_compliance")
 """Kinds of terms that may be named for one joint, as `<joint>.<kind>`: compliance about its axis, and about the two axes normal to it."""
 
 
-_FLAT = 0.01
-"""Extent of sockets normal to a line, relative to that along it, below which they lie on the line."""
 _AS_ONE = 1e-4
 """Relative motion of the points, beside that of a rigid body, below which the whole robot moves as one."""
 _LOADED = 0.01
@@ -66,9 +62,8 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
     unplaced = not poses.located.any()
     known = next(iter(poses.station[poses.located].tolist()), None)
     for station in poses.stations:
-        names += [
-            f"station.{station}.{key}" for key in _place(model, poses, station, turned=station != known)
-        ]
+        told = kind_of(poses, station).place(model, poses, station, turned=station != known)
+        names += [f"station.{station}.{key}" for key in told]
     errors = joint_errors(model, joints)
     names += _moving_parts(model, poses, errors) if unplaced else errors
     names += [f"tool.{key}" for key in GEOMETRY]
@@ -111,40 +106,6 @@ def _moving_parts(model: RobotModel, poses: PoseSet, names: Sequence[str]) -> li
         for name, own, whole in zip(names, np.linalg.norm(left, axis=0), size, strict=True)
         if own > _AS_ONE * whole
     ]
-
-
-def _place(model: RobotModel, poses: PoseSet, station: str, *, turned: bool) -> Sequence[str]:
-    """Numbers of a station's place that its readings tell, with its rotation where it may be `turned`."""
-    kind = "" if poses.kind is None else str(poses.kind[poses.station == station][0])
-    if kind == DISTANCE:
-        return (*STATION[:3], "zero")
-    if kind:
-        # a rotation about the normal of a plane, or about a line, and motions along them change nothing
-        vector = model.stations.pose[model.station_index(station), 3:]
-        tilts = _without_turn_about(vector, np.array([0.0, 0.0, 1.0]))
-        return ("z", *tilts) if kind == PLANE else ("x", "y", *tilts)
-    return (*STATION[:3], *(_turns(model, poses, station) if turned else ()))
-
-
-def _without_turn_about(vector: np.ndarray, axis: np.ndarray) -> list[str]:
-    """Two coordinates of a rotation `vector` (3,), without the one that is most like a rotation about an `axis` (3,)."""
-    about = np.linalg.solve(left_jacobian(vector), axis)
-    return [key for k, key in enumerate(STATION[3:]) if k != int(np.argmax(np.abs(about)))]
-
-
-def _turns(model: RobotModel, poses: PoseSet, station: str) -> Sequence[str]:
-    """Rotations of a station that its points tell: none of a fixture with one socket, two of one whose sockets lie on a line."""
-    keys = STATION[3:]
-    if station not in poses.fixtures:
-        return keys
-    places = np.unique(poses.position[poses.station == station], axis=0)
-    _, sizes, axes = np.linalg.svd(places - places.mean(axis=0))
-    if len(places) == 1 or sizes[0] == 0:
-        return ()
-    if len(places) > 2 and sizes[1] > _FLAT * sizes[0]:
-        return keys
-    # a rotation about the line changes nothing
-    return _without_turn_about(model.stations.pose[model.station_index(station), 3:], axes[0])
 
 
 def random_waves(model: RobotModel, poses: PoseSet, free: Parameters) -> dict[str, float]:
@@ -252,19 +213,9 @@ def plausible_size(model: RobotModel, name: str) -> float:
 def declared_size(model: RobotModel, name: str) -> float | None:
     """Standard deviation of a geometric parameter in robot.yaml's `prior:`, by name or by kind; None if not given."""
     prior, (owner, _, key) = model.prior, name.rpartition(".")
-    if name == SOCKET_SCALE:
-        fixtures = [
-            item for item in model.config.measurements.values() if item.kind == "sockets" and item.extent > 0
-        ]
-        return fixtures[0].std / fixtures[0].extent if fixtures else None
-    if name == BOARD_SCALE:
-        return next(
-            (item.board.std for item in model.config.measurements.values() if item.kind == "camera"), None
-        )
-    if name == WIRE_SCALE:
-        return next(
-            (item.scale_std for item in model.config.measurements.values() if item.kind == "wire"), None
-        )
+    scaled = next((kind for kind in KINDS if name == kind.scale), None)
+    if scaled is not None:
+        return scaled.scale_std(model)
     if name in prior.parameters:
         return prior.parameters[name]
     if owner not in model.joint_names or key not in (*GEOMETRY, *ORIGIN):

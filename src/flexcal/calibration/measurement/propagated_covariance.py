@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.measurement.prediction import left_jacobian
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import point_kinematics
-from flexcal.model.parts import vector_rotation
+from flexcal.model.parts import left_jacobian, vector_rotation
 from flexcal.model.robot import GEOMETRY, LATERAL, MASS_AND_COM, ORIGIN, SPRINGS, STATION, RobotModel
 from flexcal.model.statics import (
     carried_mass,

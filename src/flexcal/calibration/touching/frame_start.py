@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexcal.calibration.measurement import rigid_motion
+from flexcal.calibration.kinds import rigid_motion
 from flexcal.data.poses import FrameTouches
 from flexcal.errors import FlexcalError
 

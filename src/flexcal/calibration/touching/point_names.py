@@ -7,7 +7,7 @@ from itertools import combinations, permutations
 
 import numpy as np
 
-from flexcal.calibration.measurement import rigid_motion
+from flexcal.calibration.kinds import rigid_motion
 from flexcal.errors import FlexcalError
 
 _ALL_ORDERS = 6

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.calibration.error_model import group_numbers
-from flexcal.calibration.measurement import best_motion, rigid_motion
+from flexcal.calibration.kinds import best_motion, rigid_motion
 from flexcal.data.poses import PoseSet
 from flexcal.model.parts import rotation_vector, vector_rotation
 from flexcal.model.robot import STATION, RobotModel

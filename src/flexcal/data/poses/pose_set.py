@@ -143,25 +143,30 @@ class PoseSet:
                 result[self.kind == name] = coordinates
         return result
 
+    def of_kind(self, kind: str) -> np.ndarray:
+        """Rows of a kind of measurement.
+
+        Parameters
+        ----------
+        kind : str
+            Entry of the field `kind`.
+
+        Returns
+        -------
+        ndarray
+            Mask (N,).
+        """
+        return np.zeros(len(self), bool) if self.kind is None else self.kind == kind
+
     @property
     def far(self) -> np.ndarray:
         """Rows (N,) whose distance from the instrument was measured."""
-        return np.zeros(len(self), bool) if self.kind is None else self.kind == DISTANCE
+        return self.of_kind(DISTANCE)
 
     @property
     def located(self) -> np.ndarray:
         """Rows (N,) whose point was measured with all three coordinates by an instrument, which sockets are not."""
         return ~self.in_socket if self.kind is None else ~self.in_socket & (self.kind == "")
-
-    @property
-    def tells_lengths(self) -> bool:
-        """Whether any reading tells how large the robot is, which contacts do not, nor sockets without a known distance."""
-        read = self.far & (self.position[:, 0] > 0)
-        known = any(
-            len(np.unique(self.position[self.in_socket & (self.station == name)], axis=0)) > 1
-            for name in self.fixtures
-        )
-        return bool(self.located.any() or read.any() or known)
 
     @property
     def places(self) -> tuple[str, ...]:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.measurement import predict_measurements, turn_to_z
+from flexcal.calibration.kinds import turn_to_z
+from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.camera import board_corners, lens_prior, projected
 from flexcal.data.poses import PoseSet
 from flexcal.model.kinematics import damped_step, joint_ranges

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from flexcal.calibration.measurement import predict_measurements, turn_to_z
+from flexcal.calibration.kinds import turn_to_z
+from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import DEFAULT_SIGMA, DISTANCE, LINE, PLANE, PoseSet
 from flexcal.design.poses.camera_setup import CameraSetup
 from flexcal.errors import FlexcalError

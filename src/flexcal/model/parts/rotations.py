@@ -92,3 +92,23 @@ def wxyz_rotation(quaternion: np.ndarray) -> np.ndarray:
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def left_jacobian(vector: np.ndarray) -> np.ndarray:
+    """Left Jacobian (3, 3) of a rotation vector (3,): rotation in fixed axes per change of the vector."""
+    angle = float(np.linalg.norm(vector))
+    skew = skew_matrix(vector)
+    if angle < 1e-8:
+        return np.eye(3) + skew / 2
+    return (
+        np.eye(3) + (1 - np.cos(angle)) / angle**2 * skew + (angle - np.sin(angle)) / angle**3 * skew @ skew
+    )
+
+
+def inverse_right_jacobians(vectors: np.ndarray) -> np.ndarray:
+    """Inverse right Jacobians (N, 3, 3) of rotation vectors (N, 3): change of the vector with a rotation in the turned axes."""
+    angle = np.linalg.norm(vectors, axis=1)
+    half = np.maximum(angle, 1e-6) / 2
+    factor = np.where(angle < 1e-6, 1 / 12, (1 - half / np.tan(half)) / (4 * half**2))
+    skew = np.cross(vectors[:, None, :], np.eye(3)).swapaxes(1, 2)
+    return np.eye(3) + skew / 2 + factor[:, None, None] * (skew @ skew)

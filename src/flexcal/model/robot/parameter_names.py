@@ -38,6 +38,7 @@ BOARD_SCALE = "board.scale"
 """Relative deviation of the size of a camera's board from the declared one."""
 WIRE_SCALE = "wires.scale"
 """Relative deviation of the lengths that draw-wires read from the true ones."""
+SCALES = (SOCKET_SCALE, BOARD_SCALE, WIRE_SCALE)
 LENS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 """Intrinsic parameters of a camera."""
 SCATTER = (
@@ -133,9 +134,8 @@ def parameter_locations(model: RobotModel) -> dict[str, Location]:
         for k, key in enumerate(STATION):
             table[f"station.{name}.{key}"] = Location("stations", "pose", (s, k))
         table[f"station.{name}.zero"] = Location("stations", "zero", (s,))
-    table[SOCKET_SCALE] = Location("stations", "scale", (0,))
-    table[BOARD_SCALE] = Location("stations", "scale", (1,))
-    table[WIRE_SCALE] = Location("stations", "scale", (2,))
+    for k, name in enumerate(SCALES):
+        table[name] = Location("stations", "scale", (k,))
     for c, name in enumerate(model.lenses.names):
         for k, key in enumerate(LENS):
             table[f"camera.{name}.{key}"] = Location("lenses", "values", (c, k))

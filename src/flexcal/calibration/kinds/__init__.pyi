@@ -1,0 +1,16 @@
+from .kind import Kind
+from .registry import ANGULAR, KINDS, LOCATING, kind_of, tells_lengths
+from .rigid_motions import best_motion, rigid_motion
+from .robust_start import turn_to_z
+
+__all__ = [
+    "ANGULAR",
+    "KINDS",
+    "LOCATING",
+    "Kind",
+    "best_motion",
+    "kind_of",
+    "rigid_motion",
+    "tells_lengths",
+    "turn_to_z",
+]

@@ -1,0 +1,96 @@
+"""A kind of measurement, as the fit of all kinds together takes it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from flexcal.calibration.kinds.rigid_motions import registered, rigid_motion
+from flexcal.data.poses import PoseSet
+from flexcal.model.parts import left_jacobian
+from flexcal.model.robot import SCALES, STATION, RobotModel
+
+if TYPE_CHECKING:
+    from flexcal.calibration.measurement import PredictedMeasurements
+
+
+class Kind(ABC):
+    """Kind of measurement: its readings, its own parameters, and the place of its station.
+
+    Arm, deflection and station are common to all kinds; without more said, a kind reads the target's coordinates in the station's axes.
+    """
+
+    scale: ClassVar[str] = ""
+    """Parameter that is the relative deviation of its readings from the true lengths; empty where it has none."""
+
+    @abstractmethod
+    def rows(self, poses: PoseSet) -> np.ndarray:
+        """Rows (N,) of a pose set that are of this kind."""
+
+    def read(self, model: RobotModel, station: np.ndarray, located: np.ndarray) -> np.ndarray:
+        """Readings (K, 3), m, of targets `located` (K, 3), m, in the axes of their `station` (K,); zero where a coordinate is not read."""
+        return located
+
+    def slopes(self, located: np.ndarray) -> np.ndarray:
+        """Change (K, 3, 3) of the readings with a displacement of the target in the station's axes."""
+        return np.broadcast_to(np.eye(3), (len(located), 3, 3))
+
+    def angles(self, at: PredictedMeasurements) -> np.ndarray:
+        """Measured minus predicted angles (K, 3), rad, of the rows whose orientation is read; only of kinds that do."""
+        raise NotImplementedError
+
+    def angle_slopes(self, at: PredictedMeasurements) -> np.ndarray:
+        """Change (K, 3, 3) of the read angles with a rotation of the target about the station's axes, rad; only of kinds that read some."""
+        raise NotImplementedError
+
+    def scaled(self, poses: PoseSet) -> np.ndarray:
+        """Rows (N,) whose readings the `scale` changes."""
+        return self.rows(poses)
+
+    def scale_std(self, model: RobotModel) -> float | None:
+        """Declared standard deviation of the `scale`; None where none is declared."""
+        return None
+
+    def stretch(self, model: RobotModel, poses: PoseSet) -> np.ndarray | None:
+        """What the readings (N, 3), m, are too short by, due to the `scale`; None where nothing."""
+        deviation = model.stations.scale[SCALES.index(self.scale)] if self.scale else 0.0
+        return None if deviation == 0 else (deviation * self.scaled(poses))[:, None] * poses.position
+
+    def shift(self, at: PredictedMeasurements) -> np.ndarray | None:
+        """Change (R, 3) of what was measured with parameters of the instrument; None where nothing changes."""
+        return None
+
+    def owns(self, name: str) -> bool:
+        """Whether a parameter belongs to this kind alone."""
+        return name == self.scale != ""
+
+    def column(self, at: PredictedMeasurements, name: str) -> np.ndarray:
+        """Derivative (R, 3) of the readings by a parameter that `owns` names."""
+        column = np.zeros((len(at.readings.row), 3))
+        column[: len(at.poses)] = -np.where(self.scaled(at.poses)[:, None], at.poses.position, 0.0)
+        return column
+
+    def start(self, station: str, targets: np.ndarray, readings: np.ndarray) -> dict[str, float]:
+        """Numbers x, y, z, rx, ry, rz, and `zero` where it has one, of a station that reads `readings` (K, 3) of `targets` (K, 3), m, in
+        the base frame.
+
+        Raises `FlexcalError` for too few or badly distributed targets, and where the readings fit no place.
+        """
+        return registered(station, targets, readings, rigid_motion)
+
+    def place(self, model: RobotModel, poses: PoseSet, station: str, *, turned: bool) -> Sequence[str]:
+        """Numbers of a station's pose that the readings tell; its rotation only where that is free (`turned`)."""
+        return STATION if turned else STATION[:3]
+
+    def tells_lengths(self, poses: PoseSet) -> bool:
+        """Whether any reading tells how large the robot is."""
+        return bool(self.rows(poses).any())
+
+
+def tilts_across(model: RobotModel, station: str, axis: np.ndarray) -> list[str]:
+    """Two coordinates of a station's rotation vector, without the one that is most like a rotation about an `axis` (3,)."""
+    about = np.linalg.solve(left_jacobian(model.stations.pose[model.station_index(station), 3:]), axis)
+    return [key for k, key in enumerate(STATION[3:]) if k != int(np.argmax(np.abs(about)))]

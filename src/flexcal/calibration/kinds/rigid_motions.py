@@ -1,0 +1,100 @@
+"""Rigid motions between corresponding points, by which instruments of points are registered."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from flexcal.errors import FlexcalError
+from flexcal.model.parts import rotation_vector
+from flexcal.model.robot import STATION
+
+ALREADY_ALIGNED = 0.010
+"""Median distance, m, between nominal and measured points below which instrument and base frame are the same."""
+
+
+def registered(
+    station: str,
+    targets: np.ndarray,
+    readings: np.ndarray,
+    motion: Callable[[np.ndarray, np.ndarray, str], tuple[np.ndarray, np.ndarray]],
+) -> dict[str, float]:
+    """Numbers of a station by their keys, from the `motion` of targets (K, 3), m, to readings (K, 3), m.
+
+    Where these already agree to a centimetre, the station stays at the base frame.
+    """
+    if np.median(np.linalg.norm(readings - targets, axis=1)) < ALREADY_ALIGNED:
+        return dict.fromkeys(STATION, 0.0)
+    rotation, offset = motion(targets, readings, station)
+    numbers = zip(STATION, (*offset, *rotation_vector(rotation)), strict=True)
+    return {key: float(value) for key, value in numbers}
+
+
+def rigid_motion(source: np.ndarray, target: np.ndarray, name: str = "") -> tuple[np.ndarray, np.ndarray]:
+    """Rigid motion that maps points onto others with the least sum of squared distances (Kabsch 1976).
+
+    Parameters
+    ----------
+    source, target : ndarray
+        Corresponding points (N, 3), m.
+    name : str
+        What the points are, for the message of the error.
+
+    Returns
+    -------
+    rotation : ndarray
+        Rotation matrix (3, 3).
+    translation : ndarray
+        Translation (3,), m: ``target ≈ source @ rotation.T + translation``.
+
+    Raises
+    ------
+    FlexcalError
+        Where the points do not span a plane.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from flexcal import rigid_motion
+    >>> source = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    >>> rotation, translation = rigid_motion(source, source + [1, 2, 3])
+    >>> np.allclose(rotation, np.eye(3))
+    True
+    >>> translation.round(6)
+    array([1., 2., 3.])
+    """
+    left, sizes, right = _correlation(source, target, name)
+    if sizes[1] < 1e-9 * max(sizes[0], 1e-12):
+        raise FlexcalError(
+            "E-CAL-016", f"the points of station '{name}' lie on a line; measure poses distributed in space."
+        )
+    return _motion(source, target, left, right)
+
+
+def best_motion(source: np.ndarray, target: np.ndarray, name: str = "") -> tuple[np.ndarray, np.ndarray]:
+    """One of the rigid motions of `rigid_motion` for points (N, 3) that may lie on a line, or in one place, as sockets of a fixture do.
+
+    Raises `FlexcalError` for fewer than three points.
+    """
+    left, _, right = _correlation(source, target, name)
+    return _motion(source, target, left, right)
+
+
+def _correlation(
+    source: np.ndarray, target: np.ndarray, name: str
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    if len(source) < 3:
+        raise FlexcalError(
+            "E-CAL-015", f"station '{name}' has {len(source)} poses; at least 3 are needed to register it."
+        )
+    return np.linalg.svd((target - target.mean(axis=0)).T @ (source - source.mean(axis=0)))
+
+
+def _motion(
+    source: np.ndarray, target: np.ndarray, left: np.ndarray, right: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    from_centre, to_centre = source.mean(axis=0), target.mean(axis=0)
+    sign = np.sign(np.linalg.det(left @ right))
+    rotation = left @ np.diag([1.0, 1.0, sign]) @ right
+    return rotation, to_centre - rotation @ from_centre

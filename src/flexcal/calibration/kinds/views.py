@@ -1,0 +1,71 @@
+"""Views: a camera's pose by a printed board that it sees, or the board's by a camera in the cell."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from flexcal.calibration.kinds.kind import Kind
+from flexcal.data.poses import PoseSet
+from flexcal.model.robot import BOARD_SCALE, LENS, SCALES, RobotModel
+
+if TYPE_CHECKING:
+    from flexcal.calibration.measurement import PredictedMeasurements
+
+_CAMERA = "camera."
+
+
+class Views(Kind):
+    """Coordinates and orientation in the board's axes, in lengths of the board, and with the lens of the view's own fit."""
+
+    scale: ClassVar[str] = BOARD_SCALE
+
+    def rows(self, poses: PoseSet) -> np.ndarray:
+        """As `Kind.rows`."""
+        return poses.seen
+
+    def scale_std(self, model: RobotModel) -> float | None:
+        """As `Kind.scale_std`."""
+        declared = model.config.measurements.values()
+        return next((item.board.std for item in declared if item.kind == "camera"), None)
+
+    def stretch(self, model: RobotModel, poses: PoseSet) -> np.ndarray | None:
+        """As `Kind.stretch`: none, for the board's size changes what was measured (`shift`)."""
+        return None
+
+    def shift(self, at: PredictedMeasurements) -> np.ndarray | None:
+        """As `Kind.shift`: by the board's size, and by lenses that differ from those that the poses were measured with.
+
+        None for a camera whose parameters the robot does not have, as before a calibration.
+        """
+        if not at.poses.seen.any():
+            return None
+        lenses, shift = at.model.lenses, np.zeros((len(at.readings.row), 3))
+        shift[: len(at.poses)] = (
+            at.model.stations.scale[SCALES.index(BOARD_SCALE)] * at.poses.position * at.poses.seen[:, None]
+        )
+        for name, lens in at.poses.lenses.items():
+            if name in lenses.names:
+                values = lenses.values[lenses.names.index(name)]
+                shift += np.matmul(_by_lens(at, name), values - lens.values)
+        return shift
+
+    def owns(self, name: str) -> bool:
+        """As `Kind.owns`."""
+        return name.startswith(_CAMERA) or super().owns(name)
+
+    def column(self, at: PredictedMeasurements, name: str) -> np.ndarray:
+        """As `Kind.column`."""
+        if name == self.scale:
+            return super().column(at, name)
+        camera, _, key = name.removeprefix(_CAMERA).rpartition(".")
+        return -_by_lens(at, camera)[:, :, LENS.index(key)]
+
+
+def _by_lens(at: PredictedMeasurements, camera: str) -> np.ndarray:
+    """Change (R, 3, 9) of the measured poses with the intrinsic parameters of a camera."""
+    own = at.poses.by_lens
+    assert own is not None and at.poses.camera is not None
+    mine = np.where((at.poses.camera == camera)[:, None, None], own, 0.0)
+    return np.concatenate([mine[:, :3], mine[at.poses.turned, 3:]])

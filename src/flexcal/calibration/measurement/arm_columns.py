@@ -1,0 +1,179 @@
+"""Derivatives of readings by what moves the target on the robot: geometry, loads of springs, twists and tilts of joints."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexcal.errors import FlexcalError
+from flexcal.model.robot import GEOMETRY, LATERAL, ORIGIN, SPRINGS
+from flexcal.model.statics import (
+    carried_mass,
+    force_moments,
+    lateral_axes,
+    lateral_slopes,
+    twist_by_hardening,
+    twist_from_torque,
+)
+
+if TYPE_CHECKING:
+    from flexcal.calibration.measurement.prediction import PredictedMeasurements
+
+
+@dataclass(frozen=True, eq=False)
+class ArmColumns:
+    """Columns of the Jacobian of the readings `at` for parameters of the robot, the motion of the deflection included."""
+
+    at: PredictedMeasurements
+
+    def column(self, name: str) -> np.ndarray:
+        """Derivative (R, 3) of the readings by a parameter, natural units; raises `FlexcalError` for one without effect."""
+        owner, _, key = name.rpartition(".")
+        if owner.startswith("point."):
+            return self._point(owner.removeprefix("point."), key)
+        kind = "transmission" if key.startswith("transmission_") else key
+        if kind in _BY_KEY:
+            return _BY_KEY[kind](self, owner, key)
+        return np.matmul(self._by_load, self.at.by_row(self._load(name))[:, :, None])[:, :, 0]
+
+    @cached_property
+    def _by_motion(self) -> np.ndarray:
+        """Readings (R, 3, n, 3) by a rotation of each joint about x, y, z (a motion along z where prismatic)."""
+        motion = self.at.kinematics.motion_jacobian
+        moved = self.at.moved(motion.reshape(len(motion), 6, -1))
+        return moved.reshape(len(moved), 3, self.at.model.n, 3)
+
+    @cached_property
+    def _by_load(self) -> np.ndarray:
+        """Readings (R, 3, d) by the load on each elastic coordinate."""
+        rest = self.at.rest
+        own = self._by_motion[:, :, rest.axes[:, 0], rest.axes[:, 1]]
+        return -np.matmul(own, self.at.by_row(rest.compliance))
+
+    @cached_property
+    def _by_geometry(self) -> np.ndarray:
+        """Readings (R, 3, 6 n + 6) by six errors of every joint and of the tool."""
+        columns = self.at.moved(self.at.kinematics.geometry_jacobian)
+        coupling = self.at.by_row(self.at.rest.coupling)
+        columns[:, :, : 6 * self.at.model.n] += np.matmul(self._by_load, coupling)
+        return columns
+
+    def _point(self, target: str, key: str) -> np.ndarray:
+        own = self.at.by_row(self.at.poses.target) == target
+        place = self._by_geometry[:, :, 6 * self.at.model.n + 3 + "xyz".index(key)]
+        return np.where(own[:, None], place, 0.0)
+
+    def _error(self, owner: str, key: str) -> np.ndarray:
+        names = [*self.at.model.joint_names, "tool"]
+        column = self._by_geometry[:, :, 6 * names.index(owner) + GEOMETRY.index(key)]
+        if owner == "tool" and key.startswith("length"):
+            first = next(iter(self.at.model.points))
+            return np.where((self.at.by_row(self.at.poses.target) == first)[:, None], column, 0.0)
+        return column
+
+    def _origin(self, owner: str, key: str) -> np.ndarray:
+        """By a displacement of a joint and all beyond it along an axis of its parent link.
+
+        As by that link's length vector for the targets that the joint moves; the load on springs below shifts with the weight.
+        """
+        at, model, axis = self.at, self.at.model, ORIGIN.index(key)
+        joint = model.joint_index(owner)
+        parent, masses = model.joints[joint].parent, model.links.mass
+        paths = {name: model.path_to(model.point(name).joint) for name in at.poses.targets}
+        carried = np.array([joint in paths[name] for name in at.poses.target.tolist()])
+        if parent < 0:
+            moved = np.broadcast_to(np.eye(6)[axis, :, None], (len(carried), 6, 1))
+        else:
+            column = 6 * parent + 3 + axis
+            moved = at.kinematics.geometry_jacobian[:, :, column : column + 1]
+        moved = at.moved(np.where(carried[:, None, None], moved, 0.0))[:, :, 0]
+        if parent < 0 or not at.rest.axes.size:
+            return moved
+        beyond = [i for i in range(model.n) if joint in model.path_to(i)]
+        weight = np.full(len(carried), masses[beyond].sum())
+        if model.payload is not None and model.payload.joint in beyond:
+            weight += carried_mass(model, at.poses.payload, len(at.poses))
+        load = weight[:, None] * at.rest.regressor[:, :, 4 * parent + 1 + axis]
+        return moved + np.matmul(self._by_load, at.by_row(load)[:, :, None])[:, :, 0]
+
+    def _twisted(self, owner: str, key: str) -> np.ndarray:
+        joint = self.at.model.joint_index(owner)
+        return self.at.by_row(self._twist(joint, key))[:, None] * self._by_geometry[:, :, 6 * joint]
+
+    def _hardened(self, owner: str, key: str) -> np.ndarray:
+        joint = self.at.model.joint_index(owner.removesuffix(".drive"))
+        model, rest = self.at.model, self.at.rest
+        hardening = model.springs.hardening[joint]
+        twist = twist_from_torque(-rest.torque[:, joint], model.springs.stiffness[joint, 2], hardening)
+        turned = self.at.by_row(twist_by_hardening(twist, hardening))
+        return turned[:, None] * self._by_motion[:, :, joint, 2]
+
+    def _tilted(self, owner: str, key: str) -> np.ndarray:
+        joint = self.at.model.joint_index(owner)
+        tilt = self.at.by_row(self._lateral[:, joint, LATERAL.index(key)])
+        return np.matmul(self._by_motion[:, :, joint, :2], tilt[:, :, None])[:, :, 0]
+
+    def _twist(self, joint: int, key: str) -> np.ndarray:
+        """Rotation (N,) of a joint by its backlash, gravity compliance or one wave of its transmission error."""
+        if key == "backlash":
+            return -self.at.rest.flank[:, joint]
+        if key == "gravity_compliance":
+            return -self.at.rest.torque[:, joint]
+        order, wave = key.split("_")[1:]
+        phase = int(order) * self.at.poses.q[:, joint]
+        return np.sin(phase) if wave == "sin" else np.cos(phase)
+
+    @cached_property
+    def _lateral(self) -> np.ndarray:
+        """Tilt about the bearing's x and y (N, n, axis, 2) of every joint by its lateral compliances, rad per rad/(N m)."""
+        model, poses = self.at.model, self.at.poses
+        masses = carried_mass(model, poses.payload, len(poses))
+        slopes = lateral_slopes(model, poses.q, masses)
+        if poses.force is not None:
+            axes = lateral_axes(model, poses.q)
+            moments = force_moments(self.at.kinematics, poses.force)[:, :, :2]
+            slopes = slopes + np.matmul(axes, moments[:, :, :, None]) * axes
+        return slopes
+
+    def _load(self, name: str) -> np.ndarray:
+        """Change of the load on each elastic coordinate (N, d) with a stiffness, mass or centre of mass."""
+        owner, _, key = name.rpartition(".")
+        model, poses, rest = self.at.model, self.at.poses, self.at.rest
+        if key == "stiffness":
+            joint_name, _, spring = owner.rpartition(".")
+            axis = (model.joint_index(joint_name), SPRINGS.index(spring))
+            load = np.zeros(rest.compliance.shape[:2])
+            stretch = rest.deflection[:, axis[0], axis[1]]
+            if axis[1] == 2:
+                stretch = -rest.torque[:, axis[0]] / model.springs.stiffness[axis]
+            load[:, [tuple(a) for a in rest.axes].index(axis)] = stretch
+            return load
+        if key == "mass" or key.startswith("com_"):
+            if owner == "payload":
+                payload = model.payload
+                assert payload is not None
+                block = rest.regressor[:, :, 4 * payload.joint : 4 * payload.joint + 4]
+                masses = carried_mass(model, poses.payload, len(poses))[:, None]
+                if key == "mass":
+                    share = masses / payload.mass if payload.mass > 0 else 1.0
+                    return share * (block[:, :, 0] + block[:, :, 1:] @ payload.com_in_link)
+                return masses * (block[:, :, 1:] @ payload.rotation[:, "xyz".index(key[-1])])
+            i = [joint.link for joint in model.joints].index(owner)
+            block = rest.regressor[:, :, 4 * i : 4 * i + 4]
+            if key == "mass":
+                return block[:, :, 0] + block[:, :, 1:] @ model.links.com[i]
+            return model.links.mass[i] * block[:, :, 1 + "xyz".index(key[-1])]
+        raise FlexcalError("E-CAL-013", f"the position of a point does not depend on '{name}'.")
+
+
+_BY_KEY: Mapping[str, Callable[[ArmColumns, str, str], np.ndarray]] = {
+    **dict.fromkeys(GEOMETRY, ArmColumns._error),
+    **dict.fromkeys(ORIGIN, ArmColumns._origin),
+    **dict.fromkeys(("backlash", "gravity_compliance", "transmission"), ArmColumns._twisted),
+    **dict.fromkeys(LATERAL, ArmColumns._tilted),
+    "hardening": ArmColumns._hardened,
+}
