@@ -6,6 +6,7 @@ from .nearest_socket import NearestSocket, nearest_sockets
 from .place_agreement import FEWEST_PLACES, Disagreement, PlaceAgreement, PlaceErrors
 from .plausibility import implausible_shifts, is_implausible, residuals_implausible
 from .size_of_board import board_size
+from .stated_noise import StatedNoise, stated_noise
 
 __all__ = [
     "FEWEST_PLACES",
@@ -17,6 +18,7 @@ __all__ = [
     "PlaceAgreement",
     "PlaceErrors",
     "ReadingJump",
+    "StatedNoise",
     "board_size",
     "compare_bearings",
     "gravity_loads",
@@ -25,4 +27,5 @@ __all__ = [
     "nearest_sockets",
     "reading_jumps",
     "residuals_implausible",
+    "stated_noise",
 ]

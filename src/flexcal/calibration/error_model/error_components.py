@@ -9,7 +9,14 @@ import numpy as np
 from flexcal.calibration.error_model.groups import ErrorGroups, occurrence
 from flexcal.calibration.error_model.incidence_matrices import incidence
 from flexcal.calibration.error_model.whitening import Whitening
-from flexcal.calibration.measurement import METRES, RADIANS, PredictedMeasurements, Readings
+from flexcal.calibration.measurement import (
+    METRES,
+    OF_INSTRUMENTS,
+    RADIANS,
+    ROBOT,
+    PredictedMeasurements,
+    Readings,
+)
 from flexcal.model.robot import RobotModel
 
 _SMALLEST = 1e-6
@@ -26,7 +33,9 @@ class ErrorComponents:
     from measurement to measurement, `pose` m and `angular` rad at every revolute joint, common to the points of one visit to a pose:
     repeatability; `orientation` rad, independent from measured orientation to orientation, the instrument's where none is stated;
     `workspace`, `order` and `command` m: model error common to a cell of the workspace, to a stretch of the measuring
-    order, and to all visits of one command; `transmission` rad, of a wave of order 1 of a joint's transmission error (`waves`).
+    order, and to all visits of one command; `transmission` rad, of a wave of order 1 of a joint's transmission error (`waves`). `views`,
+    `sockets`, `lengths` and `contacts` m, in place of `robot`: of the readings of cameras, of balls in sockets, of wires and of touched
+    faces, where measurements of another kind have that.
     """
 
     share: float
@@ -38,6 +47,10 @@ class ErrorComponents:
     command: float = 0.0
     transmission: float = 0.0
     orientation: float = 0.0
+    views: float = 0.0
+    sockets: float = 0.0
+    lengths: float = 0.0
+    contacts: float = 0.0
 
     @property
     def model(self) -> float:
@@ -52,6 +65,7 @@ class ErrorComponents:
             (self.angular, before.angular),
             (self.transmission, before.transmission),
             (self.orientation, before.orientation),
+            *((getattr(self, name), getattr(before, name)) for name in OF_INSTRUMENTS),
         )
         turned = all(abs(a - b) <= tolerance * (a + _SMALLEST_TURN) for a, b in angles)
         return bool(same) and turned and abs(self.share - before.share) <= tolerance
@@ -67,12 +81,11 @@ class ErrorComponents:
 
     def _scattered(self, readings: Readings) -> np.ndarray:
         """Variances (R, 3) of what is independent from reading to reading besides what is stated; 1 where there is no reading."""
-        metres, radians = readings.unit == METRES, readings.unit == RADIANS
-        return (
-            self.robot**2 * metres
-            + self.orientation**2 * radians
-            + np.where(readings.present, _SMALLEST**2, 1.0)
+        own = sum(
+            getattr(self, name) ** 2 * readings.of_scatter(name) for name in (ROBOT, *readings.instruments)
         )
+        turned = self.orientation**2 * (readings.unit == RADIANS)
+        return own + turned + np.where(readings.present, _SMALLEST**2, 1.0)
 
     def jointly(self, readings: Readings, turns: np.ndarray, cells: ErrorGroups) -> np.ndarray:
         """Joint covariance (G, 3 T, 3 T) of all readings of a visit to a pose, independent of other visits.
@@ -96,9 +109,15 @@ class ErrorComponents:
     def whitening(self, readings: Readings, turns: np.ndarray) -> Whitening:
         """Whitening by the total variance of single readings, and what is stated of a point with its orientation."""
         whole = self.independent(readings, turns)
-        whole = whole + self.model**2 * (readings.unit == METRES)[:, :, None] * np.eye(3)
+        whole = whole + self._systematic(readings)[:, :, None] * np.eye(3)
         across = None if readings.across is None else self.share**2 * readings.across
         return Whitening.of(whole, across, readings.beside)
+
+    def _systematic(self, readings: Readings) -> np.ndarray:
+        """Variances (R, 3) of the model error, of which sockets, lengths and contacts beside points have none of the workspace."""
+        lengths = readings.unit == METRES
+        placed = readings.of_scatter(ROBOT) | readings.of_scatter("views")
+        return (self.order**2 + self.command**2) * lengths + self.workspace**2 * placed
 
     def weights(self, readings: Readings, turns: np.ndarray) -> Whitening:
         """Whitening with the repeatability of the joints averaged over readings and directions.
@@ -108,14 +127,18 @@ class ErrorComponents:
         own = turns[~readings.points]
         turned = float(np.mean((own**2).sum(axis=2))) if own.size else 0.0
         orientation = float(np.hypot(self.orientation, self.angular * np.sqrt(turned)))
-        robot = self.evenly(turns[readings.unit == METRES])
-        even = replace(self, robot=robot, pose=0.0, angular=0.0, orientation=orientation)
-        return even.whitening(readings, turns)
+        moved = turns[readings.unit == METRES]
+        even = {name: self.evenly(moved, name) for name in (ROBOT, *readings.instruments)}
+        return replace(self, pose=0.0, angular=0.0, orientation=orientation, **even).whitening(
+            readings, turns
+        )
 
-    def evenly(self, turns: np.ndarray) -> float:
-        """Standard deviation of coordinates, m, that move by `turns` (K, r), m/rad, due to the robot's repeatability, root mean square."""
+    def evenly(self, turns: np.ndarray, name: str = ROBOT) -> float:
+        """Standard deviation of coordinates, m, that move by `turns` (K, r), m/rad, due to the robot's repeatability and the component
+        `name`, root mean square.
+        """
         turned = float(np.mean((turns**2).sum(axis=1))) if turns.size else 0.0
-        return float(np.sqrt(self.robot**2 + self.pose**2 + self.angular**2 * turned))
+        return float(np.sqrt(getattr(self, name) ** 2 + self.pose**2 + self.angular**2 * turned))
 
     def shared(self, cells: ErrorGroups, rows: np.ndarray) -> np.ndarray:
         """Sums (k, m) of `rows` (N, 3, m) over the points that share each coordinate of a model error, times its standard deviation."""

@@ -26,7 +26,7 @@ class ErrorGroups:
 
     `pose`: measured in one visit to a pose, each another target or its orientation; the robot's scatter is common to them. The others
     share a model error of their points: a cell of the `workspace`, a stretch of the measuring `order`, a `command` with its target, -1
-    for an orientation; None where there are too few poses, or too few commands that were visited again.
+    for an orientation, and for what has no cell; None where there are too few poses, or too few commands that were visited again.
     """
 
     pose: np.ndarray
@@ -96,8 +96,8 @@ def _numbered_again(labels: np.ndarray) -> np.ndarray:
 def _regions(poses: PoseSet, visit: np.ndarray, count: int) -> np.ndarray | None:
     """Labels (N,) of `count` cells of the workspace, of whole visits (N,), for points of an instrument; None where there are none.
 
-    Points in sockets are each alone: an error common to those at one place of the fixture is taken for where it stands. So are distances
-    and touches, whose directions differ.
+    Points in sockets have none, -1: an error common to those at one place of the fixture is taken for where it stands. Nor have distances
+    and touches, whose directions differ. What is left of it is part of their own scatter.
     """
     measured = poses.located
     if not measured.any():
@@ -105,9 +105,9 @@ def _regions(poses: PoseSet, visit: np.ndarray, count: int) -> np.ndarray | None
     labels = group_numbers(visit[measured])
     size = np.bincount(labels)
     place = np.column_stack([np.bincount(labels, axis) for axis in poses.position[measured].T])
-    result = count + np.arange(len(poses))
+    result = np.full(len(poses), -1)
     result[measured] = workspace_folds(place / size[:, None], count)[labels]
-    return group_numbers(result)
+    return _numbered_again(result)
 
 
 def block_columns(labels: np.ndarray) -> np.ndarray:

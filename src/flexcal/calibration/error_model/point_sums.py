@@ -12,7 +12,7 @@ from flexcal.calibration.error_model.command_sums import CommandSums
 from flexcal.calibration.error_model.error_components import stated_covariance, translations
 from flexcal.calibration.error_model.groups import COMMAND
 from flexcal.calibration.error_model.incidence_matrices import added, by_axes, incidence, pairs_of
-from flexcal.calibration.measurement import METRES, RADIANS
+from flexcal.calibration.measurement import RADIANS, ROBOT
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -49,7 +49,10 @@ class PointSums:
         turned = cells.gathered(fit.turns)
         together = cells.gathered(translations(fit.readings))
         structures = {
-            "robot": cells.gathered((fit.readings.unit == METRES).astype(float)),
+            name: cells.gathered(fit.readings.of_scatter(name).astype(float))
+            for name in (ROBOT, *fit.readings.instruments)
+        }
+        structures |= {
             "orientation": cells.gathered((fit.readings.unit == RADIANS).astype(float)),
             "share": stated_covariance(fit.readings, cells),
             "pose": together @ np.swapaxes(together, 1, 2),

@@ -11,7 +11,7 @@ from flexcal.calibration.error_model.error_components import ErrorComponents
 from flexcal.calibration.error_model.groups import ErrorGroups
 from flexcal.calibration.error_model.point_sums import PointSums
 from flexcal.calibration.error_model.restricted_likelihood import RestrictedLikelihood
-from flexcal.calibration.measurement import METRES, RADIANS, Readings
+from flexcal.calibration.measurement import METRES, OF_INSTRUMENTS, RADIANS, ROBOT, Readings
 
 _CLEAR_GAIN = 3.0
 """Gain in log-likelihood from which a stated sigma counts as too large (p = 0.01, one parameter at its bound)."""
@@ -26,7 +26,8 @@ TRANSMISSION = "transmission"
 _SMALLEST = 1e-9
 """Share of the total variance that bounds a component from below."""
 _STEPS, _HALVINGS = 60, 30
-_ALWAYS = ("robot", "orientation")
+ORIENTATION = "orientation"
+_ALWAYS = (ROBOT, *OF_INSTRUMENTS, ORIENTATION)
 """Components that the data need not support: points and orientations scatter."""
 _STILL = 1e-6
 """Change of the deviance, by its slope, below which the maximisation has converged."""
@@ -69,29 +70,27 @@ class LinearFit:
         Where a sigma is `stated`, the instrument's part is that, or less where the points scatter clearly less than it says.
         """
         shared = [*([TRANSMISSION] if self.waves.size else []), *self.cells.blocks]
-        angles = ["orientation"] if (self.readings.unit == RADIANS).any() else []
-        names = ["robot", *angles, *(["pose"] if self._several else []), "angular", *shared]
+        own = [*self.readings.instruments, *([ORIENTATION] if (self.readings.unit == RADIANS).any() else [])]
+        names = [ROBOT, *own, *(["pose"] if self._several else []), "angular", *shared]
         totals = self._mean_squares()
-        total = totals[METRES]
         levers = {
             name: _lever(moved[self.readings.unit == METRES])
             for name, moved in (("angular", self.turns), (TRANSMISSION, self.waves))
         }
-        sizes = {"orientation": totals.get(RADIANS, 0.0)}
-        scale = np.array([sizes.get(name, total / levers.get(name, 1.0)) for name in names])
+        sizes = {name: totals[ROBOT] / levers.get(name, 1.0) for name in names} | totals
+        scale = np.array([sizes[name] for name in names])
         share = 1.0 if stated else 0.0
         variances, likelihood = self._maximum(names, scale, share)
         if stated:
             # the points may scatter less than the instrument alone should, even if nothing else errs
-            own = np.concatenate([scale[1 : 1 + len(angles)], scale[len(names) - len(shared) :]])
-            sizes = np.append(
-                own, total / float(np.mean(self.readings.sigma[self.readings.unit == METRES] ** 2))
-            )
-            alone = self._maximum([*angles, *shared, "share"], sizes, None, favour=False)[1]
+            of_robot = self.readings.of_scatter(ROBOT)
+            whole = totals[ROBOT] / float(np.mean(self.readings.sigma[of_robot] ** 2))
+            narrow = [*own, *shared]
+            tried = np.array([*(sizes[name] for name in narrow), whole])
+            alone = self._maximum([*narrow, "share"], tried, None, favour=False)[1]
             if alone - self._maximum(names, scale, share, favour=False)[1] > _CLEAR_GAIN:
-                names, scale = ["robot", *angles, *shared], np.append(total, own)
-                sizes = np.append(scale, sizes[-1])
-                narrower, likelihood = self._maximum([*names, "share"], sizes, None)
+                names, scale = [ROBOT, *narrow], np.append(totals[ROBOT], tried[:-1])
+                narrower, likelihood = self._maximum([*names, "share"], np.append(scale, whole), None)
                 variances, share = narrower[:-1], float(np.sqrt(narrower[-1]))
         names, scale, variances = self._supported(names, scale, variances, likelihood, share)
         variances = np.where(variances > _NEGLIGIBLE * scale, variances, 0.0)
@@ -138,13 +137,12 @@ class LinearFit:
         """Whether any visit to a pose has several points."""
         return bool(np.bincount(self.cells.pose[self.readings.points]).max(initial=0) > 1)
 
-    def _mean_squares(self) -> dict[int, float]:
-        """Residual variance of a coordinate by its unit, with the parameters' degrees of freedom deducted."""
-        units = {
-            unit: self.readings.unit.ravel() == unit
-            for unit in (METRES, RADIANS)
-            if (self.readings.unit == unit).any()
-        }
+    def _mean_squares(self) -> dict[str, float]:
+        """Residual variance of a coordinate by the component that it has for itself, with the parameters' degrees of freedom deducted."""
+        readings = self.readings
+        units = {name: readings.of_scatter(name).ravel() for name in (ROBOT, *readings.instruments)}
+        if (turned := (readings.unit == RADIANS).ravel()).any():
+            units[ORIENTATION] = turned
         rows, size = self.residual.size, self.free.shape[2]
         residual, free = self.residual.ravel(), self.free.reshape(rows, size)
         weight = np.ones(rows)

@@ -35,11 +35,14 @@ from flexcal.calibration.fit.terms import (
 from flexcal.calibration.kinds import KINDS
 from flexcal.calibration.measurement import (
     RADIANS,
+    ROBOT,
     PredictedMeasurements,
+    Readings,
     predict_measurements,
     register,
     require_both_flanks,
     require_orientations,
+    stated_sigma,
     with_target_axes,
 )
 from flexcal.data.poses import PoseSet
@@ -144,7 +147,8 @@ class PointFit:
         """Initial error model: stated values, and typical ones of robots."""
         share = 1.0 if self.poses.sigma_given else 0.0
         orientation = _FIRST_ORIENTATION if self.poses.turned.any() else 0.0
-        return ErrorComponents(share=share, robot=_FIRST_SCATTER, orientation=orientation)
+        own = dict.fromkeys((ROBOT, *Readings.of(self.poses).instruments), _FIRST_SCATTER)
+        return ErrorComponents(share=share, orientation=orientation, **own)
 
     @property
     def hidden(self) -> tuple[str, ...]:
@@ -304,12 +308,11 @@ class FittedPoints:
         rows = int(present.sum())
         spread = rows / max(rows - self.fit.identifiability.rank, 1)
         squares = (self.at.residual**2).sum(axis=1) / _CHI_MEDIAN[present.sum(axis=1)]
-        angles = ~self.at.readings.points
-        robot, orientation = (
-            float(np.sqrt(np.median(own) * spread)) if len(own) else 0.0
-            for own in (squares[~angles], squares[angles])
-        )
-        return ErrorComponents(share=0.0, robot=robot, orientation=orientation)
+        readings = self.at.readings
+        groups = {n: readings.of_scatter(n).any(axis=1) for n in (ROBOT, *readings.instruments)}
+        groups["orientation"] = ~readings.points
+        found = {n: float(np.sqrt(np.median(squares[g]) * spread)) for n, g in groups.items() if g.any()}
+        return ErrorComponents(share=0.0, **found)
 
     def undetermined(self, scatter: ErrorComponents) -> tuple[Undetermined, ...]:
         """Parameters that the poses do not determine under a given scatter."""
@@ -333,14 +336,15 @@ class FittedPoints:
     def poses(self) -> PoseSet:
         """Poses; those without a stated sigma have that of the scatter."""
         poses, scatter = self.fit.poses, self.scatter
-        if poses.sigma_given:
+        if poses.stated.all():
             return poses
         variances = np.diagonal(
             replace(scatter, share=0.0).independent(self.at.readings, self.turns)[: len(poses)],
             axis1=1,
             axis2=2,
         )
-        return replace(poses, sigma=np.sqrt(variances + scatter.model**2))
+        estimated = np.sqrt(variances + scatter.model**2)
+        return replace(poses, sigma=np.where(poses.stated[:, None], poses.sigma, estimated))
 
     def whole_estimate(self) -> Estimate:
         """Estimate of all parameters: fitted, held (with the uncertainty due to holding them), and the scatter."""
@@ -412,9 +416,7 @@ class FittedPoints:
 
     def _scatter_parameters(self) -> tuple[Parameters, np.ndarray]:
         scatter = self.scatter
-        instrument = scatter.share * float(
-            np.sqrt(np.mean(self.fit.poses.sigma[self.fit.poses.present] ** 2))
-        )
+        instrument = scatter.share * stated_sigma(self.at.readings)
         robot, robot_std = self._together("robot", "pose")
         model, model_std = self._together("workspace", "order", "command")
         values = (

@@ -13,7 +13,7 @@ from flexcal.calibration.fit.elastic_prior import NOTHING_ELASTIC, ElasticPrior
 from flexcal.calibration.fit.fitted_points import FittedPoints, PointFit
 from flexcal.calibration.fit.least_squares_problem import LossName
 from flexcal.calibration.fit.practical_identifiability import Undetermined
-from flexcal.calibration.measurement import METRES, ambiguous_poses
+from flexcal.calibration.measurement import METRES, ambiguous_poses, stated_sigma
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate, Identifiability, Loss, Squares, loss_named
@@ -91,16 +91,19 @@ class GeometricFit:
         """Uncertainty budget of a measured point, 1σ of a coordinate in mm, as in results.json.
 
         `instrument_mm` is null where no sigma is stated: the robot's part then holds it. `robot_mm` has the repeatability of the
-        joints at the measured points in it. `stated_mm` is the sigma of the files, root mean square.
+        joints at the measured points in it. `stated_mm` is the sigma of the files, root mean square. Where several kinds of
+        measurements are fitted together, `robot_mm` is of the first, and `views_mm`, `sockets_mm`, `lengths_mm` and `contacts_mm` are
+        what the others scatter by for themselves.
         """
         scatter, lengths = self.scatter, self.linear.readings.unit == METRES
-        sigma = float(np.sqrt(np.mean(self.linear.readings.sigma[lengths] ** 2)))
+        sigma = stated_sigma(self.linear.readings)
         stated = self.poses.sigma_given
         return {
             "instrument_mm": scatter.share * sigma / MILLIMETRE if stated else None,
             "robot_mm": scatter.evenly(self.linear.turns[lengths]) / MILLIMETRE,
             "model_mm": scatter.model / MILLIMETRE,
             "stated_mm": sigma / MILLIMETRE if stated else None,
+            **{f"{n}_mm": getattr(scatter, n) / MILLIMETRE for n in self.linear.readings.instruments},
         }
 
 

@@ -6,12 +6,14 @@ from .prediction import (
     require_points,
 )
 from .propagated_covariance import Propagation, covariance_root, moving_parameters, propagation
-from .readings import METRES, RADIANS, Readings
+from .readings import METRES, OF_INSTRUMENTS, RADIANS, ROBOT, Readings, stated_sigma
 from .registration import register, require_orientations, with_target_axes
 
 __all__ = [
     "METRES",
+    "OF_INSTRUMENTS",
     "RADIANS",
+    "ROBOT",
     "PredictedMeasurements",
     "Propagation",
     "Readings",
@@ -25,5 +27,6 @@ __all__ = [
     "require_both_flanks",
     "require_orientations",
     "require_points",
+    "stated_sigma",
     "with_target_axes",
 ]

@@ -66,6 +66,8 @@ class PoseSet:
         Known forces (N, 3) on the measured points, N in the base frame, as of a wire that pulls; zero where there are none.
     sigma_given : bool
         False where `sigma` is a default.
+    unstated : ndarray, optional
+        Rows (N,) of instruments without a stated noise beside others that have one: their `sigma` is a default.
 
     Raises
     ------
@@ -93,6 +95,7 @@ class PoseSet:
     socket: np.ndarray | None = None
     force: np.ndarray | None = None
     sigma_given: bool = True
+    unstated: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         if self.q.ndim != 2:
@@ -118,6 +121,7 @@ class PoseSet:
             "time": (n_rows,),
             "socket": (n_rows,),
             "force": (n_rows, 3),
+            "unstated": (n_rows,),
         }
         for name, shape in shapes.items():
             values = getattr(self, name)
@@ -162,6 +166,11 @@ class PoseSet:
     def far(self) -> np.ndarray:
         """Rows (N,) whose distance from the instrument was measured."""
         return self.of_kind(DISTANCE)
+
+    @property
+    def stated(self) -> np.ndarray:
+        """Rows (N,) whose noise is stated."""
+        return np.full(len(self), self.sigma_given) if self.unstated is None else ~self.unstated
 
     @property
     def located(self) -> np.ndarray:
@@ -240,6 +249,9 @@ class PoseSet:
         for name, value in changed.items():
             if isinstance(value, np.ndarray):
                 changed[name] = value[index]
+        unstated = changed["unstated"]
+        if unstated is not None and (unstated.all() or not unstated.any()):
+            changed |= {"unstated": None, "sigma_given": not unstated.all()}
         return PoseSet(**changed)
 
 
@@ -248,7 +260,7 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
 
     Where a later set uses a pose number again, its numbers are shifted past the largest so far. Raises `FlexcalError`
     where there is nothing to join, joint counts differ, or only some sets have torques, payload, temperature or time, or some points of an
-    instrument a sigma: sockets, lengths and contacts without one have the default beside those. Orientations are NaN where a set has none.
+    instrument a sigma: sockets, lengths and contacts without one are `unstated` beside those. Orientations are NaN where a set has none.
     """
     if not sets:
         raise FlexcalError("E-POSES-023", "there are no poses to join; give at least one set.")
@@ -270,6 +282,8 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
                     f"only {sum(values)} of {len(sets)} pose sets have sigma; give it for all, or for none.",
                 )
             joined[entry.name] = any(values)
+        elif entry.name == "unstated":
+            joined[entry.name] = _unstated(sets)
         elif entry.name == "lenses":
             joined[entry.name] = {name: lens for one in values for name, lens in one.items()}
         elif entry.name in _PARTIAL and any(present):
@@ -322,6 +336,13 @@ def _orientation_sigmas(sets: Sequence[PoseSet]) -> np.ndarray:
     return np.concatenate(
         [np.full(len(s), np.nan) if s.orientation_sigma is None else s.orientation_sigma for s in sets]
     )
+
+
+def _unstated(sets: Sequence[PoseSet]) -> np.ndarray | None:
+    """Rows without a stated noise where other rows have one."""
+    own = [np.full(len(s), not s.sigma_given) if s.unstated is None else s.unstated for s in sets]
+    rows = np.concatenate(own)
+    return rows if rows.any() and not rows.all() else None
 
 
 def _numbered_on(numbers: Sequence[np.ndarray]) -> np.ndarray:

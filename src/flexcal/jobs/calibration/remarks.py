@@ -10,12 +10,14 @@ import numpy as np
 from flexcal.calibration.diagnostics import (
     Drift,
     NearestSocket,
+    StatedNoise,
     board_size,
     implausible_shifts,
     is_implausible,
     nearest_sockets,
     reading_jumps,
     residuals_implausible,
+    stated_noise,
 )
 from flexcal.calibration.fit import GeometricFit
 from flexcal.jobs.calibration.ignored_columns import ignored_columns_remarks
@@ -239,6 +241,20 @@ def _jumps(fit: GeometricFit) -> Sequence[str]:
     )
 
 
+def _contradicted(test: StatedNoise) -> str:
+    """What the residuals say against the stated noise of an instrument."""
+    of = f" of {test.name}" if test.name else ""
+    cause = (
+        "it is too large"
+        if test.factor < 1
+        else "it is too small, or the robot does not repeat so well; weights and intervals include the difference"
+    )
+    return (
+        f"the readings{of} scatter {test.factor:.2g} times as much as the stated sigma says (χ² is {test.chi2:.2f} per degree of freedom, "
+        f"p = {test.probability:.1g}): {cause}"
+    )
+
+
 def _noise(fit: GeometricFit) -> Sequence[str]:
     budget = fit.variances
     instrument, stated, robot, model = (
@@ -259,6 +275,9 @@ def _noise(fit: GeometricFit) -> Sequence[str]:
             f"in addition to the stated sigma of {stated:.3g} mm the points scatter by {robot:.3f} mm per coordinate: repeatability of the "
             "robot, or a sigma that is too small; weights and intervals include both"
         )
+    else:
+        tests = stated_noise(fit)
+        remarks += [_contradicted(test) for test in tests[1:] or tests if test.contradicted]
     if model > 0:
         remarks.append(
             f"systematic model errors of {model:.3f} mm per coordinate (1σ) remain; intervals include them"

@@ -15,6 +15,7 @@ from flexcal.calibration.diagnostics import (
     PlaceAgreement,
     gravity_loads,
     is_implausible,
+    stated_noise,
 )
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.fit import (
@@ -190,6 +191,7 @@ class Calibration(Identification):
         selected, chosen, before = self.selected, self.selection, self.before.document()
         identifiability = selected.identifiability
         drift = Drift.of(selected) if selected.poses.located.any() else None
+        noise = stated_noise(selected)
         agreement, scale = PlaceAgreement.of(selected), scale_document(selected)
         bearings = bearing_remarks(self.bearings, selected)
         blamed = self.bearings is not None and self.bearings.contradicted
@@ -227,7 +229,8 @@ class Calibration(Identification):
             },
             "fit": {
                 "status": selected.estimate.status,
-                "reduced_chi2": selected.estimate.reduced_chi2,
+                "reduced_chi2": noise[0].chi2 if noise else None,
+                "stated_noise": [item.document() for item in noise],
                 "sigma_given": selected.poses.sigma_given,
                 "sigma_mm": float(np.sqrt(np.mean(selected.poses.sigma**2))) / MILLIMETRE,
                 "ambiguous_poses": int(selected.ambiguous.sum()),

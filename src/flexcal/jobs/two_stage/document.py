@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration.diagnostics import Drift, is_implausible
+from flexcal.calibration.diagnostics import Drift, is_implausible, stated_noise
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.verification import PredictionErrors, prediction_document
 from flexcal.estimation import Estimate
@@ -31,6 +31,7 @@ def two_stage_document(run: TwoStageRun, exported: ExportedFile) -> dict[str, An
         run.calibration.identifiability,
         Drift.of(run.calibration),
     )
+    noise = stated_noise(run.calibration)
     stage_one = {kind: _springs(run, estimate, kind) for kind in ("stiffness", "damping")}
     rigid = {f"rigid_{len(c.poses)}": v for c, v in zip(run.rigid, run.rigid_verification, strict=True)}
     return {
@@ -47,7 +48,8 @@ def two_stage_document(run: TwoStageRun, exported: ExportedFile) -> dict[str, An
         "before": run.before.document(),
         "calibration": run.calibration.errors.in_millimetres(),
         "calibration_fit": {
-            "reduced_chi2": run.calibration.estimate.reduced_chi2,
+            "reduced_chi2": noise[0].chi2 if noise else None,
+            "stated_noise": [item.document() for item in noise],
             "is_implausible": is_implausible(run.calibration),
             "nominal": run.before.document()["registered"],
             "rigid": run.rigid[0].errors.in_millimetres(),

@@ -17,7 +17,7 @@ from .springs import hardening_sentence, spring_table, unseen_springs
 from .stiffness import response_blocks, stiffness_section
 from .torques import recording_labels, torque_blocks
 from .uncalibrated import BEFORE, BEFORE_NOTE, uncalibrated_ranges, uncalibrated_rows, uncalibrated_table
-from .uncertainty_budget import budget_table
+from .uncertainty_budget import budget_table, noise_tables
 from .verification import verification_section
 
 __all__ = [
@@ -40,6 +40,7 @@ __all__ = [
     "learned_section",
     "levels_block",
     "link_inertials_section",
+    "noise_tables",
     "orientation_tables",
     "parameter_figures",
     "parameter_table",

@@ -1,0 +1,181 @@
+"""What the numbers of every kind of reading, and of mixtures, promise: intervals cover, noise is tested, and more data do no harm."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from stranger_readings import Asked, ReadArm, readings, right
+
+from flexcal import PoseSet, RobotModel, calibrate
+from flexcal.calibration.diagnostics import stated_noise
+from flexcal.calibration.fit import GeometricFit, fit_geometry
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.robot import propagated_covariance_root
+
+KINDS = {
+    "points of a few poses": [right("points", 30)],
+    "points": [right("points", 60)],
+    "points of many poses": [right("points", 200)],
+    "points without a sigma": [Asked("points", 60, 5e-5, None)],
+    "full poses": [right("poses", 40)],
+    "one wire": [right("wire", 180)],
+    "wires": [right("wires", 180)],
+    "dial": [right("dial", 180)],
+    "plane": [right("plane", 180)],
+    "line": [right("line", 180)],
+    "sphere": [right("sphere", 180)],
+    "sockets": [right("sockets", 120)],
+    "points and sockets": [right("points", 30), right("sockets", 120)],
+    "points and a wire": [right("points", 30), right("wire", 90)],
+    "points and a wire without a sigma": [right("points", 30), Asked("wire", 90, 2e-4, None)],
+    "wires and plane": [right("wires", 90), right("plane", 90)],
+    "full poses and sockets": [right("poses", 30), right("sockets", 120)],
+    "points, wires and plane": [right("points", 25), right("wires", 90), right("plane", 60)],
+}
+CONTACTS = {"dial", "plane", "line", "sphere"}
+
+
+def fitted(folder: Path, arm: ReadArm, asked: Sequence[Asked], seed: int) -> GeometricFit:
+    model, poses = readings(folder, arm, asked, seed)
+    return fit_geometry(model, poses, terms=("kinematic",))
+
+
+def distances(at: np.ndarray, *, sized: bool = True) -> np.ndarray:
+    """Distances between pairs of positions (N, 3); relative to their mean where the readings tell no size."""
+    between = np.linalg.norm(at[::2] - at[1::2], axis=1)
+    return between if sized else between / between.mean()
+
+
+def errors(
+    arm: ReadArm, model: RobotModel, seed: int, *, sized: bool = True
+) -> tuple[np.ndarray, np.ndarray]:
+    """Errors of the distances between the tool's positions at 200 fresh poses, and their predicted standard deviations."""
+    q = arm.postures(200, np.random.default_rng([seed, 5, 5]))
+
+    def predicted(robot: RobotModel) -> np.ndarray:
+        at = point_kinematics(robot, q, point="smr", jacobians=False).position
+        return distances(at, sized=sized)
+
+    std = np.linalg.norm(propagated_covariance_root(model, predicted), axis=1)
+    return predicted(model) - distances(arm.points(q), sized=sized), std
+
+
+def covered(folder: Path, asked: Sequence[Asked], seed: int) -> tuple[float, float]:
+    """Shares of parameters and of predictions at fresh poses within 95 % intervals.
+
+    True parameters are those of readings without noise, regrouped; those of the base, which follow from how the first station is
+    registered, do not count.
+    """
+    arm = ReadArm.drawn(seed)
+    fit = fitted(folder / "noisy", arm, asked, seed)
+    exact = fitted(folder / "exact", arm, [Asked(a.kind, a.count, 0.0, a.stated) for a in asked], seed)
+    truth = fit.estimate.regrouped(exact.estimate.values)
+    of_arm = [
+        p.name for p in fit.estimate.parameters if p.name.startswith(("a2", "a3", "a4", "a5", "a6", "tool"))
+    ]
+    intervals = {name: fit.estimate.interval(name) for name in of_arm}
+    inside = [low <= truth[name] <= high for name, (low, high) in ((n, i) for n, i in intervals.items() if i)]
+    away, std = errors(arm, fit.model, seed, sized=not {a.kind for a in asked} <= CONTACTS)
+    return float(np.mean(inside)), float(np.mean(np.abs(away) < 1.96 * std))
+
+
+def noises(folder: Path, asked: Sequence[Asked], seed: int) -> dict[str, tuple[float, float, bool]]:
+    """χ², degrees of freedom, and whether the stated noise is contradicted, of all together and of every instrument."""
+    tests = stated_noise(fitted(folder, ReadArm.drawn(seed), asked, seed))
+    return {test.name: (test.chi2, test.freedom, test.contradicted) for test in tests}
+
+
+def test_chi_square_is_one_where_the_noise_is_right(tmp_path: Path) -> None:
+    """On few poses too: nothing that the fit estimates of the scatter is in it."""
+    found = np.array([noises(tmp_path, [right("points", 20)], seed)[""][:2] for seed in range(800, 812)])
+    mean = np.sum(found[:, 0] * found[:, 1]) / np.sum(found[:, 1])
+    assert mean == pytest.approx(1, abs=3 * np.sqrt(2 / np.sum(found[:, 1])))
+
+
+@pytest.mark.parametrize("factor", [1 / 1.5, 1.5])
+@pytest.mark.parametrize("wrong", ["points", "east"])
+def test_the_instrument_whose_sigma_is_wrong_is_named(tmp_path: Path, factor: float, wrong: str) -> None:
+    stated = {"points": 5e-5, "east": 5e-5} | {wrong: 5e-5 * factor}
+    asked = [Asked("points", 40, 5e-5, stated["points"]), Asked("wire", 110, 5e-5, stated["east"])]
+    found = noises(tmp_path, asked, 821)
+    assert {name for name, (*_, contradicted) in found.items() if name and contradicted} == {wrong}
+    assert found[wrong][0] == pytest.approx(1 / factor**2, rel=0.45)
+
+
+def test_a_wrong_sigma_is_said(tmp_path: Path) -> None:
+    """In the remarks of a calibration, with its name, and in results.json."""
+    asked = [Asked("points", 40, 5e-5, 5e-5), Asked("wire", 110, 5e-5, 3e-5)]
+    model, poses = readings(tmp_path, ReadArm.drawn(822), asked, 822)
+    document = calibrate(model, poses, terms=["kinematic"]).document()
+    (said,) = (remark for remark in document["remarks"] if "stated sigma says" in remark)
+    assert said.startswith("the readings of east scatter 1.")
+    noise = document["fit"]["stated_noise"]
+    assert [item["instrument"] for item in noise] == [None, "points", "east"]
+    assert document["fit"]["reduced_chi2"] == noise[0]["reduced_chi2"]
+
+
+def alone_and_together(folder: Path, asked: Sequence[Asked], seed: int) -> np.ndarray:
+    """Root mean square errors of the arm from each kind alone, and from all of them."""
+    arm = ReadArm.drawn(seed)
+    model, poses = readings(folder, arm, asked, seed)
+    sets = [*(poses.subset(own) for own in _rows(poses, asked)), poses]
+    models = [fit_geometry(model, one, terms=("kinematic",)).model for one in sets]
+    return np.array([np.sqrt(np.mean(errors(arm, one, seed)[0] ** 2)) for one in models])
+
+
+def _rows(poses: PoseSet, asked: Sequence[Asked]) -> list[np.ndarray]:
+    """Rows of the first kind, and of the second."""
+    first = len(poses) - asked[1].count
+    return [np.arange(first), np.arange(first, len(poses))]
+
+
+MIXTURES = {
+    "as exact": [right("points", 30), right("sockets", 120)],
+    "sockets more exact than the tracker": [right("points", 30), right("sockets", 120, 1e-5)],
+    "a wire more exact than its default": [right("points", 30), Asked("wires", 150, 1e-5, None)],
+    "a wire whose sigma is wrong": [right("points", 30, 2e-5), Asked("wire", 150, 5e-4, 5e-5)],
+    "sockets ten times less exact": [right("points", 30), right("sockets", 120, 5e-4)],
+}
+
+
+@pytest.mark.parametrize("case", list(MIXTURES)[1:4])
+def test_more_instruments_do_no_harm(tmp_path: Path, case: str) -> None:
+    """Each kind has the weight of its own scatter, whatever is stated of it."""
+    first, second, both = alone_and_together(tmp_path, MIXTURES[case], 831)
+    assert both < 1.05 * min(first, second)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", list(MIXTURES))
+def test_more_instruments_do_no_harm_on_twenty_arms(tmp_path: Path, case: str) -> None:
+    """Never significantly worse than the better kind alone, and not by a fifth on any arm."""
+    found = np.array([alone_and_together(tmp_path / str(s), MIXTURES[case], s) for s in range(840, 860)])
+    better = int(np.argmin(np.log(found[:, :2]).mean(axis=0)))
+    ratio = np.log(found[:, 2] / found[:, better])
+    assert ratio.mean() < 2 * ratio.std(ddof=1) / np.sqrt(len(ratio))
+    assert ratio.max() < np.log(1.25)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", list(KINDS))
+def test_intervals_cover(tmp_path: Path, kind: str) -> None:
+    """Parameters and predictions of 20 arms that nothing was tuned on; 20 shares scatter by up to two percent about their mean."""
+    found = [covered(tmp_path / str(seed), KINDS[kind], seed) for seed in range(860, 880)]
+    parameters, predictions = np.mean(found, axis=0)
+    error = np.std(found, axis=0, ddof=1) / np.sqrt(len(found))
+    assert 0.93 - 2 * error[0] < parameters < 0.97 + 2 * error[0]
+    assert 0.93 - 2 * error[1] < predictions < 0.97 + 2 * error[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [name for name, asked in KINDS.items() if any(a.stated for a in asked)])
+def test_chi_square_of_every_kind_is_one(tmp_path: Path, kind: str) -> None:
+    """Pooled over 40 arms, within three standard deviations of its distribution, which are 5 % or less; false alarms are rare."""
+    found = [noises(tmp_path, KINDS[kind], seed) for seed in range(900, 940)]
+    chi, freedom = (np.array([one[""][k] for one in found]) for k in (0, 1))
+    mean = np.sum(chi * freedom) / np.sum(freedom)
+    assert mean == pytest.approx(1, abs=max(0.05, 3 * np.sqrt(2 / np.sum(freedom))))
+    assert np.mean([one[""][2] for one in found]) <= 0.05
