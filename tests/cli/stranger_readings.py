@@ -72,6 +72,7 @@ class ReadArm(StrangerArm):
         found, drawn = [], []
         while sum(map(len, found)) < count:
             q, error = self.postures(2 * count, rng), rng.normal(size=(2 * count, 3))
+            there = np.zeros(len(q), bool)
             for _ in range(25):
                 now = off(self.points(q), error)
                 there = np.linalg.norm(now, axis=1) < 1e-10

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from stranger_readings import Asked, ReadArm, readings, right
 
-from flexcal import PoseSet, RobotModel, calibrate
+from flexcal import PoseSet, RobotModel, calibrate, read_poses
 from flexcal.calibration.diagnostics import stated_noise
 from flexcal.calibration.fit import GeometricFit, fit_geometry
 from flexcal.model.kinematics import point_kinematics
@@ -146,6 +146,26 @@ def test_more_instruments_do_no_harm(tmp_path: Path, case: str) -> None:
     """Each kind has the weight of its own scatter, whatever is stated of it."""
     first, second, both = alone_and_together(tmp_path, MIXTURES[case], 831)
     assert both < 1.05 * min(first, second)
+
+
+def test_a_wire_whose_drum_is_larger_than_declared_does_no_harm(tmp_path: Path) -> None:
+    """Points tell the scale of its lengths, 0.8 per mille, which is said; alone it makes the robot that much larger."""
+    arm = ReadArm.drawn(835)
+    readings(tmp_path, arm, [right("points", 30), right("wires", 150)], 835)
+    robot, wires = tmp_path / "robot.yaml", tmp_path / "1_wires.csv"
+    robot.write_text(robot.read_text().replace("scale_std: 1.0e-6", "scale_std: 1.0e-3"))
+    header, *lines = wires.read_text().splitlines()
+    cells = [line.rpartition(",") for line in lines]
+    longer = [f"{head},{1.0008 * float(length)!r}" for head, _, length in cells]
+    wires.write_text("\n".join([header, *longer]) + "\n")
+    model = RobotModel.from_yaml(robot)
+    points = read_poses(tmp_path / "0_points.csv", model)
+    alone = fit_geometry(model, points, terms=("kinematic",))
+    both = calibrate(model, read_poses([tmp_path / "0_points.csv", wires], model), terms=["kinematic"])
+    sizes = [np.sqrt(np.mean(errors(arm, one, 835)[0] ** 2)) for one in (alone.model, both.model)]
+    assert sizes[1] < 1.2 * sizes[0]
+    assert both.estimate.values["wires.scale"] == pytest.approx(-8e-4, abs=1e-4)
+    assert any("lengths of wires are wrong by 0.8" in remark for remark in both.document()["remarks"])
 
 
 @pytest.mark.slow

@@ -168,25 +168,37 @@ class PointFit:
 
     @property
     def free(self) -> Parameters:
-        """Parameters determined by rank or a declared prior."""
+        """Parameters determined by rank or a declared prior, and scales that other lengths tell."""
         kept = self.identifiability.kept_names
-        return Parameters(p for p in self.geometric if p.name in kept or np.isfinite(p.prior_std))
+        geometric = Parameters(p for p in self.geometric if p.name in kept or np.isfinite(p.prior_std))
+        return geometric + Parameters(self._scales[int(self._size_is_a_scale) :])
 
     @property
     def known(self) -> Parameters:
-        """Parameters that are held at what is declared, within its standard deviation: scales of sockets' distances, boards and wires, and
-        the length of the robot that gives its size where no reading does.
+        """Parameters that are held at what is declared, within its standard deviation.
 
+        Where sockets' distances, boards or wires alone tell the size of the robot, the best known of their scales; where no reading does, a
+        length of the robot.
         Errors of the joints grow with the robot, so a fit would make a smaller robot of fewer errors, and shorter distances.
         """
-        own = [kind.scale for kind in KINDS if kind.scale and kind.scaled(self.poses).any()]
-        sizes = {name: declared_size(self.start, name) for name in own}
-        scales = [Parameter(name, "1", 0.0, prior_std=std) for name, std in sizes.items() if std is not None]
         lengths = [
             Parameter(name, "m", self.start.value(name), prior_std=plausible_size(self.start, name))
             for name in self.size
         ]
-        return Parameters([*scales, *lengths])
+        return Parameters([*self._scales[: int(self._size_is_a_scale)], *lengths])
+
+    @property
+    def _size_is_a_scale(self) -> bool:
+        """Whether lengths are told by sockets, boards and wires alone, and not by an instrument that measures points."""
+        return not (self.poses.located & ~self.poses.seen).any()
+
+    @property
+    def _scales(self) -> list[Parameter]:
+        """Scales of sockets' distances, boards and wires with their declared standard deviations, the best known first."""
+        own = [kind.scale for kind in KINDS if kind.scale and kind.scaled(self.poses).any()]
+        sizes = {name: declared_size(self.start, name) for name in own}
+        scales = [Parameter(name, "1", 0.0, prior_std=std) for name, std in sizes.items() if std is not None]
+        return sorted(scales, key=lambda item: item.prior_std)
 
     def solved(
         self,

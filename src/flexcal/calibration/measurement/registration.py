@@ -15,6 +15,8 @@ from flexcal.model.robot import RobotModel
 
 FOREIGN = np.deg2rad(15)
 """Median angle, rad, between measured and nominal orientations above which they follow another convention."""
+_MANY, _CENTRES, _LISTED = 0.3, 200, 10
+"""Share of the orientations that follow one convention from which it is that of the file; how many are compared with all, and listed."""
 
 
 def register(model: RobotModel, poses: PoseSet, predicted: np.ndarray) -> RobotModel:
@@ -60,8 +62,28 @@ def require_orientations(model: RobotModel, poses: PoseSet) -> None:
     own = poses.subset(poses.turned)
     angles = np.linalg.norm(predict_measurements(model, own, elastic=False).residual[len(own) :], axis=1)
     if (angle := float(np.median(angles))) > FOREIGN:
+        agreeing = _agreeing(model, own)
+        if agreeing.mean() > _MANY:
+            other = own.pose[~agreeing]
+            listed = ", ".join(map(str, other[:_LISTED].tolist())) + (" …" if len(other) > _LISTED else "")
+            raise FlexcalError(
+                "E-CAL-024",
+                f"{agreeing.sum()} of {len(own)} orientations agree with each other, and the others, of pose {listed}, follow another "
+                "convention: give all rows of qw, qx, qy, qz the same order of components, the same direction and the same axes.",
+            )
         raise FlexcalError(
             "E-CAL-012",
             f"the measured orientations differ from the robot's by {np.rad2deg(angle):.0f}° (median) however the target is turned on "
             "the tool; qw, qx, qy, qz must turn its axes into the instrument's: 'flexcal import' tells the convention of a file.",
         )
+
+
+def _agreeing(model: RobotModel, poses: PoseSet) -> np.ndarray:
+    """Rows (N,) of the largest set of orientations that turn the target in the same way on the tool, to 15°."""
+    quaternion = poses.quaternion_wxyz
+    assert quaternion is not None
+    predicted = predict_measurements(model, poses, elastic=False).orientation
+    mounted = np.matmul(np.swapaxes(predicted, 1, 2), wxyz_rotation(quaternion)).reshape(len(poses), 9)
+    centres = mounted[np.linspace(0, len(poses) - 1, min(len(poses), _CENTRES)).astype(int)]
+    near = centres @ mounted.T > 1 + 2 * np.cos(FOREIGN)
+    return near[np.argmax(near.sum(axis=1))]

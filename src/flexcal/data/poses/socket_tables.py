@@ -28,7 +28,8 @@ def read_sockets(file: TableFile, model: RobotModel, further: Sequence[str] = ()
     the `further` columns, which are not used.
 
     `fixture` is any name of the place where the fixture stood, `socket` a name under `measurements:` of robot.yaml. Raises `InputError`
-    where robot.yaml declares no sockets, for an unknown socket, and for a place that is called as a station of an instrument.
+    where robot.yaml declares no sockets, for an unknown socket, for places whose names differ only in capital letters, and for a place
+    that is called as a station of an instrument.
     """
     declared = _declared(file, model)
     texts = (*SOCKET_COLUMNS, *(name for name in ("target", *further) if name in file.columns))
@@ -46,7 +47,15 @@ def read_sockets(file: TableFile, model: RobotModel, further: Sequence[str] = ()
             raise table.error(
                 "E-POSES-037", row, "socket", f"there is no socket '{name}' in robot.yaml{hint}"
             )
+    spelt: dict[str, str] = {}
     for row, name in enumerate(fixture.tolist()):
+        if (first := spelt.setdefault(name.casefold(), name)) != name:
+            raise table.error(
+                "E-POSES-063",
+                row,
+                "fixture",
+                f"the places '{first}' and '{name}' differ only in capital letters; give one place one name.",
+            )
         if name in model.config.stations:
             raise table.error(
                 "E-POSES-038",

@@ -6,13 +6,13 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import NoneType
-from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from flexcal.files.structuring.faults import Fault
 from flexcal.files.structuring.keys import known_keys
-from flexcal.files.structuring.wording import describe
+from flexcal.files.structuring.wording import describe, suggestion
 
 if TYPE_CHECKING:
     from cattrs import Converter
@@ -31,6 +31,7 @@ def union_hook(cls: Any, converter: Converter) -> Any:
         if not fitting:
             expected = " or ".join(_expected(member) for member in members if member is not NoneType)
             raise Fault("E-YAML-033", f"{expected} is expected, not {describe(value)}")
+        fitting = _of_kind(fitting, value)
         for member in fitting[:-1]:
             try:
                 return converter.structure(value, member)
@@ -39,6 +40,34 @@ def union_hook(cls: Any, converter: Converter) -> Any:
         return converter.structure(value, fitting[-1])
 
     return structure
+
+
+def _of_kind(members: list[Any], value: Any) -> list[Any]:
+    """Those of some mappings whose `kind` is that of a value, all where the kind does not tell.
+
+    Raises `Fault` with all kinds for one that none of them has.
+    """
+    kinds = {
+        i: get_args(get_type_hints(m).get("kind"))
+        for i, m in enumerate(members)
+        if dataclasses.is_dataclass(m)
+    }
+    if (
+        not isinstance(value, dict)
+        or "kind" not in value
+        or len(members) < 2
+        or not all(map(kinds.get, range(len(members))))
+    ):
+        return members
+    own = [member for i, member in enumerate(members) if value["kind"] in kinds[i]]
+    if not own:
+        every = sorted(str(kind) for choices in kinds.values() for kind in choices)
+        near = suggestion(value["kind"], every) if isinstance(value["kind"], str) else ""
+        raise Fault(
+            "E-YAML-034",
+            f"the kind is {describe(value['kind'])}, but must be one of {', '.join(every)}{near}",
+        )
+    return own
 
 
 def _known(cls: Any, value: Any) -> int:

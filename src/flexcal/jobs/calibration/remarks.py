@@ -21,7 +21,7 @@ from flexcal.calibration.diagnostics import (
 )
 from flexcal.calibration.fit import GeometricFit
 from flexcal.jobs.calibration.ignored_columns import ignored_columns_remarks
-from flexcal.model.robot import WIRE_SCALE
+from flexcal.model.robot import BOARD_SCALE, SOCKET_SCALE, WIRE_SCALE
 from flexcal.units import MILLIMETRE
 
 _LOOK = (
@@ -35,6 +35,18 @@ _OVERSTATED, _UNDERSTATED = 0.5, 2.0
 
 _ANOTHER_SIZE = 0.01
 """Relative deviation of a board's size from the nominal robot's above which the declared size is doubtful."""
+
+_LENGTHS = {
+    WIRE_SCALE: "by the other readings, the lengths of wires are wrong",
+    SOCKET_SCALE: "by the other readings, the declared distances of the sockets are wrong",
+    BOARD_SCALE: "by the other readings, the declared size of the board is wrong",
+}
+"""What is said where readings of another kind show the scale of lengths."""
+
+_PER_MILLE = 1e-3
+
+_ANOTHER_CONVENTION = np.deg2rad(5)
+"""Deviation of an orientation, rad, above which it is none of the convention of the others."""
 
 _SHOWN = 3
 _LISTED = 20
@@ -108,15 +120,15 @@ def outliers_of(fit: GeometricFit) -> tuple[Outlier, ...]:
 
 def calibration_remarks(fit: GeometricFit, cause: Sequence[str] = ()) -> tuple[str, ...]:
     """Remarks on a calibration, the most important last; a known `cause` of a bad fit precedes its consequences."""
-    remarks = [*ignored_columns_remarks(fit.poses), *_nominal_springs(fit)]
+    remarks = [*ignored_columns_remarks(fit.poses), *_without_readings(fit), *_nominal_springs(fit)]
     if fit.ambiguous.any():
         remarks.append(f"the flank of a backlash is uncertain at {fit.ambiguous.sum()} poses")
     outliers = outliers_of(fit)
     if outliers:
         listed = ", ".join(str(outlier) for outlier in outliers[:_LISTED])
         more = f" and {len(outliers) - _LISTED} more" if len(outliers) > _LISTED else ""
-        remarks.append(f"{len(outliers)} outliers: {listed}{more}")
-        remarks += _mislabelled(outliers)
+        remarks.append(f"{len(outliers)} outlier{'s' * (len(outliers) > 1)}: {listed}{more}")
+        remarks += [*_mislabelled(outliers), *_turned(fit, outliers)]
     remarks += [*_undetermined(fit), *_views(fit), *_size(fit), *_noise(fit), *_jumps(fit)]
     drift = Drift.of(fit) if fit.poses.located.any() else None
     if drift is not None and drift.certain:
@@ -214,8 +226,17 @@ def _size(fit: GeometricFit) -> Sequence[str]:
             f"{std / MILLIMETRE:.2g} mm, and all its lengths are off in the same ratio as that; measure with a wire, sockets at a known "
             "distance or an instrument of points too where that matters",
         )
-    held = [name for name in (WIRE_SCALE,) if name in fit.estimate.parameters.names]
-    if held and not fit.poses.located.any():
+    estimate = fit.estimate
+    known = [name for name in _LENGTHS if name in estimate.parameters.names]
+    told = {name: interval for name in known if (interval := estimate.interval(name))}
+    if told:
+        return [
+            f"{_LENGTHS[name]} by {abs(low + high) / 2 / _PER_MILLE:.2g} ± {(high - low) / 2 / _PER_MILLE:.1g} per mille (95 %), which "
+            "the fit takes into account"
+            for name, (low, high) in told.items()
+            if low * high > 0
+        ]
+    if WIRE_SCALE in known and not fit.poses.located.any():
         std = fit.estimate.parameters[WIRE_SCALE].prior_std
         return (
             f"all lengths of the robot are known to {1e3 * std:.2g} per mille, which is the `scale_std` of the wire in robot.yaml",
@@ -238,6 +259,30 @@ def _jumps(fit: GeometricFit) -> Sequence[str]:
     return (
         f"the readings jump: {listed}{more}. What is zeroed, hung up again or moved between measurements is another instrument: declare "
         "one for each part under `measurements:` in robot.yaml, and name it in the column `wire` or `touched`",
+    )
+
+
+def _without_readings(fit: GeometricFit) -> Sequence[str]:
+    """Remark on declared instruments of which there are no readings."""
+    poses = fit.poses
+    read = {*poses.station.tolist(), *([] if poses.camera is None else poses.camera.tolist())}
+    declared = fit.model.config.measurements.items()
+    missing = [
+        n for n, item in declared if n not in read and not (item.kind == "sockets" and poses.in_socket.any())
+    ]
+    if not missing:
+        return ()
+    return (f"robot.yaml declares {', '.join(missing)} under `measurements:`, of which no file has readings",)
+
+
+def _turned(fit: GeometricFit, outliers: Sequence[Outlier]) -> Sequence[str]:
+    """Remark on orientations of some rows that follow another convention than the others."""
+    far = sum(outlier.angle is not None and outlier.angle > _ANOTHER_CONVENTION for outlier in outliers)
+    if far < _SHOWN:
+        return ()
+    return (
+        f"{far} of {len(fit.rotations)} orientations differ from the robot's by more than {np.rad2deg(_ANOTHER_CONVENTION):.0f}°, which no "
+        "noise does: these rows may follow another convention than the others, as quaternions in another order or inverse ones",
     )
 
 
