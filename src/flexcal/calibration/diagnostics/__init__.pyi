@@ -3,10 +3,10 @@ from .drift_test import Drift
 from .gravity_residuals import GravityLoads, gravity_loads
 from .jumps_in_readings import ReadingJump, reading_jumps
 from .nearest_socket import NearestSocket, nearest_sockets
+from .noise_test import StatedNoise, stated_noise
 from .place_agreement import FEWEST_PLACES, Disagreement, PlaceAgreement, PlaceErrors
 from .plausibility import implausible_shifts, is_implausible, residuals_implausible
 from .size_of_board import board_size
-from .stated_noise import StatedNoise, stated_noise
 
 __all__ = [
     "FEWEST_PLACES",
