@@ -15,6 +15,8 @@ _SMALLEST_DAMPING = 1e-18
 _ROUNDING = 1e-13
 _STATIONARY = 1e-3
 _EXACT = 1e-16
+_CLOSE = 0.1
+"""Relative offset and deviation of the gain ratio from 1 below which a minimum is near, and the damping falls ever faster."""
 _CANNOT_STEP = {
     True: ("converged", "the cost no longer changes beyond rounding"),
     False: ("stalled", "no step lowers the cost, although it is not at a minimum"),
@@ -43,13 +45,16 @@ def minimise(
     max_iterations: int,
     tolerance: float,
     progress: Progress = silent,
+    first: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Optimum:
-    """Minimise over the coordinates marked in `free` (p,), from `x` (p,).
+    """Minimise over the coordinates marked in `free` (p,), from `x` (p,), where the linearisation may be known as `first`.
 
     Damping follows the gain ratio (Nielsen 1999; Madsen, Nielsen, Tingleff 2004, alg. 3.16) in coordinates scaled by the
     largest column norms seen (Moré 1978). Robust losses are reweighted at every linearisation; the weighted quadratic
-    bounds them from above, so the gain ratio keeps its meaning. Steps are clipped at the bounds, and a coordinate that is
-    at one and pushed outwards rests for that step. Directions without information are not moved.
+    bounds them from above, so the gain ratio keeps its meaning. Near the minimum, while the gain ratio stays near 1, each
+    fall of the damping is three times the last one, or weak directions would take a dozen steps. Steps are clipped at the
+    bounds, and a coordinate that is at one and pushed outwards rests for that step. Directions without information are not
+    moved.
 
     Converged: the relative offset ‖Qᵀb‖/‖b‖ (Bates & Watts 1981) or the scaled step is below `tolerance`, or the cost no
     longer changes beyond rounding. Stalled: no step lowers the cost although the relative offset is above 1e-3, which Bates and Watts
@@ -57,10 +62,10 @@ def minimise(
     """
     lower, upper = objective.problem.parameters.bounds()
     x = np.clip(x, lower, upper)
-    residual, jacobian = objective.linearise(x)
+    residual, jacobian = objective.linearise(x) if first is None else objective.checked(*first)
     cost = first_cost = objective.cost(residual, x)
     scale = np.zeros(x.size)
-    damping, growth, best_offset = _FIRST_DAMPING, 2.0, np.inf
+    damping, growth, fall, best_offset = _FIRST_DAMPING, 2.0, 1.0 / 3.0, np.inf
     status, message, iteration, polishing = "iteration limit", "", 0, False
     while True:
         progress("fitting", iteration / max_iterations)
@@ -104,8 +109,10 @@ def minimise(
             polishing = abs(predicted) <= _ROUNDING * cost and abs(actual) <= 10 * _ROUNDING * cost
             gain = 1.0 if polishing else actual / predicted if predicted > 0 else -1.0
             if gain > 1e-4:
-                damping = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3), _SMALLEST_DAMPING)
-                growth = 2.0
+                close = offset < _CLOSE and abs(gain - 1.0) < _CLOSE
+                damping *= fall if close else max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3)
+                damping, growth = max(damping, _SMALLEST_DAMPING), 2.0
+                fall = fall / 3.0 if close else 1.0 / 3.0
                 break
             damping, growth = damping * growth, growth * 2.0
             rejected = True

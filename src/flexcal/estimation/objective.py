@@ -69,7 +69,10 @@ class Objective:
 
     def linearise(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Residual (m,) and Jacobian (m, p); raises FlexcalError when they are not finite."""
-        residual, jacobian = self.problem.linearise(x)
+        return self.checked(*self.problem.linearise(x))
+
+    def checked(self, residual: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same residual (m,) and Jacobian (m, p); raises FlexcalError when they are not finite."""
         names = self.problem.parameters.names
         rows = self.grouping.number.size
         if np.shape(residual) != (rows,) or np.shape(jacobian) != (rows, len(names)):

@@ -55,9 +55,13 @@ def solve(
     failure: FlexcalError | None = None
     for point in points:
         try:
+            if problem.residual is None:
+                first = problem.linearise(point)
+                residual = first[0]
+            else:
+                first, residual = None, problem.residual(point)
             if objective is None:
-                first = problem.linearise(point)[0] if problem.residual is None else problem.residual(point)
-                objective = Objective.of(problem, chosen, np.size(first))
+                objective = Objective.of(problem, chosen, np.size(residual))
             optima.append(
                 minimise(
                     objective,
@@ -66,6 +70,7 @@ def solve(
                     max_iterations=max_iterations,
                     tolerance=tolerance,
                     progress=progress,
+                    first=first,
                 )
             )
         except FlexcalError as error:

@@ -25,6 +25,8 @@ TRANSMISSION = "transmission"
 """Name of the component of transmission errors."""
 _SMALLEST = 1e-9
 """Share of the total variance that bounds a component from below."""
+_START = 0.01
+"""Least share of the total variance from which the search for a component begins."""
 _STEPS, _HALVINGS = 60, 30
 ORIENTATION = "orientation"
 _ALWAYS = (ROBOT, *OF_INSTRUMENTS, ORIENTATION)
@@ -64,8 +66,10 @@ class LinearFit:
         own = np.arange(last - columns.shape[2] - 1, last)
         return RestrictedLikelihood.of(sums, names, scatter).products(own)
 
-    def scatter(self, *, stated: bool) -> tuple[ErrorComponents, dict[str, float]]:
-        """Estimated components, and the standard deviation of each that is not zero.
+    def scatter(
+        self, *, stated: bool, near: ErrorComponents | None = None
+    ) -> tuple[ErrorComponents, dict[str, float]]:
+        """Estimated components, and the standard deviation of each that is not zero; the search begins `near` known ones.
 
         Where a sigma is `stated`, the instrument's part is that, or less where the points scatter clearly less than it says.
         """
@@ -80,7 +84,12 @@ class LinearFit:
         sizes = {name: totals[ROBOT] / levers.get(name, 1.0) for name in names} | totals
         scale = np.array([sizes[name] for name in names])
         share = 1.0 if stated else 0.0
-        variances, likelihood = self._maximum(names, scale, share)
+        start = (
+            None
+            if near is None
+            else np.maximum(np.array([getattr(near, name) for name in names]) ** 2 / scale, _START)
+        )
+        variances, likelihood = self._maximum(names, scale, share, start)
         if stated:
             # the points may scatter less than the instrument alone should, even if nothing else errs
             of_robot = self.readings.of_scatter(ROBOT)

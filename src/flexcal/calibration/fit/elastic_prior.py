@@ -44,6 +44,18 @@ class ElasticPrior:
                 covariance[k, k] += secant_scale**2
         return cls(Parameters(items), covariance)
 
+    def started(self, values: Mapping[str, float]) -> ElasticPrior:
+        """The same prior for a fit that starts at those of the `values` that it has."""
+        items = (
+            replace(
+                item,
+                value=values.get(item.name, item.value),
+                prior_mean=item.value if item.prior_mean is None else item.prior_mean,
+            )
+            for item in self.parameters
+        )
+        return replace(self, parameters=Parameters(items))
+
     def beside(self, waves: Mapping[str, float], std: float) -> ElasticPrior:
         """Prior with the `waves` of transmission errors, each with its size relative to order 1, whose 1σ is `std` rad; none for 0."""
         if not waves or std == 0:

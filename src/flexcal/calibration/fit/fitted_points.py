@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -50,6 +51,8 @@ from flexcal.estimation import RANK_TOLERANCE, Estimate, Identifiability, Loss, 
 from flexcal.model.robot import SCATTER, RobotModel, unit_of
 from flexcal.progress import Progress
 
+CONVERGED = 1e-9
+"""Relative offset of a fit that has converged."""
 _FLANK_PASSES = 4
 _FIRST_SCATTER = 1e-4
 """Initial scatter (m) of a fit: its size matters relative to priors only."""
@@ -70,7 +73,7 @@ _FREE_STIFFNESS = 0.3
 class PointFit:
     """Input of a fit: the registered robot `start`, its `geometric` parameters, their rank on the `poses`, the elastic `prior`.
 
-    `size` is the length that is held where no reading tells how large the robot is.
+    `size` is the length that is held where no reading tells how large the robot is, `near` has values close to the solution.
     """
 
     start: RobotModel
@@ -83,6 +86,7 @@ class PointFit:
     prior: ElasticPrior
     elastic: bool
     marginalised: bool
+    near: Mapping[str, float]
     progress: Progress
 
     @classmethod
@@ -95,6 +99,7 @@ class PointFit:
         elastic: bool,
         *,
         marginalised: bool,
+        near: Mapping[str, float],
         progress: Progress,
     ) -> PointFit:
         """Input without the term `transmission` for fewer than 20 different poses, which do not determine its variance.
@@ -124,7 +129,18 @@ class PointFit:
             seen = kinematic_identifiability(start, poses, geometric, scale=sizes)
             structural = random_identifiability(start, poses, geometric, seen, scale=sizes)
         return cls(
-            start, poses, terms, geometric, held[:1], seen, structural, prior, elastic, marginalised, progress
+            start,
+            poses,
+            terms,
+            geometric,
+            held[:1],
+            seen,
+            structural,
+            prior,
+            elastic,
+            marginalised,
+            near,
+            progress,
         )
 
     @cached_property
@@ -173,6 +189,21 @@ class PointFit:
         geometric = Parameters(p for p in self.geometric if p.name in kept or np.isfinite(p.prior_std))
         return geometric + Parameters(self._scales[int(self._size_is_a_scale) :])
 
+    @cached_property
+    def _beginning(self) -> dict[str, float]:
+        """Values `near` the solution; parameters kept here take up those that were kept there and are dropped here."""
+        every = self.identifiability
+        lost = [name not in every.kept_names and name in self.free for name in every.names]
+        nominal = np.array([self.start.value(name) for name in every.names])
+        shift = np.array([self.near.get(name, 0.0) for name in every.names]) - nominal
+        shift[[k for k, name in enumerate(every.names) if lost[k] or name not in self.near]] = 0.0
+        moved = every.regrouping @ shift
+        kept = {
+            name: self.start.value(name) + float(change)
+            for name, change in zip(every.kept_names, moved, strict=True)
+        }
+        return dict(self.near) | kept if self.near else {}
+
     @property
     def known(self) -> Parameters:
         """Parameters that are held at what is declared, within its standard deviation.
@@ -208,10 +239,12 @@ class PointFit:
         *,
         fixed: tuple[Undetermined, ...] = (),
         spread: dict[str, float] | None = None,
+        tolerance: float = CONVERGED,
     ) -> FittedPoints:
         """Fit under a given scatter from the solution `near`, repeated until the flanks agree with the fitted robot.
 
-        `fixed` parameters stay at their nominal values; `spread` are the standard deviations of the scatter's components.
+        `fixed` parameters stay at their nominal values; `spread` are the standard deviations of the scatter's components; `tolerance` is
+        that of `solve`.
         """
         names = [item.name for item in fixed]
         kept = Parameters(item for item in self.free if item.name not in names)
@@ -220,18 +253,21 @@ class PointFit:
             turns = joint_rotation_jacobian(at)
         else:
             at, turns = near.at, near.turns
-            kept = Parameters(
-                replace(p, value=near.estimate.values.get(p.name, p.value), prior_mean=p.value) for p in kept
-            )
+        values = self._beginning if near is None else near.estimate.values
+        kept = Parameters(
+            replace(p, value=values.get(p.name, p.value), prior_mean=p.value) if p.name in values else p
+            for p in kept
+        )
         whitening = scatter.weights(at.readings, turns)
         flank, prior = at.rest.flank, self.prior.beside(self.waves, scatter.transmission)
+        prior = prior.started(values)
         passes = 0
         while True:
             task = GeometryProblem(self.start, self.poses, kept, prior, flank, self.elastic, whitening)
             if self.marginalised and len(prior.parameters):
                 estimate = marginalised(task, progress=self.progress)
             else:
-                estimate = task.reestimated(loss=loss, progress=self.progress)
+                estimate = task.reestimated(loss=loss, tolerance=tolerance, progress=self.progress)
             fitted = self.start.with_values(estimate.values)
             after = predict_measurements(fitted, self.poses, elastic=self.elastic, jacobians=True)
             if (after.rest.flank == flank).all():
@@ -312,7 +348,8 @@ class FittedPoints:
 
     def estimated_scatter(self) -> tuple[ErrorComponents, dict[str, float]]:
         """Variance components of the residuals, and the standard deviation of each."""
-        return self.linear.scatter(stated=self.fit.poses.sigma_given)
+        near = self.scatter if self.spread else None
+        return self.linear.scatter(stated=self.fit.poses.sigma_given, near=near)
 
     def robust_scatter(self) -> ErrorComponents:
         """Common scatter of all coordinates of a unit, from the median of the residuals' distances."""

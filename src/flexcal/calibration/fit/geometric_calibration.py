@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -22,6 +22,12 @@ from flexcal.progress import Progress, silent
 from flexcal.units import MILLIMETRE
 
 _PASSES = 8
+_ROUGH, _NEAR = 0.1, 1e-3
+"""Relative offsets at which a fit is close enough to estimate its errors: at first, where directions are free that noise hides and that
+take many steps; and once these are held (Bates and Watts 1981).
+"""
+_NOISE = 1e-3
+"""Scatter of a coordinate, m, from which errors may be those of a fit that is still far from its solution."""
 _SETTLED = 2e-3
 """Relative change of every standard deviation of the errors at which the components have converged."""
 
@@ -116,6 +122,7 @@ def fit_geometry(
     elasticity: Literal["reestimated", "marginalised"] = "reestimated",
     secant_scale: float = 0.0,
     loss: Loss | LossName = "auto",
+    near: Mapping[str, float] | None = None,
     progress: Progress = silent,
 ) -> GeometricFit:
     """Fit the geometry of a robot to measured points by the Levenberg-Marquardt method (vector error (28), Jacobian (29)).
@@ -146,6 +153,8 @@ def fit_geometry(
         Relative standard deviation of the ratio of each drive's secant stiffness under gravity to its tangent stiffness.
     loss : {"auto", "squares", "huber", "cauchy"} or Loss
         Loss function; "cauchy" finds outliers, "auto" takes it where squares leave some.
+    near : mapping of float, optional
+        Values of parameters from which to start, as of a fit to nearly the same points; by default those of the `model`.
     progress : Progress
         Called with the stage and the share of it that is done.
 
@@ -185,22 +194,31 @@ def fit_geometry(
         prior,
         elastic,
         marginalised=elasticity == "marginalised",
+        near=near or {},
         progress=progress,
     )
-    fitted = _settled(fit, "squares" if loss == "auto" else loss)
+    first = _rough(fit)
+    fitted = _settled(first, "squares" if loss == "auto" else loss)
     if loss == "auto" and elasticity == "reestimated" and fitted.suspects_outliers:
-        again = _settled(fit, "cauchy")
+        again = _settled(first, "cauchy")
         fitted = again if again.estimate.outliers else fitted
     return _calibration(fitted)
 
 
-def _settled(fit: PointFit, loss: Loss | Literal["squares", "huber", "cauchy"]) -> FittedPoints:
-    """Fit with the scatter of its own residuals, with the parameters undetermined under that scatter held."""
-    robust = not isinstance(loss_named(loss), Squares)
-    fitted = fit.solved(fit.first_scatter, "squares")
-    if robust:
+def _rough(fit: PointFit) -> FittedPoints:
+    """Fit by squares that is close enough to estimate its errors, or has converged where these are no noise."""
+    fitted = fit.solved(fit.first_scatter, "squares", tolerance=_ROUGH)
+    if fitted.robust_scatter().robot < _NOISE:
+        return fitted
+    return fit.solved(fit.first_scatter, "squares", fitted)
+
+
+def _settled(fitted: FittedPoints, loss: Loss | Literal["squares", "huber", "cauchy"]) -> FittedPoints:
+    """Fit with the scatter of its own residuals, with the parameters undetermined under that scatter held, from a rough one."""
+    fit = fitted.fit
+    if not isinstance(loss_named(loss), Squares):
         for _ in range(_PASSES):
-            before, fitted = fitted, fit.solved(fitted.robust_scatter(), loss, fitted)
+            before, fitted = fitted, fit.solved(fitted.robust_scatter(), loss, fitted, tolerance=_ROUGH)
             if fitted.scatter.settled(before.scatter, 1e-2):
                 break
     for _ in range(_PASSES):
@@ -208,8 +226,8 @@ def _settled(fit: PointFit, loss: Loss | Literal["squares", "huber", "cauchy"]) 
         fixed = fitted.undetermined(scatter)
         if scatter.settled(fitted.scatter, _SETTLED) and fixed == fitted.fixed:
             break
-        fitted = fit.solved(scatter, loss, fitted, fixed=fixed, spread=spread)
-    return fitted
+        fitted = fit.solved(scatter, loss, fitted, fixed=fixed, spread=spread, tolerance=_NEAR)
+    return fit.solved(fitted.scatter, loss, fitted, fixed=fitted.fixed, spread=fitted.spread)
 
 
 def _calibration(fitted: FittedPoints) -> GeometricFit:

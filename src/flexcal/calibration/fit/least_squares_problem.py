@@ -51,7 +51,7 @@ class GeometryProblem:
         """Whitened Jacobian of all coordinates (3 R, p) by some parameters, natural units."""
         return self.whitening(at.jacobian(names))
 
-    def reestimated(self, *, loss: Loss | PlainLoss, progress: Progress) -> Estimate:
+    def reestimated(self, *, loss: Loss | PlainLoss, tolerance: float, progress: Progress) -> Estimate:
         """Levenberg-Marquardt (29) on geometry, stiffness and inertia together; the latter keep their prior."""
         parameters = self.kept + self.prior.parameters
 
@@ -66,11 +66,8 @@ class GeometryProblem:
             columns = self.columns(at, parameters.names)[there]
             return self.residual(at)[there], -columns * parameters.natural_slope(x)
 
-        def residual(x: np.ndarray) -> np.ndarray:
-            return self.residual(self.predicted(values(x)))[there]
-
         covariance = np.diag(parameters.prior_std() ** 2)
         covariance[len(self.kept) :, len(self.kept) :] = self.prior.covariance
         groups = np.repeat(readings.row, 3)[there]
-        problem = Problem(parameters, linearise, residual, covariance, groups)
-        return solve(problem, loss=loss, progress=progress)
+        problem = Problem(parameters, linearise, None, covariance, groups)
+        return solve(problem, loss=loss, tolerance=tolerance, progress=progress)

@@ -58,19 +58,8 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
     `<joint>.gravity_compliance` is that of one joint.
     """
     joints = moving_joints(model, poses)
-    names: list[str] = []
-    unplaced = not poses.located.any()
-    known = next(iter(poses.station[poses.located].tolist()), None)
-    for station in poses.stations:
-        told = kind_of(poses, station).place(model, poses, station, turned=station != known)
-        names += [f"station.{station}.{key}" for key in told]
-    errors = joint_errors(model, joints)
-    names += _moving_parts(model, poses, errors) if unplaced else errors
-    names += [f"tool.{key}" for key in GEOMETRY]
-    first = next(iter(model.points))
-    names += [f"point.{t}.{key}" for t in dict.fromkeys(poses.target) if t != first for key in "xyz"]
-    names += [f"point.{t}.{key}" for t in dict.fromkeys(poses.target[poses.turned]) for key in STATION[3:]]
-    items = [_parameter(model, name) for name in names if "kinematic" in terms]
+    names = _kinematic(model, poses, joints) if "kinematic" in terms else []
+    items = [_parameter(model, name) for name in names]
     if "backlash" in terms:
         items += [
             _parameter(model, f"{model.joints[i].name}.backlash", lower=0.0)
@@ -89,6 +78,22 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
             seen = [name for name in every if name in loaded or kind not in PER_JOINT]
             further |= dict.fromkeys(every if owner and not seen else seen)
     return Parameters([*items, *(_parameter(model, name) for name in further)])
+
+
+def _kinematic(model: RobotModel, poses: PoseSet, joints: Sequence[int]) -> list[str]:
+    """Names of the term `kinematic`."""
+    names: list[str] = []
+    known = next(iter(poses.station[poses.located].tolist()), None)
+    for station in poses.stations:
+        told = kind_of(poses, station).place(model, poses, station, turned=station != known)
+        names += [f"station.{station}.{key}" for key in told]
+    errors = joint_errors(model, joints)
+    names += errors if poses.located.any() else _moving_parts(model, poses, errors)
+    names += [f"tool.{key}" for key in GEOMETRY]
+    first = next(iter(model.points))
+    names += [f"point.{t}.{key}" for t in dict.fromkeys(poses.target) if t != first for key in "xyz"]
+    names += [f"point.{t}.{key}" for t in dict.fromkeys(poses.target[poses.turned]) for key in STATION[3:]]
+    return names
 
 
 def _moving_parts(model: RobotModel, poses: PoseSet, names: Sequence[str]) -> list[str]:

@@ -15,7 +15,7 @@ from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import PointKinematics
 from flexcal.model.parts import left_jacobian, vector_rotation
-from flexcal.model.robot import STATION, RobotModel
+from flexcal.model.robot import RobotModel
 from flexcal.model.statics import Equilibrium, tool_at_rest
 from flexcal.progress import Progress, silent
 
@@ -139,14 +139,17 @@ class PredictedMeasurements:
     def _by_station(self, station: str, key: str) -> np.ndarray:
         """Derivative (R, 3) of the readings by one number of a station's pose."""
         own, turned = self.poses.station == station, self.poses.turned
+        rows, slopes = np.flatnonzero(own), self.readings.slopes
+        result = np.zeros((len(self.readings.row), 3))
         if key in ("x", "y", "z"):
-            moved = self.displaced(own[:, None] * np.eye(3)["xyz".index(key)])
-            return np.concatenate([moved, np.zeros((int(turned.sum()), 3))])
-        values = [self.model.value(f"station.{station}.{k}") for k in STATION]
-        arm = self.located - np.array(values[:3])
-        axis = left_jacobian(np.array(values[3:]))[:, "xyz".index(key[1])]
-        turns = own[turned][:, None] * (self.angle_slopes @ axis)
-        return np.concatenate([self.displaced(own[:, None] * np.cross(axis, arm)), turns])
+            moved = np.tile(np.eye(3)["xyz".index(key)], (len(rows), 1))
+        else:
+            pose = self.model.stations.pose[self.model.station_index(station)]
+            axis = left_jacobian(pose[3:])[:, "xyz".index(key[1])]
+            moved = np.cross(axis, self.located[rows] - pose[:3])
+            result[len(own) :] = own[turned][:, None] * (self.angle_slopes @ axis)
+        result[rows] = moved if slopes is None else np.matmul(slopes[rows], moved[:, :, None])[:, :, 0]
+        return result
 
 
 def _read(model: RobotModel, poses: PoseSet, located: np.ndarray) -> np.ndarray:

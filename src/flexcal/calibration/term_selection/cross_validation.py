@@ -82,7 +82,7 @@ def _folds(poses: PoseSet) -> tuple[tuple[np.ndarray, ...], int]:
     return folds, len(np.unique(alone))
 
 
-def select_terms(model: RobotModel, poses: PoseSet) -> TermSelection:
+def select_terms(model: RobotModel, poses: PoseSet, fitted: GeometricFit | None = None) -> TermSelection:
     """Forward selection of compliance under gravity, backlash and transmission harmonics on top of the rigid fit.
 
     A term is added where it lowers the mean error on poses left out by more than one standard error of the paired difference, lowers the
@@ -90,6 +90,8 @@ def select_terms(model: RobotModel, poses: PoseSet) -> TermSelection:
     more in folds contiguous in measuring order and in the workspace, where both must agree. Fits are linear, about the fit of the base
     terms to all poses. Compliances that are not supported for all joints are tried joint by joint, and must then lower the criterion by
     2 log(number of such candidates) more (Chen and Chen 2008). Fewer than 20 different poses support no choice.
+
+    `fitted` is a fit of the base terms to these poses, or more, without springs: where there is one it is the one, or its start.
 
     The random effects `transmission` are none of the terms: beside them compliance of every joint, which moves the points much alike,
     would not be found.
@@ -100,7 +102,11 @@ def select_terms(model: RobotModel, poses: PoseSet) -> TermSelection:
         more = LEAST_POSES - distinct
         return TermSelection(base, model, (), "nothing", _too_few(distinct, more))
     open_terms = candidates(model, poses)
-    rigid = fit_geometry(model, poses, terms=base, elastic=bool(model.elastic))
+    if fitted is not None and len(fitted.poses) == len(poses) and not model.elastic:
+        rigid = fitted
+    else:
+        near = None if fitted is None else fitted.estimate.values
+        rigid = fit_geometry(model, poses, terms=base, elastic=bool(model.elastic), near=near)
     trials = TermTrials(rigid, open_terms.model, base, folds, many=distinct >= MANY_POSES)
     chosen, rows = base, [trials.start()]
     left: dict[str, TermComparison] = {}

@@ -76,7 +76,15 @@ def _distances(
     places: Sequence[tuple[np.ndarray, np.ndarray]],
 ) -> np.ndarray:
     distance = np.empty(len(left))
-    for k in np.unique(fold):
+    number, sizes = np.unique(fold, return_inverse=True, return_counts=True)[1:]
+    single = sizes[number] == 1
+    if single.any() and all(len(rows) > 1 for rows, _ in places):
+        q = basis[single]
+        alone = np.linalg.solve(np.eye(3) - q @ q.swapaxes(1, 2), left[single][:, :, None])
+        distance[single] = np.linalg.norm(alone[:, :, 0], axis=1)
+    else:
+        single[:] = False
+    for k in np.unique(fold[~single]):
         own = fold == k
         q, r = basis[own].reshape(-1, basis.shape[2]), left[own].ravel()
         if len(r) <= q.shape[1]:

@@ -8,29 +8,14 @@ from typing import Literal
 
 import numpy as np
 
-from flexcal.calibration.diagnostics import (
-    compare_bearings,
-)
 from flexcal.calibration.error_model import TRANSMISSION
-from flexcal.calibration.fit import (
-    PER_JOINT,
-    GeometricFit,
-    LossName,
-    StratifiedSample,
-    all_errors,
-    fit_geometry,
-)
-from flexcal.calibration.term_selection import (
-    cross_validated,
-    select_terms,
-)
-from flexcal.calibration.verification import (
-    uncalibrated_model,
-    uncalibrated_orientations,
-)
+from flexcal.calibration.fit import PER_JOINT, GeometricFit, LossName, StratifiedSample, all_errors
+from flexcal.calibration.term_selection import cross_validated
+from flexcal.calibration.verification import uncalibrated_model, uncalibrated_orientations
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.files.formats import provenance
+from flexcal.jobs.calibration.fits import Fits, FitSettings, sampled
 from flexcal.jobs.calibration.fitted_measurements import measurement_digests
 from flexcal.jobs.calibration.held_out import held_out_errors
 from flexcal.jobs.calibration.joint_ranges import joint_extents
@@ -106,82 +91,50 @@ def calibrate(
     """
     _require_uncalibrated(model)
     nominal, measured = model, poses
-    model = model.with_stations(poses.places)
     sample = StratifiedSample.of(measured)
     poses = measured if sample is None else measured.subset(sample.rows)
     requested = _terms(model, terms)
-
-    def fit(robot_: RobotModel, chosen: Sequence[str], stage: str, *, elastic: bool) -> GeometricFit:
-        progress(stage, 0.0)
-        calibration = fit_geometry(
-            robot_,
-            poses,
-            terms=chosen,
-            elastic=elastic,
-            elasticity=elasticity,
-            secant_scale=secant_scale,
-            loss=loss,
-        )
-        progress(stage, 1.0)
-        return calibration
-
-    base = ("kinematic", "backlash") if model.backlash_joints else ("kinematic",)
-    rigid = fit(model, base, "rigid fit", elastic=False)
-    bearings = compare_bearings(
-        model, lambda robot_: fit(robot_, (*base, TRANSMISSION), "bearing axes", elastic=True)
-    )
-    if bearings is not None and bearings.declared is None and bearings.preferred is not None:
-        model = model.with_bearings(bearings.preferred)
-    selection = None
-    if requested is None:
-        progress("terms", 0.0)
-        good = np.setdiff1d(np.arange(len(poses)), rigid.estimate.outliers)
-        selection = select_terms(model, poses.subset(good))
-        progress("terms", 1.0)
-        model, requested = selection.model, _with_random_waves(selection.terms)
+    settings = FitSettings(requested, loss, secant_scale, elasticity)
+    fits = Fits.of(nominal, poses, settings, progress=progress)
     held_out = None
     if hold_out is not None:
         progress("held out", 0.0)
-        kept = _without_wrong_readings(measured, rigid) if sample is None else np.ones(len(measured), bool)
+        kept = (
+            _without_wrong_readings(measured, fits.rigid) if sample is None else np.ones(len(measured), bool)
+        )
         held_out = held_out_errors(
-            lambda rest: (
-                calibrate(
-                    nominal, rest, terms=terms, loss=loss, secant_scale=secant_scale, elasticity=elasticity
-                ).model
-            ),
+            lambda rest: Fits.of(nominal, sampled(rest), settings, near=fits).selected.model,
             measured.subset(kept),
             hold_out[0],
             hold_out[1][kept],
             left_out=int((~kept).sum()),
         )
         progress("held out", 1.0)
-    elastic = bool(model.elastic)
-    same = not elastic and tuple(requested) == base
-    selected = rigid if same else fit(model, requested, "selected fit", elastic=elastic)
+    selected = fits.selected
     options = {
-        "terms": " ".join(requested),
+        "terms": " ".join(fits.terms),
         "loss": loss,
         "secant_scale": secant_scale,
         "elasticity": elasticity,
         TARGETS: TARGETS_BETWEEN.join(poses.targets),
-    } | ({"bearings": model.bearings} if model.has_bearings else {})
+    } | ({"bearings": fits.model.bearings} if fits.model.has_bearings else {})
     estimate = replace(
         selected.estimate,
         provenance=provenance((), options),
         ranges=joint_extents(selected.model, selected.poses.q),
         measurements=measurement_digests(poses),
     )
-    uncalibrated = uncalibrated_model(model, poses)
+    uncalibrated = uncalibrated_model(fits.model, poses)
     return Calibration(
         model=selected.model,
         estimate=estimate,
         nominal=nominal,
         before=uncalibrated.errors(poses),
-        rigid=rigid,
-        selection=selection,
+        rigid=fits.rigid,
+        selection=fits.selection,
         selected=selected,
-        bearings=bearings,
-        validated=None if selection is None else cross_validated(selected),
+        bearings=fits.bearings,
+        validated=None if fits.selection is None else cross_validated(selected),
         sample=sample,
         everywhere=None if sample is None else all_errors(selected.model, measured, progress),
         held_out=held_out,
@@ -202,11 +155,6 @@ def _require_uncalibrated(model: RobotModel) -> None:
             f"{model.name} has been calibrated already, and its points would count twice; read it with "
             "RobotModel.from_yaml(path, without='calibration').",
         )
-
-
-def _with_random_waves(terms: Sequence[str]) -> tuple[str, ...]:
-    """Selected terms with all transmission errors as random effects, in place of those of single orders."""
-    return (*(term for term in terms if not term.startswith(TRANSMISSION)), TRANSMISSION)
 
 
 def _terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str, ...] | None:

@@ -85,6 +85,11 @@ def _solve(
     sensitivities: bool,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Elastic deflection (samples, n, 3), compliance, regressor and coupling of `Equilibrium`."""
+    if not axes:
+        samples, n = q.shape
+        shapes = ((samples, n, 3), (samples, 0, 0), (samples, 0, 4 * n), (samples, 0, 6 * n))
+        deflection, compliance, regressor, coupling = (np.zeros(shape) for shape in shapes)
+        return deflection, compliance, regressor, coupling
     declared = model.payload
     try:
         deflection, compliance, regressor, coupling, step = model.tree.equilibrium(

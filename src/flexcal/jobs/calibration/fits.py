@@ -1,0 +1,106 @@
+"""The fits of a calibration: rigid, for the choice of the bearing axes, and with the selected terms."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from flexcal.calibration.diagnostics import BearingAxes, compare_bearings
+from flexcal.calibration.error_model import TRANSMISSION
+from flexcal.calibration.fit import GeometricFit, LossName, StratifiedSample, fit_geometry
+from flexcal.calibration.term_selection import TermSelection, select_terms
+from flexcal.data.poses import PoseSet
+from flexcal.model.robot import RobotModel
+from flexcal.progress import Progress, silent
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """How to fit: `terms`, None for those that cross-validation supports, and the rest as `calibrate` has it."""
+
+    terms: tuple[str, ...] | None
+    loss: LossName
+    secant_scale: float
+    elasticity: Literal["reestimated", "marginalised"]
+
+
+@dataclass(frozen=True, eq=False)
+class Fits:
+    """The `rigid` fit and the one of the `selected` terms, of a `model` with the bearing axes and the backlash that they have.
+
+    `terms` are those asked for or selected, of which few poses may not support all.
+    """
+
+    model: RobotModel
+    terms: tuple[str, ...]
+    rigid: GeometricFit
+    bearings: BearingAxes | None
+    selection: TermSelection | None
+    selected: GeometricFit
+
+    @classmethod
+    def of(
+        cls,
+        model: RobotModel,
+        poses: PoseSet,
+        settings: FitSettings,
+        *,
+        near: Fits | None = None,
+        progress: Progress = silent,
+    ) -> Fits:
+        """Fit the nominal robot `model`, starting from the fits `near` of most of these poses, where there are some."""
+        model = model.with_stations(poses.places)
+        loss, terms, selection = settings.loss, settings.terms, None
+
+        def fit(
+            robot: RobotModel, chosen: Sequence[str], stage: str, start: GeometricFit | None, *, elastic: bool
+        ) -> GeometricFit:
+            progress(stage, 0.0)
+            calibration = fit_geometry(
+                robot,
+                poses,
+                terms=chosen,
+                elastic=elastic,
+                elasticity=settings.elasticity,
+                secant_scale=settings.secant_scale,
+                loss=loss,
+                near=None if start is None else start.estimate.values,
+            )
+            progress(stage, 1.0)
+            return calibration
+
+        base = ("kinematic", "backlash") if model.backlash_joints else ("kinematic",)
+        rigid = fit(model, base, "rigid fit", None if near is None else near.rigid, elastic=False)
+        bearings = compare_bearings(
+            model, lambda robot: fit(robot, (*base, TRANSMISSION), "bearing axes", None, elastic=True)
+        )
+        if bearings is not None and bearings.declared is None and bearings.preferred is not None:
+            model = model.with_bearings(bearings.preferred)
+        if terms is None:
+            progress("terms", 0.0)
+            good = np.setdiff1d(np.arange(len(poses)), rigid.estimate.outliers)
+            selection = select_terms(model, poses.subset(good), rigid if loss == "auto" else None)
+            progress("terms", 1.0)
+            model, terms = selection.model, _with_random_waves(selection.terms)
+        elastic = bool(model.elastic)
+        start = rigid if near is None else near.selected
+        selected = (
+            rigid
+            if not elastic and terms == base
+            else fit(model, terms, "selected fit", start, elastic=elastic)
+        )
+        return cls(model, terms, rigid, bearings, selection, selected)
+
+
+def sampled(poses: PoseSet) -> PoseSet:
+    """The poses that are fitted, a stratified sample of very many."""
+    sample = StratifiedSample.of(poses)
+    return poses if sample is None else poses.subset(sample.rows)
+
+
+def _with_random_waves(terms: Sequence[str]) -> tuple[str, ...]:
+    """Selected terms with all transmission errors as random effects, in place of those of single orders."""
+    return (*(term for term in terms if not term.startswith(TRANSMISSION)), TRANSMISSION)
