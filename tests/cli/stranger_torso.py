@@ -194,6 +194,25 @@ class StrangerTorso:
         seen = at @ self.tracker[0].T + self.tracker[1]
         return seen + self.tracker_noise * rng.normal(size=seen.shape)
 
+    def seen_from_hand(self, q: np.ndarray, rng: np.random.Generator, noise: float = 5e-5) -> np.ndarray:
+        """The right reflector (N, 3), m, as a probe mounted somehow on the left hand reads it."""
+        real = q + self.jitter * rng.normal(size=q.shape)
+        rotation, position = self.tool(real, "left", true=True)
+        inside = np.einsum("sji,sj->si", rotation, self.reflector(real, "right") - position)
+        seen = inside @ turn(np.array([0.3, -0.5, 0.2])).T + [0.03, 0.05, -0.02]
+        return seen + noise * rng.normal(size=seen.shape)
+
+    def write_relative(self, path: Path, count: int, rng: np.random.Generator) -> Path:
+        """Measurements of the right reflector by the probe on the left hand, a station `probe`."""
+        q = self.postures(count, rng)
+        lines = [
+            ",".join(["pose", *(f"q{i + 1}" for i in range(self.n)), "x", "y", "z", "target", "station"])
+        ]
+        for k, (row, point) in enumerate(zip(q, self.seen_from_hand(q, rng), strict=True)):
+            lines.append(",".join([str(k + 1), *(repr(float(v)) for v in (*row, *point)), "right", "probe"]))
+        path.write_text("\n".join(lines) + "\n")
+        return path
+
     def write(self, folder: Path, more: str = "") -> Path:
         """robot.urdf and robot.yaml."""
         folder.mkdir(parents=True, exist_ok=True)

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import refused
 from stranger_torso import StrangerTorso
 
-from flexcal import Calibration, PoseSet, RobotModel, calibrate, read_poses, verify
+from flexcal import Calibration, PoseSet, RobotModel, ToolTargets, calibrate, compensate, read_poses, verify
 from flexcal.calibration.fit import geometric_parameters
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.calibration.verification import error_scale
 from flexcal.export.urdf import render_urdf
+from flexcal.model.parts import rotation_wxyz
 
 SPRINGS = """elastic:
   - joint: waist_pitch
@@ -93,6 +96,59 @@ def test_a_urdf_has_both_shoulders_where_they_are(tmp_path: Path) -> None:
     assert shift - model.joints[model.joint_index("right_shoulder_pitch")].translation == pytest.approx(
         [4e-3, 0, 1e-3]
     )
+
+
+PROBE = "stations: {probe: {frame: left_hand}}\n"
+
+
+def test_derivatives_by_a_reading_from_the_other_hand_are_those_of_differences(tmp_path: Path) -> None:
+    """Of every parameter: joints of both arms, origins, compliances and the place of the probe."""
+    robot, rng = StrangerTorso(1, joints=4), np.random.default_rng(0)
+    model = RobotModel.from_yaml(robot.write(tmp_path, PROBE + SPRINGS), estimates=False)
+    poses = read_poses(robot.write_relative(tmp_path / "poses.csv", 20, rng), model)
+    names = geometric_parameters(
+        model, poses, ["kinematic", "gravity_compliance", "lateral_compliance"]
+    ).names
+    assert "left_elbow.offset" in names and "station.probe.rx" in names
+    changed = {name: 1e-3 * rng.normal() for name in names if "compliance" not in name}
+    model = model.with_values(changed)
+    poses = replace(poses, quaternion_wxyz=np.tile([1.0, 0.0, 0.0, 0.0], (len(poses), 1)))
+    turned = rotation_wxyz(predict_measurements(model, poses).orientation)
+    poses = replace(poses, quaternion_wxyz=turned)
+    jacobian = predict_measurements(model, poses, jacobians=True).jacobian(names)
+    assert len(jacobian) == 2 * len(poses)
+    for k, name in enumerate(names):
+        step = 1e-6 if "compliance" in name else 1e-4
+        up, down = (
+            predict_measurements(model.with_values({name: model.value(name) + h}), poses).residual
+            for h in (step, -step)
+        )
+        expected = (down - up) / (2 * step)
+        assert jacobian[:, :, k] == pytest.approx(expected, abs=2e-3 * np.abs(expected).max() + 1e-6), name
+
+
+def test_a_probe_on_one_hand_calibrates_the_arms_relative_to_each_other(tmp_path: Path) -> None:
+    robot, rng = StrangerTorso(2, joints=4, yields=0.0), np.random.default_rng(2)
+    model = RobotModel.from_yaml(robot.write(tmp_path, PROBE), estimates=False)
+    poses = read_poses(robot.write_relative(tmp_path / "poses.csv", 60, rng), model)
+    fresh = read_poses(robot.write_relative(tmp_path / "fresh.csv", 150, rng), model)
+    calibration = calibrate(model, poses, terms=["kinematic"])
+    noise = 1e3 * np.sqrt(3) * 5e-5
+    assert distances(calibration, fresh).mean() < 1.5 * noise
+    verification = verify(calibration.robot, fresh)
+    assert error_scale(verification.predicted, verification.covariance).inside > 0.9
+    position = np.array([[0.4, -0.2, 0.8]])
+    targets = ToolTargets(np.array([1]), np.array(["right"]), position=position, station=np.array(["probe"]))
+    with refused("E-ROBOT-062", "probe", "left_hand"):
+        compensate(calibration.robot, targets)
+
+
+def test_a_station_on_the_robot_has_no_place_in_the_base_frame(tmp_path: Path) -> None:
+    robot = StrangerTorso(2, joints=4)
+    with refused("E-ROBOT-061", "robot.yaml"):
+        RobotModel.from_yaml(robot.write(tmp_path, "stations: {probe: {frame: left_hand, xyz: [0, 0, 1]}}\n"))
+    with refused("E-ROBOT-028", "left_foot"):
+        RobotModel.from_yaml(robot.write(tmp_path, "stations: {probe: {frame: left_foot}}\n"))
 
 
 @pytest.mark.slow

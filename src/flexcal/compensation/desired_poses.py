@@ -48,7 +48,7 @@ def joints_before(model: RobotModel, target: str) -> int:
 def _from_stations(
     model: RobotModel, station: np.ndarray, position: np.ndarray, rotation: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    places = np.array([model.stations.pose[model.station_index(name)] for name in station.tolist()])
+    places = np.array([model.standing_station(name) for name in station.tolist()])
     turns = np.array([vector_rotation(place[3:]) for place in places])
     back = np.swapaxes(turns, 1, 2)
     moved = np.matmul(back, (position - places[:, :3])[:, :, None])[:, :, 0]

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexcal.calibration.fit.terms import TOLERANCE, joint_errors
+from flexcal.calibration.fit.terms import TOLERANCE, carrying_joints, joint_errors
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameter, Parameters
@@ -102,8 +102,7 @@ def point_uncertainty(model: RobotModel, target: str) -> float:
 
 def _names(model: RobotModel, targets: Sequence[str], stations: Sequence[str]) -> list[str]:
     """Names of the geometric parameters; for a station in the base frame without its rotation."""
-    moving = {i for target in targets for i in model.path_to(model.point(target).joint)}
-    names = joint_errors(model, sorted(moving))
+    names = joint_errors(model, carrying_joints(model, targets, stations))
     names += [f"tool.{key}" for key in GEOMETRY]
     first = next(iter(model.points))
     names += [f"point.{t}.{axis}" for t in targets if t != first for axis in "xyz"]

@@ -83,7 +83,7 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
 def _kinematic(model: RobotModel, poses: PoseSet, joints: Sequence[int]) -> list[str]:
     """Names of the term `kinematic`."""
     names: list[str] = []
-    known = next(iter(poses.station[poses.located].tolist()), None)
+    known = next((name for name in poses.station[poses.located].tolist() if name not in model.carriers), None)
     for station in poses.stations:
         told = kind_of(poses, station).place(model, poses, station, turned=station != known)
         names += [f"station.{station}.{key}" for key in told]
@@ -153,9 +153,15 @@ def loaded_compliances(model: RobotModel, poses: PoseSet) -> frozenset[str]:
 
 
 def moving_joints(model: RobotModel, poses: PoseSet) -> list[int]:
-    """Joints between the base and any measured target, in chain order."""
-    targets = dict.fromkeys(poses.target)
-    return sorted({i for target in targets for i in model.path_to(model.point(target).joint)})
+    """Joints between the base and any measured target or carried instrument, in chain order."""
+    return carrying_joints(model, poses.targets, poses.stations)
+
+
+def carrying_joints(model: RobotModel, targets: Sequence[str], stations: Sequence[str]) -> list[int]:
+    """Joints between the base and any of the `targets` or of the instruments on the robot among the `stations`, in chain order."""
+    ends = [model.point(target).joint for target in targets]
+    ends += [model.carriers[name].joint for name in stations if name in model.carriers]
+    return sorted({i for end in ends for i in model.path_to(end)})
 
 
 def joint_errors(model: RobotModel, joints: Sequence[int]) -> list[str]:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.model.robot import GEOMETRY, LATERAL, ORIGIN, SPRINGS
+from flexcal.model.kinematics import PointKinematics, relative_motion
+from flexcal.model.robot import GEOMETRY, LATERAL, ORIGIN, SPRINGS, RobotModel
 from flexcal.model.statics import (
     carried_mass,
     force_moments,
@@ -83,18 +84,19 @@ class ArmColumns:
         at, model, axis = self.at, self.at.model, ORIGIN.index(key)
         joint = model.joint_index(owner)
         parent, masses = model.joints[joint].parent, model.links.mass
-        paths = {name: model.path_to(model.point(name).joint) for name in at.poses.targets}
-        carried = np.array([joint in paths[name] for name in at.poses.target.tolist()])
-        if parent < 0:
-            moved = np.broadcast_to(np.eye(6)[axis, :, None], (len(carried), 6, 1))
-        else:
-            column = 6 * parent + 3 + axis
-            moved = at.kinematics.geometry_jacobian[:, :, column : column + 1]
-        moved = at.moved(np.where(carried[:, None, None], moved, 0.0))[:, :, 0]
+        ends = {name: model.point(name).joint for name in at.poses.targets}
+        moved = _shifted(at.target, parent, axis, _beyond(model, joint, ends, at.poses.target))
+        if at.carrier is not None:
+            carriers = {name: frame.joint for name, frame in model.carriers.items()}
+            carried = _beyond(model, joint, carriers, at.poses.station)
+            moved = relative_motion(
+                at.target, at.carrier, moved, _shifted(at.carrier, parent, axis, carried)
+            )
+        moved = at.moved(moved)[:, :, 0]
         if parent < 0 or not at.rest.axes.size:
             return moved
         beyond = [i for i in range(model.n) if joint in model.path_to(i)]
-        weight = np.full(len(carried), masses[beyond].sum())
+        weight = np.full(len(at.poses), masses[beyond].sum())
         if model.payload is not None and model.payload.joint in beyond:
             weight += carried_mass(model, at.poses.payload, len(at.poses))
         load = weight[:, None] * at.rest.regressor[:, :, 4 * parent + 1 + axis]
@@ -168,6 +170,21 @@ class ArmColumns:
                 return block[:, :, 0] + block[:, :, 1:] @ model.links.com[i]
             return model.links.mass[i] * block[:, :, 1 + "xyz".index(key[-1])]
         raise FlexcalError("E-CAL-013", f"the position of a point does not depend on '{name}'.")
+
+
+def _beyond(model: RobotModel, joint: int, ends: Mapping[str, int], names: np.ndarray) -> np.ndarray:
+    """Which of the `names` (N,), on the links of the joints `ends`, a joint carries; none of those on no link."""
+    carried = {name: joint in model.path_to(end) for name, end in ends.items()}
+    return np.array([carried.get(name, False) for name in names.tolist()])
+
+
+def _shifted(at: PointKinematics, parent: int, axis: int, carried: np.ndarray) -> np.ndarray:
+    """Motion (N, 6, 1) of points, where they are `carried` (N,), with a shift along an axis of the link `parent`, -1 for the base."""
+    if parent < 0:
+        moved = np.broadcast_to(np.eye(6)[axis, :, None], (len(carried), 6, 1))
+    else:
+        moved = at.geometry_jacobian[:, :, 6 * parent + 3 + axis, None]
+    return np.where(carried[:, None, None], moved, 0.0)
 
 
 _BY_KEY: Mapping[str, Callable[[ArmColumns, str, str], np.ndarray]] = {

@@ -13,7 +13,7 @@ from flexcal.calibration.measurement.arm_columns import ArmColumns
 from flexcal.calibration.measurement.readings import Readings
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
-from flexcal.model.kinematics import PointKinematics
+from flexcal.model.kinematics import PointKinematics, carrier_kinematics, relative_kinematics
 from flexcal.model.parts import left_jacobian, vector_rotation
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import Equilibrium, tool_at_rest
@@ -39,7 +39,8 @@ class PredictedMeasurements:
     """Predicted points at the poses, with the data for their derivatives and for all R `readings`.
 
     `located` (N, 3), m, are the targets in the instruments' frames, `position` (N, 3) what the instruments read of them: the same where
-    they measure coordinates.
+    they measure coordinates. `kinematics` are the targets in the base frame, or in that of the robot's link which carries the instrument:
+    then `carrier` is that frame in the base frame, and `target` the targets there.
     """
 
     model: RobotModel
@@ -49,6 +50,8 @@ class PredictedMeasurements:
     base: np.ndarray
     rest: Equilibrium
     kinematics: PointKinematics
+    target: PointKinematics
+    carrier: PointKinematics | None
 
     @cached_property
     def readings(self) -> Readings:
@@ -201,13 +204,17 @@ def predict_measurements(
         jacobians=jacobians,
         force=poses.force,
     )
+    carrier = carrier_kinematics(model, poses.q, tool.rest.deflection, poses.station, jacobians=jacobians)
+    seen = tool.kinematics if carrier is None else relative_kinematics(tool.kinematics, carrier)
     at, base = np.empty((len(poses), 3)), np.empty((len(poses), 3, 3))
     for name in poses.stations:
         own, place = poses.station == name, model.stations.pose[model.station_index(name)]
         at[own], base[own] = place[:3], vector_rotation(place[3:])
-    located = np.matmul(base, tool.kinematics.position[:, :, None])[:, :, 0] + at
+    located = np.matmul(base, seen.position[:, :, None])[:, :, 0] + at
     position = _read(model, poses, located)
-    return PredictedMeasurements(model, poses, located, position, base, tool.rest, tool.kinematics)
+    return PredictedMeasurements(
+        model, poses, located, position, base, tool.rest, seen, tool.kinematics, carrier
+    )
 
 
 def predicted_positions(

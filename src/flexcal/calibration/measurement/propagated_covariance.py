@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.model.kinematics import point_kinematics
+from flexcal.model.kinematics import carrier_kinematics, point_kinematics, relative_kinematics
 from flexcal.model.parts import left_jacobian, vector_rotation
 from flexcal.model.robot import GEOMETRY, LATERAL, MASS_AND_COM, ORIGIN, SPRINGS, STATION, RobotModel
 from flexcal.model.statics import (
@@ -64,6 +64,9 @@ class Propagation:
         model, axes = self.model, np.array(elastic_axes(self.model), dtype=int).reshape(-1, 2)
         loads, regressor, coupling = spring_loads(model, q, self.payload)
         at = point_kinematics(model, q, point=self.target)
+        still = np.zeros((len(q), model.n, 3))
+        carrier = carrier_kinematics(model, q, still, np.full(len(q), self.station), jacobians=True)
+        at = at if carrier is None else relative_kinematics(at, carrier)
         stiffness = model.springs.stiffness[axes[:, 0], axes[:, 1]]
         by_load = at.motion_jacobian[:, :3][:, :, axes[:, 0], axes[:, 1]] / -stiffness
         if model.springs.hardening.any():

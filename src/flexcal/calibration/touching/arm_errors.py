@@ -136,7 +136,15 @@ def _prediction(frames: TouchedFrames) -> PredictedMeasurements:
     poses = frames.touches.as_poses(frames.point)
     base = np.broadcast_to(np.eye(3), (count, 3, 3))
     return PredictedMeasurements(
-        frames.model, poses, frames.position, frames.position, base, frames.rest, frames.kinematics
+        frames.model,
+        poses,
+        frames.position,
+        frames.position,
+        base,
+        frames.rest,
+        frames.kinematics,
+        frames.kinematics,
+        None,
     )
 
 

@@ -438,7 +438,7 @@ def _placed(model: RobotModel, poses: PoseSet, points: np.ndarray) -> np.ndarray
     """Targets (N, 3), given as `points` (N, 3) in the base frame, where `model` has the instrument's stations; m."""
     placed = np.empty_like(points)
     for name in poses.stations:
-        own, place = poses.station == name, model.stations.pose[model.station_index(name)]
+        own, place = poses.station == name, model.standing_station(name)
         placed[own] = points[own] @ vector_rotation(place[3:]).T + place[:3]
     return placed
 

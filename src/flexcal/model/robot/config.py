@@ -286,14 +286,23 @@ class ForceSensorConfig:
 
 @dataclass(frozen=True)
 class StationConfig:
-    """Place of the measuring instrument in the robot's base frame (m), for planning only; the calibration estimates it."""
+    """Place of the measuring instrument in the robot's base frame (m), for planning only; the calibration estimates it.
+
+    `frame`: URDF frame that carries the instrument, as the hand of another arm; where it is on that is estimated too.
+    """
 
     xyz: Triple | None = None
     line_of_sight: bool = False
+    frame: str | None = None
 
     def __post_init__(self) -> None:
         if self.line_of_sight and self.xyz is None:
             raise FlexcalError("E-ROBOT-020", "line_of_sight needs the station's xyz (m in the base frame).")
+        if self.frame is not None and self.xyz is not None:
+            raise FlexcalError(
+                "E-ROBOT-061",
+                "a station has a frame of the robot that carries it, or xyz in the base frame; keep one.",
+            )
 
 
 @dataclass(frozen=True)

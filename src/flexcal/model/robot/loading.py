@@ -87,6 +87,11 @@ def read_robot(robot_type: type[RobotModel], path: Path) -> RobotModel:
         scatter=Scatter(np.zeros(len(SCATTER))),
         payload=payload,
         force_sensor=_force_sensor(file, description, config),
+        carriers={
+            name: _carrier(file, description, name, entry.frame)
+            for name, entry in config.stations.items()
+            if entry.frame is not None
+        },
         sensors={name: _sensor(file, description, name, config) for name in config.sensors},
     )
 
@@ -167,6 +172,12 @@ def _point(file: YamlFile, description: Description, name: str, config: RobotCon
     entry = config.points[name]
     frame = _frame(file, ("points", name, "frame"), description, entry.frame)
     return Point(name, entry.frame, frame.joint, frame.rotation, frame.translation, np.array(entry.xyz))
+
+
+def _carrier(file: YamlFile, description: Description, station: str, name: str) -> Point:
+    """Frame that carries a station's instrument."""
+    frame = _frame(file, ("stations", station, "frame"), description, name)
+    return Point(station, name, frame.joint, frame.rotation, frame.translation, np.zeros(3))
 
 
 _ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}

@@ -89,6 +89,8 @@ class RobotModel:
         The declared force sensor.
     posterior : Posterior
         Joint covariance of the parameters that were estimated.
+    carriers : mapping of Point
+        Origins of the frames that carry an instrument, by the name of its station.
     sensors : mapping of ArmSensor
         Sensors on the arm by name.
     lenses : Lenses
@@ -122,6 +124,7 @@ class RobotModel:
     payload: Payload | None
     force_sensor: ForceSensor | None
     posterior: Posterior = NOTHING_ESTIMATED
+    carriers: Mapping[str, Point] = field(default_factory=dict)
     sensors: Mapping[str, ArmSensor] = field(default_factory=dict)
     lenses: Lenses = field(default_factory=lambda: Lenses((), np.zeros((0, 9))))
 
@@ -490,6 +493,32 @@ class RobotModel:
                 "and the others there too.",
             )
         return self.stations.names.index(name)
+
+    def standing_station(self, name: str) -> np.ndarray:
+        """Pose of an instrument that does not move with the robot.
+
+        Parameters
+        ----------
+        name : str
+            Name of the station.
+
+        Returns
+        -------
+        ndarray
+            Pose (6,): translation, m, and rotation vector, rad, from the base frame to the instrument's.
+
+        Raises
+        ------
+        FlexcalError
+            For an unknown name, and for an instrument that a frame of the robot carries.
+        """
+        if name in self.carriers:
+            raise FlexcalError(
+                "E-ROBOT-062",
+                f"the station '{name}' moves with the robot's {self.carriers[name].frame}, so it gives no place in the base frame; use an "
+                "instrument that stands still.",
+            )
+        return self.stations.pose[self.station_index(name)]
 
     @cached_property
     def _locations(self) -> dict[str, Location]:
