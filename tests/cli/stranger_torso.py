@@ -202,6 +202,29 @@ class StrangerTorso:
         seen = inside @ turn(np.array([0.3, -0.5, 0.2])).T + [0.03, 0.05, -0.02]
         return seen + noise * rng.normal(size=seen.shape)
 
+    def write_on_cart(self, path: Path, count: int, rng: np.random.Generator, tilt: float = 0.0) -> Path:
+        """The left reflector and markers on a cart that carries the robot, both in the room's axes."""
+        q = self.postures(count, rng)
+        place = np.column_stack([rng.uniform(-3, 3, (count, 2)), np.zeros(count)])
+        heading = np.column_stack([tilt * rng.normal(size=(count, 2)), rng.uniform(-3, 3, count)])
+        cart, mark = turn(heading), turn(np.array([0.2, 0.1, 1.0]))
+        point = self.reflector(q + self.jitter * rng.normal(size=q.shape), "left")
+        seen = np.einsum("sij,sj->si", cart, point) + place
+        seen += self.tracker_noise * rng.normal(size=seen.shape)
+        markers = np.einsum("sij,j->si", cart, [0.3, -0.2, 0.1]) + place
+        columns = ["base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw"]
+        lines = [",".join(["pose", *(f"q{i + 1}" for i in range(self.n)), "x", "y", "z", *columns])]
+        for k in range(count):
+            trace = cart[k] @ mark
+            w = np.sqrt(max(1 + np.trace(trace), 1e-9)) / 2
+            xyz = np.array(
+                [trace[2, 1] - trace[1, 2], trace[0, 2] - trace[2, 0], trace[1, 0] - trace[0, 1]]
+            ) / (4 * w)
+            numbers = (*q[k], *seen[k], *markers[k], *xyz, w)
+            lines.append(",".join([str(k + 1), *(repr(float(v)) for v in numbers)]))
+        path.write_text("\n".join(lines) + "\n")
+        return path
+
     def write_relative(self, path: Path, count: int, rng: np.random.Generator) -> Path:
         """Measurements of the right reflector by the probe on the left hand, a station `probe`."""
         q = self.postures(count, rng)

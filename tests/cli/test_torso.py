@@ -151,6 +151,23 @@ def test_a_station_on_the_robot_has_no_place_in_the_base_frame(tmp_path: Path) -
         RobotModel.from_yaml(robot.write(tmp_path, "stations: {probe: {frame: left_foot}}\n"))
 
 
+def test_an_arm_on_a_cart_that_drives_about(tmp_path: Path) -> None:
+    """The room's axes, the markers on the cart and the arm that is not moved are nobody's business."""
+    robot, rng = StrangerTorso(4, joints=4, yields=0.0), np.random.default_rng(4)
+    model = RobotModel.from_yaml(robot.write(tmp_path), estimates=False)
+    poses = read_poses(robot.write_on_cart(tmp_path / "poses.csv", 60, rng), model)
+    fresh = read_poses(robot.write_on_cart(tmp_path / "fresh.csv", 100, rng), model)
+    calibration = calibrate(model, poses, terms=["kinematic"])
+    assert distances(calibration, fresh).mean() < 1.5e3 * np.sqrt(3) * robot.tracker_noise
+    leaning = robot.write_on_cart(tmp_path / "leaning.csv", 20, rng, tilt=0.1)
+    with refused("E-POSES-065", "leaning.csv", "base_qw"):
+        read_poses(leaning, model)
+    text = (tmp_path / "poses.csv").read_text().replace("base_x,base_y,base_z", "temperature,t,sigma")
+    (tmp_path / "half.csv").write_text(text)
+    with refused("E-POSES-064", "half.csv", "base_x"):
+        read_poses(tmp_path / "half.csv", model)
+
+
 @pytest.mark.slow
 def test_four_hundred_poses_of_each_arm_in_a_minute(tmp_path: Path) -> None:
     errors, inside = [], []

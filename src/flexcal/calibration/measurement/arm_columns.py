@@ -89,9 +89,7 @@ class ArmColumns:
         if at.carrier is not None:
             carriers = {name: frame.joint for name, frame in model.carriers.items()}
             carried = _beyond(model, joint, carriers, at.poses.station)
-            moved = relative_motion(
-                at.target, at.carrier, moved, _shifted(at.carrier, parent, axis, carried)
-            )
+            moved = relative_motion(at.target, at.carrier, moved, _shifted(at.carrier, parent, axis, carried))
         moved = at.moved(moved)[:, :, 0]
         if parent < 0 or not at.rest.axes.size:
             return moved

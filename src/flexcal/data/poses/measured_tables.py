@@ -27,6 +27,7 @@ from flexcal.data.poses.distance_tables import (
     measures_distances,
     read_distances,
 )
+from flexcal.data.poses.moving_base import BASE, seen_from_base
 from flexcal.data.poses.pose_set import DEFAULT_SIGMA, PLANE, PoseSet, concatenate
 from flexcal.data.poses.socket_tables import SOCKET_COLUMNS, measures_sockets, read_sockets
 from flexcal.data.tables import (
@@ -45,7 +46,9 @@ from flexcal.errors import InputError
 if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
 
-_NUMBERS = ("quaternion", "sigma", "sigma_xyz", "sigma_angle", "tau", "payload", "force", "temperature", "t")
+_NUMBERS = (
+    "quaternion", "sigma", "sigma_xyz", "sigma_angle", "tau", "payload", "force", "temperature", "t", *BASE,
+)  # fmt: skip
 _TEXTS = ("target", "station")
 
 
@@ -239,6 +242,7 @@ def _read(path: Path, model: RobotModel, further: tuple[str, ...]) -> PoseSet:
         sigma_given=sigma is not None,
     )
     check_same_pose(poses.pose, poses.q, table)
+    poses = seen_from_base(poses, table, signals, values, model)
     check_metres(poses, model, table, signals["xyz"])
     return poses
 
