@@ -115,6 +115,9 @@ def test_a_wrong_sigma_is_said(tmp_path: Path) -> None:
     noise = document["fit"]["stated_noise"]
     assert [item["instrument"] for item in noise] == [None, "points", "east"]
     assert document["fit"]["reduced_chi2"] == noise[0]["reduced_chi2"]
+    by_kind = document["calibration"]["by_kind"]
+    assert {name: own["poses"] for name, own in by_kind.items()} == {"points": 40, "lengths": 110}
+    assert by_kind["lengths"]["mean_mm"] == pytest.approx(5e-2 * np.sqrt(2 / np.pi), rel=0.3)
 
 
 def alone_and_together(folder: Path, asked: Sequence[Asked], seed: int) -> np.ndarray:

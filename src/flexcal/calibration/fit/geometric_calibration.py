@@ -13,7 +13,7 @@ from flexcal.calibration.fit.elastic_prior import NOTHING_ELASTIC, ElasticPrior
 from flexcal.calibration.fit.fitted_points import FittedPoints, PointFit
 from flexcal.calibration.fit.least_squares_problem import LossName
 from flexcal.calibration.fit.practical_identifiability import Undetermined
-from flexcal.calibration.measurement import METRES, ambiguous_poses, stated_sigma
+from flexcal.calibration.measurement import METRES, ambiguous_poses, kind_names, stated_sigma
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate, Identifiability, Loss, Squares, loss_named
@@ -91,6 +91,13 @@ class GeometricFit:
     def errors(self) -> ErrorStatistics:
         """Errors of the calibrated robot at the points of the fit."""
         return ErrorStatistics.of(self.residuals)
+
+    @property
+    def errors_by_kind(self) -> dict[str, ErrorStatistics]:
+        """Differences from what was measured by each of several kinds of measurements; empty for one kind."""
+        kinds = kind_names(self.poses)
+        names = list(dict.fromkeys(kinds.tolist()))
+        return {n: ErrorStatistics.of(self.residuals[kinds == n]) for n in names} if len(names) > 1 else {}
 
     @property
     def variances(self) -> dict[str, float | None]:

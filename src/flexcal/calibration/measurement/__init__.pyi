@@ -6,7 +6,7 @@ from .prediction import (
     require_points,
 )
 from .propagated_covariance import Propagation, covariance_root, moving_parameters, propagation
-from .readings import METRES, OF_INSTRUMENTS, RADIANS, ROBOT, Readings, stated_sigma
+from .readings import METRES, OF_INSTRUMENTS, RADIANS, ROBOT, Readings, kind_names, stated_sigma
 from .registration import register, require_orientations, with_target_axes
 
 __all__ = [
@@ -19,6 +19,7 @@ __all__ = [
     "Readings",
     "ambiguous_poses",
     "covariance_root",
+    "kind_names",
     "moving_parameters",
     "predict_measurements",
     "predicted_positions",

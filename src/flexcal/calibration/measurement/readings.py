@@ -11,6 +11,8 @@ from flexcal.data.poses import PoseSet
 ABSENT, METRES, RADIANS = 0, 1, 2
 """Units of a coordinate, and of one that was not measured."""
 
+POINTS = "points"
+"""Kind of the measurements of whole points by an instrument."""
 ROBOT = "robot"
 """Scatter of points, of the one kind of measurement, or of the first of several."""
 OF_INSTRUMENTS = ("views", "sockets", "lengths", "contacts")
@@ -124,15 +126,21 @@ def _scatter_names(poses: PoseSet, readings: int) -> np.ndarray | None:
 
     The first kind whose noise is stated, or the first of all, has that of the robot.
     """
-    kind = np.full(len(poses), ROBOT, dtype=object)
-    faces = np.zeros(len(poses), bool) if poses.kind is None else ~poses.far & (poses.kind != "")
-    if poses.kind is not None:
-        faces |= poses.far & (poses.position[:, 0] == 0)
-    for name, rows in zip(OF_INSTRUMENTS, (poses.seen, poses.in_socket, poses.far, faces), strict=True):
-        kind[rows] = name
-    there = [name for name in (ROBOT, *OF_INSTRUMENTS) if (kind == name).any()]
+    kind = kind_names(poses)
+    there = [name for name in (POINTS, *OF_INSTRUMENTS) if (kind == name).any()]
     if len(there) == 1:
         return None
     stated = [name for name in there if poses.stated[kind == name].all()]
     kind[kind == (stated or there)[0]] = ROBOT
     return np.concatenate([kind, np.full(readings - len(poses), ROBOT, dtype=object)])
+
+
+def kind_names(poses: PoseSet) -> np.ndarray:
+    """Names (N,) of the kinds of measurements: `POINTS`, or one of `OF_INSTRUMENTS`."""
+    kind = np.full(len(poses), POINTS, dtype=object)
+    faces = np.zeros(len(poses), bool) if poses.kind is None else ~poses.far & (poses.kind != "")
+    if poses.kind is not None:
+        faces |= poses.far & (poses.position[:, 0] == 0)
+    for name, rows in zip(OF_INSTRUMENTS, (poses.seen, poses.in_socket, poses.far, faces), strict=True):
+        kind[rows] = name
+    return kind

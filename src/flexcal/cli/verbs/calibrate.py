@@ -119,6 +119,7 @@ class Calibrate:
         )
         labels = {"rigid": "rigid", "selected": f"selected: {terms}"}
         rows = uncalibrated_rows(document) | {label: errors[key] for key, label in labels.items()}
+        rows |= {f"  of its {kind}": own for kind, own in errors["by_kind"].items()}
         located = calibration.selected.poses.located
         read = "distance to the measured points" if located.all() else "difference from what was measured"
         console.show(error_table(read, rows))

@@ -226,6 +226,7 @@ class Calibration(Identification):
                 "nominal": before["registered"],
                 "rigid": self.rigid.errors.in_millimetres(),
                 "selected": selected.errors.in_millimetres(),
+                "by_kind": {name: own.in_millimetres() for name, own in selected.errors_by_kind.items()},
             },
             "fit": {
                 "status": selected.estimate.status,

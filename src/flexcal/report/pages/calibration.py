@@ -182,13 +182,18 @@ def _accuracy_section(study: CalibrationStudy) -> Section:
         if model in points.errors:
             statistics = points.statistics(model)
             rows.append((label, str(statistics.poses), *statistics_cells(statistics), ranks[model]))
+    kinds = {
+        name: ErrorStatistics.of_millimetres(own)
+        for name, own in study.results["calibration"].get("by_kind", {}).items()
+    }
+    rows += [(f"of its {n}", str(own.poses), *statistics_cells(own), NOTHING) for n, own in kinds.items()]
     table = Table(
         "table-accuracy",
         "Errors at the measured poses",
         ("model", "points", "mean / mm", "P90 / mm", "max / mm", "determined parameters"),
         tuple(rows),
         note=BEFORE_NOTE,
-        strong=(len(rows) - 1,),
+        strong=(len(rows) - 1 - len(kinds),),
     )
     remarks, before = study.results["remarks"], points.delivered
     return Section(
