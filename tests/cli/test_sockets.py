@@ -230,7 +230,7 @@ def test_the_arms_of_delft(examples: Path, tmp_path: Path, capsys: pytest.Captur
         (("place0,a", "place0,c"), ["E-POSES-037", "'c'"]),
         (("measurements", "# measurements"), ["E-POSES-039", "measurements:"]),
         (("std: 2.0e-5", "std: 0"), ["E-ROBOT-051", "positive"]),
-        (("kind: sockets", "kind: socket"), ["E-YAML-032", "sockets"]),
+        (("kind: sockets", "kind: socket"), ["E-YAML-034", "sockets"]),
         (("--hold-out fixture", "--hold-out shift"), ["E-POSES-041", "shift"]),
     ],
 )
