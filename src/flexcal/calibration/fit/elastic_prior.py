@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from flexcal.calibration.kinds import KINDS
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameter, Parameters
 from flexcal.model.robot import (
-    LENS,
     SPRINGS,
     RobotModel,
     declared_parameter,
@@ -61,25 +61,20 @@ class ElasticPrior:
         if not waves or std == 0:
             return self
         items = Parameters(Parameter(name, unit_of(name), 0.0) for name in waves)
-        size, own = len(self.parameters), std * np.array(list(waves.values()))
-        covariance = np.diag(np.concatenate([np.zeros(size), own**2]))
-        covariance[:size, :size] = self.covariance
-        return ElasticPrior(self.parameters + items, covariance)
+        return self.joined(items, np.diag((std * np.array(list(waves.values()))) ** 2))
+
+    def joined(self, items: Parameters, covariance: np.ndarray) -> ElasticPrior:
+        """Prior with further parameters, independent of these, and their covariance (p, p)."""
+        size = len(self.parameters)
+        whole = np.zeros((size + len(items), size + len(items)))
+        whole[:size, :size], whole[size:, size:] = self.covariance, covariance
+        return ElasticPrior(self.parameters + items, whole)
 
 
-def with_lenses(prior: ElasticPrior, poses: PoseSet) -> ElasticPrior:
-    """Prior with the intrinsic parameters of the cameras that measured, as their free views determine them."""
-    for name, lens in poses.lenses.items():
-        if poses.camera is None or not (poses.camera == name).any():
-            continue
-        items = Parameters(
-            Parameter(f"camera.{name}.{key}", unit_of(key), float(value))
-            for key, value in zip(LENS, lens.values, strict=True)
-        )
-        size = len(prior.parameters)
-        covariance = np.zeros((size + len(items), size + len(items)))
-        covariance[:size, :size], covariance[size:, size:] = prior.covariance, lens.covariance
-        prior = ElasticPrior(prior.parameters + items, covariance)
+def with_instruments(prior: ElasticPrior, model: RobotModel, poses: PoseSet) -> ElasticPrior:
+    """Prior with the parameters of the instruments about which something is known beforehand."""
+    for kind in KINDS:
+        prior = prior.joined(*kind.uncertain(model, poses))
     return prior
 
 

@@ -16,7 +16,7 @@ from flexcal.calibration.error_model import (
     are_different,
     joint_rotation_jacobian,
 )
-from flexcal.calibration.fit.elastic_prior import ElasticPrior, with_lenses
+from flexcal.calibration.fit.elastic_prior import ElasticPrior, with_instruments
 from flexcal.calibration.fit.held_size import held_lengths
 from flexcal.calibration.fit.least_squares_problem import GeometryProblem, PlainLoss
 from flexcal.calibration.fit.marginalised_elasticity import marginalised
@@ -114,7 +114,7 @@ class PointFit:
         start = register(model, poses, predict_measurements(bare, poses, elastic=elastic).located)
         start = with_target_axes(start, poses)
         require_orientations(start, poses)
-        prior = with_lenses(prior, poses)
+        prior = with_instruments(prior, start, poses)
         if "backlash" in terms:
             require_both_flanks(model, predict_measurements(start, poses, elastic=elastic).rest.flank)
         held = held_lengths(start, poses)
@@ -208,7 +208,7 @@ class PointFit:
     def known(self) -> Parameters:
         """Parameters that are held at what is declared, within its standard deviation.
 
-        Where sockets' distances, boards or wires alone tell the size of the robot, the best known of their scales; where no reading does, a
+        Where sockets' distances or boards alone tell the size of the robot, the best known of their scales; where no reading does, a
         length of the robot.
         Errors of the joints grow with the robot, so a fit would make a smaller robot of fewer errors, and shorter distances.
         """
@@ -220,12 +220,12 @@ class PointFit:
 
     @property
     def _size_is_a_scale(self) -> bool:
-        """Whether lengths are told by sockets, boards and wires alone, and not by an instrument that measures points."""
-        return not (self.poses.located & ~self.poses.seen).any()
+        """Whether lengths are told by sockets and boards alone, and not by wires or an instrument that measures points."""
+        return not any(kind.tells_lengths(self.poses) and not kind.scale for kind in KINDS)
 
     @property
     def _scales(self) -> list[Parameter]:
-        """Scales of sockets' distances, boards and wires with their declared standard deviations, the best known first."""
+        """Scales of sockets' distances and boards with their declared standard deviations, the best known first."""
         own = [kind.scale for kind in KINDS if kind.scale and kind.scaled(self.poses).any()]
         sizes = {name: declared_size(self.start, name) for name in own}
         scales = [Parameter(name, "1", 0.0, prior_std=std) for name, std in sizes.items() if std is not None]
@@ -458,9 +458,11 @@ class FittedPoints:
         stds = np.sqrt(np.diag(estimate.covariance))
         waves = {name: size * self.scatter.transmission for name, size in self.fit.waves.items()}
         beforehand = {p.name: p.prior_std for p in self.task.kept} | waves
+        known = zip(self.fit.prior.parameters, np.sqrt(np.diag(self.fit.prior.covariance)), strict=True)
+        beforehand |= {p.name: std for p, std in known if p.name.endswith(".scale")}
         return tuple(
-            known and bool(std < 0.8 * beforehand.get(p.name, np.inf))
-            for p, known, std in zip(estimate.parameters, estimate.identifiable, stds, strict=True)
+            told and bool(std < 0.8 * beforehand.get(p.name, np.inf))
+            for p, told, std in zip(estimate.parameters, estimate.identifiable, stds, strict=True)
         )
 
     def _scatter_parameters(self) -> tuple[Parameters, np.ndarray]:

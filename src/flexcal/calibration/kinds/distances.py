@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,18 +18,20 @@ from flexcal.calibration.kinds.robust_start import (
 )
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
-from flexcal.model.robot import STATION, WIRE_SCALE, RobotModel
+from flexcal.estimation import Parameter, Parameters
+from flexcal.model.robot import STATION, RobotModel
 
 if TYPE_CHECKING:
     from flexcal.calibration.measurement import PredictedMeasurements
 
-_ZERO = ".zero"
+_OWN = ("zero", "scale")
 
 
 class Distances(Kind):
-    """Distance from the station's origin without its `zero`, and with the relative deviation of the wires' lengths."""
+    """Distance from the station's origin, from a `zero` of its own, and of a wire in lengths of its own `scale`.
 
-    scale: ClassVar[str] = WIRE_SCALE
+    A drum that is larger by one per mille reads one per mille too little; that is the scale.
+    """
 
     def rows(self, poses: PoseSet) -> np.ndarray:
         """As `Kind.rows`."""
@@ -37,38 +39,42 @@ class Distances(Kind):
 
     def read(self, model: RobotModel, station: np.ndarray, located: np.ndarray) -> np.ndarray:
         """As `Kind.read`: the first coordinate is the distance."""
-        zero = np.array([model.stations.zero[model.station_index(name)] for name in station.tolist()])
+        number = [model.station_index(name) for name in station.tolist()]
         readings = np.zeros_like(located)
-        readings[:, 0] = np.linalg.norm(located, axis=1) - zero
+        readings[:, 0] = np.linalg.norm(located, axis=1) - model.stations.zero[number]
+        readings[:, 0] /= 1 + model.stations.wire_scale[number]
         return readings
 
-    def slopes(self, located: np.ndarray) -> np.ndarray:
+    def slopes(self, model: RobotModel, station: np.ndarray, located: np.ndarray) -> np.ndarray:
         """As `Kind.slopes`."""
-        length = np.linalg.norm(located, axis=1, keepdims=True)
+        scale = np.array([model.stations.wire_scale[model.station_index(name)] for name in station.tolist()])
+        length = np.linalg.norm(located, axis=1, keepdims=True) * (1 + scale[:, None])
         slopes = np.zeros((len(located), 3, 3))
         slopes[:, 0] = np.divide(located, length, out=np.zeros_like(located), where=length > 0)
         return slopes
 
-    def scaled(self, poses: PoseSet) -> np.ndarray:
-        """As `Kind.scaled`: spheres have no length."""
-        return poses.far & (poses.position[:, 0] != 0)
-
-    def scale_std(self, model: RobotModel) -> float | None:
-        """As `Kind.scale_std`."""
-        declared = model.config.measurements.values()
-        return next((item.scale_std for item in declared if item.kind == "wire"), None)
+    def uncertain(self, model: RobotModel, poses: PoseSet) -> tuple[Parameters, np.ndarray]:
+        """As `Kind.uncertain`: the scales of the wires; spheres have no length."""
+        declared = model.config.measurements
+        stds = {
+            f"station.{name}.scale": item.scale_std
+            for name, item in declared.items()
+            if item.kind == "wire" and (poses.far & (poses.station == name)).any()
+        }
+        items = Parameters(Parameter(name, "1", model.value(name)) for name in stds)
+        return items, np.diag(np.square(list(stds.values())))
 
     def owns(self, name: str) -> bool:
         """As `Kind.owns`."""
-        return (name.startswith("station.") and name.endswith(_ZERO)) or super().owns(name)
+        return name.startswith("station.") and name.rpartition(".")[2] in _OWN
 
     def column(self, at: PredictedMeasurements, name: str) -> np.ndarray:
         """As `Kind.column`."""
-        if name == self.scale:
-            return super().column(at, name)
+        station, _, key = name.removeprefix("station.").rpartition(".")
+        own = np.flatnonzero(at.poses.far & (at.poses.station == station))
+        scale = 1 + at.model.stations.wire_scale[at.model.station_index(station)]
         column = np.zeros((len(at.readings.row), 3))
-        own = at.poses.far & (at.poses.station == name.removeprefix("station.").removesuffix(_ZERO))
-        column[np.flatnonzero(own), 0] = -1.0
+        column[own, 0] = -(1.0 if key == "zero" else at.position[own, 0]) / scale
         return column
 
     def start(self, station: str, targets: np.ndarray, readings: np.ndarray) -> dict[str, float]:
@@ -88,7 +94,7 @@ class Distances(Kind):
 
     def place(self, model: RobotModel, poses: PoseSet, station: str, *, turned: bool) -> Sequence[str]:
         """As `Kind.place`."""
-        return (*STATION[:3], _ZERO.removeprefix("."))
+        return (*STATION[:3], "zero")
 
     def tells_lengths(self, poses: PoseSet) -> bool:
         """As `Kind.tells_lengths`: wires do, touched spheres of unknown radius do not."""

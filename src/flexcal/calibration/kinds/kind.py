@@ -10,6 +10,7 @@ import numpy as np
 
 from flexcal.calibration.kinds.rigid_motions import registered, rigid_motion
 from flexcal.data.poses import PoseSet
+from flexcal.estimation import Parameters
 from flexcal.model.parts import left_jacobian
 from flexcal.model.robot import SCALES, STATION, RobotModel
 
@@ -34,7 +35,7 @@ class Kind(ABC):
         """Readings (K, 3), m, of targets `located` (K, 3), m, in the axes of their `station` (K,); zero where a coordinate is not read."""
         return located
 
-    def slopes(self, located: np.ndarray) -> np.ndarray:
+    def slopes(self, model: RobotModel, station: np.ndarray, located: np.ndarray) -> np.ndarray:
         """Change (K, 3, 3) of the readings with a displacement of the target in the station's axes."""
         return np.broadcast_to(np.eye(3), (len(located), 3, 3))
 
@@ -62,6 +63,10 @@ class Kind(ABC):
     def shift(self, at: PredictedMeasurements) -> np.ndarray | None:
         """Change (R, 3) of what was measured with parameters of the instrument; None where nothing changes."""
         return None
+
+    def uncertain(self, model: RobotModel, poses: PoseSet) -> tuple[Parameters, np.ndarray]:
+        """Parameters of the instruments about which something is known beforehand, and its covariance (p, p); the fit estimates them."""
+        return Parameters(), np.zeros((0, 0))
 
     def owns(self, name: str) -> bool:
         """Whether a parameter belongs to this kind alone."""

@@ -32,7 +32,7 @@ class Lines(Kind):
         """As `Kind.read`."""
         return located * [1.0, 1.0, 0.0]
 
-    def slopes(self, located: np.ndarray) -> np.ndarray:
+    def slopes(self, model: RobotModel, station: np.ndarray, located: np.ndarray) -> np.ndarray:
         """As `Kind.slopes`."""
         return np.broadcast_to(np.diag([1.0, 1.0, 0.0]), (len(located), 3, 3))
 

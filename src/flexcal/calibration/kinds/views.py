@@ -8,7 +8,8 @@ import numpy as np
 
 from flexcal.calibration.kinds.kind import Kind
 from flexcal.data.poses import PoseSet
-from flexcal.model.robot import BOARD_SCALE, LENS, SCALES, RobotModel
+from flexcal.estimation import Parameter, Parameters
+from flexcal.model.robot import BOARD_SCALE, LENS, SCALES, RobotModel, unit_of
 
 if TYPE_CHECKING:
     from flexcal.calibration.measurement import PredictedMeasurements
@@ -50,6 +51,24 @@ class Views(Kind):
                 values = lenses.values[lenses.names.index(name)]
                 shift += np.matmul(_by_lens(at, name), values - lens.values)
         return shift
+
+    def uncertain(self, model: RobotModel, poses: PoseSet) -> tuple[Parameters, np.ndarray]:
+        """As `Kind.uncertain`: the intrinsic parameters of the cameras that measured, as their free views determine them."""
+        used = {
+            name: lens
+            for name, lens in poses.lenses.items()
+            if poses.camera is not None and (poses.camera == name).any()
+        }
+        items = [
+            Parameter(f"{_CAMERA}{name}.{key}", unit_of(key), float(value))
+            for name, lens in used.items()
+            for key, value in zip(LENS, lens.values, strict=True)
+        ]
+        covariance = np.zeros((len(items), len(items)))
+        for k, lens in enumerate(used.values()):
+            own = slice(k * len(LENS), (k + 1) * len(LENS))
+            covariance[own, own] = lens.covariance
+        return Parameters(items), covariance
 
     def owns(self, name: str) -> bool:
         """As `Kind.owns`."""

@@ -56,7 +56,7 @@ class PredictedMeasurements:
     @cached_property
     def readings(self) -> Readings:
         """What was measured at the poses."""
-        return Readings.of(self.poses, _slopes(self.poses, self.located))
+        return Readings.of(self.poses, _slopes(self.model, self.poses, self.located))
 
     @cached_property
     def residual(self) -> np.ndarray:
@@ -170,14 +170,14 @@ def _read(model: RobotModel, poses: PoseSet, located: np.ndarray) -> np.ndarray:
     return readings
 
 
-def _slopes(poses: PoseSet, located: np.ndarray) -> np.ndarray | None:
+def _slopes(model: RobotModel, poses: PoseSet, located: np.ndarray) -> np.ndarray | None:
     """Change (N, 3, 3) of the readings with a displacement of the target; None where all read coordinates."""
     if poses.kind is None:
         return None
     slopes = np.zeros((len(poses), 3, 3))
     for kind in LOCATING:
         own = kind.rows(poses)
-        slopes[own] = kind.slopes(located[own])
+        slopes[own] = kind.slopes(model, poses.station[own], located[own])
     return slopes
 
 

@@ -17,7 +17,6 @@ from flexcal.model.parts import rotation_wxyz, vector_rotation
 from flexcal.model.robot import (
     SOCKET_SCALE,
     STATION,
-    WIRE_SCALE,
     FaceConfig,
     RobotModel,
     SocketsConfig,
@@ -108,7 +107,7 @@ class Instrument:
             stds = {"x": _DISTANT, "y": _DISTANT, "rx": _TILTED, "ry": _TILTED}
         else:
             stds |= tilts if len(self.sockets) > 1 else {}
-        scale = SOCKET_SCALE if self.kind == "sockets" else WIRE_SCALE
+        scale = SOCKET_SCALE if self.kind == "sockets" else f"station.{self.name}.scale"
         placed = {f"station.{station}.{key}": std for station in self.stations for key, std in stds.items()}
         return placed | ({scale: self.scale_std} if self.scale_std > 0 else {})
 

@@ -21,7 +21,7 @@ from flexcal.calibration.diagnostics import (
 )
 from flexcal.calibration.fit import GeometricFit
 from flexcal.jobs.calibration.ignored_columns import ignored_columns_remarks
-from flexcal.model.robot import BOARD_SCALE, SOCKET_SCALE, WIRE_SCALE
+from flexcal.model.robot import BOARD_SCALE, SOCKET_SCALE
 from flexcal.units import MILLIMETRE
 
 _LOOK = (
@@ -37,7 +37,6 @@ _ANOTHER_SIZE = 0.01
 """Relative deviation of a board's size from the nominal robot's above which the declared size is doubtful."""
 
 _LENGTHS = {
-    WIRE_SCALE: "by the other readings, the lengths of wires are wrong",
     SOCKET_SCALE: "by the other readings, the declared distances of the sockets are wrong",
     BOARD_SCALE: "by the other readings, the declared size of the board is wrong",
 }
@@ -227,21 +226,27 @@ def _size(fit: GeometricFit) -> Sequence[str]:
             "distance or an instrument of points too where that matters",
         )
     estimate = fit.estimate
-    known = [name for name in _LENGTHS if name in estimate.parameters.names]
-    told = {name: interval for name in known if (interval := estimate.interval(name))}
-    if told:
-        return [
-            f"{_LENGTHS[name]} by {abs(low + high) / 2 / _PER_MILLE:.2g} ± {(high - low) / 2 / _PER_MILLE:.1g} per mille (95 %), which "
-            "the fit takes into account"
-            for name, (low, high) in told.items()
-            if low * high > 0
-        ]
-    if WIRE_SCALE in known and not fit.poses.located.any():
-        std = fit.estimate.parameters[WIRE_SCALE].prior_std
-        return (
-            f"all lengths of the robot are known to {1e3 * std:.2g} per mille, which is the `scale_std` of the wire in robot.yaml",
+    wires = {f"station.{name}.scale": name for name in fit.poses.stations}
+    what = _LENGTHS | {
+        scale: f"by the other readings, the lengths of {name} are wrong" for scale, name in wires.items()
+    }
+    remarks = [
+        f"{what[name]} by {abs(interval[0] + interval[1]) / 2 / _PER_MILLE:.2g} ± {(interval[1] - interval[0]) / 2 / _PER_MILLE:.1g} per "
+        "mille (95 %), which the fit takes into account"
+        for name in what
+        if name in estimate.parameters
+        and (interval := estimate.interval(name))
+        and interval[0] * interval[1] > 0
+    ]
+    scales = [i for i, name in enumerate(estimate.parameters.names) if name in wires]
+    if scales and not fit.poses.located.any():
+        # all wires, and the robot with them, may be longer by as much as their mean is uncertain
+        std = float(np.sqrt(estimate.covariance[np.ix_(scales, scales)].mean()))
+        those = "the wire" if len(scales) == 1 else f"the {len(scales)} wires"
+        remarks.append(
+            f"all lengths of the robot are known to {std / _PER_MILLE:.2g} per mille, by the `scale_std` of {those} in robot.yaml"
         )
-    return ()
+    return remarks
 
 
 def _jumps(fit: GeometricFit) -> Sequence[str]:

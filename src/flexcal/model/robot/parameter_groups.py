@@ -99,19 +99,22 @@ class Stations:
 
     Each place of a fixture with sockets is a station too, which measures where the ball is in the fixture, and so is a wire's anchor or a
     touched face. `zero` (stations,), m: distance from the station's origin at which an instrument of distances reads zero, as the radius
-    of a touched sphere. `scale` (3,): relative deviation of the distances between sockets, of the size of a camera's board, and of a
-    wire's lengths from the declared or read ones.
+    of a touched sphere. `wire_scale` (stations,): relative deviation of the lengths that a wire reads from the true ones, as a drum of
+    another radius has it. `scale` (2,): relative deviation of the distances between sockets, and of the size of a camera's board, from
+    the declared ones.
     """
 
     names: tuple[str, ...]
     pose: np.ndarray
     zero: np.ndarray
+    wire_scale: np.ndarray
     scale: np.ndarray
 
     @classmethod
     def at_base(cls, names: Sequence[str]) -> Stations:
         """Stations in the robot's base frame."""
-        return cls(tuple(names), np.zeros((len(names), 6)), np.zeros(len(names)), np.zeros(3))
+        number = len(names)
+        return cls(tuple(names), np.zeros((number, 6)), np.zeros(number), np.zeros(number), np.zeros(2))
 
 
 @dataclass(frozen=True, eq=False)

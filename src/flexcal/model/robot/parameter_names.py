@@ -36,9 +36,7 @@ SOCKET_SCALE = "sockets.scale"
 """Relative deviation of the distances between a fixture's sockets from the declared ones."""
 BOARD_SCALE = "board.scale"
 """Relative deviation of the size of a camera's board from the declared one."""
-WIRE_SCALE = "wires.scale"
-"""Relative deviation of the lengths that draw-wires read from the true ones."""
-SCALES = (SOCKET_SCALE, BOARD_SCALE, WIRE_SCALE)
+SCALES = (SOCKET_SCALE, BOARD_SCALE)
 LENS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 """Intrinsic parameters of a camera."""
 SCATTER = (
@@ -134,6 +132,7 @@ def parameter_locations(model: RobotModel) -> dict[str, Location]:
         for k, key in enumerate(STATION):
             table[f"station.{name}.{key}"] = Location("stations", "pose", (s, k))
         table[f"station.{name}.zero"] = Location("stations", "zero", (s,))
+        table[f"station.{name}.scale"] = Location("stations", "wire_scale", (s,))
     for k, name in enumerate(SCALES):
         table[name] = Location("stations", "scale", (k,))
     for c, name in enumerate(model.lenses.names):

@@ -188,6 +188,7 @@ class RobotModel:
             names=(*self.stations.names, *more),
             pose=pose,
             zero=np.concatenate([self.stations.zero, np.zeros(len(more))]),
+            wire_scale=np.concatenate([self.stations.wire_scale, np.zeros(len(more))]),
         )
         return replace(self, stations=stations)
 
