@@ -19,6 +19,8 @@ _SMALL_TURN = np.deg2rad(10)
 """Rotation of the tool over all poses below which the instrument's place absorbs the point's offset."""
 _SMALL_RANGE = np.deg2rad(20)
 """Range of a joint below which its errors resemble those of its neighbours."""
+_ON_AXIS = 1e-3
+"""Distance of the measured point from a joint's axis, relative to the reach, below which that joint's direction is nearly hidden."""
 _FLAT = 0.05
 """Ratio of the extent of the points normal to a plane to that in it, below which they count as flat."""
 
@@ -46,7 +48,6 @@ def undetermined(
     those that are `hidden`, which random poses would determine and these do not, are undetermined too. `plausible` are the sizes of
     them all, by name.
     """
-    start, poses = at.model, at.poses
     sizes = np.array([plausible[name] for name in kept.names])
     columns = whitening(at.jacobian(kept.names))
     largest = np.linalg.norm(columns * sizes, axis=0).max()
@@ -55,13 +56,13 @@ def undetermined(
     lost += hidden
     partners = {item.name: item.absorbed_by for item in identifiability.dropped}
     return tuple(
-        Undetermined(name, plausible[name], _cause(start, poses, name, partners.get(name, ())))
-        for name in lost
+        Undetermined(name, plausible[name], _cause(at, name, partners.get(name, ()))) for name in lost
     )
 
 
-def _cause(start: RobotModel, poses: PoseSet, name: str, partners: tuple[tuple[str, float], ...]) -> str:
+def _cause(at: PredictedMeasurements, name: str, partners: tuple[tuple[str, float], ...]) -> str:
     """Clause for the user: the property of the poses that hides a parameter."""
+    start, poses = at.model, at.poses
     owner = name.rpartition(".")[0]
     if owner == "tool" or owner.startswith("point."):
         turned = _turning(start, poses, owner)
@@ -72,6 +73,15 @@ def _cause(start: RobotModel, poses: PoseSet, name: str, partners: tuple[tuple[s
         extent = float(np.ptp(poses.q[:, i]))
         if joint.kind == "revolute" and extent < _SMALL_RANGE:
             return f"{joint.name} moved {np.rad2deg(extent):.1f}° only"
+    own = start.joint_index(owner) if owner in start.joint_names else start.n - 1
+    for joint in start.joints[own : own + 2]:
+        # its errors, and those of the joint before it, are hidden if the point is on its axis
+        lever = float(np.linalg.norm(at.jacobian([f"{joint.name}.offset"])[: len(poses)], axis=1).max())
+        if joint.kind == "revolute" and lever < _ON_AXIS * start.reach:
+            return (
+                f"the measured point lies {lever / MILLIMETRE:.1f} mm from the axis of {joint.name}, whose errors are then hardly told "
+                "from its neighbours'"
+            )
     shape = _shape(poses.position) if poses.located.all() else ""
     if shape:
         return shape

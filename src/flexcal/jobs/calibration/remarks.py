@@ -33,6 +33,10 @@ _LOOK = (
 _OVERSTATED, _UNDERSTATED = 0.5, 2.0
 """Ratio of estimated noise to the stated sigma, below and above which a remark is made."""
 
+_FLOOR = 2.0
+"""Scatter from pose to pose, relative to all other errors together, from which it is what limits the accuracy."""
+_GAIN = 1 / 3
+"""Share of the errors before that is left by a calibration which gained little."""
 _ANOTHER_SIZE = 0.01
 """Relative deviation of a board's size from the nominal robot's above which the declared size is doubtful."""
 
@@ -302,6 +306,30 @@ def _contradicted(test: StatedNoise) -> str:
     return (
         f"the readings{of} scatter {test.factor:.2g} times as much as the stated sigma says (χ² is {test.chi2:.2f} per degree of freedom, "
         f"p = {test.probability:.1g}): {cause}"
+    )
+
+
+def floor_remark(fit: GeometricFit, before: np.ndarray | None) -> tuple[str, ...]:
+    """Remark where the scatter from pose to pose is what is left, and large; `before` (N, 3), m, are the errors without calibration."""
+    budget = fit.variances
+    robot, model, instrument = (
+        float(budget[key] or 0.0) for key in ("robot_mm", "model_mm", "instrument_mm")
+    )
+    dof = fit.estimate.degrees_of_freedom
+    rows = int(fit.poses.present.sum())
+    parameters = robot * np.sqrt(max(rows - dof, 0) / rows)
+    if (
+        before is None
+        or is_implausible(fit)
+        or robot < _FLOOR * np.hypot(np.hypot(model, parameters), instrument)
+    ):
+        return ()
+    if fit.errors.mean < _GAIN * float(np.linalg.norm(before, axis=1).mean()):
+        return ()
+    return (
+        f"the scatter from pose to pose, {robot:.2f} mm per coordinate (1σ), is the floor: model errors of {model:.2f} mm and parameters "
+        f"known to {parameters:.2f} mm at these poses add little to it, so neither further terms nor more poses will make this robot much "
+        "more accurate. Visits to the same poses tell how much of it is the robot's repeatability (flexcal repeatability)",
     )
 
 

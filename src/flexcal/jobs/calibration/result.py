@@ -42,8 +42,8 @@ from flexcal.calibration.verification import (
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, json_values
 from flexcal.jobs.calibration.held_out import HeldOut
-from flexcal.jobs.calibration.remarks import calibration_remarks, outliers_of
-from flexcal.jobs.calibration.sockets import place_remarks, scale_document, scale_remark
+from flexcal.jobs.calibration.remarks import calibration_remarks, floor_remark, outliers_of
+from flexcal.jobs.calibration.sockets import base_remark, place_remarks, scale_document, scale_remark
 from flexcal.jobs.calibration.subsample import calibration_subsample_remark, subsample_document
 from flexcal.jobs.inputs import CalibratedRobot
 from flexcal.jobs.pages import Identification
@@ -249,9 +249,11 @@ class Calibration(Identification):
                 *calibration_subsample_remark(self.sample, self.everywhere),
                 *([chosen.remark] if chosen and chosen.remark else []),
                 *scale_remark(scale),
+                *base_remark(selected),
                 *calibration_remarks(selected, bearings if blamed else ()),
                 *(() if blamed else bearings),
                 *place_remarks(agreement),
+                *floor_remark(selected, self.before.robots_own),
                 *(
                     []
                     if misfit is None

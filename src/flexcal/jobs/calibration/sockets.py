@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from flexcal.calibration.diagnostics import FEWEST_PLACES, PlaceAgreement, PlaceErrors
 from flexcal.calibration.fit import GeometricFit
+from flexcal.model.robot import GEOMETRY
 from flexcal.units import MILLIMETRE
 
 _PER_MILLE = 1e-3
@@ -30,6 +31,28 @@ def scale_remark(scale: Mapping[str, float] | None) -> tuple[str, ...]:
     return (
         f"all lengths of the robot are known to ± {scale['relative_std'] / _PER_MILLE:.1f} ‰ (1σ) at best, from the "
         f"{scale['distance_mm']:.4g} mm ± {scale['std_mm']:.2g} mm of the fixture; these measurements do not improve it",
+    )
+
+
+def base_remark(fit: GeometricFit) -> tuple[str, ...]:
+    """Remark on what the places of a fixture cannot tell, and on how many of the robot's own parameters they do."""
+    if not fit.poses.in_socket.all():
+        return ()
+    seen = fit.identifiability
+    blind = [item.name for item in seen.dropped if not item.absorbed_by]
+    every = [
+        name
+        for name in seen.names
+        if name.rpartition(".")[2] in GEOMETRY and not name.startswith("station.") and name not in blind
+    ]
+    kept = [name for name in seen.kept_names if name in every]
+    held = sum(item.name in kept for item in fit.undetermined)
+    owners = dict.fromkeys(joint.name for joint in fit.model.joints if f"{joint.name}.length_x" in every)
+    lost = [f"{owner}.{key}" for owner in owners for key in GEOMETRY if f"{owner}.{key}" not in every]
+    hidden = f", of which {held} are hidden by the scatter" if held else ""
+    return (
+        f"of {len(every) + len(lost)} parameters of the robot itself {len(kept)} combinations are seen{hidden}; where its base stands "
+        f"cannot be told, so nothing is claimed of what moves the whole robot: {', '.join(lost)}",
     )
 
 
