@@ -16,7 +16,8 @@ from flexcal.calibration.fit import geometric_parameters
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.calibration.verification import error_scale
 from flexcal.export.urdf import render_urdf
-from flexcal.model.parts import rotation_wxyz
+from flexcal.model.kinematics import joint_placement
+from flexcal.model.parts import rotation_wxyz, vector_rotation
 
 SPRINGS = """elastic:
   - joint: waist_pitch
@@ -149,6 +150,17 @@ def test_a_station_on_the_robot_has_no_place_in_the_base_frame(tmp_path: Path) -
         RobotModel.from_yaml(robot.write(tmp_path, "stations: {probe: {frame: left_hand, xyz: [0, 0, 1]}}\n"))
     with refused("E-ROBOT-028", "left_foot"):
         RobotModel.from_yaml(robot.write(tmp_path, "stations: {probe: {frame: left_foot}}\n"))
+
+
+def test_arms_on_a_rail_whose_direction_is_off(tmp_path: Path) -> None:
+    """The rail of the simulator is a milliradian off; its direction is the first joint's misalignment."""
+    robot = StrangerTorso(5, joints=4, rail=True, yields=0.0)
+    calibration, fresh = calibrated(robot, tmp_path, 60, terms=("kinematic",))
+    assert distances(calibration, fresh).mean() < 1.5e3 * np.sqrt(3) * robot.tracker_noise
+    _, rotation = joint_placement(calibration.model, 0)
+    inside = rotation @ calibration.model.joints[0].axis
+    turned = vector_rotation(calibration.model.stations.pose[0, 3:])
+    assert turned @ inside == pytest.approx(robot.tracker[0] @ robot.true_axis[0], abs=1e-4)
 
 
 def test_an_arm_on_a_cart_that_drives_about(tmp_path: Path) -> None:
