@@ -106,8 +106,8 @@ def calibration_page(study: CalibrationStudy) -> Page:
     stations = len(points.poses.stations)
     return Page(
         title=f"{results['robot']}: calibration report",
-        subtitle=f"Calibration on {len(points.poses)} measured points"
-        + (f" from {stations} stations" if stations > 1 else "")
+        subtitle=f"Calibration on {len(points.poses)} measurements"
+        + (f" of {stations} stations or instruments" if stations > 1 else "")
         + f" · terms: {', '.join(term.replace('_', ' ') for term in results['terms'])}",
         verdict=calibration_verdict(study),
         sections=sections,
@@ -131,7 +131,7 @@ def calibration_verdict(study: CalibrationStudy) -> Verdict:
         f"maximum of {millimetres(after.max)} mm{_better(before, after)}.",
         headline_facts(before, after, trust, "points of the fit"),
         tuple(ranges),
-        f"Error of the robot at the {after.poses} measured points",
+        f"Differences of the {after.poses} measurements from the robot",
         checks,
     )
 
@@ -199,7 +199,8 @@ def _accuracy_section(study: CalibrationStudy) -> Section:
     return Section(
         "accuracy",
         "Before and after",
-        "Distances between measured and predicted points. These are the poses of the fit; measure others "
+        "Differences between what was measured and what is predicted; of points, their distances. These are the poses of the fit; "
+        "measure others "
         "and run flexcal verify.",
         (
             table,
