@@ -15,6 +15,8 @@ RANK_TOLERANCE = 1e-9
 """Relative size of a diagonal of R that counts as zero: exact derivatives leave 1e-15, finite differences about 1e-8."""
 _WEAK, _NAMED = 3, 0.2
 """Number of weak combinations shown; members below this share of the largest are not named."""
+_ALIKE = 1e-8
+"""Relative difference of the norms of two columns that is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +199,8 @@ def _select(
     chosen: list[int] = []
     for _ in rest:
         norms = np.linalg.norm(remainder, axis=0)
-        largest = int(np.argmax(norms))
+        # of columns of one size the first: rounding must not choose, as by the order of the rows
+        largest = int(np.argmax(norms >= (1 - _ALIKE) * norms.max()))
         if norms[largest] == 0.0:
             break
         if norms[largest] > limit:

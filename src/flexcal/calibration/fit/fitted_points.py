@@ -44,6 +44,7 @@ from flexcal.calibration.measurement import (
     require_both_flanks,
     require_orientations,
     stated_sigma,
+    with_camera_places,
     with_target_axes,
 )
 from flexcal.data.poses import PoseSet
@@ -112,7 +113,7 @@ class PointFit:
         model = model.with_lenses({name: lens.values for name, lens in poses.lenses.items()})
         bare = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
         start = register(model, poses, predict_measurements(bare, poses, elastic=elastic).located)
-        start = with_target_axes(start, poses)
+        start = with_target_axes(with_camera_places(start, poses), poses)
         require_orientations(start, poses)
         prior = with_instruments(prior, start, poses)
         if "backlash" in terms:

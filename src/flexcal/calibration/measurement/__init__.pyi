@@ -1,4 +1,5 @@
 from .backlash_flanks import ambiguous_poses, require_both_flanks
+from .hand_eye import with_camera_places
 from .prediction import (
     PredictedMeasurements,
     predict_measurements,
@@ -29,5 +30,6 @@ __all__ = [
     "require_orientations",
     "require_points",
     "stated_sigma",
+    "with_camera_places",
     "with_target_axes",
 ]

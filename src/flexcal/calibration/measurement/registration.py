@@ -56,11 +56,22 @@ def with_target_axes(model: RobotModel, poses: PoseSet) -> RobotModel:
 
 
 def require_orientations(model: RobotModel, poses: PoseSet) -> None:
-    """Raise `FlexcalError` where the measured orientations are far from those of the registered `model`, whose targets' axes are placed."""
+    """Raise `FlexcalError` where the orientations that an instrument or a camera measured are far from those of the registered `model`,
+    whose targets' axes are placed.
+    """
     if not poses.turned.any():
         return
     own = poses.subset(poses.turned)
     angles = np.linalg.norm(predict_measurements(model, own, elastic=False).residual[len(own) :], axis=1)
+    for camera in dict.fromkeys([] if own.camera is None else own.camera[own.seen].tolist()):
+        off = float(np.median(angles[own.camera == camera]))
+        if off > FOREIGN:
+            raise FlexcalError(
+                "E-CAL-028",
+                f"the views of {camera} turn otherwise than the robot, by {np.rad2deg(off):.0f}° (median), however camera and board are "
+                "mounted: check the order and units of the joint positions, whether each belongs to its image, and whether the images are "
+                "mirrored.",
+            )
     if (angle := float(np.median(angles))) > FOREIGN:
         agreeing = _agreeing(model, own)
         if agreeing.mean() > _MANY:

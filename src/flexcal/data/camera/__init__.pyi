@@ -1,10 +1,12 @@
 from .board import board_corners
-from .bundle import FreeViews, View, free_views, lens_prior
+from .bundle import FEWEST_CORNERS, FreeViews, View, free_views, lens_prior
 from .detection import detected_views
+from .half_turns import half_turns
 from .lens import Lens, projected
 from .poses_of_views import ViewPoses, view_poses
 
 __all__ = [
+    "FEWEST_CORNERS",
     "FreeViews",
     "Lens",
     "View",
@@ -12,6 +14,7 @@ __all__ = [
     "board_corners",
     "detected_views",
     "free_views",
+    "half_turns",
     "lens_prior",
     "projected",
     "view_poses",

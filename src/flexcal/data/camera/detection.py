@@ -17,9 +17,10 @@ if TYPE_CHECKING:
 
 
 def detected_views(camera: CameraConfig, paths: Sequence[Path]) -> tuple[list[View], np.ndarray]:
-    """Views of the board in images, one each, and the size (2,) of these, pixels.
+    """Views of the board in images, one each, without corners where it is not found, and the size (2,) of these, pixels.
 
-    Raises `FlexcalError` without OpenCV, and `InputError` for an image that is not there, is of another size, or does not show the board.
+    Raises `FlexcalError` without OpenCV, and `InputError` for an image that is not there, is of another size, and where most of them do
+    not show the board.
     """
     try:
         import cv2
@@ -41,12 +42,15 @@ def detected_views(camera: CameraConfig, paths: Sequence[Path]) -> tuple[list[Vi
                 f"{path} has {image.shape[1]} × {image.shape[0]} pixels, but robot.yaml says {width} × {height}; correct `size:`.",
             )
         numbers, pixels = find(image)
-        if len(numbers) < FEWEST_CORNERS:
-            raise InputError(
-                "E-POSES-055",
-                f"{path} shows {len(numbers)} corners of the board that robot.yaml declares; take out its line, or correct `board:`.",
-            )
         views.append(View(path.name, board[numbers], pixels))
+    without = [path for path, view in zip(paths, views, strict=True) if len(view.points) < FEWEST_CORNERS]
+    if 2 * len(without) > len(paths):
+        named = f", as {without[0].name}" if len(without) > 1 else f", {without[0].name}"
+        raise InputError(
+            "E-POSES-055",
+            f"{without[0].parent}: {len(without)} of {len(paths)} images{named}, show fewer than {FEWEST_CORNERS} corners of the board "
+            "that robot.yaml declares; correct `board:` (its kind, columns, rows and dictionary), take sharper images, or unmirrored ones.",
+        )
     return views, np.array(camera.size, dtype=float)
 
 
@@ -60,14 +64,16 @@ def _detector(cv2: Any, board: BoardConfig) -> Callable[[np.ndarray], tuple[np.n
         )
     dictionary = cv2.aruco.getPredefinedDictionary(known)
     if board.kind == "tags":
-        markers = cv2.aruco.ArucoDetector(dictionary)
+        precisely = cv2.aruco.DetectorParameters()
+        precisely.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_APRILTAG
+        markers = cv2.aruco.ArucoDetector(dictionary, precisely)
         return lambda image: _tags(markers, board, image)
     printed = cv2.aruco.CharucoBoard((board.columns, board.rows), board.square, board.marker, dictionary)
     charuco = cv2.aruco.CharucoDetector(printed)
 
     def find(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         corners, numbers, _, _ = charuco.detectBoard(image)
-        return _none() if numbers is None else (numbers.ravel(), _refined(cv2, image, corners.reshape(-1, 2)))
+        return _none() if numbers is None else (numbers.ravel(), corners.reshape(-1, 2).astype(float))
 
     return find
 
@@ -90,12 +96,6 @@ def _tags(markers: Any, board: BoardConfig, image: np.ndarray) -> tuple[np.ndarr
         np.concatenate([4 * k + np.arange(4) for k, _ in seen]),
         np.concatenate([own.reshape(4, 2) for _, own in seen]).astype(float),
     )
-
-
-def _refined(cv2: Any, image: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-3)
-    start = np.ascontiguousarray(corners, dtype=np.float32)
-    return cv2.cornerSubPix(image, start, (5, 5), (-1, -1), stop).reshape(-1, 2).astype(float)
 
 
 def _none() -> tuple[np.ndarray, np.ndarray]:

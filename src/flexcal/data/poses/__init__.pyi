@@ -2,6 +2,7 @@ from .candidate_pool import PosePool
 from .checks import check_metres, check_same_pose
 from .columns import check_positive, unit_quaternions, whole_numbers
 from .frame_touches import FrameMethod, FrameTouches
+from .image_folders import tables_of
 from .measured_tables import column_labels, read_pose_pool, read_poses, write_poses
 from .pose_set import DEFAULT_SIGMA, DISTANCE, LINE, PLANE, PoseSet, concatenate
 from .target_files import read_commands, read_targets, write_commands, write_targets
@@ -33,6 +34,7 @@ __all__ = [
     "read_targets",
     "read_touches",
     "read_working",
+    "tables_of",
     "unit_quaternions",
     "whole_numbers",
     "write_commands",

@@ -3,16 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.data.camera import FreeViews, Lens, View, board_corners, detected_views, free_views, view_poses
+from flexcal.data.camera import (
+    FEWEST_CORNERS,
+    FreeViews,
+    Lens,
+    View,
+    board_corners,
+    detected_views,
+    free_views,
+    half_turns,
+    view_poses,
+)
 from flexcal.data.poses.checks import check_same_pose
 from flexcal.data.poses.columns import first_point, payload_column, target_column, whole_numbers
 from flexcal.data.poses.pose_set import PoseSet
 from flexcal.data.tables import Table, TableFile, assign, check_joint_units
 from flexcal.files.structuring import suggestion
+from flexcal.model.kinematics import point_kinematics
 
 if TYPE_CHECKING:
     from flexcal.model.robot import CameraConfig, RobotModel
@@ -21,6 +33,8 @@ CAMERA_COLUMNS = ("camera", "image")
 _BLURRED = 5.0
 """Ratio of a view's residual to the median of all views from which it is not used."""
 _CORNERS = ("corner", "u", "v")
+_NAMED = 8
+"""Number of views that a sentence names."""
 
 
 def measures_images(file: TableFile) -> bool:
@@ -34,7 +48,8 @@ def read_views(file: TableFile, model: RobotModel, further: Sequence[str] = ()) 
     Optional are `camera`, a name under `measurements:` of robot.yaml, `station`, the place of the board or of the camera in the cell,
     `target`, `payload`, and the `further` columns, which are not used. Raises `InputError` where robot.yaml declares no camera, for an
     unknown one, for a corner that the board does not have, for an image that cannot be read or shows no board, for corners of which no
-    camera makes sense, and for a mirrored board.
+    camera makes sense, for a mirrored board, and where several points may be what is seen. Views without
+    the board and blurred ones are left out, and noted.
     """
     images = "image" in file.columns
     texts = (*CAMERA_COLUMNS, "station", "target", *further)
@@ -53,10 +68,22 @@ def read_views(file: TableFile, model: RobotModel, further: Sequence[str] = ()) 
         views, size = detected_views(camera, paths)
     else:
         views, size = _tabled_views(table, camera, pose, first), np.array(camera.size, dtype=float)
+    shown = np.array([len(view.points) >= FEWEST_CORNERS for view in views])
+    blank = [view.name for view, enough in zip(views, shown, strict=True) if not enough]
+    views, first = [view for view, enough in zip(views, shown, strict=True) if enough], first[shown]
     found = free_views(views, size)
     usable = _usable(file, views, found)
+    notes = _left_out(name, views, found, usable, blank)
     rows = first[usable]
     _check_side(file, found)
+    target = _targets(table, model, name)
+    if camera.board.kind == "chessboard":
+        found, turned = _upright(model, found, values["q"][first], str(target[0]))
+        notes += (
+            [f"{turned} views had the chessboard upside down, which looks the same; they are turned"]
+            if turned
+            else []
+        )
     poses = view_poses(found, on_hand=camera.mounted == "hand")
     payload = payload_column(table, signals, model)
     covariance = poses.covariance[usable]
@@ -67,9 +94,7 @@ def read_views(file: TableFile, model: RobotModel, further: Sequence[str] = ()) 
         sigma=spread[:, :3],
         torque=None,
         payload=None if payload is None else payload[rows],
-        target=target_column(table, model)[rows]
-        if "target" in texts
-        else np.full(len(rows), first_point(file, model)),
+        target=target[rows],
         station=table.columns["station"][rows] if "station" in texts else np.full(len(rows), name),
         temperature=None,
         pose=pose[rows],
@@ -79,6 +104,7 @@ def read_views(file: TableFile, model: RobotModel, further: Sequence[str] = ()) 
         camera=np.full(len(rows), name),
         by_lens=poses.by_lens[usable],
         lenses={name: Lens(found.lens, found.covariance)},
+        notes=tuple(notes),
     )
 
 
@@ -143,6 +169,60 @@ def _usable(file: TableFile, views: Sequence[View], found: FreeViews) -> np.ndar
             f"{wrong} of {corners} corners fit no camera; check columns, rows and corner numbers of the board.",
         )
     return np.flatnonzero(found.residuals <= _BLURRED * np.median(found.residuals))
+
+
+def _left_out(
+    name: str, views: Sequence[View], found: FreeViews, usable: np.ndarray, blank: Sequence[str]
+) -> list[str]:
+    """Sentences on the views of a camera that are not used."""
+    blurred = [
+        f"{views[k].name} ({found.residuals[k]:.1f} px)"
+        for k in range(len(views))
+        if k not in set(usable.tolist())
+    ]
+    usual = float(np.median(found.residuals))
+    notes = []
+    if blurred:
+        notes.append(
+            f"{name}: {len(blurred)} views are left out as blurred or wrongly detected, with corners that scatter by far more than the "
+            f"usual {usual:.2g} px: {_some(blurred)}"
+        )
+    if blank:
+        notes.append(
+            f"{name}: {len(blank)} views show fewer than {FEWEST_CORNERS} corners of the board: {_some(blank)}"
+        )
+    return notes
+
+
+def _some(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _NAMED} others" if len(names) > _NAMED else ""
+    return ", ".join(names[:_NAMED]) + more
+
+
+def _upright(model: RobotModel, found: FreeViews, q: np.ndarray, target: str) -> tuple[FreeViews, int]:
+    """Views with their chessboards the same way up, and how many were turned for it."""
+    hand = point_kinematics(model, q, point=target, jacobians=False).orientation
+    turned = half_turns(hand, found.rotation)
+    signs = np.where(turned[:, None], [-1.0, -1.0, 1.0], 1.0)
+    return replace(found, rotation=found.rotation * signs[:, None, :]), int(turned.sum())
+
+
+def _targets(table: Table, model: RobotModel, camera: str) -> np.ndarray:
+    """Names (N,) of the points: those of a column, else the only point, or that with the name of the camera; raises `InputError` for
+    several others.
+    """
+    if "target" in table.columns:
+        return target_column(table, model)
+    point = first_point(table.file, model)
+    if len(model.points) > 1:
+        if camera not in model.points:
+            named = ", ".join(model.points)
+            raise table.file.error(
+                "E-POSES-066",
+                f"robot.yaml has several points ({named}), none named as the camera {camera}; name it so, or add a column 'target'.",
+            )
+        point = camera
+    return np.full(len(table), point)
 
 
 def _check_side(file: TableFile, found: FreeViews) -> None:

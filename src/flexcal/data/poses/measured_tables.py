@@ -27,6 +27,7 @@ from flexcal.data.poses.distance_tables import (
     measures_distances,
     read_distances,
 )
+from flexcal.data.poses.image_folders import tables_of
 from flexcal.data.poses.moving_base import BASE, seen_from_base
 from flexcal.data.poses.pose_set import DEFAULT_SIGMA, PLANE, PoseSet, concatenate
 from flexcal.data.poses.socket_tables import SOCKET_COLUMNS, measures_sockets, read_sockets
@@ -68,7 +69,7 @@ def read_poses(
         the first under `points:`; without `station` the instrument stands at the robot's first station; without `sigma` it is
         0.1 mm and `sigma_given` is False. A file with `fixture`, `socket` and q1…qn has a ball on the tool in sockets, as declared
         under `measurements:`, at places of the fixture that are not known; one with `length` those of a draw-wire, one with `touched`
-        contacts with a plane, line or sphere.
+        contacts with a plane, line or sphere, one with `image` a camera's views of a board. A folder of images stands for its table.
     model : RobotModel
         Robot whose joints, points and stations the columns name.
     require_motion : bool
@@ -96,11 +97,23 @@ def read_poses(
     >>> poses.q.shape, poses.position.shape
     ((20, 6), (20, 3))
     """
-    listed = [paths] if isinstance(paths, str | Path) else list(paths)
-    poses = concatenate([_read(Path(path), model, tuple(further)) for path in listed])
+    listed = tables_of([paths] if isinstance(paths, str | Path) else list(paths))
+    poses = concatenate([_read(path, model, tuple(further)) for path in listed])
+    _check_cameras(poses, " and ".join(str(path) for path in listed))
     if require_motion:
         check_motion(poses, model, " and ".join(str(path) for path in listed))
     return poses
+
+
+def _check_cameras(poses: PoseSet, where: str) -> None:
+    """Raise `InputError` where a camera, or its board, is said to be the point that something else measures."""
+    shared = [name for name in poses.targets if len(set(poses.seen[poses.target == name].tolist())) > 1]
+    if shared:
+        raise InputError(
+            "E-POSES-068",
+            f"{where}: the point {shared[0]} is measured by a camera and by something else, but a camera's point is the camera itself, or "
+            "the board on the hand; add it under `points:` with the camera's name.",
+        )
 
 
 def read_pose_pool(path: str | Path, model: RobotModel) -> PosePool:
@@ -183,7 +196,7 @@ def _read_by_one(path: str | Path, poses: PoseSet) -> Mapping[str, np.ndarray]:
 def column_labels(paths: Sequence[Path], column: str) -> np.ndarray:
     """Texts (N,) of one column of tables, joined in order; raises `InputError` for a file without it."""
     labels = []
-    for path in paths:
+    for path in tables_of(paths):
         file = open_table(path)
         if column not in file.columns:
             raise file.error(

@@ -64,6 +64,8 @@ class PoseSet:
         the fixture, and `station` the place of the fixture.
     force : ndarray, optional
         Known forces (N, 3) on the measured points, N in the base frame, as of a wire that pulls; zero where there are none.
+    notes : tuple of str
+        What was left out or turned when the measurements were read, and why.
     sigma_given : bool
         False where `sigma` is a default.
     unstated : ndarray, optional
@@ -94,6 +96,7 @@ class PoseSet:
     time: np.ndarray | None = None
     socket: np.ndarray | None = None
     force: np.ndarray | None = None
+    notes: tuple[str, ...] = ()
     sigma_given: bool = True
     unstated: np.ndarray | None = None
 
@@ -284,6 +287,8 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
             joined[entry.name] = any(values)
         elif entry.name == "unstated":
             joined[entry.name] = _unstated(sets)
+        elif entry.name == "notes":
+            joined[entry.name] = tuple(note for notes in values for note in notes)
         elif entry.name == "lenses":
             joined[entry.name] = {name: lens for one in values for name, lens in one.items()}
         elif entry.name in _PARTIAL and any(present):

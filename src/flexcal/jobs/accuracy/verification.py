@@ -32,7 +32,7 @@ from flexcal.calibration.verification import (
     uncalibrated_orientations,
     verify_refitted,
 )
-from flexcal.data.poses import PoseSet, read_poses
+from flexcal.data.poses import PoseSet, read_poses, tables_of
 from flexcal.errors import FlexcalError
 from flexcal.files.formats import provenance
 from flexcal.jobs.accuracy.registration_refit import proposed_refit, refit_document, refit_remarks
@@ -304,6 +304,7 @@ def verify_robot(
     `estimates` is an estimates.yaml, or a folder with one, in place of that beside robot.yaml; with `out`, results.json, points.csv,
     arm.npz and report.html are left in that folder. Raises `FlexcalError` as reading and `verify` do.
     """
+    files = tables_of(files)
     require_distinct_files(files)
     robot = CalibratedRobot.from_yaml(robot_file, estimates)
     progress("reading", 0.0)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from flexcal.calibration.fit import LossName
-from flexcal.data.poses import column_labels, read_poses
+from flexcal.data.poses import column_labels, read_poses, tables_of
 from flexcal.files.formats import provenance, read_estimates
 from flexcal.jobs.calibration.procedure import calibrate
 from flexcal.jobs.calibration.result import Calibration
@@ -42,6 +42,7 @@ def calibrate_robot(
     robot.yaml changes. Raises `FlexcalError` as reading and `fit_geometry` do; nothing is written then.
     """
     progress("reading", 0.0)
+    files = tables_of(files)
     require_distinct_files(files)
     bare = RobotModel.from_yaml(robot_file, estimates=False)
     source = bare.path.parent / bare.config.estimates

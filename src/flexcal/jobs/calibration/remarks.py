@@ -214,6 +214,7 @@ def _views(fit: GeometricFit) -> Sequence[str]:
     )
     return (
         *wrong,
+        *fit.poses.notes,
         f"{seen.sum()} poses were measured by a camera, each with the noise of its own view: {noise:.3f} mm rms expected, {found:.3f} mm "
         "found; the fit weighs the views by their noise, so the calibrated robot is far more accurate than one view",
     )

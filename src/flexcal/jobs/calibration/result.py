@@ -192,6 +192,8 @@ class Calibration(Identification):
         identifiability = selected.identifiability
         drift = Drift.of(selected) if selected.poses.located.any() else None
         noise = stated_noise(selected)
+        # residuals of far more than the noise may leave no test
+        drift = drift if drift is not None and np.isfinite(drift.probability) else None
         agreement, scale = PlaceAgreement.of(selected), scale_document(selected)
         bearings = bearing_remarks(self.bearings, selected)
         blamed = self.bearings is not None and self.bearings.contradicted

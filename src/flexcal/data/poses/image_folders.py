@@ -1,0 +1,37 @@
+"""Folders with images and the table of the joint positions at which they were taken."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from flexcal.errors import InputError
+
+_IMAGES = (".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".tif", ".tiff")
+_TABLES = (".csv", ".parquet")
+
+
+def tables_of(paths: Sequence[str | Path]) -> list[Path]:
+    """Paths of tables, with the only table in it for every folder of images.
+
+    Raises `InputError` for a folder of images with no table, or several.
+    """
+    return [_table_of(Path(path)) for path in paths]
+
+
+def _table_of(path: Path) -> Path:
+    if not path.is_dir():
+        return path
+    files = sorted(path.iterdir())
+    images = [file for file in files if file.suffix.lower() in _IMAGES]
+    tables = [file for file in files if file.suffix in _TABLES]
+    if not images:
+        return path
+    if len(tables) != 1:
+        there = f"{len(tables)} tables ({', '.join(file.name for file in tables)})" if tables else "no table"
+        raise InputError(
+            "E-POSES-067",
+            f"{path} has {len(images)} images and {there}; it needs one with pose, the joint positions q1, q2 and so on, and image, the "
+            "file's name.",
+        )
+    return tables[0]
