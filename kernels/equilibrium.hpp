@@ -57,6 +57,121 @@ inline void cholesky_solve(const std::vector<double>& l, int d, double* x) {
     }
 }
 
+// The gravity load of one pose on some axes, base to tool, within a joint too, as the tree has them. About a revolute joint's axes the load
+// is a moment, along a prismatic joint's it is a force: ∂V/∂q_k = -g·(m a_k), and no later axis changes its direction.
+class GravityLoad {
+  public:
+    GravityLoad(const Tree& tree, const std::vector<ElasticAxis>& axes, const double* geometry, const Masses& masses, Vector3 gravity)
+        : tree_(tree), axes_(axes), masses_(masses), gravity_(gravity), prepared_(tree.prepare(geometry)), frames_(tree.size()),
+          mass_(tree.size()), moment_(tree.size()), axis_(axes.size()), turned_(axes.size()),
+          beyond_(static_cast<std::size_t>(tree.size()) * tree.size(), 0) {
+        for (int i = 0; i < tree.size(); ++i)
+            for (int j = i; j >= 0; j = tree.joints[j].parent) beyond_[j * tree.size() + i] = 1;
+    }
+
+    // q: (n,); deflection: (n, 3)
+    void move(const double* q, const double* deflection, double payload) {
+        const int n = tree_.size();
+        q_ = q, deflection_ = deflection, payload_ = payload;
+        for (int i = 0; i < n; ++i) {
+            const int parent = tree_.joints[i].parent;
+            frames_[i] = tree_.advance(i, prepared_[i], parent < 0 ? nullptr : &frames_[parent], q[i], deflection + 3 * i);
+            mass_[i] = masses_.mass[i];
+            Vector3 own = vector3(masses_.first_moment + 3 * i);
+            if (i == masses_.payload_joint) {
+                mass_[i] += payload;
+                own = own + payload * masses_.payload_point;
+            }
+            moment_[i] = mass_[i] * frames_[i].origin + frames_[i].link * own;
+        }
+        for (int i = n - 1; i >= 0; --i) {
+            const int parent = tree_.joints[i].parent;
+            if (parent >= 0) {
+                mass_[parent] += mass_[i];
+                moment_[parent] = moment_[parent] + moment_[i];
+            }
+        }
+        for (std::size_t k = 0; k < axes_.size(); ++k) {
+            const int joint = axes_[k].joint;
+            const Frames& f = frames_[joint];
+            axis_[k] = axes_[k].component == 0 ? f.tilt_x : axes_[k].component == 1 ? f.tilt_y : f.axis;
+            turned_[k] = slides(k) ? mass_[joint] * axis_[k] : cross(axis_[k], moment_[joint] - mass_[joint] * f.origin);
+        }
+    }
+
+    // -∂V/∂q_k
+    double load(int k) const { return dot(gravity_, turned_[k]); }
+
+    // ∂²V/∂q_k∂q_j for k before j, or j itself
+    double stiffness(int k, int j) const {
+        const bool carried = beyond_[axes_[k].joint * tree_.size() + axes_[j].joint];
+        return carried && !slides(k) ? -dot(gravity_, cross(axis_[k], turned_[j])) : 0.0;
+    }
+
+    // ∂(∂V/∂q_k) by mass and first moment of each link, (4 n,), written where not zero
+    void regressor(int k, double* row) const {
+        const int joint = axes_[k].joint;
+        const Vector3 lever = cross(gravity_, axis_[k]);  // g·(a × r) = (g × a)·r
+        for (int i = 0; i < tree_.size(); ++i) {
+            if (!beyond_[joint * tree_.size() + i]) continue;
+            if (slides(k)) {
+                row[4 * i] = -dot(gravity_, axis_[k]);
+                continue;
+            }
+            const Rotation& r = frames_[i].link;
+            row[4 * i] = -dot(lever, frames_[i].origin - frames_[joint].origin);
+            row[4 * i + 1] = -dot(lever, r.x);
+            row[4 * i + 2] = -dot(lever, r.y);
+            row[4 * i + 3] = -dot(lever, r.z);
+        }
+    }
+
+    // ∂(∂V/∂q_k) by geometry, (6 n,), written where not zero
+    void coupling(int k, double* row) const {
+        const int n = tree_.size(), joint = axes_[k].joint;
+        for (int i = 0; i < n; ++i) {
+            const bool outside = beyond_[joint * n + i] && i != joint;
+            const bool inside = beyond_[i * n + joint];
+            if (!outside && !inside) continue;
+            const Frames& f = frames_[i];
+            const Vector3 turns[3] = {f.axis, f.misalignment_1, f.misalignment_2};
+            const bool sliding = tree_.joints[i].prismatic;
+            // a misalignment turns about the joint's place before the prismatic motion
+            const double slid = sliding ? q_[i] + prepared_[i].offset + deflection_[3 * i + 2] : 0.0;
+            const Vector3 moved = moment_[i] - mass_[i] * (f.origin - slid * f.axis);
+            // fixed to the parent, the bearing tilts the offset with everything beyond
+            const bool tilted = i == joint && tree_.tilts_first && axes_[k].component != 2;
+            for (int g = 0; g < 3; ++g) {
+                const bool before = inside && !(g == 0 && tilted);
+                row[geometry_size * i + g] = before         ? -dot(gravity_, cross(turns[g], turned_[k]))
+                                             : slides(k)    ? 0.0
+                                                            : -dot(gravity_, cross(axis_[k], cross(turns[g], moved)));
+            }
+            if (sliding) row[geometry_size * i] = inside || slides(k) ? 0.0 : -mass_[i] * dot(gravity_, cross(axis_[k], f.axis));
+            if (!beyond_[joint * n + i] || slides(k)) continue;
+            const double carried = mass_[i] - masses_.mass[i] - (i == masses_.payload_joint ? payload_ : 0.0);
+            const Vector3 lengths[3] = {f.link.x, f.link.y, f.link.z};
+            for (int g = 0; g < 3; ++g) row[geometry_size * i + 3 + g] = -carried * dot(gravity_, cross(axis_[k], lengths[g]));
+        }
+    }
+
+  private:
+    bool slides(int k) const { return axes_[k].component == 2 && tree_.joints[axes_[k].joint].prismatic; }
+
+    const Tree& tree_;
+    const std::vector<ElasticAxis>& axes_;
+    const Masses& masses_;
+    const Vector3 gravity_;
+    const std::vector<Prepared> prepared_;
+    std::vector<Frames> frames_;
+    std::vector<double> mass_;
+    std::vector<Vector3> moment_, axis_, turned_;
+    std::vector<char> beyond_;  // beyond[j * n + i]: link i is carried by joint j
+    const double* q_ = nullptr;
+    const double* deflection_ = nullptr;
+    double payload_ = 0;
+};
+
 // axes: elastic axes from base to tool, within a joint too, as the tree has them. stiffness: one per axis.
 // deflection of joints without springs is left at what it is (zero). Returns the largest last step, in rad.
 inline double static_equilibrium(const Tree& tree, const std::vector<ElasticAxis>& axes, const double* stiffness, const double* geometry,
@@ -66,49 +181,18 @@ inline double static_equilibrium(const Tree& tree, const std::vector<ElasticAxis
     if (d == 0) return 0;
     constexpr int most_iterations = 30;
     constexpr double tolerance = 1e-13;
-    const std::vector<Prepared> prepared = tree.prepare(geometry);
-    std::vector<Frames> frames(n);
-    std::vector<double> mass(n), hessian(d * d), step(d), unit(d);
-    std::vector<Vector3> moment(n), axis(d), arm(d);
-    std::vector<char> beyond(static_cast<std::size_t>(n) * n, 0);  // beyond[j * n + i]: link i is carried by joint j
-    for (int i = 0; i < n; ++i)
-        for (int j = i; j >= 0; j = tree.joints[j].parent) beyond[j * n + i] = 1;
+    GravityLoad load(tree, axes, geometry, masses, gravity);
+    std::vector<double> hessian(d * d), step(d), unit(d);
 
     double worst = 0;
     for (std::ptrdiff_t s = 0; s < samples; ++s) {
         double* deflection = out.deflection + 3 * n * s;
         double largest = 0;
         for (int iteration = 0; iteration <= most_iterations; ++iteration) {
-            for (int i = 0; i < n; ++i) {
-                const int parent = tree.joints[i].parent;
-                frames[i] = tree.advance(i, prepared[i], parent < 0 ? nullptr : &frames[parent], q[s * n + i], deflection + 3 * i);
-                mass[i] = masses.mass[i];
-                Vector3 own = vector3(masses.first_moment + 3 * i);
-                if (i == masses.payload_joint) {
-                    mass[i] += masses.payload[s];
-                    own = own + masses.payload[s] * masses.payload_point;
-                }
-                moment[i] = mass[i] * frames[i].origin + frames[i].link * own;
-            }
-            for (int i = n - 1; i >= 0; --i) {
-                const int parent = tree.joints[i].parent;
-                if (parent >= 0) {
-                    mass[parent] += mass[i];
-                    moment[parent] = moment[parent] + moment[i];
-                }
-            }
-            for (int k = 0; k < d; ++k) {
-                const Frames& f = frames[axes[k].joint];
-                axis[k] = axes[k].component == 0 ? f.tilt_x : axes[k].component == 1 ? f.tilt_y : f.axis;
-                arm[k] = moment[axes[k].joint] - mass[axes[k].joint] * f.origin;
-            }
+            load.move(q + s * n, deflection, masses.payload[s]);
             for (int j = 0; j < d; ++j) {
-                const Vector3 turned = cross(axis[j], arm[j]);
-                step[j] = dot(gravity, turned) - stiffness[j] * deflection[3 * axes[j].joint + axes[j].component];
-                for (int k = 0; k <= j; ++k) {
-                    const bool carried = beyond[axes[k].joint * n + axes[j].joint];
-                    hessian[j * d + k] = carried ? -dot(gravity, cross(axis[k], turned)) : 0.0;
-                }
+                step[j] = load.load(j) - stiffness[j] * deflection[3 * axes[j].joint + axes[j].component];
+                for (int k = 0; k <= j; ++k) hessian[j * d + k] = load.stiffness(k, j);
                 hessian[j * d + j] += stiffness[j];
             }
             if (!cholesky(hessian, d)) throw std::domain_error("the springs cannot carry the arm: the equilibrium is not stable");
@@ -130,53 +214,36 @@ inline double static_equilibrium(const Tree& tree, const std::vector<ElasticAxis
                 std::copy(unit.begin(), unit.end(), out.compliance + (s * d + k) * d);
             }
         }
-        if (out.regressor) {
-            for (int k = 0; k < d; ++k) {
-                double* row = out.regressor + (s * d + k) * 4 * n;
-                const Vector3 lever = cross(gravity, axis[k]);  // g·(a × r) = (g × a)·r
-                for (int i = 0; i < n; ++i) {
-                    if (!beyond[axes[k].joint * n + i]) continue;
-                    const Rotation& r = frames[i].link;
-                    row[4 * i] = -dot(lever, frames[i].origin - frames[axes[k].joint].origin);
-                    row[4 * i + 1] = -dot(lever, r.x);
-                    row[4 * i + 2] = -dot(lever, r.y);
-                    row[4 * i + 3] = -dot(lever, r.z);
-                }
-            }
-        }
-        if (out.coupling) {
-            for (int k = 0; k < d; ++k) {
-                double* row = out.coupling + (s * d + k) * geometry_size * n;
-                const int joint = axes[k].joint;
-                const Vector3 own = cross(axis[k], arm[k]);
-                for (int i = 0; i < n; ++i) {
-                    const bool outside = beyond[joint * n + i] && i != joint;
-                    const bool inside = beyond[i * n + joint];
-                    if (!outside && !inside) continue;
-                    const Frames& f = frames[i];
-                    const Vector3 turns[3] = {f.axis, f.misalignment_1, f.misalignment_2};
-                    const bool slides = tree.joints[i].prismatic;
-                    // a misalignment turns about the joint's place before the prismatic motion
-                    const double slid = slides ? q[s * n + i] + prepared[i].offset + deflection[3 * i + 2] : 0.0;
-                    const Vector3 moved = moment[i] - mass[i] * (f.origin - slid * f.axis);
-                    // fixed to the parent, the bearing tilts the offset with everything beyond
-                    const bool tilted = i == joint && tree.tilts_first && axes[k].component != 2;
-                    for (int g = 0; g < 3; ++g) {
-                        const bool before = inside && !(g == 0 && tilted);
-                        row[geometry_size * i + g] = before ? -dot(gravity, cross(turns[g], own))
-                                                            : -dot(gravity, cross(axis[k], cross(turns[g], moved)));
-                    }
-                    if (slides) row[geometry_size * i] = inside ? 0.0 : -mass[i] * dot(gravity, cross(axis[k], f.axis));
-                    if (!beyond[joint * n + i]) continue;
-                    const double carried = mass[i] - masses.mass[i] - (i == masses.payload_joint ? masses.payload[s] : 0.0);
-                    const Vector3 lengths[3] = {f.link.x, f.link.y, f.link.z};
-                    for (int g = 0; g < 3; ++g)
-                        row[geometry_size * i + 3 + g] = -carried * dot(gravity, cross(axis[k], lengths[g]));
-                }
-            }
+        for (int k = 0; k < d; ++k) {
+            if (out.regressor) load.regressor(k, out.regressor + (s * d + k) * 4 * n);
+            if (out.coupling) load.coupling(k, out.coupling + (s * d + k) * geometry_size * n);
         }
     }
     return worst;
+}
+
+struct GravityOutput {
+    double* load;       // (samples, d): -∂V/∂q
+    double* stiffness;  // (samples, d, d): ∂²V/∂q∂q
+    double* regressor;  // (samples, d, 4 n)
+    double* coupling;   // (samples, d, 6 n)
+};
+
+// Gravity loads of poses that are not at rest, for arms whose joints do not move independently. deflection: (samples, n, 3)
+inline void gravity_loads(const Tree& tree, const std::vector<ElasticAxis>& axes, const double* geometry, const Masses& masses, Vector3 gravity,
+                          const double* q, const double* deflection, std::ptrdiff_t samples, const GravityOutput& out) {
+    const int n = tree.size(), d = static_cast<int>(axes.size());
+    GravityLoad load(tree, axes, geometry, masses, gravity);
+    for (std::ptrdiff_t s = 0; s < samples; ++s) {
+        load.move(q + s * n, deflection + 3 * n * s, masses.payload[s]);
+        for (int j = 0; j < d; ++j) {
+            const std::ptrdiff_t at = s * d + j;
+            out.load[at] = load.load(j);
+            for (int k = 0; k <= j; ++k) out.stiffness[at * d + k] = out.stiffness[(s * d + k) * d + j] = load.stiffness(k, j);
+            load.regressor(j, out.regressor + at * 4 * n);
+            load.coupling(j, out.coupling + at * geometry_size * n);
+        }
+    }
 }
 
 }  // namespace flexcal

@@ -76,37 +76,67 @@ nb::tuple point(const Tree& tree, int joint, nb::handle placement_, nb::handle t
     return nb::make_tuple(position.release(), orientation.release(), by_geometry.release(), by_motion.release());
 }
 
-nb::tuple equilibrium(const Tree& tree, const std::vector<std::pair<int, int>>& axes, nb::handle stiffness_, nb::handle geometry_,
-                      nb::handle mass_, nb::handle first_moment_, nb::handle payload_, int payload_joint, nb::handle payload_point_,
-                      nb::handle gravity_, nb::handle q_, bool sensitivities) {
-    const std::size_t n = tree.size(), d = axes.size();
-    const auto stiffness = reals(stiffness_, {d}, "stiffness");
-    const auto geometry = reals(geometry_, {n, 6}, "geometry");
-    const auto mass = reals(mass_, {n}, "mass");
-    const auto first_moment = reals(first_moment_, {n, 3}, "first_moment");
-    const auto payload_point = reals(payload_point_, {3}, "payload_point");
-    const auto gravity = reals(gravity_, {3}, "gravity");
-    const auto q = reals(q_, {any, n}, "q");
-    const std::size_t samples = q.shape(0);
-    const auto payload = reals(payload_, {samples}, "payload");
-    if (payload_joint < -1 || payload_joint >= static_cast<int>(n)) throw nb::value_error("the payload's joint is out of range");
-    std::vector<ElasticAxis> elastic;
-    for (auto [joint, component] : axes) {
-        if (joint < 0 || joint >= static_cast<int>(n) || component < 0 || component > 2) throw nb::value_error("no such elastic axis");
-        elastic.push_back({joint, component});
+// What the arm carries and the axes that it loads.
+struct Loaded {
+    Contiguous<const double, 2> geometry, first_moment, q;
+    Contiguous<const double, 1> mass, payload, payload_point, gravity;
+    std::vector<ElasticAxis> axes;
+    std::size_t samples;
+    Masses masses;
+
+    Loaded(const Tree& tree, const std::vector<std::pair<int, int>>& axes_, nb::handle geometry_, nb::handle mass_, nb::handle first_moment_,
+           nb::handle payload_, int payload_joint, nb::handle payload_point_, nb::handle gravity_, nb::handle q_) {
+        const std::size_t n = tree.size();
+        geometry = reals(geometry_, {n, 6}, "geometry");
+        mass = reals(mass_, {n}, "mass");
+        first_moment = reals(first_moment_, {n, 3}, "first_moment");
+        payload_point = reals(payload_point_, {3}, "payload_point");
+        gravity = reals(gravity_, {3}, "gravity");
+        q = reals(q_, {any, n}, "q");
+        samples = q.shape(0);
+        payload = reals(payload_, {samples}, "payload");
+        if (payload_joint < -1 || payload_joint >= static_cast<int>(n)) throw nb::value_error("the payload's joint is out of range");
+        for (auto [joint, component] : axes_) {
+            if (joint < 0 || joint >= static_cast<int>(n) || component < 0 || component > 2) throw nb::value_error("no such elastic axis");
+            axes.push_back({joint, component});
+        }
+        masses = {mass.data(), first_moment.data(), payload.data(), payload_joint, vector3(payload_point.data())};
     }
+};
+
+nb::tuple equilibrium(const Tree& tree, const std::vector<std::pair<int, int>>& axes, nb::handle stiffness_, nb::handle geometry, nb::handle mass,
+                      nb::handle first_moment, nb::handle payload, int payload_joint, nb::handle payload_point, nb::handle gravity, nb::handle q,
+                      bool sensitivities) {
+    const std::size_t n = tree.size(), d = axes.size();
+    const Loaded arm(tree, axes, geometry, mass, first_moment, payload, payload_joint, payload_point, gravity, q);
+    const auto stiffness = reals(stiffness_, {d}, "stiffness");
+    const std::size_t samples = arm.samples;
     Buffer deflection({samples, n, 3}), compliance({sensitivities ? samples : 0, d, d}), regressor({sensitivities ? samples : 0, d, 4 * n}),
         coupling({sensitivities ? samples : 0, d, 6 * n});
-    const Masses masses{mass.data(), first_moment.data(), payload.data(), payload_joint, vector3(payload_point.data())};
     double residual = 0;
     {
         nb::gil_scoped_release release;
-        residual = static_equilibrium(tree, elastic, stiffness.data(), geometry.data(), masses, vector3(gravity.data()), q.data(),
-                                      static_cast<std::ptrdiff_t>(samples),
+        residual = static_equilibrium(tree, arm.axes, stiffness.data(), arm.geometry.data(), arm.masses, vector3(arm.gravity.data()),
+                                      arm.q.data(), static_cast<std::ptrdiff_t>(samples),
                                       {deflection.data.get(), sensitivities ? compliance.data.get() : nullptr,
                                        sensitivities ? regressor.data.get() : nullptr, sensitivities ? coupling.data.get() : nullptr});
     }
     return nb::make_tuple(deflection.release(), compliance.release(), regressor.release(), coupling.release(), residual);
+}
+
+nb::tuple loads(const Tree& tree, const std::vector<std::pair<int, int>>& axes, nb::handle geometry, nb::handle mass, nb::handle first_moment,
+                nb::handle payload, int payload_joint, nb::handle payload_point, nb::handle gravity, nb::handle q, nb::handle deflection_) {
+    const std::size_t n = tree.size(), d = axes.size();
+    const Loaded arm(tree, axes, geometry, mass, first_moment, payload, payload_joint, payload_point, gravity, q);
+    const std::size_t samples = arm.samples;
+    const auto deflection = reals(deflection_, {samples, n, 3}, "deflection");
+    Buffer load({samples, d}), stiffness({samples, d, d}), regressor({samples, d, 4 * n}), coupling({samples, d, 6 * n});
+    {
+        nb::gil_scoped_release release;
+        gravity_loads(tree, arm.axes, arm.geometry.data(), arm.masses, vector3(arm.gravity.data()), arm.q.data(), deflection.data(),
+                      static_cast<std::ptrdiff_t>(samples), {load.data.get(), stiffness.data.get(), regressor.data.get(), coupling.data.get()});
+    }
+    return nb::make_tuple(load.release(), stiffness.release(), regressor.release(), coupling.release());
 }
 
 // What both directions of the torque regressor take.
@@ -170,6 +200,10 @@ void bind_tree(nb::module_& m) {
              nb::arg("payload"), nb::arg("payload_joint"), nb::arg("payload_point"), nb::arg("gravity"), nb::arg("q"), nb::arg("sensitivities"),
              "Deflection (samples, n, 3), compliance (samples, d, d), gravity regressor (samples, d, 4 n), its coupling with geometry "
              "(samples, d, 6 n), largest last Newton step (rad).")
+        .def("gravity_loads", &loads, nb::arg("axes"), nb::arg("geometry"), nb::arg("mass"), nb::arg("first_moment"), nb::arg("payload"),
+             nb::arg("payload_joint"), nb::arg("payload_point"), nb::arg("gravity"), nb::arg("q"), nb::arg("deflection"),
+             "Gravity's load on the axes (samples, d), the stiffness by which it changes (samples, d, d), and the regressor and coupling of "
+             "equilibrium, where the arm stands.")
         .def("torque_regressor", &torques, nb::arg("geometry"), nb::arg("gravity"), nb::arg("q"), nb::arg("dq"), nb::arg("ddq"),
              nb::arg("places"), nb::arg("out"),
              "Joint torques by mass, first moment and inertia of every link, into the rows of out (·, samples) that places (n, 10 n) names; "

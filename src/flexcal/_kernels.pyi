@@ -39,6 +39,19 @@ class Tree:
         q: np.ndarray,
         sensitivities: bool,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]: ...
+    def gravity_loads(
+        self,
+        axes: list[tuple[int, int]],
+        geometry: np.ndarray,
+        mass: np.ndarray,
+        first_moment: np.ndarray,
+        payload: np.ndarray,
+        payload_joint: int,
+        payload_point: np.ndarray,
+        gravity: np.ndarray,
+        q: np.ndarray,
+        deflection: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]: ...
     def torque_regressor(
         self,
         geometry: np.ndarray,

@@ -142,7 +142,6 @@ def test_joints_without_limits(run, tmp_path: Path) -> None:
         ("<robot name='x'/>", "a.urdf.xacro", ["E-URDF-033", "a.urdf", "xacro"]),
         ("<robot name='x' xmlns:xacro='u'><xacro:macro name='m'/></robot>", "a.urdf", ["E-URDF-002", "xacro"]),
         ("<robot name='x'><link name='a'/></robot>", "a.urdf", ["E-URDF-036"]),
-        (MIMICKING, "a.urdf", ["E-URDF-039", "shoulder"]),
     ],
 )  # fmt: skip
 def test_bad_files_are_refused_in_a_sentence(
@@ -154,6 +153,20 @@ def test_bad_files_are_refused_in_a_sentence(
     assert outcome.status == 2 and outcome.out == "" and outcome.err.count("\n") == 1
     assert_refusal(outcome.err, *refusal)
     assert snapshot(tmp_path) == before
+
+
+def test_a_joint_of_the_arm_that_mimics_another_follows_it(run, tmp_path: Path) -> None:
+    (tmp_path / "a.urdf").write_text(MIMICKING)
+    document = run("init", tmp_path / "a.urdf", "--out", tmp_path, "--json").document
+    assert (
+        document["joints"] == [name for name in JOINTS if name != "shoulder"]
+        and "elbow" not in document["locked"]
+    )
+    model = RobotModel.from_yaml(tmp_path / "robot.yaml")
+    assert model.motor_names == tuple(document["joints"]) and "shoulder" in model.joint_names
+    assert "shoulder" in next(
+        line for line in (tmp_path / "robot.yaml").read_text().splitlines() if "follows others" in line
+    )
 
 
 def test_unknown_tip_is_suggested(run, tmp_path: Path) -> None:

@@ -37,6 +37,7 @@ class RobotStandIn:
     reach: float = 1.2
     stations: Stations = field(default_factory=lambda: Stations.at_base(("tracker",)))
     sensors: dict[str, object] = field(default_factory=dict)
+    relations: None = None
 
     @property
     def n(self) -> int:
@@ -45,6 +46,18 @@ class RobotStandIn:
     @property
     def joint_names(self) -> tuple[str, ...]:
         return tuple(joint.name for joint in self.joints)
+
+    @property
+    def motors(self) -> tuple[int, ...]:
+        return tuple(range(self.n))
+
+    @property
+    def motor_joints(self) -> tuple[JointStandIn, ...]:
+        return self.joints
+
+    @property
+    def motor_names(self) -> tuple[str, ...]:
+        return self.joint_names
 
 
 @dataclass(frozen=True)

@@ -119,7 +119,7 @@ def test_an_exported_gripper_weighs_what_was_found(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("locked", "refusal"),
     [
-        ({"slide": 0.02}, ["E-URDF-003", "follow"]),
+        ({"slide": 0.02}, ["E-URDF-042", "follow", "slide"]),
         ({**LOCKED, "slde": 0.02}, ["E-URDF-025", "slde", "shoulder", "slide"]),
         ({**LOCKED, "slide": 2.1}, ["E-URDF-026", "slide", "2.1", "0", "2"]),
         ({**LOCKED, "shoulder": 1}, ["E-URDF-024"]),

@@ -66,7 +66,7 @@ MISTAKES = [
     ('upper="2"', 'upper="-2"', ["E-URDF-019", "line 17", "joint 'shoulder'", "-2", "-2"]),
     (' effort="100"', "", ["E-URDF-027", "line 17", "limit", "joint 'shoulder'", "effort"]),
     ('velocity="3"', 'velocity="-0.3"', ["E-URDF-020", "line 17", "velocity", "joint 'shoulder'"]),
-    (LIMIT, LIMIT + '<mimic joint="mount"/>', ["E-URDF-003", "line 12", "shoulder"]),
+    (LIMIT, LIMIT + '<mimic joint="mount"/>', ["E-URDF-042", "line 17", "shoulder", "mount"]),
     # names
     ('<child link="tip"/>', '<child link="top"/>', ["E-URDF-016", "line 21", "child", "joint 'mount'", "top"]),
     ('<parent link="boom"/>', "", ["E-URDF-015", "line 19: joint 'mount'", "parent"]),

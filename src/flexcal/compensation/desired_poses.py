@@ -41,8 +41,8 @@ def desired_pose(model: RobotModel, nominal: RobotModel, targets: ToolTargets) -
 
 
 def joints_before(model: RobotModel, target: str) -> int:
-    """Number of joints that move a point."""
-    return len(model.path_to(model.point(target).joint))
+    """Number of motors that move a point."""
+    return len(set(model.moving(model.point(target).joint)) & set(model.motors))
 
 
 def _from_stations(

@@ -74,13 +74,13 @@ def _past_limit(model: RobotModel, q: np.ndarray, verb: str) -> str | None:
     if not beyond[joint] > 0:
         return None
     unit, limit = _unit(model, joint), lower[joint] if q[joint] < lower[joint] else upper[joint]
-    return f"joint limit: {model.joint_names[joint]} {verb} {beyond[joint]:.2g} {unit} past its limit of {limit:.5g} {unit}"
+    return f"joint limit: {model.motor_names[joint]} {verb} {beyond[joint]:.2g} {unit} past its limit of {limit:.5g} {unit}"
 
 
 def _large(model: RobotModel, correction: np.ndarray, tied: str) -> str:
     joint = int(np.argmax(np.abs(correction)))
     size = f"{abs(correction[joint]):.2g} {_unit(model, joint)}"
-    return f"singular: {tied}, and the correction would move {model.joint_names[joint]} by {size}"
+    return f"singular: {tied}, and the correction would move {model.motor_names[joint]} by {size}"
 
 
 def _tied(model: RobotModel, weakest: np.ndarray) -> str:
@@ -88,12 +88,12 @@ def _tied(model: RobotModel, weakest: np.ndarray) -> str:
     part = np.abs(weakest)
     joints = np.flatnonzero(part > _SHARE * part.max()).tolist()
     if len(joints) == 1:
-        return f"{model.joint_names[joints[0]]} hardly moves the tool"
+        return f"{model.motor_names[joints[0]]} hardly moves the tool"
     return f"{_named(model, joints)} can move together with hardly any motion of the tool"
 
 
 def _named(model: RobotModel, joints: list[int]) -> str:
-    names = [model.joint_names[j] for j in joints]
+    names = [model.motor_names[j] for j in joints]
     return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
@@ -104,4 +104,4 @@ def _weakest_motion(model: RobotModel, aim: ToolPoseTarget, q: np.ndarray) -> np
 
 
 def _unit(model: RobotModel, joint: int) -> str:
-    return "m" if model.joints[joint].kind == "prismatic" else "rad"
+    return "m" if model.motor_joints[joint].kind == "prismatic" else "rad"

@@ -6,7 +6,12 @@ import numpy as np
 
 from flexcal.compensation.inverse_kinematics import inverse_kinematics
 from flexcal.compensation.tool_target import ToolPoseTarget
-from flexcal.model.kinematics import joint_ranges, low_discrepancy_configurations, point_kinematics
+from flexcal.model.kinematics import (
+    joint_ranges,
+    low_discrepancy_configurations,
+    motor_motion,
+    point_kinematics,
+)
 from flexcal.model.robot import RobotModel
 
 _POSTURES = 256
@@ -20,7 +25,9 @@ def best_posture(model: RobotModel, target: str | None = None) -> np.ndarray:
     nearest limit leaves a joint, is the largest. An arm that cannot turn its tool every way is judged by positions alone.
     """
     postures = low_discrepancy_configurations(model, _POSTURES)
-    jacobian = point_kinematics(model, postures, point=target).motion_jacobian[:, :, :, 2]
+    jacobian = point_kinematics(model, postures, point=target).motion_jacobian[:, :, :, 2] @ motor_motion(
+        model
+    )
     whole = np.linalg.svd(jacobian * np.repeat([1.0, model.reach], 3)[:, None], compute_uv=False)[:, -1]
     if model.n < 6 or not whole.max() > 0:
         whole = np.linalg.svd(jacobian[:, :3], compute_uv=False)[:, -1]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.model.kinematics import PointKinematics
+from flexcal.model.kinematics import PointKinematics, motor_motion
 from flexcal.model.parts import rotation_vector
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import points_kinematics
@@ -57,4 +57,4 @@ class ToolPoseTarget:
     def nominal(self, model: RobotModel, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Residual (N, m) and its negative Jacobian (N, m, n) of an undeflected robot at `q` (N, n)."""
         at = points_kinematics(model, q, None, self.target, jacobians=True)
-        return self.residual(at), at.motion_jacobian[:, : self.rows, :, 2]
+        return self.residual(at), at.motion_jacobian[:, : self.rows, :, 2] @ motor_motion(model)

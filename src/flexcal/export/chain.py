@@ -9,12 +9,14 @@ from flexcal.model.robot import RobotModel
 def chain_to(model: RobotModel, point: str | None, format_name: str) -> tuple[str, tuple[int, ...]]:
     """Name of a target (default: the first) and indices of the joints that move it, from the base on.
 
-    Raises `FlexcalError` for an unknown point, and for a robot without any, to which the `format_name` could lead.
+    Raises `FlexcalError` for an unknown point, and for a robot without any, to which the `format_name` could lead,
+    and one with joints that follow others.
     """
     if not model.points:
         raise FlexcalError(
             "E-EXPORT-001",
             f"{format_name} are of the chain from the base to a point, and {model.path} declares none; add one under `points:`.",
         )
+    model.require_motors(format_name)
     target = model.point(point)
     return target.name, model.path_to(target.joint)

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from flexcal.export.following_joints import followed_joints
 from flexcal.export.representation_error import ToolMap, tool_positions
 from flexcal.export.transforms import transform
 from flexcal.export.written_file import RenderedModel
 from flexcal.model.kinematics import bearing_placement, link_placement, point_placement
-from flexcal.model.parts import rotation_wxyz, vector_rotation
+from flexcal.model.parts import LoopEnd, rotation_wxyz, vector_rotation
 from flexcal.model.robot import LATERAL, RobotModel, unit_in
 
 FORMAT = "flexcal robot"
@@ -29,6 +30,7 @@ def render_json(model: RobotModel, nominal: RobotModel) -> RenderedModel:
         "units": "SI: m, rad, kg, s, N",
         "gravity": model.gravity.tolist(),
         "joints": [_joint(model, i, parent) for i, parent in enumerate(names)],
+        "relations": _relations(model),
         "points": {name: _point(model, name) for name in model.points},
         "payload": _payload(model),
         "stations": {
@@ -94,6 +96,38 @@ def _joint(model: RobotModel, i: int, parent: str | None) -> dict[str, Any]:
             "com": inertia.com.tolist(),
             "inertia_about_com": inertia.inertia.tolist(),
         },
+    }
+
+
+def _relations(model: RobotModel) -> dict[str, Any] | None:
+    relations, names = model.relations, model.joint_names
+    if relations is None:
+        return None
+
+    def end(at: LoopEnd) -> dict[str, Any]:
+        return {
+            "joint": None if at.joint < 0 else names[at.joint],
+            "placement": _placement(at.translation, at.rotation),
+        }
+
+    return {
+        "motors": list(model.motor_names),
+        "linear": [
+            {"joint": names[i], "of": {names[j]: ratio for j, ratio in of.items()}, "offset": offset}
+            for i, (of, offset) in followed_joints(model).items()
+        ],
+        "loops": [
+            {
+                "name": loop.name,
+                "a": end(loop.a),
+                "b": end(loop.b),
+                "ground": None if loop.ground < 0 else names[loop.ground],
+                "passive": {names[i]: float(at) for i, at in zip(loop.passive, loop.start, strict=True)},
+                "directions": loop.rows.tolist(),
+                "errors": {key: _quantity(model, f"loop.{loop.name}.{key}") for key in loop.errors},
+            }
+            for loop in relations.loops
+        ],
     }
 
 

@@ -42,6 +42,7 @@ def mjcf_spec(
     """
     import mujoco
 
+    model.require_motors("MJCF")
     log_mujoco_warnings()
     motors = set(range(model.n)) if free is None else set(free)
     if len(motors) < model.n and q is None:

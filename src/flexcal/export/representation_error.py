@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexcal.model.kinematics import joint_limits, point_kinematics, reach_points
+from flexcal.model.kinematics import joint_limits, point_kinematics, random_configurations, reach_points
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import static_equilibrium
 from flexcal.units import MILLIMETRE
@@ -151,7 +151,7 @@ def random_poses(model: RobotModel, point: str | None, rng: np.random.Generator)
     The second value says which. Where fewer than 50 of the tries reach the volume, it is the joint range, too.
     """
     lower, upper = joint_limits(model)
-    slides = np.array([joint.kind == "prismatic" for joint in model.joints])
+    slides = np.array([joint.kind == "prismatic" for joint in model.motor_joints])
     free = ~(upper - lower <= np.where(slides, np.finfo(float).max, _TURNS))
     reach = np.where(slides, _STROKE, np.pi)
     lower, upper = np.where(free, -reach, lower), np.where(free, reach, upper)
@@ -163,14 +163,20 @@ def random_poses(model: RobotModel, point: str | None, rng: np.random.Generator)
         poses = np.concatenate([q[reached] for q, reached in tried])
         if len(poses) >= _LEAST_REACHED:
             return poses, "working volume"
-    return rng.uniform(lower, upper, (SAMPLES, model.n)), "joint range"
+    return random_configurations(model, SAMPLES, rng, lower, upper), "joint range"
 
 
 def _leave_out(model: RobotModel, term: str) -> RobotModel:
     """Robot without a term; unchanged if it does not have it."""
     geometry, springs, drives = model.geometry, model.springs, model.drives
     if term == GEOMETRY:
-        parts = (geometry.errors[:, 1:], geometry.origin_error, geometry.tool, geometry.point_error)
+        parts = (
+            geometry.errors[:, 1:],
+            geometry.origin_error,
+            geometry.tool,
+            geometry.point_error,
+            geometry.loops,
+        )
         if not any(part.any() for part in parts):
             return model
         geometry = replace(
@@ -179,6 +185,7 @@ def _leave_out(model: RobotModel, term: str) -> RobotModel:
             origin_error=np.zeros_like(geometry.origin_error),
             tool=np.zeros(6),
             point_error=np.zeros_like(geometry.point_error),
+            loops=np.zeros_like(geometry.loops),
         )
     elif term == DEFLECTION and model.elastic:
         return model.without_springs()

@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 
 from flexcal.errors import FlexcalError
+from flexcal.export.following_joints import joint_values, relation_remarks
 from flexcal.export.representation_error import AT_REST, ToolMap
 from flexcal.export.transforms import XYZ_RPY, from_xyz_rpy, shifted, transform, turned, xyz_rpy
 from flexcal.export.urdf_inertials import bodiless_links, bodiless_remark
@@ -62,6 +63,7 @@ def render_sdf(model: RobotModel, nominal: RobotModel) -> RenderedModel:
             "Fixed and locked links are merged into those that carry them, rotors and payload are left out.",
             "Looks and collision bodies stay in the URDF.",
             *bodiless_remark(bodiless),
+            *relation_remarks(model, f"SDFormat {VERSION}", mimics=False),
         ),
     )
 
@@ -79,6 +81,7 @@ def sdf_tool(model: RobotModel, text: str) -> ToolMap:
     frames = {frame.get("name", ""): frame for frame in body.findall("frame")}
 
     def positions(q: np.ndarray) -> np.ndarray:
+        q = joint_values(model, q)
         frame = frames[model.point().name]
         at = np.broadcast_to(_matrix(frame.findtext("pose", "")), (len(q), 4, 4))
         link = frame.get("attached_to", "")

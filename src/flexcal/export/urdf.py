@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from flexcal.errors import FlexcalError
+from flexcal.export.following_joints import followed_joints, joint_values, mimicked, relation_remarks
 from flexcal.export.representation_error import AT_REST, ToolMap
 from flexcal.export.urdf_inertials import bodiless_remark, write_inertials
 from flexcal.export.written_file import ExportedFile, RenderedModel, write_rendered
@@ -62,6 +64,7 @@ def render_urdf(model: RobotModel) -> RenderedModel:
         if (position != joint.translation).any() or (rotation != joint.rotation).any():
             shift = joint.rotation.T @ (position - joint.translation)
             _move(joints[joint.name], shift, joint.rotation.T @ rotation)
+    _write_mimics(model, joints)
     bodiless = write_inertials(model, root)
     _add_points(model, root)
     ET.indent(tree)
@@ -81,7 +84,7 @@ def urdf_tool(model: RobotModel, text: str) -> ToolMap:
         data, frame = read.createData(), read.getFrameId(model.point().name, pin.FrameType.BODY)
         joints = [read.joints[read.getJointId(name)] for name in model.joint_names]
         result = np.zeros((len(q), 3))
-        for k, own in enumerate(q):
+        for k, own in enumerate(joint_values(model, q)):
             configuration = pin.neutral(read)
             for joint, value in zip(joints, own, strict=True):
                 turn = (value,) if joint.nq == 1 else (np.cos(value), np.sin(value))
@@ -95,12 +98,24 @@ def urdf_tool(model: RobotModel, text: str) -> ToolMap:
 
 def _remarks(model: RobotModel, bodiless: tuple[str, ...]) -> tuple[str, ...]:
     """Remarks on parts of the dynamics that the file lacks, one sentence each."""
-    sentences = [*bodiless_remark(bodiless)]
+    sentences = [*bodiless_remark(bodiless), *relation_remarks(model, "URDF")]
     if any(f"{name}.rotor_inertia" in model.posterior.parameters for name in model.joint_names):
         sentences.append(
             "Rotor inertia, friction and torque offset of the drives stay in estimates.yaml: torques need them besides."
         )
     return tuple(sentences)
+
+
+def _write_mimics(model: RobotModel, joints: Mapping[str | None, ET.Element]) -> None:
+    """Set the <mimic> of every joint that follows others to what it follows alone, and remove that of one that follows several."""
+    held, names = mimicked(model), model.joint_names
+    for i in followed_joints(model):
+        element = joints[names[i]]
+        for mimic in element.findall("mimic"):
+            element.remove(mimic)
+        if i in held:
+            other, ratio, offset = held[i]
+            ET.SubElement(element, "mimic", joint=names[other], multiplier=repr(ratio), offset=repr(offset))
 
 
 def _move(joint: ET.Element, shift: np.ndarray, turn: np.ndarray) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from flexcal.calibration.measurement import Propagation
 from flexcal.errors import FlexcalError
 from flexcal.estimation import distance_quantile, mean_distance, principal_variances
-from flexcal.model.kinematics import joint_ranges, point_kinematics
+from flexcal.model.kinematics import joint_ranges, point_kinematics, random_configurations
 from flexcal.progress import Progress, silent
 
 _BATCH = 256
@@ -74,7 +74,7 @@ def random_poses_in(
     model = reach.model
     lower, upper = joint_ranges(model)
     if box is None:
-        return rng.uniform(lower, upper, (count, model.n))
+        return random_configurations(model, count, rng, lower, upper)
     if not np.all(box[0] < box[1]):
         raise FlexcalError(
             "E-CAL-003",

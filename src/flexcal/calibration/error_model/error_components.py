@@ -189,6 +189,6 @@ def known_scatter(model: RobotModel, *, stated: bool) -> ErrorComponents | None:
 
 
 def joint_rotation_jacobian(at: PredictedMeasurements) -> np.ndarray:
-    """Derivative (R, 3, r) of the readings with respect to a rotation of every revolute joint, per rad, in the instrument's frame."""
-    joints = [joint for joint in at.model.joints if joint.kind == "revolute"]
+    """Derivative (R, 3, r) of the readings with respect to a rotation of every revolute motor joint, per rad, in the instrument's frame."""
+    joints = [joint for joint in at.model.motor_joints if joint.kind == "revolute"]
     return at.jacobian([f"{joint.name}.offset" for joint in joints])

@@ -86,7 +86,7 @@ def _names(model: RobotModel, poses: PoseSet) -> list[str]:
         return []
     names = [f"{e.name}.{SPRINGS[c]}.stiffness" for e in model.elastic for c in sorted(e.components)]
     names += [name for e in model.elastic if model.posterior.determines(name := f"{e.name}.drive.hardening")]
-    names += uncertain_inertials(model, [i for i in range(model.n) if _carried(model, i)])
+    names += uncertain_inertials(model, [i for i in range(len(model.joints)) if _carried(model, i)])
     if poses.payload is None or poses.payload.any():
         names += uncertain_payload(model)
     return names
@@ -94,4 +94,4 @@ def _names(model: RobotModel, poses: PoseSet) -> list[str]:
 
 def _carried(model: RobotModel, link: int) -> bool:
     """Whether a link is carried by a spring."""
-    return any(joint in model.springs.bearing_frames for joint in model.path_to(link))
+    return any(joint in model.springs.bearing_frames for joint in model.moving(link))

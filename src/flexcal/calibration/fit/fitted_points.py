@@ -255,6 +255,9 @@ class PointFit:
         else:
             at, turns = near.at, near.turns
         values = self._beginning if near is None else near.estimate.values
+        if self.start.relations is not None and self.start.relations.loops:
+            # where a parameter is held that moved a loop far, the others' values may leave the loop open
+            values = {} if near is None or fixed != near.fixed else values
         kept = Parameters(
             replace(p, value=values.get(p.name, p.value), prior_mean=p.value) if p.name in values else p
             for p in kept

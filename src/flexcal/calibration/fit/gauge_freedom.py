@@ -13,13 +13,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexcal.calibration.fit.terms import TOLERANCE, carrying_joints, joint_errors
+from flexcal.calibration.fit.terms import TOLERANCE, carrying_joints
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameter, Parameters
-from flexcal.model.kinematics import found_xyz, joint_limits
+from flexcal.model.kinematics import found_xyz, joint_limits, random_configurations
 from flexcal.model.parts import rotation_wxyz
-from flexcal.model.robot import GEOMETRY, STATION, Posterior, RobotModel, propagated_covariance_root, unit_of
+from flexcal.model.robot import (
+    GEOMETRY,
+    STATION,
+    Posterior,
+    RobotModel,
+    geometric_errors,
+    propagated_covariance_root,
+    unit_of,
+)
 
 KNOWN_POINT_STD = 0.002
 """Standard deviation, m, above which a measured point's place on the tool counts as undetermined."""
@@ -102,7 +110,7 @@ def point_uncertainty(model: RobotModel, target: str) -> float:
 
 def _names(model: RobotModel, targets: Sequence[str], stations: Sequence[str]) -> list[str]:
     """Names of the geometric parameters; for a station in the base frame without its rotation."""
-    names = joint_errors(model, carrying_joints(model, targets, stations))
+    names = geometric_errors(model, carrying_joints(model, targets, stations))
     names += [f"tool.{key}" for key in GEOMETRY]
     first = next(iter(model.points))
     names += [f"point.{t}.{axis}" for t in targets if t != first for axis in "xyz"]
@@ -140,12 +148,12 @@ def _as_predicted(model: RobotModel, poses: PoseSet) -> PoseSet:
 
 
 def _random_poses(model: RobotModel, targets: Sequence[str], stations: Sequence[str]) -> PoseSet:
-    reach = np.where([joint.kind == "prismatic" for joint in model.joints], 1.0, np.pi)
+    reach = np.where([joint.kind == "prismatic" for joint in model.motor_joints], 1.0, np.pi)
     lower, upper = (np.clip(limit, -reach, reach) for limit in joint_limits(model))
     pairs = [(target, station) for target in targets for station in stations]
     size = _POSES * len(pairs)
     return PoseSet(
-        q=np.random.default_rng(0).uniform(lower, upper, (size, model.n)),
+        q=random_configurations(model, size, np.random.default_rng(0), lower, upper),
         position=np.zeros((size, 3)),
         sigma=np.ones((size, 3)),
         torque=None,

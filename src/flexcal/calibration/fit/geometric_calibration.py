@@ -266,7 +266,7 @@ def _check_variety(model: RobotModel, poses: PoseSet) -> None:
         raise FlexcalError(
             "E-CAL-007", f"all {len(poses.q)} poses are the same; measure poses that differ in every joint."
         )
-    still = [joint.name for joint, range_ in zip(model.joints, spread, strict=True) if range_ < 1e-6]
+    still = [joint.name for joint, range_ in zip(model.motor_joints, spread, strict=True) if range_ < 1e-6]
     if still:
         raise FlexcalError(
             "E-CAL-008",

@@ -11,7 +11,7 @@ from flexcal.calibration.error_model import Whitening
 from flexcal.calibration.measurement import PredictedMeasurements
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameters, analyse
-from flexcal.model.kinematics import point_kinematics
+from flexcal.model.kinematics import joint_positions, point_kinematics
 from flexcal.model.robot import RobotModel
 from flexcal.units import MILLIMETRE
 
@@ -68,9 +68,10 @@ def _cause(at: PredictedMeasurements, name: str, partners: tuple[tuple[str, floa
         turned = _turning(start, poses, owner)
         if turned < _SMALL_TURN:
             return f"the tool turned by {np.rad2deg(turned):.1f}° only, so its offset is not identifiable beside the instrument"
+    positions = joint_positions(start, poses.q)
     for i in _neighbours(start, owner):
         joint = start.joints[i]
-        extent = float(np.ptp(poses.q[:, i]))
+        extent = float(np.ptp(positions[:, i]))
         if joint.kind == "revolute" and extent < _SMALL_RANGE:
             return f"{joint.name} moved {np.rad2deg(extent):.1f}° only"
     own = start.joint_index(owner) if owner in start.joint_names else start.n - 1
@@ -104,9 +105,9 @@ def _turning(start: RobotModel, poses: PoseSet, owner: str) -> float:
 def _neighbours(start: RobotModel, owner: str) -> list[int]:
     """Indices of the owning joint and those before and after it; for the tool the last one."""
     if owner not in start.joint_names:
-        return [start.n - 1]
+        return [] if owner.startswith("loop.") else [len(start.joints) - 1]
     i = start.joint_index(owner)
-    return [k for k in (i, i - 1, i + 1) if 0 <= k < start.n]
+    return [k for k in (i, i - 1, i + 1) if 0 <= k < len(start.joints)]
 
 
 def _shape(position: np.ndarray) -> str:

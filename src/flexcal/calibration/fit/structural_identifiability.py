@@ -12,6 +12,7 @@ from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Identifiability, Parameters, analyse
+from flexcal.model.kinematics import random_configurations
 from flexcal.model.robot import RobotModel
 
 _RANDOM_POSES = 100
@@ -59,10 +60,10 @@ def random_identifiability(
     scale: np.ndarray | None = None,
 ) -> Identifiability:
     """Rank on random poses over the whole joint ranges, with the parameters kept in `seen` ordered first."""
-    limits = np.array([(max(j.lower, -np.pi), min(j.upper, np.pi)) for j in model.joints])
+    limits = np.array([(max(j.lower, -np.pi), min(j.upper, np.pi)) for j in model.motor_joints])
     count = max(_RANDOM_POSES, len(parameters))
     many = poses.subset(np.linspace(0, len(poses) - 1, count).astype(int))
-    spread = np.random.default_rng(0).uniform(limits[:, 0], limits[:, 1], many.q.shape)
+    spread = random_configurations(model, count, np.random.default_rng(0), limits[:, 0], limits[:, 1])
     return kinematic_identifiability(
         model, replace(many, q=spread), parameters, scale=scale, prefer=seen.kept_names
     )

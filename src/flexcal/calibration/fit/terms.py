@@ -10,12 +10,14 @@ from flexcal.calibration.kinds import KINDS, kind_of
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameter, Parameters
+from flexcal.model.parts import LOOP
 from flexcal.model.robot import (
     GEOMETRY,
     LATERAL,
     ORIGIN,
     STATION,
     RobotModel,
+    geometric_errors,
     unit_of,
 )
 from flexcal.model.statics import (
@@ -49,7 +51,7 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
     """Geometric parameters of some terms, starting at the model's values (Neubauer et al. 2015, §3).
 
     `kinematic`: a place for every station, and a rotation for all but the first, whose rotation the first joint's errors span; the
-    `joint_errors` of every joint that moves a measured target, six for the tool, three for each further target, and a rotation for each
+    `geometric_errors` of every joint that moves a measured target, six for the tool, three for each further target, and a rotation for each
     target whose orientation was measured. A wire has a place and a zero, a touched plane a height and two tilts. Without an instrument of
     points nothing tells where the robot's base is: all places may turn, and errors of joints that move the whole robot as one are left out.
     `backlash`: the joints declared with it; `transmission` none, its waves being random effects (`random_waves`).
@@ -87,7 +89,7 @@ def _kinematic(model: RobotModel, poses: PoseSet, joints: Sequence[int]) -> list
     for station in poses.stations:
         told = kind_of(poses, station).place(model, poses, station, turned=station != known)
         names += [f"station.{station}.{key}" for key in told]
-    errors = joint_errors(model, joints)
+    errors = geometric_errors(model, joints)
     names += errors if poses.located.any() else _moving_parts(model, poses, errors)
     names += [f"tool.{key}" for key in GEOMETRY]
     first = next(iter(model.points))
@@ -129,10 +131,18 @@ def random_waves(model: RobotModel, poses: PoseSet, free: Parameters) -> dict[st
 
 
 def free_joints(model: RobotModel, kind: str, joints: Sequence[int]) -> list[int]:
-    """Revolute joints that may have a term of this kind: those without a spring declared in robot.yaml in its place."""
+    """Revolute joints that may have a term of this kind: those without a spring declared in robot.yaml in its place.
+
+    Joints that a loop determines have only the lateral kind.
+    """
     springs = {e.index: e.components for e in model.elastic}
     taken = {"gravity_compliance": 2, "lateral_compliance": 0}.get(kind)
-    return [i for i in joints if model.joints[i].kind == "revolute" and taken not in springs.get(i, ())]
+    held = () if model.relations is None or kind == "lateral_compliance" else model.relations.passive
+    return [
+        i
+        for i in joints
+        if model.joints[i].kind == "revolute" and taken not in springs.get(i, ()) and i not in held
+    ]
 
 
 def loaded_compliances(model: RobotModel, poses: PoseSet) -> frozenset[str]:
@@ -153,26 +163,15 @@ def loaded_compliances(model: RobotModel, poses: PoseSet) -> frozenset[str]:
 
 
 def moving_joints(model: RobotModel, poses: PoseSet) -> list[int]:
-    """Joints between the base and any measured target or carried instrument, in chain order."""
+    """Joints that move any measured target or carried instrument, those between it and the base and those that these follow."""
     return carrying_joints(model, poses.targets, poses.stations)
 
 
 def carrying_joints(model: RobotModel, targets: Sequence[str], stations: Sequence[str]) -> list[int]:
-    """Joints between the base and any of the `targets` or of the instruments on the robot among the `stations`, in chain order."""
+    """Joints that move any of the `targets` or of the instruments on the robot among the `stations`, in chain order."""
     ends = [model.point(target).joint for target in targets]
     ends += [model.carriers[name].joint for name in stations if name in model.carriers]
-    return sorted({i for end in ends for i in model.path_to(end)})
-
-
-def joint_errors(model: RobotModel, joints: Sequence[int]) -> list[str]:
-    """Names of the geometric errors of some `joints`, in chain order.
-
-    Where several of them are on one link its length vector places them together, and each but the first has an origin of its own.
-    """
-    parents = [model.joints[i].parent for i in joints]
-    branching = [i for k, i in enumerate(joints) if parents[k] in parents[:k]]
-    names = [f"{model.joints[i].name}.{key}" for i in joints for key in GEOMETRY]
-    return [*names, *(f"{model.joints[i].name}.{key}" for i in branching for key in ORIGIN)]
+    return sorted({i for end in ends for i in model.moving(end)})
 
 
 def _keys(kind: str) -> tuple[str, ...]:
@@ -215,7 +214,7 @@ def plausible_size(model: RobotModel, name: str) -> float:
         return _PLAUSIBLE_TRANSMISSION
     if key.startswith("gravity_compliance"):
         return _PLAUSIBLE_COMPLIANCE
-    if key.startswith(("length", "origin")):
+    if key.startswith(("length", "origin")) or key in LOOP:
         return _PLAUSIBLE_LENGTH
     at_base = owner in model.joint_names and model.joints[model.joint_index(owner)].parent < 0
     return _PLAUSIBLE_STATION if at_base and key != "backlash" else _PLAUSIBLE[key]
@@ -229,6 +228,8 @@ def declared_size(model: RobotModel, name: str) -> float | None:
         return scaled.scale_std(model)
     if name in prior.parameters:
         return prior.parameters[name]
+    if key in LOOP:
+        return prior.length
     if owner not in model.joint_names or key not in (*GEOMETRY, *ORIGIN):
         return None
     return prior.angle if unit_of(name) == "rad" else prior.length

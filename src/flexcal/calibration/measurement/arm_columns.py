@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.model.kinematics import PointKinematics, relative_motion
+from flexcal.model.kinematics import PointKinematics, joint_positions, relative_motion
 from flexcal.model.robot import GEOMETRY, LATERAL, ORIGIN, SPRINGS, RobotModel
 from flexcal.model.statics import (
     carried_mass,
@@ -36,6 +36,8 @@ class ArmColumns:
         owner, _, key = name.rpartition(".")
         if owner.startswith("point."):
             return self._point(owner.removeprefix("point."), key)
+        if name in self.at.model.geometry_columns:
+            return self._by_geometry[:, :, self.at.model.geometry_columns[name]]
         kind = "transmission" if key.startswith("transmission_") else key
         if kind in _BY_KEY:
             return _BY_KEY[kind](self, owner, key)
@@ -43,10 +45,10 @@ class ArmColumns:
 
     @cached_property
     def _by_motion(self) -> np.ndarray:
-        """Readings (R, 3, n, 3) by a rotation of each joint about x, y, z (a motion along z where prismatic)."""
+        """Readings (R, 3, N, 3) by a rotation of each joint about x, y, z (a motion along z where prismatic)."""
         motion = self.at.kinematics.motion_jacobian
         moved = self.at.moved(motion.reshape(len(motion), 6, -1))
-        return moved.reshape(len(moved), 3, self.at.model.n, 3)
+        return moved.reshape(len(moved), 3, len(self.at.model.joints), 3)
 
     @cached_property
     def _by_load(self) -> np.ndarray:
@@ -57,21 +59,20 @@ class ArmColumns:
 
     @cached_property
     def _by_geometry(self) -> np.ndarray:
-        """Readings (R, 3, 6 n + 6) by six errors of every joint and of the tool."""
+        """Readings (R, 3, G + 6) by the errors of `RobotModel.geometry_columns`, and six of the tool."""
         columns = self.at.moved(self.at.kinematics.geometry_jacobian)
         coupling = self.at.by_row(self.at.rest.coupling)
-        columns[:, :, : 6 * self.at.model.n] += np.matmul(self._by_load, coupling)
+        columns[:, :, : len(self.at.model.geometry_columns)] += np.matmul(self._by_load, coupling)
         return columns
 
     def _point(self, target: str, key: str) -> np.ndarray:
         own = self.at.by_row(self.at.poses.target) == target
-        place = self._by_geometry[:, :, 6 * self.at.model.n + 3 + "xyz".index(key)]
+        place = self._by_geometry[:, :, len(self.at.model.geometry_columns) + 3 + "xyz".index(key)]
         return np.where(own[:, None], place, 0.0)
 
-    def _error(self, owner: str, key: str) -> np.ndarray:
-        names = [*self.at.model.joint_names, "tool"]
-        column = self._by_geometry[:, :, 6 * names.index(owner) + GEOMETRY.index(key)]
-        if owner == "tool" and key.startswith("length"):
+    def _tool(self, owner: str, key: str) -> np.ndarray:
+        column = self._by_geometry[:, :, len(self.at.model.geometry_columns) + GEOMETRY.index(key)]
+        if key.startswith("length"):
             first = next(iter(self.at.model.points))
             return np.where((self.at.by_row(self.at.poses.target) == first)[:, None], column, 0.0)
         return column
@@ -93,7 +94,7 @@ class ArmColumns:
         moved = at.moved(moved)[:, :, 0]
         if parent < 0 or not at.rest.axes.size:
             return moved
-        beyond = [i for i in range(model.n) if joint in model.path_to(i)]
+        beyond = [i for i in range(len(model.joints)) if joint in model.path_to(i)]
         weight = np.full(len(at.poses), masses[beyond].sum())
         if model.payload is not None and model.payload.joint in beyond:
             weight += carried_mass(model, at.poses.payload, len(at.poses))
@@ -124,7 +125,7 @@ class ArmColumns:
         if key == "gravity_compliance":
             return -self.at.rest.torque[:, joint]
         order, wave = key.split("_")[1:]
-        phase = int(order) * self.at.poses.q[:, joint]
+        phase = int(order) * joint_positions(self.at.model, self.at.poses.q)[:, joint]
         return np.sin(phase) if wave == "sin" else np.cos(phase)
 
     @cached_property
@@ -186,7 +187,7 @@ def _shifted(at: PointKinematics, parent: int, axis: int, carried: np.ndarray) -
 
 
 _BY_KEY: Mapping[str, Callable[[ArmColumns, str, str], np.ndarray]] = {
-    **dict.fromkeys(GEOMETRY, ArmColumns._error),
+    **dict.fromkeys(GEOMETRY, ArmColumns._tool),
     **dict.fromkeys(ORIGIN, ArmColumns._origin),
     **dict.fromkeys(("backlash", "gravity_compliance", "transmission"), ArmColumns._twisted),
     **dict.fromkeys(LATERAL, ArmColumns._tilted),

@@ -204,6 +204,12 @@ def predict_measurements(
         jacobians=jacobians,
         force=poses.force,
     )
+    if not np.isfinite(tool.kinematics.position).all():
+        pose = poses.pose[int(np.argmin(np.isfinite(tool.kinematics.position).all(axis=1)))]
+        raise FlexcalError(
+            "E-CAL-030",
+            f"a loop of {model.name} does not close at pose {pose} with its present geometry; correct `loops:`, or leave the pose out.",
+        )
     carrier = carrier_kinematics(model, poses.q, tool.rest.deflection, poses.station, jacobians=jacobians)
     seen = tool.kinematics if carrier is None else relative_kinematics(tool.kinematics, carrier)
     at, base = np.empty((len(poses), 3)), np.empty((len(poses), 3, 3))

@@ -7,8 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.model.kinematics import carrier_kinematics, point_kinematics, relative_kinematics
-from flexcal.model.parts import left_jacobian, vector_rotation
+from flexcal.model.kinematics import (
+    carrier_kinematics,
+    joint_positions,
+    point_kinematics,
+    relative_kinematics,
+)
+from flexcal.model.parts import LOOP, left_jacobian, vector_rotation
 from flexcal.model.robot import GEOMETRY, LATERAL, MASS_AND_COM, ORIGIN, SPRINGS, STATION, RobotModel
 from flexcal.model.statics import (
     carried_mass,
@@ -21,7 +26,7 @@ from flexcal.model.statics import (
     twist_from_torque,
 )
 
-_GEOMETRIC = (*GEOMETRY, *ORIGIN, *STATION, "backlash", "gravity_compliance", *LATERAL)
+_GEOMETRIC = (*GEOMETRY, *ORIGIN, *LOOP, *STATION, "backlash", "gravity_compliance", *LATERAL)
 
 
 def moving_parameters(model: RobotModel, *, elastic: bool = True) -> list[str]:
@@ -42,7 +47,7 @@ def covariance_root(model: RobotModel, names: list[str]) -> np.ndarray:
 class Propagation:
     """Square root of the parameters' covariance, with rows sorted by their effect on the point `target` under `payload` kg.
 
-    `rows` (6 n + 6 + d + 4 n + T + 6, p): by geometric errors of joints and tool, by the stiffness of each of the d elastic coordinates, by
+    `rows` (G + 6 + d + 4 N + T + 6, p): by geometric errors of columns and tool, by the stiffness of the d elastic coordinates, by
     mass and first moment of each link, by the T `twisting` parameters (joint and kind, those that tilt its axis included), by the place
     of the `station`; natural units.
     """
@@ -73,7 +78,7 @@ class Propagation:
             hardening = np.where(axes[:, 1] == 2, model.springs.hardening[axes[:, 0]], 0.0)
             by_load /= tangent_ratio(twist_from_torque(loads, stiffness, hardening), hardening)[:, None]
         by_geometry = at.geometry_jacobian[:, :3]
-        by_geometry[:, :, : 6 * model.n] += np.matmul(by_load, coupling)
+        by_geometry[:, :, : len(model.geometry_columns)] += np.matmul(by_load, coupling)
         twists = by_geometry[:, :, [6 * joint for joint, _ in self.twisting]] * self._twist(q, loads)[:, None]
         self._tilt(q, at.motion_jacobian[:, :3, :, :2], twists)
         columns = (
@@ -94,7 +99,7 @@ class Propagation:
         model, columns = self.model, []
         angular = model.value("scatter.angular")
         if angular > 0:
-            revolute = [6 * i for i, joint in enumerate(model.joints) if joint.kind == "revolute"]
+            revolute = [6 * i for i in model.motors if model.joints[i].kind == "revolute"]
             columns.append(angular * by_geometry[:, :, revolute])
         size = np.hypot(model.value("scatter.robot"), model.value("scatter.model"))
         if size > 0:
@@ -120,7 +125,9 @@ class Propagation:
                 columns[:, k] = 0.0
             else:
                 order, wave = kind.split("_")[1:]
-                columns[:, k] = (np.sin if wave == "sin" else np.cos)(int(order) * q[:, joint])
+                columns[:, k] = (np.sin if wave == "sin" else np.cos)(
+                    int(order) * joint_positions(self.model, q)[:, joint]
+                )
         return columns
 
     def _tilt(self, q: np.ndarray, by_tilt: np.ndarray, twists: np.ndarray) -> None:
@@ -145,7 +152,7 @@ class Propagation:
         }
         if not loaded <= springs.keys():
             return gravity_torque(self.model, q, self.payload)
-        torque = np.zeros(q.shape)
+        torque = np.zeros((len(q), len(self.model.joints)))
         for joint in loaded:
             torque[:, joint] = loads[:, springs[joint]]
         return torque
@@ -178,24 +185,26 @@ def propagation(
     mass = float(carried_mass(model, None if payload is None else np.array([payload]), 1)[0])
     place = model.stations.names[0] if station is None else station
     root = covariance_root(model, names)
-    n, axes = model.n, elastic_axes(model)
-    owners = [*model.joint_names, "tool"]
+    axes, columns = elastic_axes(model), model.geometry_columns
+    errors, bodies = len(columns), 4 * len(model.joints)
     links = [joint.link for joint in model.joints]
     twisting = [_twisting(model, item) for item in names]
     twists = [item for item in twisting if item is not None]
-    first_twist = 6 * n + 6 + len(axes) + 4 * n
+    first_twist = errors + 6 + len(axes) + bodies
     rows = np.zeros((first_twist + len(twists) + 6, len(names)))
     for item, row in zip(names, root, strict=True):
         owner, _, key = item.rpartition(".")
-        body = 6 * n + 6 + len(axes)
+        body = errors + 6 + len(axes)
         if owner == f"station.{place}":
             rows[first_twist + len(twists) + STATION.index(key)] += row
         elif owner == f"point.{name}":
-            rows[6 * n + 3 + "xyz".index(key)] += row
-        elif owner in owners and key in GEOMETRY:
-            if owner != "tool" or not key.startswith("length") or name == next(iter(model.points)):
-                rows[6 * owners.index(owner) + GEOMETRY.index(key)] += row
-        elif owner in owners and key in ORIGIN:
+            rows[errors + 3 + "xyz".index(key)] += row
+        elif owner == "tool":
+            if not key.startswith("length") or name == next(iter(model.points)):
+                rows[errors + GEOMETRY.index(key)] += row
+        elif item in columns:
+            rows[columns[item]] += row
+        elif key in ORIGIN:
             joint, axis = model.joint_index(owner), ORIGIN.index(key)
             parent = model.joints[joint].parent
             if joint in model.path_to(model.point(name).joint) and parent >= 0:
@@ -209,7 +218,7 @@ def propagation(
             rows[first_twist + twists.index(twist)] += row
         elif key == "stiffness":
             joint, _, spring = owner.rpartition(".")
-            rows[6 * n + 6 + axes.index((model.joint_index(joint), SPRINGS.index(spring)))] += row
+            rows[errors + 6 + axes.index((model.joint_index(joint), SPRINGS.index(spring)))] += row
         elif owner == "payload":
             attached = model.payload
             assert attached is not None

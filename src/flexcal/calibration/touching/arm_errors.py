@@ -11,7 +11,7 @@ from flexcal.calibration.fit import TOLERANCE, declared_size
 from flexcal.calibration.measurement import PredictedMeasurements, covariance_root, moving_parameters
 from flexcal.data.poses import Touches
 from flexcal.model.kinematics import PointKinematics
-from flexcal.model.robot import GEOMETRY, RobotModel, unit_in
+from flexcal.model.robot import GEOMETRY, RobotModel, geometric_errors, unit_in
 from flexcal.model.statics import Equilibrium, tool_at_rest
 
 _TYPICAL = 2.0
@@ -84,7 +84,7 @@ def arm_errors(frames: TouchedFrames, *, tool: bool) -> ArmErrors:
     those that the place of the point on the tool takes up do count.
     """
     model, touches = frames.model, frames.touches
-    joints = model.path_to(model.point(frames.point).joint)
+    joints = model.moving(model.point(frames.point).joint)
     rigid = _rigid_names(model, joints, frames.point, tool=tool)
     calibrated = is_calibrated(model)
     known = [
@@ -97,7 +97,7 @@ def arm_errors(frames: TouchedFrames, *, tool: bool) -> ArmErrors:
         columns.append(prediction.jacobian(known).reshape(rows, -1) @ covariance_root(model, known))
     std: dict[str, float] = {}
     if not calibrated:
-        names = [f"{model.joints[i].name}.{key}" for i in joints for key in GEOMETRY]
+        names = geometric_errors(model, joints)
         std = {name: _typical_size(model, name) for name in names if name not in rigid}
         columns.append(prediction.jacobian(list(std)).reshape(rows, -1) * np.array(list(std.values())))
     shared = np.concatenate(columns, axis=1)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.data.poses import PoseSet
-from flexcal.model.kinematics import LinkSurface
+from flexcal.model.kinematics import LinkSurface, joint_positions
 from flexcal.model.parts import vector_rotation
 from flexcal.model.robot import STATION, RobotModel
 
@@ -54,8 +54,8 @@ def joint_polylines(model: RobotModel, poses: PoseSet) -> np.ndarray:
     """Polyline (N, joints + 2, 3) m of the undeflected arm from the base through every joint to the measured point, base frame,
     undeflected.
     """
-    still = np.zeros((len(poses), model.n, 3))
-    q = np.ascontiguousarray(poses.q)
+    q = np.ascontiguousarray(joint_positions(model, poses.q))
+    still = np.zeros((*q.shape, 3))
     target = model.point(str(poses.target[0]))
 
     def place(index: int, rotation: np.ndarray, translation: np.ndarray, xyz: np.ndarray) -> np.ndarray:

@@ -43,7 +43,7 @@ class Init:
         described = init_robot(self.urdf, self.folder, tip=self.tip)
         arm, model = described.arm, described.model
         console.say(
-            f"{model.name}: {model.n} joints ({', '.join(model.joint_names)}), reach {model.reach:.2f} m"
+            f"{model.name}: {model.n} joints ({', '.join(model.motor_names)}), reach {model.reach:.2f} m"
         )
         if arm.locked:
             stand = ", ".join(f"{name} at {value:g}" for name, value in arm.locked.items())

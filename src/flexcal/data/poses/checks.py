@@ -33,7 +33,7 @@ def check_motion(poses: PoseSet, model: RobotModel, where: str) -> None:
         )
     still = np.flatnonzero(travel < STILL)
     if still.size:
-        listed = ", ".join(f"{model.joint_names[i]} (column q{i + 1})" for i in still)
+        listed = ", ".join(f"{model.motor_names[i]} (column q{i + 1})" for i in still)
         word = "joints never move" if still.size > 1 else "joint never moves"
         raise InputError(
             "E-POSES-005",

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexcal.data.tables.following_joints import check_following_joints
 from flexcal.data.tables.signals import Signal
 from flexcal.data.tables.tabular_file import Table
 from flexcal.units import DEGREE, MILLIMETRE
@@ -18,19 +19,21 @@ if TYPE_CHECKING:
 def check_joint_units(model: RobotModel, table: Table, signal: Signal, q: np.ndarray) -> None:
     """Raise `InputError` with row and column of the first position (N, n) that lies far past the joint's limits.
 
-    Far is more than half the joint's range (at least 0.5 rad or m) past a limit; a joint without limits has ±2π.
+    Far is more than half the joint's range (at least 0.5 rad or m) past a limit; a joint without limits has ±2π. Joints that follow others
+    are checked too, as `check_following_joints` does.
     """
-    lower = np.array([joint.lower for joint in model.joints])
-    upper = np.array([joint.upper for joint in model.joints])
+    lower = np.array([joint.lower for joint in model.motor_joints])
+    upper = np.array([joint.upper for joint in model.motor_joints])
     lower = np.where(np.isfinite(lower), lower, -2 * np.pi)
     upper = np.where(np.isfinite(upper), upper, 2 * np.pi)
     margin = np.maximum(0.5 * (upper - lower), 0.5)
     far = (q < lower - margin) | (q > upper + margin)
     if not far.any():
+        check_following_joints(model, table, signal.column_of(0), q)
         return
     row = int(np.argmax(far.any(axis=1)))
     column = int(np.argmax(far[row]))
-    joint, value = model.joints[column], q[row, column]
+    joint, value = model.motor_joints[column], q[row, column]
     prismatic = getattr(joint, "kind", "revolute") == "prismatic"
     unit, other, word = ("m", "mm", "millimetres") if prismatic else ("rad", "deg", "degrees")
     scaled = q * (MILLIMETRE if prismatic else DEGREE)
@@ -58,16 +61,16 @@ def check_joint_limits(
     be free on either side for what moves about the pose.
     """
     need = np.broadcast_to(room, q.shape[1:])
-    lower = np.array([joint.lower for joint in model.joints])
-    upper = np.array([joint.upper for joint in model.joints])
+    lower = np.array([joint.lower for joint in model.motor_joints])
+    upper = np.array([joint.upper for joint in model.motor_joints])
     outside = (q < lower + need) | (q > upper - need)
     if not outside.any():
         return
     row, joint = (int(i) for i in np.argwhere(outside)[0])
     name = table.columns["pose"][rows[row]]
     pose = f"pose {name}" if isinstance(name, str) else f"pose {name:g}"
-    unit = "m" if model.joints[joint].kind == "prismatic" else "rad"
-    limits = f"limits of {model.joints[joint].name} ({lower[joint]:.5g} to {upper[joint]:.5g} {unit})"
+    unit = "m" if model.motor_joints[joint].kind == "prismatic" else "rad"
+    limits = f"limits of {model.motor_joints[joint].name} ({lower[joint]:.5g} to {upper[joint]:.5g} {unit})"
     if need[joint]:
         what = f"{pose}, at {q[row, joint]:.5g} {unit}, leaves less than the {need[joint]:.3g} {unit} that it needs to the {limits}"
     else:

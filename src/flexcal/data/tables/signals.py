@@ -151,6 +151,7 @@ def assign(
         if choice is not None:
             assigned[quantity] = choice
     used = {column for signal in assigned.values() for column in signal.columns} | set(texts)
+    used |= {joint.name for i, joint in enumerate(model.joints) if i not in model.motors}
     known = [name for quantity in (*required, *optional) for name in standard_columns(quantity, model.n)]
     known += [
         name for quantity in (*required, *optional) if quantity in mapped for name in mapped[quantity].columns

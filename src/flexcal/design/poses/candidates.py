@@ -9,7 +9,7 @@ import numpy as np
 from flexcal.design.poses.gravity_preload import preloaded
 from flexcal.design.scene import STANDARD, CollisionChecker, MeasuringSetup, visible
 from flexcal.errors import FlexcalError
-from flexcal.model.kinematics import joint_ranges, point_kinematics
+from flexcal.model.kinematics import joint_ranges, point_kinematics, random_configurations
 from flexcal.progress import Progress, silent
 
 _TRIES = 100
@@ -51,7 +51,7 @@ def random_candidates(
                 "relax the most restrictive one (station, acceptance, obstacles, floor, payload).",
             )
         share = max(have / drawn, 0.02) if drawn else 0.5
-        q = rng.uniform(lower, upper, (int(1.1 * (count - have) / share) + 16, model.n))
+        q = random_configurations(model, int(1.1 * (count - have) / share) + 16, rng, lower, upper)
         drawn += len(q)
         for name, check in checks.items():
             passed = check(q)

@@ -49,7 +49,7 @@ def geometry_jacobian(
     motion = point_kinematics(model, q, point=setup.point)
     target = model.point(setup.point)
     names = [f"station.{station}.{axis}" for axis in "xyz"]
-    names += [f"{joint.name}.{key}" for joint in model.joints for key in GEOMETRY]
+    names += list(model.geometry_columns)
     names += [f"tool.{key}" for key in GEOMETRY]
     if target.name != next(iter(model.points)):
         names[-3:] = [f"point.{target.name}.{axis}" for axis in "xyz"]

@@ -178,7 +178,7 @@ class Instrument:
             good = np.linalg.norm(missing, axis=1) < _REACHED
             if good.all():
                 break
-            columns = at.jacobian([f"{name}.offset" for name in model.joint_names])
+            columns = at.jacobian([f"{name}.offset" for name in model.motor_names])
             q = q + (np.linalg.pinv(columns, rcond=1e-6) @ missing[:, :, None])[:, :, 0]
         return q[good & (q >= lower).all(axis=1) & (q <= upper).all(axis=1)]
 

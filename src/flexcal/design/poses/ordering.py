@@ -59,7 +59,7 @@ def measurement_order(
 
 def move_seconds(checker: CollisionChecker, q: np.ndarray) -> np.ndarray:
     """Least time (N, N), s, between the poses `q` (N, n), all joints moving at once, none faster than its limit."""
-    speed = np.array([joint.velocity for joint in checker.model.joints])
+    speed = np.array([joint.velocity for joint in checker.model.motor_joints])
     speed = np.where(np.isfinite(speed) & (speed > 0), speed, UNLIMITED)
     return np.max(np.abs(q[:, None] - q[None]) / speed, axis=2)
 

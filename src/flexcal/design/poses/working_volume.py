@@ -9,7 +9,7 @@ import numpy as np
 from flexcal.design.poses.candidates import above_floor
 from flexcal.design.scene import CollisionChecker
 from flexcal.errors import FlexcalError
-from flexcal.model.kinematics import joint_ranges, reach_points
+from flexcal.model.kinematics import joint_ranges, random_configurations, reach_points
 
 TRIES = 12
 """Number of starts from which a point is tried."""
@@ -86,7 +86,12 @@ def _configurations(
         if not len(left):
             break
         tried, reached = reach_points(
-            model, targets[left], rng.uniform(lower, upper, (len(left), model.n)), lower, upper, point=point
+            model,
+            targets[left],
+            random_configurations(model, len(left), rng, lower, upper),
+            lower,
+            upper,
+            point=point,
         )
         reached &= above_floor(checker, tried, point)
         reached[reached] = ~checker.collides(tried[reached])

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from flexcal.errors import InputError
-from flexcal.model.kinematics import joint_batch, low_discrepancy_configurations
+from flexcal.model.kinematics import joint_batch, joint_positions, low_discrepancy_configurations
 from flexcal.model.robot import RobotModel
 from flexcal.model.urdf import locked_joints, read_elements
 
@@ -171,6 +171,7 @@ class CollisionChecker:
 
     def configurations(self, q: np.ndarray) -> np.ndarray:
         """Pinocchio's configurations (samples, nq), in which an unbounded joint is a cosine and a sine."""
+        q = joint_positions(self.model, q)
         result = np.empty((len(q), self.kinematics.nq))
         for i, name in enumerate(self.model.joint_names):
             joint = self.kinematics.joints[self.kinematics.getJointId(name)]

@@ -42,7 +42,7 @@ def joint_quantities(
     """Columns of every quantity with one a joint; `reasons` gets those that are like them and not used."""
     groups: _Groups = {}
     numbered: _Groups = {}
-    sliding = [joint.kind == "prismatic" for joint in model.joints]
+    sliding = [joint.kind == "prismatic" for joint in model.motor_joints]
     for name in names:
         joint, words = _joint_of(name, model)
         slides = any(sliding) if joint is None else sliding[joint]
@@ -121,7 +121,7 @@ def _best(
 def _joint_of(name: ColumnName, model: RobotModel) -> tuple[int | None, tuple[str, ...]]:
     """Joint whose name is part of a column's name, and the other words."""
     best: tuple[int, int, tuple[str, ...]] | None = None
-    for joint, called in enumerate(model.joint_names):
+    for joint, called in enumerate(model.motor_names):
         rest = _says(name, called)
         if rest is not None and (best is None or len(called) > best[0]):
             best = (len(called), joint, rest)

@@ -186,7 +186,7 @@ def _simple_changes(model: RobotModel) -> Iterator[_Change]:
 
 def _turning(model: RobotModel) -> list[int]:
     """The joints whose zero is seen: not the first and the last, for instrument and point may be anywhere."""
-    return [i for i in range(1, model.n - 1) if model.joints[i].kind != "prismatic"]
+    return [i for i in range(1, model.n - 1) if model.motor_joints[i].kind != "prismatic"]
 
 
 def _signs_and_zeros(model: RobotModel, tool: _Tool, q: np.ndarray, xyz: np.ndarray) -> _Change:
@@ -223,7 +223,7 @@ def _said(model: RobotModel, placed: ColumnAssignment, change: _Change) -> dict[
         words.append(
             f"the joints seem to be in another order: {', '.join(placed.columns[i] for i in change.order)}"
         )
-    for i, joint in enumerate(model.joints):
+    for i, joint in enumerate(model.motor_joints):
         sign, zero, source = change.signs[i], change.zeros[i], change.order[i]
         if sign < 0:
             words.append(f"{joint.name} seems to have the opposite sign")

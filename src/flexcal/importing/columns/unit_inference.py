@@ -27,7 +27,7 @@ def joint_units(model: RobotModel, q: np.ndarray) -> tuple[str, ...]:
 
     A single joint's limits do not count: one that is counted the other way is past them in any unit.
     """
-    kinds = np.array([joint.kind == "prismatic" for joint in model.joints])
+    kinds = np.array([joint.kind == "prismatic" for joint in model.motor_joints])
     chosen = {}
     for prismatic, (unit, other) in ((False, ("rad", "deg")), (True, ("m", "mm"))):
         values = np.abs(q[:, kinds == prismatic])
@@ -38,7 +38,7 @@ def joint_units(model: RobotModel, q: np.ndarray) -> tuple[str, ...]:
 
 def _widest(model: RobotModel, prismatic: bool) -> float:
     """The largest limit (rad or m) of the joints of a kind; a joint without limits turns by 2π."""
-    own = [joint for joint in model.joints if (joint.kind == "prismatic") == prismatic]
+    own = [joint for joint in model.motor_joints if (joint.kind == "prismatic") == prismatic]
     limits = [abs(limit) for joint in own for limit in (joint.lower, joint.upper)]
     return max((limit if np.isfinite(limit) else 2 * np.pi for limit in limits), default=0.0)
 

@@ -16,17 +16,17 @@ _FEW = 0.05
 def joint_extents(model: RobotModel, q: np.ndarray) -> dict[str, tuple[float, float]]:
     """Lowest and highest position of every joint over poses `q` (N, n), rad or m."""
     lowest, highest = q.min(axis=0).tolist(), q.max(axis=0).tolist()
-    return dict(zip(model.joint_names, zip(lowest, highest, strict=True), strict=True))
+    return dict(zip(model.motor_names, zip(lowest, highest, strict=True), strict=True))
 
 
 def outside_ranges(calibrated: CalibratedRobot, q: np.ndarray) -> str:
     """Remark on poses `q` (N, n) outside the joint ranges of the calibration; empty if there are hardly any."""
     ranges, model = calibrated.blocks["calibration"].ranges, calibrated.model
-    known = [name for name in model.joint_names if name in ranges]
+    known = [name for name in model.motor_names if name in ranges]
     if not known:
         return ""
     low, high = np.array([ranges[name] for name in known]).T
-    columns = q[:, [model.joint_index(name) for name in known]]
+    columns = q[:, [model.motor_names.index(name) for name in known]]
     slack = _BEYOND * (high - low)
     outside = (columns < low - slack) | (columns > high + slack)
     share = float(outside.any(axis=1).mean())

@@ -118,10 +118,10 @@ class Compensation(Result):
                 "p90_mm": float(np.quantile(before, 0.9)),
                 "max_mm": float(before.max()),
             },
-            "largest_change": dict(zip(self.model.joint_names, change.tolist(), strict=True)),
+            "largest_change": dict(zip(self.model.motor_names, change.tolist(), strict=True)),
             "start": None
             if self.start is None
-            else dict(zip(self.model.joint_names, self.start.tolist(), strict=True)),
+            else dict(zip(self.model.motor_names, self.start.tolist(), strict=True)),
             "from_other_postures": self.targets.pose[reached & commands.elsewhere].tolist(),
             "refused": self.refused,
         }
@@ -270,6 +270,6 @@ def _start(model: RobotModel, values: Sequence[float]) -> np.ndarray:
         j = int(outside[0])
         raise InputError(
             "E-RUN-020",
-            f"--start puts {model.joint_names[j]} at {start[j]:g}, outside its limits ({lower[j]:.4g} to {upper[j]:.4g}); use rad.",
+            f"--start puts {model.motor_names[j]} at {start[j]:g}, outside its limits ({lower[j]:.4g} to {upper[j]:.4g}); use rad.",
         )
     return start

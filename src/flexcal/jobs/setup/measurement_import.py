@@ -148,7 +148,7 @@ def import_file(
     value is missing or cannot be, and for a `sigma` that is not positive or has no place.
     """
     model = RobotModel.from_yaml(robot_file, estimates=False)
-    foreign = read_foreign(file, model.joint_names, sheet=sheet, topic=topic)
+    foreign = read_foreign(file, model.motor_names, sheet=sheet, topic=topic)
     guess = guess_columns(foreign, model)
     if mapped:
         guess = apply_map(mapped, guess, foreign, model)

@@ -36,7 +36,7 @@ class InitialisedRobot:
         return {
             "file": self.file,
             "robot": self.model.name,
-            "joints": list(self.model.joint_names),
+            "joints": list(self.model.motor_names),
             "locked": self.arm.locked,
             "frame": self.arm.frame,
             "frames": list(self.arm.frames),
@@ -75,7 +75,11 @@ def init_robot(urdf: Path, out: Path, *, tip: str | None = None) -> InitialisedR
 
 
 def _minimal(urdf: str, arm: Arm) -> str:
-    return f"robot: {_text(urdf)}\n{_locked(arm)}"
+    return f"robot: {_text(urdf)}\n{_locked(arm)}{_motors(arm)}"
+
+
+def _motors(arm: Arm) -> str:
+    return f"motors: [{', '.join(map(_text, arm.motors))}]\n" if arm.motors else ""
 
 
 def _locked(arm: Arm) -> str:
@@ -88,11 +92,19 @@ def _locked(arm: Arm) -> str:
 def _commented(urdf: str, arm: Arm, model: RobotModel) -> str:
     n = model.n
     width = max(len(name) for name in model.joint_names)
-    rows = [f"#   q{i:<3}{joint.name:<{width}}  {_range(joint)}" for i, joint in enumerate(model.joints, 1)]
+    rows = [
+        f"#   q{i:<3}{joint.name:<{width}}  {_range(joint)}" for i, joint in enumerate(model.motor_joints, 1)
+    ]
+    rows += [
+        f"#   –   {joint.name:<{width}}  follows others"
+        for i, joint in enumerate(model.joints)
+        if i not in model.motors
+    ]
+    order = f"\n# Their order is a guess from their names: check it.\n{_motors(arm)}" if arm.motors else ""
     others = f"; also on it: {', '.join(arm.frames[1:])}" if arm.frames[1:] else ""
     zeros, gains = ", ".join(["0"] * n), ", ".join(["1.0"] * n)
-    turning = [joint.name for joint in model.joints if joint.kind != "prismatic"]
-    sliding = [joint.name for joint in model.joints if joint.kind == "prismatic"]
+    turning = [joint.name for joint in model.motor_joints if joint.kind != "prismatic"]
+    sliding = [joint.name for joint in model.motor_joints if joint.kind == "prismatic"]
     first = _text((turning or sliding)[min(1, len(turning or sliding) - 1)])
     per = "m" if not turning else "rad"
     force = "N" if not turning else "N m"
@@ -105,7 +117,7 @@ robot: {_text(urdf)}
 
 # The joints, in the order of the columns q1 … q{n} of every file:
 {chr(10).join(rows)}
-{locked if arm.locked else ""}
+{locked if arm.locked else ""}{order}
 # What the instrument sees: the centre of the reflector, m along the axes of a frame of the URDF. {_text(arm.frame)} was guessed
 # from its name{others}. Measure xyz with a ruler, to a centimetre or so: the calibration finds the rest,
 # and 'flexcal import' and 'flexcal calibrate' write what they find here with --write-point.
@@ -148,7 +160,7 @@ gravity: [0, 0, -9.81]         # in the robot's base frame; turn it for a robot 
 
 def _position_unit(model: RobotModel) -> str:
     """Remainder of the line of q under `signals:`: one unit if all joints are of one type, else a factor to rad or m for every joint."""
-    slides = [joint.kind == "prismatic" for joint in model.joints]
+    slides = [joint.kind == "prismatic" for joint in model.motor_joints]
     if all(slides):
         return "unit: mm}"
     if not any(slides):

@@ -1,12 +1,14 @@
-from .forward import PointKinematics, joint_batch, point_kinematics
+from .following_joints import JointMotion, joint_motion, joint_positions, loop_gap
+from .forward import PointKinematics, joint_batch, motor_motion, point_kinematics
 from .inverse import damped_step, reach_points
-from .joint_space import joint_limits, joint_ranges, low_discrepancy_configurations
+from .joint_space import joint_limits, joint_ranges, low_discrepancy_configurations, random_configurations
 from .link_poses import joint_origins, link_frames
 from .link_surface import LinkSurface
 from .placements import bearing_placement, found_xyz, joint_placement, link_placement, point_placement
 from .relative import carrier_kinematics, relative_kinematics, relative_motion
 
 __all__ = [
+    "JointMotion",
     "LinkSurface",
     "PointKinematics",
     "bearing_placement",
@@ -15,14 +17,19 @@ __all__ = [
     "found_xyz",
     "joint_batch",
     "joint_limits",
+    "joint_motion",
     "joint_origins",
     "joint_placement",
+    "joint_positions",
     "joint_ranges",
     "link_frames",
     "link_placement",
+    "loop_gap",
     "low_discrepancy_configurations",
+    "motor_motion",
     "point_kinematics",
     "point_placement",
+    "random_configurations",
     "reach_points",
     "relative_kinematics",
     "relative_motion",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexcal.model.kinematics.forward import joint_batch, point_kinematics
+from flexcal.model.kinematics.forward import joint_batch, motor_motion, point_kinematics
 from flexcal.model.robot import RobotModel
 from flexcal.units import MILLIMETRE
 
@@ -34,9 +34,7 @@ def reach_points(
     q = np.clip(joint_batch(model, q), lower, upper)
     for _ in range(STEPS):
         motion = point_kinematics(model, q, point=point)
-        columns = motion.geometry_jacobian[
-            :, :3, : 6 * model.n : 6
-        ]  # by the joint's offset, which moves it like q
+        columns = motion.motion_jacobian[:, :3, :, 2] @ motor_motion(model)
         missing = position - motion.position
         step = damped_step(columns, missing, DAMPING)
         largest = np.abs(step).max(axis=1, initial=1e-12)

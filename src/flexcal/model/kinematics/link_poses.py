@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from flexcal.model.kinematics.following_joints import joint_motion
 from flexcal.model.kinematics.forward import joint_batch, point_kinematics
 from flexcal.model.kinematics.placements import joint_placement
 from flexcal.model.parts import axis_rotations
@@ -11,13 +12,16 @@ from flexcal.model.robot import RobotModel
 
 
 def link_frames(model: RobotModel, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation (samples, n, 3, 3) and origin (samples, n, 3), m, of every joint's link in the base frame at `q` (samples, n).
+    """Rotation (samples, N, 3, 3) and origin (samples, N, 3), m, of every joint's link in the base frame at `q` (samples, n).
 
     Geometric errors count, deflection does not (Eqs. 15-17 with q_arm = q_motor). Raises `FlexcalError` for a wrong joint count.
     """
     q = joint_batch(model, q)
-    rotation = np.empty((len(q), model.n, 3, 3))
-    origin = np.empty((len(q), model.n, 3))
+    if model.relations is not None:
+        motion = joint_motion(model, q, np.zeros((len(q), len(model.joints), 3)), derivatives=False)
+        q = motion.q + motion.deflection[:, :, 2]
+    rotation = np.empty((*q.shape, 3, 3))
+    origin = np.empty((*q.shape, 3))
     for i, joint in enumerate(model.joints):
         shift, turn = joint_placement(model, i)
         moved = q[:, i] + model.geometry.errors[i, 0]

@@ -102,7 +102,7 @@ def _mesh(shape: Any) -> tuple[np.ndarray, np.ndarray] | None:
 
 def _capsules(model: RobotModel) -> list[tuple[int, np.ndarray, np.ndarray]]:
     """Capsules in every link from its joint to the next joints and to the first point."""
-    ends = [(model.joints[k].parent, joint_placement(model, k)[0]) for k in range(model.n)]
+    ends = [(model.joints[k].parent, joint_placement(model, k)[0]) for k in range(len(model.joints))]
     ends += [point_placement(model, name)[:2] for name in list(model.points)[:1]]
     radius = _SLENDER * sum(float(np.linalg.norm(end)) for _, end in ends)
     parts = []

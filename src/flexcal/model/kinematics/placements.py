@@ -24,7 +24,7 @@ def joint_placement(model: RobotModel, joint: int) -> tuple[np.ndarray, np.ndarr
 def link_placement(model: RobotModel, joint: int, q: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Position (3,) m and rotation (3, 3) of a joint's link in the parent link with the motor at `q` (rad or m), undeflected."""
     position, rotation = joint_placement(model, joint)
-    axis, motion = model.joints[joint].axis, q + model.geometry.errors[joint, 0]
+    axis, motion = model.joints[joint].axis, q + model.joint_offsets[joint]
     if model.joints[joint].kind == "prismatic":
         return position + rotation @ axis * motion, rotation
     return position, rotation @ axis_rotation(axis, motion)
@@ -34,7 +34,7 @@ def bearing_placement(model: RobotModel, spring: ElasticJoint, q: float = 0.0) -
     """Axes (3, 3) about which the bearing tilts, and the joint's, in the axes of its link at `link_placement`."""
     if not spring.tilts_first:
         return spring.frame
-    motion = q + model.geometry.errors[spring.index, 0]
+    motion = q + model.joint_offsets[spring.index]
     return axis_rotation(model.joints[spring.index].axis, -motion) @ spring.frame
 
 

@@ -13,11 +13,13 @@ def carrier_kinematics(
 ) -> PointKinematics | None:
     """Kinematics of the frames that carry the `stations` (N,) at `q` (N, n), bent by `deflection` (N, n, 3); None where none is carried.
 
-    Instruments that stand still are at the base. Without `jacobians` these are empty.
+    Instruments that stand still are at the base. Without `jacobians` these are empty. Raises `FlexcalError` for a robot with joints that
+    follow others.
     """
     names = [name for name in dict.fromkeys(stations.tolist()) if name in model.carriers]
     if not names:
         return None
+    model.require_motors("the joints that carry an instrument")
     count, n = len(q), model.n
     rows = count if jacobians else 0
     position, orientation = np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1))

@@ -2,6 +2,7 @@ from .inertia import LINK_PARAMETERS, Inertia, parallel_axis
 from .joint import ElasticJoint, Joint, normals_to
 from .point import ForceSensor, Payload, Point
 from .pseudo_inertia_matrix import PSEUDO_INERTIA, is_physically_consistent, pseudo_inertia
+from .relations import LOOP, Loop, LoopEnd, Relations, carried, common_joint, joints_that_move
 from .rotations import (
     axis_rotation,
     axis_rotations,
@@ -19,20 +20,27 @@ from .tree import Bearings, bearing_frame, branching_joints, kinematic_tree, pat
 
 __all__ = [
     "LINK_PARAMETERS",
+    "LOOP",
     "PSEUDO_INERTIA",
     "Bearings",
     "ElasticJoint",
     "ForceSensor",
     "Inertia",
     "Joint",
+    "Loop",
+    "LoopEnd",
     "Payload",
     "Point",
+    "Relations",
     "axis_rotation",
     "axis_rotations",
     "bearing_frame",
     "branching_joints",
+    "carried",
+    "common_joint",
     "inverse_right_jacobians",
     "is_physically_consistent",
+    "joints_that_move",
     "kinematic_tree",
     "left_jacobian",
     "normals_to",

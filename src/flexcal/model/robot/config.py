@@ -476,6 +476,46 @@ class LimitsConfig:
 
 
 @dataclass(frozen=True)
+class RelationConfig:
+    """A `joint` whose actual position is `offset` + Σ ratio · actual position of the joints `of`: rad or m, deflection included.
+
+    A joint that stands among its own `of` has a motor, which turns it by that ratio while the others carry it along.
+    """
+
+    joint: str
+    of: dict[str, float]
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.of or 0 in self.of.values():
+            raise FlexcalError(
+                "E-ROBOT-061",
+                f"the relation of '{self.joint}' needs the joints that it follows, each with a ratio other than 0, as "
+                "`of: {joint_2: -1.0}`.",
+            )
+
+
+@dataclass(frozen=True)
+class LoopConfig:
+    """Two frames `a` and `b` of the URDF that coincide: a pin, which leaves a rotation, or a ball.
+
+    `passive`: the joints that this determines, two for a pin and three for a ball, with the positions near which the loop closes while all
+    motors are at zero, or at the limit nearest to it (rad or m).
+    """
+
+    a: str
+    b: str
+    passive: dict[str, float]
+
+    def __post_init__(self) -> None:
+        if len(self.passive) not in (2, 3):
+            raise FlexcalError(
+                "E-ROBOT-064",
+                f"a loop determines two passive joints by a pin, or three by a ball, not {len(self.passive)}; list them under `passive:`.",
+            )
+
+
+@dataclass(frozen=True)
 class ControllerConfig:
     """Joint-side PD gains (N m/rad, N m s/rad) and the rate (Hz) of the position controller."""
 
@@ -507,12 +547,16 @@ class RobotConfig:
     """Content of robot.yaml. `locked`: movable joints of the URDF that stand still, as those of a gripper, and their positions (rad or m).
 
     `bearings` says whether the bearings of elastic joints tilt before or after the joint's rotation (Eq. 1: after); without it the data
-    decide, where they tell.
+    decide, where they tell. `relations`, beside those that the URDF gives as <mimic>, and `loops` determine joints without motors;
+    `motors`: the others in the order of the columns q1, q2, ….
     """
 
     robot: str
     points: dict[str, PointConfig] = field(default_factory=dict)
     locked: dict[str, float] = field(default_factory=dict)
+    relations: tuple[RelationConfig, ...] = ()
+    loops: dict[str, LoopConfig] = field(default_factory=dict)
+    motors: tuple[str, ...] = ()
     sensors: dict[str, ArmSensorConfig] = field(default_factory=dict)
     payload: PayloadConfig | None = None
     gravity: Triple = (0.0, 0.0, -9.81)

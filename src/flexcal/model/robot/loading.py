@@ -12,16 +12,19 @@ import numpy as np
 from flexcal.files.formats import YamlFile, read_yaml_file
 from flexcal.files.structuring import suggestion
 from flexcal.model.parts import (
+    LOOP,
     ForceSensor,
     Joint,
     Payload,
     Point,
+    Relations,
     bearing_frame,
-    path_to,
+    joints_that_move,
     rpy_rotation,
 )
 from flexcal.model.robot.arm_sensor import ArmSensor
 from flexcal.model.robot.config import ElasticConfig, RobotConfig
+from flexcal.model.robot.joint_relations import read_relations
 from flexcal.model.robot.parameter_groups import Drives, Geometry, Links, Scatter, Springs, Stations
 from flexcal.model.robot.parameter_names import COUPLED, FRICTION_PARAMETERS, PARALLEL, SCATTER
 from flexcal.model.urdf import Description, Frame, read_urdf
@@ -39,6 +42,8 @@ def read_robot(robot_type: type[RobotModel], path: Path) -> RobotModel:
     urdf = path.parent / config.robot
     description = read_urdf(urdf, config.locked)
     joints = description.joints
+    relations = read_relations(file, config, description)
+    motors = tuple(range(len(joints))) if relations is None else relations.motors
     n = len(joints)
     names = [joint.name for joint in joints]
     for k, name in enumerate(config.geometry.backlash):
@@ -57,12 +62,12 @@ def read_robot(robot_type: type[RobotModel], path: Path) -> RobotModel:
                     f"the joint '{entry.joint}' stands twice under `{key}:`; keep one.",
                 )
     for key in ("kp", "kd") if config.controller is not None else ():
-        _check_count(file, ("controller", key), getattr(config.controller, key), n)
+        _check_count(file, ("controller", key), getattr(config.controller, key), len(motors))
     if config.limits.acceleration is not None:
-        _check_count(file, ("limits", "acceleration"), config.limits.acceleration, n)
+        _check_count(file, ("limits", "acceleration"), config.limits.acceleration, len(motors))
     points = {name: _point(file, description, name, config) for name in config.points}
     payload = _payload(file, description, config)
-    springs = _springs(file, config, joints, points)
+    springs = _springs(file, config, joints, points, relations)
     stations = tuple(config.stations) or ("tracker",)
     return robot_type(
         config=config,
@@ -79,9 +84,10 @@ def read_robot(robot_type: type[RobotModel], path: Path) -> RobotModel:
             point_turn=np.zeros((len(points), 3)),
             gravity_compliance=np.zeros(n),
             lateral_compliance=np.zeros((n, 2)),
+            loops=np.zeros((len(config.loops), len(LOOP))),
         ),
         springs=springs,
-        drives=_drives(file, config, n),
+        drives=_drives(file, config, n, motors),
         links=Links.of(description.inertias),
         stations=Stations.at_base(stations),
         scatter=Scatter(np.zeros(len(SCATTER))),
@@ -93,16 +99,21 @@ def read_robot(robot_type: type[RobotModel], path: Path) -> RobotModel:
             if entry.frame is not None
         },
         sensors={name: _sensor(file, description, name, config) for name in config.sensors},
+        relations=relations,
     )
 
 
 def _springs(
-    file: YamlFile, config: RobotConfig, joints: Sequence[Joint], points: Mapping[str, Point]
+    file: YamlFile,
+    config: RobotConfig,
+    joints: Sequence[Joint],
+    points: Mapping[str, Point],
+    relations: Relations | None,
 ) -> Springs:
     n, names = len(joints), [joint.name for joint in joints]
     stiffness, damping = np.full((n, 3), np.nan), np.full((n, 3), np.nan)
     bearing_frames: dict[int, np.ndarray] = {}
-    carrying = {i for p in points.values() for i in path_to(joints, p.joint)}
+    carrying = {i for p in points.values() for i in joints_that_move(joints, relations, p.joint)}
     for k, entry in enumerate(config.elastic):
         i = _joint(file, ("elastic", k, "joint"), names, entry.joint)
         if i in bearing_frames:
@@ -119,6 +130,12 @@ def _springs(
                 f"no declared point ({seen}) is downstream of the elastic joint '{entry.joint}'; "
                 "declare a point that it moves, or remove the joint from `elastic:`.",
             )
+        if relations is not None and i in relations.passive:
+            raise file.error(
+                "E-ROBOT-073",
+                ("elastic", k),
+                f"a loop determines the joint '{entry.joint}', so no drive holds it; remove it from `elastic:`.",
+            )
         bearing_frames[i] = _bearing_frame(file, k, entry, joints[i])
         stiffness[i, 2], damping[i, 2] = entry.drive.stiffness, entry.drive.damping
         for c, spring in enumerate((entry.bearing_x, entry.bearing_y)):
@@ -127,18 +144,23 @@ def _springs(
     return Springs(bearing_frames, stiffness, damping, hardening=np.zeros(n))
 
 
-def _drives(file: YamlFile, config: RobotConfig, n: int) -> Drives:
+def _drives(file: YamlFile, config: RobotConfig, n: int, motors: Sequence[int]) -> Drives:
+    def declared(key: str) -> np.ndarray:
+        values = np.full(n, np.nan)
+        values[list(motors)] = _per_motor(file, config, key, len(motors))
+        return values
+
     return Drives(
-        rotor_inertia=_per_joint(file, config, "rotor_inertia", n),
+        rotor_inertia=declared("rotor_inertia"),
         held_inertia=np.zeros(n),
-        viscous=_per_joint(file, config, "viscous", n),
-        coulomb=_per_joint(file, config, "coulomb", n),
+        viscous=declared("viscous"),
+        coulomb=declared("coulomb"),
         torque_offset=np.zeros(n),
         friction=np.zeros((n, len(FRICTION_PARAMETERS))),
         parallel=np.zeros((n, len(PARALLEL))),
         coupling=np.zeros((len(config.drives.coupling), len(COUPLED))),
         delay=np.zeros(n),
-        ratio=_per_joint(file, config, "ratio", n),
+        ratio=declared("ratio"),
         backlash=np.zeros(n),
         transmission=np.zeros((n, len(HARMONICS), 2)),
         harmonics=HARMONICS,
@@ -262,7 +284,7 @@ def _bearing_frame(file: YamlFile, k: int, entry: ElasticConfig, joint: Joint) -
     return frame
 
 
-def _per_joint(file: YamlFile, config: RobotConfig, key: str, n: int) -> np.ndarray:
+def _per_motor(file: YamlFile, config: RobotConfig, key: str, n: int) -> np.ndarray:
     values = getattr(config.drives, key)
     if values is None:
         return np.full(n, np.nan)

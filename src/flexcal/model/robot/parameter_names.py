@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from flexcal.model.parts import LOOP
 from flexcal.model.robot.parameter_groups import Location
 
 if TYPE_CHECKING:
@@ -51,6 +53,7 @@ SCATTER = (
 )
 
 _UNITS = {
+    **dict.fromkeys(LOOP, "m"),
     "offset": "rad", "misalignment_1": "rad", "misalignment_2": "rad", "length_x": "m", "length_y": "m", "length_z": "m",
     "origin_x": "m", "origin_y": "m", "origin_z": "m",
     "x": "m", "y": "m", "z": "m", "zero": "m", "rx": "rad", "ry": "rad", "rz": "rad", "backlash": "rad", "gravity_compliance": "rad/(N m)",
@@ -82,6 +85,22 @@ def unit_in(model: RobotModel, name: str) -> str:
         return unit
     slides = [model.joints[model.joint_index(j)].kind == "prismatic" for j in (owner, other or owner)]
     return _SLIDING.get(unit, unit) if all(slides) else unit
+
+
+def geometric_errors(model: RobotModel, joints: Sequence[int]) -> list[str]:
+    """Names of the geometric errors of some `joints`, in chain order, and of the loops that determine any of them.
+
+    Where several of them are on one link its length vector places them together, and each but the first has an origin of its own.
+    """
+    parents = [model.joints[i].parent for i in joints]
+    branching = [i for k, i in enumerate(joints) if parents[k] in parents[:k]]
+    loops = () if model.relations is None else model.relations.loops
+    own = [loop for loop in loops if not set(loop.passive).isdisjoint(joints)]
+    return [
+        *(f"{model.joints[i].name}.{key}" for i in joints for key in GEOMETRY),
+        *(f"{model.joints[i].name}.{key}" for i in branching for key in ORIGIN),
+        *(f"loop.{loop.name}.{key}" for loop in own for key in loop.errors),
+    ]
 
 
 def torque_units(model: RobotModel) -> dict[str, str]:
@@ -138,6 +157,9 @@ def parameter_locations(model: RobotModel) -> dict[str, Location]:
     for c, name in enumerate(model.lenses.names):
         for k, key in enumerate(LENS):
             table[f"camera.{name}.{key}"] = Location("lenses", "values", (c, k))
+    for i, loop in enumerate(() if model.relations is None else model.relations.loops):
+        for key in loop.errors:
+            table[f"loop.{loop.name}.{key}"] = Location("geometry", "loops", (i, LOOP.index(key)))
     elastic, branching = {e.index: e for e in model.elastic}, model.branching
     for i, joint in enumerate(model.joints):
         for k, key in enumerate(GEOMETRY):

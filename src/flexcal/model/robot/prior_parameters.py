@@ -96,7 +96,7 @@ def springs_and_rotors(model: RobotModel) -> tuple[Parameter, ...]:
 def elastic_inertials(model: RobotModel, *, loaded: bool) -> list[Parameter]:
     """Uncertain inertials, by robot.yaml's prior, of the links moved by an elastic joint and, if `loaded`, the payload's mass."""
     elastic = {joint.index for joint in model.elastic}
-    moved = [i for i in range(model.n) if not elastic.isdisjoint(model.path_to(i))]
+    moved = [i for i in range(len(model.joints)) if not elastic.isdisjoint(model.moving(i))]
     items = [declared_parameter(model, name) for name in uncertain_inertials(model, moved)]
     payload = model.payload
     if loaded and payload is not None and payload.mass > 0 and uncertain_payload(model):

@@ -25,8 +25,10 @@ from flexcal.model.parts import (
     Joint,
     Payload,
     Point,
+    Relations,
     bearing_frame,
     branching_joints,
+    joints_that_move,
     kinematic_tree,
     parallel_axis,
     path_to,
@@ -44,7 +46,7 @@ from flexcal.model.robot.parameter_groups import (
     Springs,
     Stations,
 )
-from flexcal.model.robot.parameter_names import parameter_locations
+from flexcal.model.robot.parameter_names import GEOMETRY, ORIGIN, parameter_locations
 from flexcal.model.robot.posterior import NOTHING_ESTIMATED, Posterior
 
 _MOMENTS = {"Ixx": (0, 0), "Ixy": (0, 1), "Ixz": (0, 2), "Iyy": (1, 1), "Iyz": (1, 2), "Izz": (2, 2)}
@@ -53,7 +55,7 @@ _FIRST_MOMENTS = {"mc_x": 0, "mc_y": 1, "mc_z": 2}
 
 @dataclass(frozen=True, eq=False)
 class RobotModel:
-    """Immutable robot of n joints: structure of the URDF, settings of robot.yaml, and parameters in groups of arrays, SI units.
+    """Immutable robot of n motors: structure of the URDF, settings of robot.yaml, and parameters in groups of arrays, SI units.
 
     Every number that can be identified has a name (docs/file-formats.md): `values` reads them all, `with_values` makes a changed robot.
     Setting a link's or the payload's mass scales its inertia about the centre of mass with it; setting a link's `com_x`… or first
@@ -95,6 +97,8 @@ class RobotModel:
         Sensors on the arm by name.
     lenses : Lenses
         Intrinsic parameters of cameras.
+    relations : Relations or None
+        How joints without a motor of their own follow the others; None where every joint has one.
 
     Examples
     --------
@@ -127,6 +131,7 @@ class RobotModel:
     carriers: Mapping[str, Point] = field(default_factory=dict)
     sensors: Mapping[str, ArmSensor] = field(default_factory=dict)
     lenses: Lenses = field(default_factory=lambda: Lenses((), np.zeros((0, 9))))
+    relations: Relations | None = None
 
     @classmethod
     def from_yaml(
@@ -308,8 +313,41 @@ class RobotModel:
 
     @property
     def n(self) -> int:
-        """Number of movable joints."""
-        return len(self.joints)
+        """Number of motors: the joints whose positions are commanded and measured, all of them where there are no relations."""
+        return len(self.motors)
+
+    @cached_property
+    def motors(self) -> tuple[int, ...]:
+        """Indices of the joints with motors."""
+        return tuple(range(len(self.joints))) if self.relations is None else self.relations.motors
+
+    @cached_property
+    def motor_joints(self) -> tuple[Joint, ...]:
+        """The joints with motors, in the order of the columns q1, q2, …"""
+        return tuple(self.joints[i] for i in self.motors)
+
+    @cached_property
+    def motor_names(self) -> tuple[str, ...]:
+        """URDF names of the joints with motors."""
+        return tuple(joint.name for joint in self.motor_joints)
+
+    @cached_property
+    def joint_offsets(self) -> np.ndarray:
+        """Offsets (N,) of all joints, with what the offsets of others make of them by linear relations, rad or m."""
+        offsets = self.geometry.errors[:, 0]
+        return offsets if self.relations is None else self.relations.carry @ offsets
+
+    @cached_property
+    def geometry_columns(self) -> Mapping[str, int]:
+        """Names of the geometric errors that Jacobians have columns for, but those of the tool, with their places.
+
+        Six of every joint; with loops those of their ends and the displacements of joints that branch off, which move the loops.
+        """
+        loops = () if self.relations is None else self.relations.loops
+        names = [f"{joint}.{key}" for joint in self.joint_names for key in GEOMETRY]
+        names += [f"loop.{loop.name}.{key}" for loop in loops for key in loop.errors]
+        names += [f"{self.joint_names[i]}.{key}" for i in self.branching for key in ORIGIN if loops]
+        return MappingProxyType({name: place for place, name in enumerate(names)})
 
     @cached_property
     def joint_names(self) -> tuple[str, ...]:
@@ -437,6 +475,46 @@ class RobotModel:
             Indices, `joint` included; none for the base.
         """
         return path_to(self.joints, joint)
+
+    def require_motors(self, purpose: str) -> None:
+        """Refuse a robot with joints that follow others.
+
+        Parameters
+        ----------
+        purpose : str
+            What takes only robots without.
+
+        Raises
+        ------
+        FlexcalError
+            Where a joint has no motor of its own.
+        """
+        if self.relations is not None:
+            other = next((joint.name for i, joint in enumerate(self.joints) if i not in self.motors), "")
+            what = (
+                f"'{other}' of {self.name} follows other joints"
+                if other
+                else f"motors of {self.name} are coupled"
+            )
+            raise FlexcalError(
+                "E-ROBOT-076",
+                f"{what}, and {purpose} can have only joints that move each by a motor of its own.",
+            )
+
+    def moving(self, joint: int) -> tuple[int, ...]:
+        """Indices of the joints that move a joint's link: those from the base to it, and those that these follow.
+
+        Parameters
+        ----------
+        joint : int
+            Index of the joint.
+
+        Returns
+        -------
+        tuple of int
+            Indices, ascending.
+        """
+        return joints_that_move(self.joints, self.relations, joint)
 
     def point(self, name: str | None = None) -> Point:
         """Target point by name.

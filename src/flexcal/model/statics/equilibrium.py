@@ -7,18 +7,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.model.kinematics import joint_batch
+from flexcal.model.kinematics import joint_batch, joint_positions
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics.hardening import tangent_ratio, twist_from_torque
+from flexcal.model.statics.related_equilibrium import related_equilibrium
 
 
 def lateral_axes(model: RobotModel, q: np.ndarray) -> np.ndarray:
-    """Axes of `misalignment_1` and `misalignment_2` (N, n, 2, 2) at `q` (N, n), by their components on the tilt axes x and y.
+    """Axes of `misalignment_1` and `misalignment_2` (samples, N, 2, 2) at `q` (samples, n), by their components on the tilt axes x and y.
 
     The former are fixed to the parent link; the latter turn with the joint, but for `bearings: before`. Zero for prismatic joints.
     """
     from flexcal.model.parts import bearing_frame
 
+    q = joint_positions(model, q)
     result = np.zeros((*q.shape, 2, 2))
     motion = q + model.geometry.errors[:, 0] if model.bearings == "after" else np.zeros(q.shape)
     cosine, sine = np.cos(motion), np.sin(motion)
@@ -38,14 +40,14 @@ _RIGID = 1e17
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """Rest positions of a batch of poses (n joints, d elastic coordinates, E elastic joints).
+    """Rest positions of a batch of poses (N joints, d elastic coordinates, G geometric errors).
 
-    `deflection` (samples, n, 3) rad: tilt about x, about y, and twist of the arm beyond the motor, backlash included; `torque`
-    (samples, n) N m of the motor on the arm that holds gravity; `flank` (samples, n) the side of its backlash that the arm rests on,
-    the sign of that torque, 0 where there is none; `axes` (d, 2) joint and component of each elastic coordinate; `compliance`
-    (samples, d, d) rad/(N m), the inverse of spring plus gravity stiffness; `regressor` (samples, d, 4 n): the gravity load on each
-    coordinate by mass and first moment of each link; `coupling` (samples, d, 6 n) the same by offset, misalignments and lengths of every
-    joint. The last three are empty without sensitivities.
+    `deflection` (samples, N, 3) rad: tilt about x, about y, and twist of the arm beyond the motor, or beyond the relation of a joint
+    without one, backlash included; `torque` (samples, N) N m of the motor, or what stands in its place, on the arm that holds gravity;
+    `flank` (samples, N) the side of its backlash that the arm rests on, the sign of that torque, 0 where there is none; `axes` (d, 2)
+    joint and component of each elastic coordinate; `compliance` (samples, d, d) rad/(N m), the inverse of spring plus gravity stiffness;
+    `regressor` (samples, d, 4 N): the gravity load on each coordinate by mass and first moment of each link; `coupling`
+    (samples, d, G) the same by the errors of `RobotModel.geometry_columns`. The last three are empty without sensitivities.
     """
 
     deflection: np.ndarray
@@ -80,30 +82,22 @@ def _solve(
     axes: list[tuple[int, int]],
     stiffness: np.ndarray,
     q: np.ndarray,
+    slack: np.ndarray,
     payload: np.ndarray,
     *,
     sensitivities: bool,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Elastic deflection (samples, n, 3), compliance, regressor and coupling of `Equilibrium`."""
+    """Elastic deflection (samples, N, 3) beside `slack` (samples, N), compliance, regressor and coupling of `Equilibrium`."""
     if not axes:
-        samples, n = q.shape
-        shapes = ((samples, n, 3), (samples, 0, 0), (samples, 0, 4 * n), (samples, 0, 6 * n))
+        samples, joints = len(q), len(model.joints)
+        errors = len(model.geometry_columns)
+        shapes = ((samples, joints, 3), (samples, 0, 0), (samples, 0, 4 * joints), (samples, 0, errors))
         deflection, compliance, regressor, coupling = (np.zeros(shape) for shape in shapes)
         return deflection, compliance, regressor, coupling
-    declared = model.payload
+    solve = _independent if model.relations is None else related_equilibrium
     try:
-        deflection, compliance, regressor, coupling, step = model.tree.equilibrium(
-            axes,
-            np.ascontiguousarray(stiffness, dtype=float),
-            np.ascontiguousarray(model.geometry.errors),
-            np.ascontiguousarray(model.links.mass),
-            np.ascontiguousarray(model.links.mass[:, None] * model.links.com),
-            payload,
-            declared.joint if declared else -1,
-            np.ascontiguousarray(declared.com_in_link if declared else np.zeros(3)),
-            model.gravity,
-            q,
-            sensitivities,
+        deflection, compliance, regressor, coupling, step = solve(
+            model, axes, stiffness, q, slack, payload, sensitivities=sensitivities
         )
     except ValueError as problem:
         raise FlexcalError(
@@ -115,6 +109,33 @@ def _solve(
             f"{model.name}: no stable equilibrium was found (last step {step:.1e} rad); check the stiffnesses.",
         )
     return deflection, compliance, regressor, coupling
+
+
+def _independent(
+    model: RobotModel,
+    axes: list[tuple[int, int]],
+    stiffness: np.ndarray,
+    q: np.ndarray,
+    slack: np.ndarray,
+    payload: np.ndarray,
+    *,
+    sensitivities: bool,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:
+    """`related_equilibrium` of a robot whose joints all have motors."""
+    declared = model.payload
+    return model.tree.equilibrium(
+        axes,
+        np.ascontiguousarray(stiffness, dtype=float),
+        np.ascontiguousarray(model.geometry.errors),
+        np.ascontiguousarray(model.links.mass),
+        np.ascontiguousarray(model.links.mass[:, None] * model.links.com),
+        payload,
+        declared.joint if declared else -1,
+        np.ascontiguousarray(declared.com_in_link if declared else np.zeros(3)),
+        model.gravity,
+        q + slack,
+        sensitivities,
+    )
 
 
 def gravity_torque(model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None) -> np.ndarray:
@@ -134,7 +155,7 @@ def gravity_torque(model: RobotModel, q: np.ndarray, payload: np.ndarray | float
     Returns
     -------
     ndarray
-        Torques (N, n), N m; zero for prismatic joints.
+        Torques (N, joints), N m, of the motor of every joint, or of what stands in its place; zero for prismatic joints.
 
     Examples
     --------
@@ -151,7 +172,7 @@ def gravity_torque(model: RobotModel, q: np.ndarray, payload: np.ndarray | float
 def gravity_moments(
     model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None
 ) -> np.ndarray:
-    """Moments (samples, n, 2), N m, of joints balancing gravity about their axes of `misalignment_1` and `misalignment_2`.
+    """Moments (samples, N, 2), N m, of joints balancing gravity about their axes of `misalignment_1` and `misalignment_2`.
 
     As `gravity_torque` otherwise: of the undeflected robot, carrying everything beyond the joint; 0 for prismatic joints.
     """
@@ -162,7 +183,7 @@ def gravity_moments(
 
 
 def lateral_slopes(model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None) -> np.ndarray:
-    """Tilt (samples, n, 2, 2) of every joint due to its two lateral compliances, about the tilt axes x and y (last), rad per rad/(N m).
+    """Tilt (samples, N, 2, 2) of every joint due to its two lateral compliances, about the tilt axes x and y (last), rad per rad/(N m).
 
     Minus the moment that holds gravity, about an axis that is fixed to the parent link.
     """
@@ -172,10 +193,11 @@ def lateral_slopes(model: RobotModel, q: np.ndarray, payload: np.ndarray | float
 def gravity_regressor(
     model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None
 ) -> np.ndarray:
-    """Derivative (samples, n, 4 n) of `gravity_torque` with respect to mass and first moment of each link, payload included."""
+    """Derivative (samples, N, 4 N) of `gravity_torque` with respect to mass and first moment of each link, payload included."""
     axes = _twists(model)
     _, deflection, regressor, _ = _held_rigidly(model, q, payload, axes, sensitivities=True)
-    result = np.zeros((len(deflection), model.n, 4 * model.n))
+    joints = len(model.joints)
+    result = np.zeros((len(deflection), joints, 4 * joints))
     result[:, [joint for joint, _ in axes]] = regressor
     return result
 
@@ -207,7 +229,7 @@ def _held_rigidly(
     q = joint_batch(model, q)
     masses = payload_batch(model, payload, len(q))
     deflection, _, regressor, coupling = _solve(
-        model, axes, np.full(len(axes), _RIGID), q, masses, sensitivities=sensitivities
+        model, axes, np.full(len(axes), _RIGID), q, np.zeros((len(q), 1)), masses, sensitivities=sensitivities
     )
     joints, components = (list(column) for column in zip(*axes, strict=True)) if axes else ([], [])
     return _RIGID * deflection[:, joints, components], deflection, regressor, coupling
@@ -224,7 +246,7 @@ def static_equilibrium(
 ) -> Equilibrium:
     """Rest position of every pose for motors held at `q` (samples, n), to 1e-12 rad.
 
-    `payload` (samples,) or a scalar in kg at the declared payload's centre of mass; None takes the declared mass. `flank` (samples, n)
+    `payload` (samples,) or a scalar in kg at the declared payload's centre of mass; None takes the declared mass. `flank` (samples, N)
     overrides the sign of the drive torque that places the arm in the backlash (q_arm = q_M - τ/c - b sign τ, b half the gap); it is that
     of the torque at rest itself, but for an arm that hangs within its gap, where either sign would pull it across: there one of the
     two is taken. Without `elastic` the arm is rigid and only backlash and gravity compliance displace it. Lateral compliance tilts
@@ -254,7 +276,7 @@ def static_equilibrium(
         passes += 1
         slack = free - rest * model.drives.backlash
         deflection, *derivatives = _solve(
-            model, axes, stiffness, q + slack, masses, sensitivities=sensitivities
+            model, axes, stiffness, q, slack, masses, sensitivities=sensitivities
         )
         torque = load.copy()
         torque[:, sprung] = -model.springs.stiffness[sprung, 2] * deflection[:, sprung, 2]
@@ -268,7 +290,7 @@ def static_equilibrium(
         deflection[:, :, :2] += np.matmul(model.geometry.lateral_compliance[:, None, :], slopes)[:, :, 0]
     if sensitivities and hardening.any():
         derivatives[0][:, drives] /= tangent_ratio(twist, hardening)[:, :, None]
-    has_backlash = np.zeros(model.n)
+    has_backlash = np.zeros(len(model.joints))
     has_backlash[list(model.backlash_joints)] = 1.0
     return Equilibrium(
         deflection, torque, sign * has_backlash, np.array(axes, dtype=int).reshape(-1, 2), *derivatives
@@ -276,10 +298,10 @@ def static_equilibrium(
 
 
 def transmission_error(model: RobotModel, q: np.ndarray) -> np.ndarray:
-    """Harmonic transmission error (samples, n), rad: Σ a_k sin(k q) + b_k cos(k q)."""
+    """Harmonic transmission error (samples, N), rad: Σ a_k sin(k q) + b_k cos(k q)."""
     if not model.drives.transmission.any():
-        return np.zeros(q.shape)
-    phase = q[:, :, None] * np.array(model.drives.harmonics)
+        return np.zeros((len(q), len(model.joints)))
+    phase = joint_positions(model, q)[:, :, None] * np.array(model.drives.harmonics)
     return (
         model.drives.transmission[:, :, 0] * np.sin(phase)
         + model.drives.transmission[:, :, 1] * np.cos(phase)

@@ -14,21 +14,21 @@ CERTAIN = 3.0
 def certain_flank(
     model: RobotModel, q: np.ndarray, torque: np.ndarray, payload: np.ndarray | float | None = None
 ) -> np.ndarray:
-    """Mask (samples, n) of drives whose gravity `torque` (samples, n) N m at `q` (samples, n) has a certain sign."""
+    """Mask (samples, N) of drives whose gravity `torque` (samples, N) N m at `q` (samples, n) has a certain sign."""
     return np.abs(torque) > CERTAIN * gravity_torque_std(model, q, payload)
 
 
 def gravity_torque_std(
     model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None
 ) -> np.ndarray:
-    """Standard deviation (samples, n), N m, of the gravity torque at `q` (samples, n), to first order.
+    """Standard deviation (samples, N), N m, of the gravity torque at `q` (samples, n), to first order.
 
     From the covariance of masses and centres of mass: that of the model's posterior where they were estimated, else independent ones as
     `prior:` and the payload's `mass_std` say. `payload` (samples,) or a scalar in kg at the declared payload's centre of mass.
     Prismatic joints read 0.
     """
     masses = payload_batch(model, payload, len(q))
-    regressor = gravity_regressor(model, q, masses).reshape(len(q), model.n, model.n, 4)
+    regressor = gravity_regressor(model, q, masses).reshape(len(q), len(model.joints), len(model.joints), 4)
     names: list[str] = []
     rows: list[np.ndarray] = []
     declared: list[float] = []

@@ -49,6 +49,7 @@ def motion_batch(
     """Position, velocity and acceleration as contiguous (samples, n) arrays; raises `FlexcalError` for shapes that differ or do not fit
     the robot.
     """
+    model.require_motors("torques of dynamics")
     q, dq, ddq = (joint_batch(model, values) for values in (q, dq, ddq))
     if not q.shape == dq.shape == ddq.shape:
         raise FlexcalError(

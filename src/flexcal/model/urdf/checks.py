@@ -19,8 +19,7 @@ _ROUNDING = 1e-9
 def carried_links(robot: Element, locked: Container[str]) -> dict[str, str]:
     """Link carried by each joint of a complete URDF; depth first, branches in the order of the file.
 
-    Raises `InputError` with file, line and link or joint where it is incomplete, unreadable or asks for what flexcal does not have; of
-    joints that mimic others, the `locked` ones are none of that.
+    Raises `InputError` with file, line and link or joint where it is incomplete, unreadable or asks for what flexcal does not have.
     """
     if robot.tag != "robot":
         raise robot.error("E-URDF-001", f"the root element is <{robot.tag}>, not <robot>; give a URDF file.")
@@ -39,12 +38,6 @@ def carried_links(robot: Element, locked: Container[str]) -> dict[str, str]:
     carried: dict[str, str] = {}
     parents: dict[str, str] = {}
     for name, joint in joints.items():
-        follows = joint.find("mimic") is not None and joint.attributes.get("type") != "fixed"
-        if follows and name not in locked:
-            raise joint.error(
-                "E-URDF-003",
-                f"joint '{name}' mimics another one, which flexcal does not handle; say where it stands under `locked:` in robot.yaml.",
-            )
         parent, child = _check_joint(joint, name, links)
         if child in parents:
             other = next(joint for joint, link in carried.items() if link == child)
@@ -82,6 +75,42 @@ def carried_links(robot: Element, locked: Container[str]) -> dict[str, str]:
             "`locked:` in robot.yaml.",
         )
     return {joint: carried[joint] for joint in _beyond(roots[0], carried, parents)}
+
+
+def mimicry(robot: Element, locked: Container[str]) -> dict[str, tuple[str, float, float]]:
+    """Joints that mimic another: its name, the multiplier and the offset; without the `locked` ones.
+
+    Raises `InputError` with file, line and joint where the other one is missing, fixed, locked, or the joint itself.
+    """
+    joints = _named(robot, "joint")
+    moving = [
+        name
+        for name, joint in joints.items()
+        if joint.attributes.get("type") != "fixed" and name not in locked
+    ]
+    result = {}
+    for name in moving:
+        mimic = joints[name].find("mimic")
+        if mimic is None:
+            continue
+        other = mimic.attributes.get("joint", "")
+        if other not in moving or other == name:
+            raise mimic.error(
+                "E-URDF-042",
+                f"joint '{name}' mimics '{other}', which is no other joint that moves; correct the name, or say where '{name}' stands "
+                "under `locked:` in robot.yaml.",
+            )
+        multiplier, offset = (
+            float(mimic.numbers(key, 1, f"joint '{name}'")[0]) if key in mimic.attributes else usual
+            for key, usual in (("multiplier", 1.0), ("offset", 0.0))
+        )
+        if multiplier == 0:
+            raise mimic.error(
+                "E-URDF-043",
+                f"joint '{name}' mimics '{other}' with a multiplier of 0; make it fixed instead.",
+            )
+        result[name] = (other, multiplier, offset)
+    return result
 
 
 def _beyond(link: str, carried: dict[str, str], parents: dict[str, str]) -> Iterator[str]:

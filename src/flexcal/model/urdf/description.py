@@ -16,7 +16,7 @@ import numpy as np
 from flexcal.errors import InputError
 from flexcal.files.transaction import current_path
 from flexcal.model.parts import Inertia, Joint, normals_to
-from flexcal.model.urdf.checks import carried_links
+from flexcal.model.urdf.checks import carried_links, mimicry
 from flexcal.model.urdf.elements import read_elements
 
 
@@ -33,13 +33,15 @@ class Frame:
 class Description:
     """Content of a URDF: movable joints, the inertia of each (with fixed and locked children), and all frames.
 
-    Joints stand depth first, branches in the order of the file; Pinocchio sorts them by name.
+    Joints stand depth first, branches in the order of the file; Pinocchio sorts them by name. `mimics`: for each joint that mimics
+    another, its name, the multiplier and the offset.
     """
 
     name: str
     joints: tuple[Joint, ...]
     inertias: tuple[Inertia, ...]
     frames: dict[str, Frame]
+    mimics: dict[str, tuple[str, float, float]]
 
 
 def read_urdf(path: Path, locked: Mapping[str, float]) -> Description:
@@ -103,7 +105,7 @@ def read_urdf(path: Path, locked: Mapping[str, float]) -> Description:
         f.name: Frame(place[f.parentJoint], np.array(f.placement.rotation), np.array(f.placement.translation))
         for f in model.frames
     }
-    return Description(model.name, tuple(joints), inertias, frames)
+    return Description(model.name, tuple(joints), inertias, frames, mimicry(robot, locked))
 
 
 def locked_joints(model: Any, locked: Mapping[str, float]) -> tuple[list[int], np.ndarray]:

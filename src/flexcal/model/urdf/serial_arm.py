@@ -27,11 +27,13 @@ class Arm:
     """Chain of a URDF that moves its tool.
 
     joints: names of its movable joints, from the base on. locked: the other movable joints and where they stand (rad or m): 0, or the
-    nearest limit. frame: the link that a point is most likely given in; frames: the links that do not move against it, that one first.
+    nearest limit. motors: where a joint beside the chain is mimicked by one of it, the joints with motors, in the order of their names,
+    which is a guess. frame: the link that a point is most likely given in; frames: the links that do not move against it, that one first.
     """
 
     joints: tuple[str, ...]
     locked: dict[str, float]
+    motors: tuple[str, ...]
     frame: str
     frames: tuple[str, ...]
 
@@ -39,9 +41,9 @@ class Arm:
 def find_arm(path: Path, tip: str | None = None) -> Arm:
     """Arm of a URDF: the only long chain, or the chain that ends at the link `tip`.
 
-    Joints that mimic others, are called like a gripper's, or make a short branch beside the one long one, are no part of it. Raises
-    `InputError` as `read_urdf` does, where several chains could be the arm, where `tip` is no link or moves with no joint, and where
-    a joint on the way to it mimics another.
+    Joints that mimic others beyond the arm, are called like a gripper's, or make a short branch beside the one long one, are no part of
+    it; joints that those on the way to the tool mimic are not locked. Raises `InputError` as `read_urdf` does, where several chains could
+    be the arm, and where `tip` is no link or moves with no joint.
     """
     if path.suffix == ".xacro":
         raise InputError(
@@ -80,17 +82,29 @@ def find_arm(path: Path, tip: str | None = None) -> Arm:
             raise InputError(
                 "E-URDF-038", f"{path}: the link '{tip}' moves with no joint; name one beyond the arm."
             )
-    mimicking = [name for name in chain if name in mimics]
-    if mimicking:
-        raise joints[mimicking[0]].error(
-            "E-URDF-039",
-            f"joint '{mimicking[0]}' is on the way to the tool and mimics another one, which flexcal does not handle; "
-            "use a URDF in which it is fixed or moves by itself.",
-        )
+    moving = _with_mimicked(chain, joints)
     frames = [link for link in ways if tuple(n for n in ways[link] if n in movable) == chain and link != tip]
     ordered = ([] if tip is None else [tip]) + sorted(frames, key=lambda link: _rank(link, ways))
-    locked = {name: _at_rest(joints[name]) for name in movable if name not in chain}
-    return Arm(chain, locked, ordered[0], tuple(ordered))
+    locked = {name: _at_rest(joints[name]) for name in movable if name not in moving}
+    driven = sorted(moving - mimics, key=_natural) if moving - set(chain) else []
+    return Arm(chain, locked, tuple(driven), ordered[0], tuple(ordered))
+
+
+def _with_mimicked(chain: Sequence[str], joints: Mapping[str, Element]) -> set[str]:
+    """Joints of a chain with those that they mimic."""
+    moving, waiting = set(chain), list(chain)
+    while waiting:
+        mimic = joints[waiting.pop()].find("mimic")
+        other = "" if mimic is None else mimic.attributes.get("joint", "")
+        if other in joints and other not in moving:
+            moving.add(other)
+            waiting.append(other)
+    return moving
+
+
+def _natural(name: str) -> list[tuple[bool, int, str]]:
+    """Sort key of names in which numbers count as numbers."""
+    return [(part.isdigit(), int(part) if part.isdigit() else 0, part) for part in re.split(r"(\d+)", name)]
 
 
 def _way(link: str, above: dict[str, str], joints: dict[str, Element]) -> tuple[str, ...]:

@@ -25,6 +25,7 @@ class ElasticArm:
     def __init__(self, robot: RobotModel, payload: float | None = None) -> None:
         import pinocchio as pin
 
+        robot.require_motors("vibration")
         self.robot = robot
         self.payload = robot.payload_mass if payload is None else float(payload)
         self.model: Any = pin.Model()

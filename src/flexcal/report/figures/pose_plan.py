@@ -27,7 +27,7 @@ from flexcal.units import DEGREE, MILLIMETRE
 def joint_positions(model: RobotModel, q: np.ndarray) -> go.Figure:
     """One row a joint of the positions `q` (N, n), from its lower limit at the left to the upper at the right."""
     figure = canvas(90 + 44 * model.n, legend=False)
-    for i, joint in enumerate(model.joints):
+    for i, joint in enumerate(model.motor_joints):
         unit, name = (MILLIMETRE, "mm") if joint.kind == "prismatic" else (DEGREE, "°")
         ends = [joint.lower, joint.upper]
         if not np.isfinite(ends).all():

@@ -215,7 +215,7 @@ def _observed(study: MapStudy) -> Section:
 
 def _joints(model: RobotModel, q: np.ndarray) -> str:
     texts = []
-    for joint, value in zip(model.joints, q, strict=True):
+    for joint, value in zip(model.motor_joints, q, strict=True):
         if joint.kind == "revolute":
             texts.append(f"{np.degrees(value):.0f}°")
         else:
