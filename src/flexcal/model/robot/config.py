@@ -489,7 +489,7 @@ class RelationConfig:
     def __post_init__(self) -> None:
         if not self.of or 0 in self.of.values():
             raise FlexcalError(
-                "E-ROBOT-061",
+                "E-ROBOT-063",
                 f"the relation of '{self.joint}' needs the joints that it follows, each with a ratio other than 0, as "
                 "`of: {joint_2: -1.0}`.",
             )
