@@ -44,5 +44,7 @@ class ErrorStatistics:
         }
 
     def __str__(self) -> str:
+        if not self.poses:
+            return "no measured points"
         mean, p90, largest = (v / MILLIMETRE for v in (self.mean, self.p90, self.max))
         return f"mean {mean:.3f}, p90 {p90:.3f}, max {largest:.3f} mm over {self.poses} poses"

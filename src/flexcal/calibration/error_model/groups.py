@@ -38,7 +38,9 @@ class ErrorGroups:
     def of(cls, poses: PoseSet) -> ErrorGroups:
         """Groups by visit: rows of one pose number are a visit; a target that the visit already has begins another."""
         points = cls._of_points(poses)
-        turned = poses.turned
+        if not poses.present.any():
+            points = cls(points.pose)
+        turned = poses.angled
         if not turned.any():
             return points
         alone = np.full(int(turned.sum()), -1)

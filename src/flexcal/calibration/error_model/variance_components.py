@@ -74,14 +74,17 @@ class LinearFit:
         Where a sigma is `stated`, the instrument's part is that, or less where the points scatter clearly less than it says.
         """
         shared = [*([TRANSMISSION] if self.waves.size else []), *self.cells.blocks]
-        own = [*self.readings.instruments, *([ORIENTATION] if (self.readings.unit == RADIANS).any() else [])]
-        names = [ROBOT, *own, *(["pose"] if self._several else []), "angular", *shared]
         totals = self._mean_squares()
+        # inclinometers alone have no reading in metres
+        unit, first = (METRES, ROBOT) if ROBOT in totals else (RADIANS, ORIENTATION)
+        own = [*self.readings.instruments]
+        own += [ORIENTATION] if ORIENTATION in totals and first != ORIENTATION else []
+        names = [first, *own, *(["pose"] if self._several else []), "angular", *shared]
         levers = {
-            name: _lever(moved[self.readings.unit == METRES])
+            name: _lever(moved[self.readings.unit == unit])
             for name, moved in (("angular", self.turns), (TRANSMISSION, self.waves))
         }
-        sizes = {name: totals[ROBOT] / levers.get(name, 1.0) for name in names} | totals
+        sizes = {name: totals[first] / levers.get(name, 1.0) for name in names} | totals
         scale = np.array([sizes[name] for name in names])
         share = 1.0 if stated else 0.0
         start = (
@@ -92,13 +95,13 @@ class LinearFit:
         variances, likelihood = self._maximum(names, scale, share, start)
         if stated:
             # the points may scatter less than the instrument alone should, even if nothing else errs
-            of_robot = self.readings.of_scatter(ROBOT)
-            whole = totals[ROBOT] / float(np.mean(self.readings.sigma[of_robot] ** 2))
+            of_first = self.readings.of_scatter(ROBOT) if first == ROBOT else self.readings.unit == RADIANS
+            whole = totals[first] / float(np.mean(self.readings.sigma[of_first] ** 2))
             narrow = [*own, *shared]
             tried = np.array([*(sizes[name] for name in narrow), whole])
             alone = self._maximum([*narrow, "share"], tried, None, favour=False)[1]
             if alone - self._maximum(names, scale, share, favour=False)[1] > _CLEAR_GAIN:
-                names, scale = [ROBOT, *narrow], np.append(totals[ROBOT], tried[:-1])
+                names, scale = [first, *narrow], np.append(totals[first], tried[:-1])
                 narrower, likelihood = self._maximum([*names, "share"], np.append(scale, whole), None)
                 variances, share = narrower[:-1], float(np.sqrt(narrower[-1]))
         names, scale, variances = self._supported(names, scale, variances, likelihood, share)
@@ -144,12 +147,15 @@ class LinearFit:
     @property
     def _several(self) -> bool:
         """Whether any visit to a pose has several points."""
-        return bool(np.bincount(self.cells.pose[self.readings.points]).max(initial=0) > 1)
+        return bool(
+            np.bincount(self.cells.pose[(self.readings.unit == METRES).any(axis=1)]).max(initial=0) > 1
+        )
 
     def _mean_squares(self) -> dict[str, float]:
         """Residual variance of a coordinate by the component that it has for itself, with the parameters' degrees of freedom deducted."""
         readings = self.readings
         units = {name: readings.of_scatter(name).ravel() for name in (ROBOT, *readings.instruments)}
+        units = {name: own for name, own in units.items() if own.any()}
         if (turned := (readings.unit == RADIANS).ravel()).any():
             units[ORIENTATION] = turned
         rows, size = self.residual.size, self.free.shape[2]

@@ -163,7 +163,7 @@ class PointFit:
     def first_scatter(self) -> ErrorComponents:
         """Initial error model: stated values, and typical ones of robots."""
         share = 1.0 if self.poses.sigma_given else 0.0
-        orientation = _FIRST_ORIENTATION if self.poses.turned.any() else 0.0
+        orientation = _FIRST_ORIENTATION if self.poses.angled.any() else 0.0
         own = dict.fromkeys((ROBOT, *Readings.of(self.poses).instruments), _FIRST_SCATTER)
         return ErrorComponents(share=share, orientation=orientation, **own)
 
@@ -365,7 +365,7 @@ class FittedPoints:
         groups = {n: readings.of_scatter(n).any(axis=1) for n in (ROBOT, *readings.instruments)}
         groups["orientation"] = ~readings.points
         found = {n: float(np.sqrt(np.median(squares[g]) * spread)) for n, g in groups.items() if g.any()}
-        return ErrorComponents(share=0.0, **found)
+        return ErrorComponents(**{"share": 0.0, ROBOT: 0.0, **found})
 
     def undetermined(self, scatter: ErrorComponents) -> tuple[Undetermined, ...]:
         """Parameters that the poses do not determine under a given scatter."""
@@ -380,8 +380,9 @@ class FittedPoints:
         from scipy.special import chdtri
 
         whitening = self.scatter.whitening(self.at.readings, self.turns)
-        squares = (whitening(self.at.residual).reshape(-1, 3) ** 2).sum(axis=1)
-        freedom = self.at.readings.present.sum(axis=1)
+        there = self.at.readings.present.any(axis=1)
+        squares = (whitening(self.at.residual).reshape(-1, 3) ** 2).sum(axis=1)[there]
+        freedom = self.at.readings.present.sum(axis=1)[there]
         limits = chdtri(freedom, _SUSPICION / len(squares)) * _SLACK
         return bool((squares > limits * np.median(squares / _CHI_MEDIAN[freedom])).any())
 
@@ -492,7 +493,7 @@ class FittedPoints:
         known = np.array(
             [0.0, share_std, robot_std, angular_std, model_std, pose_std, wave_std, orientation_std]
         )
-        count = len(SCATTER) if self.fit.poses.turned.any() else len(SCATTER) - 1
+        count = len(SCATTER) if self.fit.poses.angled.any() else len(SCATTER) - 1
         items = (
             Parameter(f"scatter.{key}", unit_of(f"scatter.{key}"), float(value), lower=0.0)
             for key, value in zip(SCATTER[:count], values, strict=False)

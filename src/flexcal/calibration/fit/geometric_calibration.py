@@ -13,6 +13,7 @@ from flexcal.calibration.fit.elastic_prior import NOTHING_ELASTIC, ElasticPrior
 from flexcal.calibration.fit.fitted_points import FittedPoints, PointFit
 from flexcal.calibration.fit.least_squares_problem import LossName
 from flexcal.calibration.fit.practical_identifiability import Undetermined
+from flexcal.calibration.fit.terms import moving_joints
 from flexcal.calibration.measurement import METRES, ambiguous_poses, kind_names, stated_sigma
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
@@ -84,13 +85,22 @@ class GeometricFit:
 
     @property
     def rotations(self) -> np.ndarray:
-        """Rotation vectors (M, 3), rad, from predicted to measured orientations, in the order of the poses that have one."""
-        return self.readings[len(self.poses) :]
+        """Rotation vectors (K, 3), rad, from predicted to measured orientations, in the order of the poses that have one."""
+        return self.readings[len(self.poses) :][self.poses.turned[self.poses.angled]]
+
+    @property
+    def tilts(self) -> np.ndarray:
+        """Measured minus predicted readings (K, 3), rad, of inclinometers, in the order of their poses; NaN for axes that they lack."""
+        poses, left = self.poses, self.readings[len(self.poses) :]
+        if poses.tilt is None:
+            return np.zeros((0, 3))
+        there = np.isfinite(poses.tilt[poses.tilted])
+        return np.where(there, left[poses.tilted[poses.angled]], np.nan)
 
     @property
     def errors(self) -> ErrorStatistics:
         """Errors of the calibrated robot at the points of the fit."""
-        return ErrorStatistics.of(self.residuals)
+        return ErrorStatistics.of(self.residuals[~self.poses.tilted])
 
     @property
     def errors_by_kind(self) -> dict[str, ErrorStatistics]:
@@ -109,6 +119,8 @@ class GeometricFit:
         what the others scatter by for themselves.
         """
         scatter, lengths = self.scatter, self.linear.readings.unit == METRES
+        if not lengths.any():
+            return dict.fromkeys(("instrument_mm", "robot_mm", "model_mm", "stated_mm"))
         sigma = stated_sigma(self.linear.readings)
         stated = self.poses.sigma_given
         return {
@@ -266,7 +278,12 @@ def _check_variety(model: RobotModel, poses: PoseSet) -> None:
         raise FlexcalError(
             "E-CAL-007", f"all {len(poses.q)} poses are the same; measure poses that differ in every joint."
         )
-    still = [joint.name for joint, range_ in zip(model.motor_joints, spread, strict=True) if range_ < 1e-6]
+    pointing = moving_joints(model, poses.pointed)
+    still = [
+        model.joints[i].name
+        for i, range_ in zip(model.motors, spread, strict=True)
+        if i in pointing and range_ < 1e-6
+    ]
     if still:
         raise FlexcalError(
             "E-CAL-008",

@@ -22,7 +22,8 @@ def held_lengths(model: RobotModel, poses: PoseSet) -> tuple[str, ...]:
     A robot of any size touches planes and spheres of that size: without the length of one link all readings of contacts fit a robot that
     is a point. None where the readings tell lengths.
     """
-    if tells_lengths(poses):
+    poses = poses.pointed
+    if not len(poses) or tells_lengths(poses):
         return ()
     parameters = geometric_parameters(model, poses, ["kinematic"])
     parameters = parameters.subset([name for name in parameters.names if not name.startswith("station.")])

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexcal.calibration.kinds import KINDS, kind_of
+from flexcal.calibration.kinds import ANGULAR, KINDS, declared_level, kind_of
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameter, Parameters
@@ -54,6 +54,7 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
     `geometric_errors` of every joint that moves a measured target, six for the tool, three for each further target, and a rotation for each
     target whose orientation was measured. A wire has a place and a zero, a touched plane a height and two tilts. Without an instrument of
     points nothing tells where the robot's base is: all places may turn, and errors of joints that move the whole robot as one are left out.
+    An inclinometer has its mounting and the zeros of its axes, the vertical two inclinations unless the base is declared level.
     `backlash`: the joints declared with it; `transmission` none, its waves being random effects (`random_waves`).
     `gravity_compliance`, `lateral_compliance`, `transmission_1`…: one or two for every revolute joint on the way, compliances only where
     no spring is declared in their place and gravity loads the axis: by moments that vary by more than 1 % of those that vary most.
@@ -84,17 +85,21 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
 
 def _kinematic(model: RobotModel, poses: PoseSet, joints: Sequence[int]) -> list[str]:
     """Names of the term `kinematic`."""
+    level = declared_level(model, poses)
     names: list[str] = []
     known = next((name for name in poses.station[poses.located].tolist() if name not in model.carriers), None)
     for station in poses.stations:
-        told = kind_of(poses, station).place(model, poses, station, turned=station != known)
+        told = kind_of(poses, station).place(model, poses, station, turned=station != known or level)
         names += [f"station.{station}.{key}" for key in told]
     errors = geometric_errors(model, joints)
-    names += errors if poses.located.any() else _moving_parts(model, poses, errors)
+    placed = poses.located.any() or level or not len(poses.pointed)
+    names += errors if placed else _moving_parts(model, poses.pointed, errors)
     names += [f"tool.{key}" for key in GEOMETRY]
     first = next(iter(model.points))
-    names += [f"point.{t}.{key}" for t in dict.fromkeys(poses.target) if t != first for key in "xyz"]
-    names += [f"point.{t}.{key}" for t in dict.fromkeys(poses.target[poses.turned]) for key in STATION[3:]]
+    names += [f"point.{t}.{key}" for t in poses.pointed.targets if t != first for key in "xyz"]
+    for kind in ANGULAR:
+        for target in dict.fromkeys(poses.target[kind.rows(poses)].tolist()):
+            names += [f"point.{target}.{key}" for key in kind.target_parameters(poses, target)]
     return names
 
 

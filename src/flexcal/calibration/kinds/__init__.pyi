@@ -1,3 +1,4 @@
+from .directions import declared_level, inclinometer
 from .kind import Kind
 from .registry import ANGULAR, KINDS, LOCATING, kind_of, tells_lengths
 from .rigid_motions import best_motion, rigid_motion
@@ -9,6 +10,8 @@ __all__ = [
     "LOCATING",
     "Kind",
     "best_motion",
+    "declared_level",
+    "inclinometer",
     "kind_of",
     "rigid_motion",
     "tells_lengths",

@@ -77,7 +77,9 @@ class Distances(Kind):
         column[own, 0] = -(1.0 if key == "zero" else at.position[own, 0]) / scale
         return column
 
-    def start(self, station: str, targets: np.ndarray, readings: np.ndarray) -> dict[str, float]:
+    def start(
+        self, model: RobotModel, station: str, targets: np.ndarray, readings: np.ndarray
+    ) -> dict[str, float]:
         """As `Kind.start`."""
         require_targets(station, targets, 5)
         centre = np.median(targets, axis=0)

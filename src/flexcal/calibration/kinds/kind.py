@@ -78,7 +78,9 @@ class Kind(ABC):
         column[: len(at.poses)] = -np.where(self.scaled(at.poses)[:, None], at.poses.position, 0.0)
         return column
 
-    def start(self, station: str, targets: np.ndarray, readings: np.ndarray) -> dict[str, float]:
+    def start(
+        self, model: RobotModel, station: str, targets: np.ndarray, readings: np.ndarray
+    ) -> dict[str, float]:
         """Numbers x, y, z, rx, ry, rz, and `zero` where it has one, of a station that reads `readings` (K, 3) of `targets` (K, 3), m, in
         the base frame.
 
@@ -89,6 +91,16 @@ class Kind(ABC):
     def place(self, model: RobotModel, poses: PoseSet, station: str, *, turned: bool) -> Sequence[str]:
         """Numbers of a station's pose that the readings tell; its rotation only where that is free (`turned`)."""
         return STATION if turned else STATION[:3]
+
+    def target_start(self, at: PredictedMeasurements, target: str) -> dict[str, float]:
+        """Numbers of how a target's axes are on the robot by their keys, from predictions `at` with them as declared; only of kinds that
+        read angles.
+        """
+        return {}
+
+    def target_parameters(self, poses: PoseSet, target: str) -> Sequence[str]:
+        """Keys of the numbers of a target that these readings tell beyond its place; only of kinds that read angles."""
+        return ()
 
     def tells_lengths(self, poses: PoseSet) -> bool:
         """Whether any reading tells how large the robot is."""

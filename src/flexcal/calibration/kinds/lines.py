@@ -36,7 +36,9 @@ class Lines(Kind):
         """As `Kind.slopes`."""
         return np.broadcast_to(np.diag([1.0, 1.0, 0.0]), (len(located), 3, 3))
 
-    def start(self, station: str, targets: np.ndarray, readings: np.ndarray) -> dict[str, float]:
+    def start(
+        self, model: RobotModel, station: str, targets: np.ndarray, readings: np.ndarray
+    ) -> dict[str, float]:
         """As `Kind.start`."""
         require_targets(station, targets, 4)
         direction, through, misfit = _line(targets)

@@ -38,7 +38,9 @@ class Planes(Kind):
         """As `Kind.slopes`."""
         return np.broadcast_to(np.diag([0.0, 0.0, 1.0]), (len(located), 3, 3))
 
-    def start(self, station: str, targets: np.ndarray, readings: np.ndarray) -> dict[str, float]:
+    def start(
+        self, model: RobotModel, station: str, targets: np.ndarray, readings: np.ndarray
+    ) -> dict[str, float]:
         """As `Kind.start`."""
         require_targets(station, targets, 4)
         extents = np.linalg.svd(targets - np.median(targets, axis=0), compute_uv=False)

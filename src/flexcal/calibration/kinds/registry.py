@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from flexcal.calibration.kinds.directions import Directions
 from flexcal.calibration.kinds.distances import Distances
 from flexcal.calibration.kinds.kind import Kind
 from flexcal.calibration.kinds.lines import Lines
@@ -14,7 +15,7 @@ from flexcal.data.poses import PoseSet
 
 LOCATING: tuple[Kind, ...] = (Points(), Sockets(), Views(), Distances(), Planes(), Lines())
 """Kinds that read where a target is; each row of a pose set is of one of them."""
-ANGULAR: tuple[Kind, ...] = (Orientations(),)
+ANGULAR: tuple[Kind, ...] = (Orientations(), Directions())
 """Kinds that read how it is turned, alone or beside its place."""
 KINDS = (*LOCATING, *ANGULAR)
 

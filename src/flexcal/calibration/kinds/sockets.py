@@ -31,7 +31,9 @@ class Sockets(Kind):
         fixtures = [item for item in declared if item.kind == "sockets" and item.extent > 0]
         return fixtures[0].std / fixtures[0].extent if fixtures else None
 
-    def start(self, station: str, targets: np.ndarray, readings: np.ndarray) -> dict[str, float]:
+    def start(
+        self, model: RobotModel, station: str, targets: np.ndarray, readings: np.ndarray
+    ) -> dict[str, float]:
         """As `Kind.start`."""
         return registered(station, targets, readings, best_motion)
 

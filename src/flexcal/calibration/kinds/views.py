@@ -87,4 +87,4 @@ def _by_lens(at: PredictedMeasurements, camera: str) -> np.ndarray:
     own = at.poses.by_lens
     assert own is not None and at.poses.camera is not None
     mine = np.where((at.poses.camera == camera)[:, None, None], own, 0.0)
-    return np.concatenate([mine[:, :3], mine[at.poses.turned, 3:]])
+    return np.concatenate([mine[:, :3], mine[at.poses.angled, 3:]])

@@ -25,7 +25,7 @@ def require_points(poses: PoseSet, where: str = "the poses") -> None:
     if poses.kind is not None and (poses.kind != "").any():
         raise FlexcalError(
             "E-CAL-011",
-            f"{where}: distances and touches alone do not tell where a point is; give points x, y, z, or compare by "
+            f"{where}: distances, touches and inclinations alone do not tell where a point is; give points x, y, z, or compare by "
             "'flexcal calibrate --hold-out COLUMN'.",
         )
 
@@ -76,14 +76,14 @@ class PredictedMeasurements:
     @property
     def _angular(self) -> list[tuple[Kind, np.ndarray]]:
         """Kinds that read angles at the poses, with a mask (M,) of those that each reads."""
-        turned = self.poses.turned
+        turned = self.poses.angled
         rows = [(kind, kind.rows(self.poses)[turned]) for kind in ANGULAR]
         return [(kind, own) for kind, own in rows if own.any()]
 
     @cached_property
     def orientation(self) -> np.ndarray:
         """Predicted axes (M, 3, 3) of the targets whose orientation was measured, in the instrument's frame."""
-        own = self.poses.turned
+        own = self.poses.angled
         axes = np.matmul(self.base[own], self.kinematics.orientation[own])
         for name in dict.fromkeys(self.poses.target[own].tolist()):
             rows = self.poses.target[own] == name
@@ -116,7 +116,7 @@ class PredictedMeasurements:
         moved = self.displaced(np.matmul(self.base, columns[:, :3]))
         if not self.readings.turns:
             return moved
-        own = self.poses.turned
+        own = self.poses.angled
         return np.concatenate([moved, np.matmul(self.angle_slopes @ self.base[own], columns[own, 3:])])
 
     def by_row(self, values: np.ndarray) -> np.ndarray:
@@ -141,7 +141,7 @@ class PredictedMeasurements:
 
     def _by_station(self, station: str, key: str) -> np.ndarray:
         """Derivative (R, 3) of the readings by one number of a station's pose."""
-        own, turned = self.poses.station == station, self.poses.turned
+        own, turned = self.poses.station == station, self.poses.angled
         rows, slopes = np.flatnonzero(own), self.readings.slopes
         result = np.zeros((len(self.readings.row), 3))
         if key in ("x", "y", "z"):

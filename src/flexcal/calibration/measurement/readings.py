@@ -21,7 +21,7 @@ OF_INSTRUMENTS = ("views", "sockets", "lengths", "contacts")
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """R readings of three coordinates: every measured point in the order of the pose set, then each of M measured orientations.
+    """R readings of three coordinates: every measured point in the order of the pose set, then M measured orientations or inclinations.
 
     `row` (R,) is the row of the pose set that a reading belongs to, `unit` (R, 3) that of each coordinate, METRES, RADIANS or ABSENT, and
     `sigma` (R, 3) its stated standard deviation, m or rad; 0 where it is absent, or none is stated beside others that are. `stated`
@@ -41,17 +41,21 @@ class Readings:
     @classmethod
     def of(cls, poses: PoseSet, slopes: np.ndarray | None = None) -> Readings:
         """Readings of a pose set, with their `slopes` (N, 3, 3)."""
-        points, turned = np.arange(len(poses)), np.flatnonzero(poses.turned)
+        points, turned = np.arange(len(poses)), np.flatnonzero(poses.angled)
         row = np.concatenate([points, turned])
         unit = np.full((len(row), 3), RADIANS)
         unit[: len(points)] = np.where(poses.present, METRES, ABSENT)
+        if poses.tilt is not None:
+            absent = poses.tilted[turned][:, None] & ~np.isfinite(poses.tilt[turned])
+            unit[len(points) :][absent] = ABSENT
         angular = (
             np.zeros(len(turned)) if poses.orientation_sigma is None else poses.orientation_sigma[turned]
         )
         scatter = _scatter_names(poses, len(row))
         known = poses.present if poses.unstated is None else poses.present & ~poses.unstated[:, None]
         stated_of_points = np.where(known, poses.sigma, 0.0)
-        sigma = np.concatenate([stated_of_points, np.broadcast_to(angular[:, None], (len(turned), 3))])
+        there = unit[len(points) :] != ABSENT
+        sigma = np.concatenate([stated_of_points, np.where(there, np.nan_to_num(angular)[:, None], 0.0)])
         if poses.covariance is None or not len(turned):
             return cls(row, unit, sigma, slopes=slopes, scatter=scatter)
         stated, across = sigma[:, :, None] ** 2 * np.eye(3), np.zeros((len(turned), 3, 3))
@@ -127,8 +131,9 @@ def _scatter_names(poses: PoseSet, readings: int) -> np.ndarray | None:
     The first kind whose noise is stated, or the first of all, has that of the robot.
     """
     kind = kind_names(poses)
+    kind[poses.tilted] = ROBOT
     there = [name for name in (POINTS, *OF_INSTRUMENTS) if (kind == name).any()]
-    if len(there) == 1:
+    if len(there) < 2:
         return None
     stated = [name for name in there if poses.stated[kind == name].all()]
     kind[kind == (stated or there)[0]] = ROBOT

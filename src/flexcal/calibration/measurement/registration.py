@@ -6,11 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexcal.calibration.kinds import kind_of
+from flexcal.calibration.kinds import ANGULAR, kind_of
 from flexcal.calibration.measurement.prediction import predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
-from flexcal.model.parts import rotation_vector, wxyz_rotation
 from flexcal.model.robot import RobotModel
 
 FOREIGN = np.deg2rad(15)
@@ -31,27 +30,29 @@ def register(model: RobotModel, poses: PoseSet, predicted: np.ndarray) -> RobotM
     for station in poses.stations:
         model.station_index(station)
         own = poses.station == station
-        start = kind_of(poses, station).start(station, predicted[own], poses.position[own])
+        start = kind_of(poses, station).start(model, station, predicted[own], poses.position[own])
         values |= {f"station.{station}.{key}": value for key, value in start.items()}
     return model.with_values(values)
 
 
 def with_target_axes(model: RobotModel, poses: PoseSet) -> RobotModel:
     """Robot with the axes of every target whose orientation was measured, as the registered stations of `model` see them on average."""
-    if poses.quaternion_wxyz is None or not poses.turned.any():
+    if not poses.angled.any():
         return model
-    own = poses.subset(poses.turned)
+    geometry = model.geometry
     bare = replace(
-        model, geometry=replace(model.geometry, point_turn=np.zeros_like(model.geometry.point_turn))
+        model,
+        geometry=replace(
+            geometry,
+            point_turn=np.zeros_like(geometry.point_turn),
+            point_zero=np.zeros_like(geometry.point_zero),
+        ),
     )
-    predicted = predict_measurements(bare, own, elastic=False).orientation
-    between = np.matmul(np.swapaxes(predicted, 1, 2), wxyz_rotation(poses.quaternion_wxyz[poses.turned]))
-    values = {}
-    for target in own.targets:
-        left, _, right = np.linalg.svd(between[own.target == target].sum(axis=0))
-        mean = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
-        turn = rotation_vector(mean)
-        values |= {f"point.{target}.r{key}": float(v) for key, v in zip("xyz", turn, strict=True)}
+    at, values = predict_measurements(bare, poses, elastic=False), {}
+    for kind in ANGULAR:
+        for target in dict.fromkeys(poses.target[kind.rows(poses)].tolist()):
+            numbers = kind.target_start(at, target)
+            values |= {f"point.{target}.{key}": value for key, value in numbers.items()}
     return model.with_values(values)
 
 

@@ -95,7 +95,9 @@ def uncalibrated_model(model: RobotModel, poses: PoseSet) -> UncalibratedRobot:
     model = model.with_stations(poses.places)
     for station in poses.stations:
         model.station_index(station)
-    poses = poses.without_orientations()
+    poses = poses.pointed.without_orientations()
+    if not len(poses):
+        return UncalibratedRobot(None, None, None)
     at_base = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
     if not (poses.located | poses.in_socket).all():
         return _placed_by_readings(at_base, poses)

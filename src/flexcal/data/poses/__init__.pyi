@@ -4,7 +4,7 @@ from .columns import check_positive, unit_quaternions, whole_numbers
 from .frame_touches import FrameMethod, FrameTouches
 from .image_folders import tables_of
 from .measured_tables import column_labels, read_pose_pool, read_poses, write_poses
-from .pose_set import DEFAULT_SIGMA, DISTANCE, LINE, PLANE, PoseSet, concatenate
+from .pose_set import DEFAULT_SIGMA, DIRECTION, DISTANCE, LINE, PLANE, PoseSet, concatenate
 from .target_files import read_commands, read_targets, write_commands, write_targets
 from .tool_targets import ToolTargets
 from .touch_tables import read_frame_touches, read_touches
@@ -13,6 +13,7 @@ from .working_files import read_working
 
 __all__ = [
     "DEFAULT_SIGMA",
+    "DIRECTION",
     "DISTANCE",
     "LINE",
     "PLANE",

@@ -31,6 +31,7 @@ from flexcal.data.poses.image_folders import tables_of
 from flexcal.data.poses.moving_base import BASE, seen_from_base
 from flexcal.data.poses.pose_set import DEFAULT_SIGMA, PLANE, PoseSet, concatenate
 from flexcal.data.poses.socket_tables import SOCKET_COLUMNS, measures_sockets, read_sockets
+from flexcal.data.poses.tilt_tables import INCLINOMETER, measures_tilts, read_tilts
 from flexcal.data.tables import (
     TableFile,
     assign,
@@ -208,7 +209,7 @@ def column_labels(paths: Sequence[Path], column: str) -> np.ndarray:
 
 def _named_texts(file: TableFile, further: Sequence[str]) -> tuple[str, ...]:
     """Columns of a file that hold texts, beside the `further` ones."""
-    named = (*_TEXTS, *SOCKET_COLUMNS, WIRE, TOUCHED, *further)
+    named = (*_TEXTS, *SOCKET_COLUMNS, WIRE, TOUCHED, INCLINOMETER, *further)
     return tuple(dict.fromkeys(name for name in named if name in file.columns))
 
 
@@ -218,6 +219,8 @@ def _read(path: Path, model: RobotModel, further: tuple[str, ...]) -> PoseSet:
         return read_sockets(file, model, further)
     if measures_images(file):
         return read_views(file, model, further)
+    if measures_tilts(file, model):
+        return read_tilts(file, model, further)
     if measures_distances(file, model):
         return read_distances(file, model, further)
     texts = tuple(dict.fromkeys(name for name in (*_TEXTS, *further) if name in file.columns))

@@ -11,9 +11,14 @@ import numpy as np
 from flexcal.data.camera import Lens
 from flexcal.errors import FlexcalError
 
-DISTANCE, PLANE, LINE = "distance", "plane", "line"
+DISTANCE, PLANE, LINE, DIRECTION = "distance", "plane", "line", "direction"
 """Kinds of measurements that are not of three coordinates."""
-_COORDINATES = {DISTANCE: (True, False, False), PLANE: (False, False, True), LINE: (True, True, False)}
+_COORDINATES = {
+    DISTANCE: (True, False, False),
+    PLANE: (False, False, True),
+    LINE: (True, True, False),
+    DIRECTION: (False, False, False),
+}
 DEFAULT_SIGMA = 1e-4
 """Default 1σ of a measured coordinate (m); only its size relative to priors matters."""
 
@@ -57,6 +62,9 @@ class PoseSet:
         Kinds (N,) of measurements that are not of three coordinates, empty for points. "distance": the first coordinate is the distance
         from the instrument's origin, as by a draw-wire or a touched sphere; "plane": the third is the distance from the plane z = 0 of its
         frame, as by a dial gauge or contact with a table; "line": the first and second are those from its z axis. The others are zero.
+        "direction": none, see `tilt`.
+    tilt : ndarray, optional
+        Readings (N, 3) of the axes of an inclinometer, rad or 1 as robot.yaml declares; NaN for axes that it does not have.
     time : ndarray, optional
         Times (N,) of the measurements, s.
     socket : ndarray, optional
@@ -93,6 +101,7 @@ class PoseSet:
     by_lens: np.ndarray | None = None
     lenses: Mapping[str, Lens] = field(default_factory=dict)
     kind: np.ndarray | None = None
+    tilt: np.ndarray | None = None
     time: np.ndarray | None = None
     socket: np.ndarray | None = None
     force: np.ndarray | None = None
@@ -121,6 +130,7 @@ class PoseSet:
             "camera": (n_rows,),
             "by_lens": (n_rows, 6, 9),
             "kind": (n_rows,),
+            "tilt": (n_rows, 3),
             "time": (n_rows,),
             "socket": (n_rows,),
             "force": (n_rows, 3),
@@ -192,6 +202,21 @@ class PoseSet:
         return (
             np.zeros(len(self), bool) if quaternion is None else np.array(np.isfinite(quaternion).all(axis=1))
         )
+
+    @property
+    def tilted(self) -> np.ndarray:
+        """Rows (N,) at which an inclinometer was read."""
+        return self.of_kind(DIRECTION)
+
+    @property
+    def angled(self) -> np.ndarray:
+        """Rows (N,) that have angles: measured orientations, and readings of inclinometers."""
+        return self.turned | self.tilted
+
+    @property
+    def pointed(self) -> PoseSet:
+        """Rows that say where a target was, which inclinometers do not."""
+        return self.subset(~self.tilted) if self.tilted.any() else self
 
     def without_orientations(self) -> PoseSet:
         """The points alone.
@@ -318,6 +343,7 @@ _PARTIAL: dict[str, tuple[tuple[int, ...], float | str]] = {
     "socket": ((), ""),
     "camera": ((), ""),
     "kind": ((), ""),
+    "tilt": ((3,), np.nan),
     "force": ((3,), 0.0),
     "quaternion_wxyz": ((4,), np.nan),
     "covariance": ((6, 6), np.nan),

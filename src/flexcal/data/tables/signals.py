@@ -39,6 +39,7 @@ _ANGLE = {"rad": 1.0, "deg": DEGREE, "turn": 2 * pi, "m": 1.0, "mm": MILLIMETRE}
 _RATE = {"rad/s": 1.0, "deg/s": DEGREE, "rpm": 2 * pi / 60, "m/s": 1.0, "mm/s": MILLIMETRE}
 _ACCELERATION = {"rad/s^2": 1.0, "deg/s^2": DEGREE, "m/s^2": 1.0, "mm/s^2": MILLIMETRE}
 _TORQUE = {"N m": 1.0, "Nm": 1.0, "N": 1.0, "A": 1.0, "mA": 1e-3}
+_TILT = {"rad": 1.0, "mrad": 1e-3, "deg": DEGREE, "1": 1.0, "m/s^2": 1 / 9.80665}
 _LENGTH = {"m": 1.0, "mm": MILLIMETRE, "um": 1e-6}
 TIMESTAMP = "timestamp"
 """Unit of time for texts with date or time of day, which count as seconds from the first."""
@@ -55,6 +56,7 @@ UNITS: dict[str, dict[str, float]] = {
     "quaternion": {},
     "base_quaternion": {},
     "sigma_angle": {"rad": 1.0, "deg": DEGREE},
+    **dict.fromkeys(("tilt_x", "tilt_y", "tilt_z"), _TILT),
     "temperature": {},
 }
 """Quantities that `signals:` can map, and the factors of their units to SI; currents take a gain in N m/A."""

@@ -202,6 +202,11 @@ def declared_instrument(model: RobotModel, name: str) -> Instrument | CameraSetu
         hint = suggestion(name, known) or f"; known are {', '.join(known)}."
         raise FlexcalError("E-DESIGN-053", f"there is no '{name}' under `measurements:` of robot.yaml{hint}")
     item = model.config.measurements[name]
+    if item.kind == "inclinometer":
+        raise FlexcalError(
+            "E-DESIGN-057",
+            f"poses for the inclinometer {name} cannot be designed yet; turn every joint whose axis is not vertical over its whole range.",
+        )
     places = item.at if item.kind == "sockets" else (item.xyz,)
     if not places or places[0] is None:
         key = "at: [[0.5, 0, 0.1], [0.5, 0.3, 0.1]]" if item.kind == "sockets" else "xyz: [0.5, 0, 0.1]"

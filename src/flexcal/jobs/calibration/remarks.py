@@ -21,6 +21,7 @@ from flexcal.calibration.diagnostics import (
 )
 from flexcal.calibration.fit import GeometricFit
 from flexcal.jobs.calibration.ignored_columns import ignored_columns_remarks
+from flexcal.jobs.calibration.inclinations import inclination_remarks
 from flexcal.model.robot import BOARD_SCALE, SOCKET_SCALE
 from flexcal.units import MILLIMETRE
 
@@ -78,6 +79,8 @@ class Outlier:
         return self.nearest is not None and (self.nearest.place, self.nearest.socket) != own
 
     def __str__(self) -> str:
+        if self.angle is not None and self.error == 0:
+            return f"pose {self.pose} ({self.target}, {np.rad2deg(self.angle):.2f}°)"
         turned = "" if self.angle is None else f", {np.rad2deg(self.angle):.2f}°"
         where = f", {self.place} {self.socket}" if self.socket else ""
         return f"pose {self.pose} ({self.error / MILLIMETRE:.2f} mm{turned}{where})"
@@ -107,6 +110,13 @@ def outliers_of(fit: GeometricFit) -> tuple[Outlier, ...]:
     nearest = dict(zip(held, nearest_sockets(fit, held), strict=True)) if held else {}
     turned = np.flatnonzero(poses.turned).tolist()
     angle = dict(zip(turned, np.linalg.norm(fit.rotations, axis=1).tolist(), strict=True))
+    angle |= dict(
+        zip(
+            np.flatnonzero(poses.tilted).tolist(),
+            np.nanmax(np.abs(fit.tilts), axis=1, initial=0.0).tolist(),
+            strict=True,
+        )
+    )
     return tuple(
         Outlier(
             int(poses.pose[row]),
@@ -133,6 +143,7 @@ def calibration_remarks(fit: GeometricFit, cause: Sequence[str] = ()) -> tuple[s
         remarks.append(f"{len(outliers)} outlier{'s' * (len(outliers) > 1)}: {listed}{more}")
         remarks += [*_mislabelled(outliers), *_turned(fit, outliers)]
     remarks += [*_undetermined(fit), *_views(fit), *_size(fit), *_noise(fit), *_jumps(fit)]
+    remarks += inclination_remarks(fit)
     drift = Drift.of(fit) if fit.poses.located.any() else None
     if drift is not None and drift.certain:
         remarks.append(
@@ -339,7 +350,8 @@ def _noise(fit: GeometricFit) -> Sequence[str]:
     instrument, stated, robot, model = (
         budget[key] for key in ("instrument_mm", "stated_mm", "robot_mm", "model_mm")
     )
-    assert robot is not None and model is not None
+    if robot is None or model is None:
+        return ()
     remarks = []
     if instrument is None or stated is None:
         text = f"no sigma in the files: scatter of instrument and robot together about the fit is {robot:.3f} mm per coordinate (1σ)"

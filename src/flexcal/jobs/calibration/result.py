@@ -42,6 +42,7 @@ from flexcal.calibration.verification import (
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, json_values
 from flexcal.jobs.calibration.held_out import HeldOut
+from flexcal.jobs.calibration.inclinations import inclination_document
 from flexcal.jobs.calibration.remarks import calibration_remarks, floor_remark, outliers_of
 from flexcal.jobs.calibration.sockets import base_remark, place_remarks, scale_document, scale_remark
 from flexcal.jobs.calibration.subsample import calibration_subsample_remark, subsample_document
@@ -174,7 +175,7 @@ class Calibration(Identification):
     def found_points(self) -> dict[str, dict[str, Any]]:
         """Measured points: frame, and position in it, m, declared and calibrated, with the 1σ distance of the latter."""
         fit = self.selected
-        targets = fit.poses.targets
+        targets = fit.poses.pointed.targets
         robot = probable_robot(fit.model, targets)
         return {
             name: {
@@ -221,6 +222,7 @@ class Calibration(Identification):
                 self.orientation_before,
                 OrientationErrors(selected.rotations) if len(selected.rotations) else None,
             ),
+            "inclination": inclination_document(selected),
             "held_out": None if self.held_out is None else self.held_out.document(),
             "before": before,
             "points": self.found_points,

@@ -82,15 +82,18 @@ def with_point(model: RobotModel, name: str, frame: str, xyz: np.ndarray) -> Rob
     point = Point(name, frame, place.joint, place.rotation, place.translation, xyz)
     others = list(model.points)
     geometry = model.geometry
-    errors, turns = (
+    errors, turns, zeros = (
         dict(zip(others, array, strict=True)) | {name: np.zeros(3)}
-        for array in (geometry.point_error, geometry.point_turn)
+        for array in (geometry.point_error, geometry.point_turn, geometry.point_zero)
     )
     return replace(
         model,
         points=MappingProxyType(dict(model.points) | {name: point}),
         geometry=replace(
-            geometry, point_error=np.array(list(errors.values())), point_turn=np.array(list(turns.values()))
+            geometry,
+            point_error=np.array(list(errors.values())),
+            point_turn=np.array(list(turns.values())),
+            point_zero=np.array(list(zeros.values())),
         ),
     )
 

@@ -438,9 +438,31 @@ class FaceConfig:
         _require_std(self.std)
 
 
-def _require_std(std: float | None) -> None:
+@dataclass(frozen=True)
+class InclinometerConfig:
+    """Inclinometer, or accelerometer of which the readings at rest are used, fixed to a `frame` of the robot.
+
+    rpy: how it is mounted in the frame, rad; found by the calibration, and compared where it is given. reads: "elevation", the angle of an
+    axis above the horizontal plane; "projection", that in the plane with the sensor's z axis, atan2(x, z) and atan2(y, z); "component",
+    the vertical component of the axis itself, as an accelerometer reads it in units of gravity. All are positive where the axis points
+    upwards. std: standard deviation of a reading, rad (1 for components); None where it is not known. level: whether `gravity` is exactly
+    the vertical in the robot's base frame; else the base may be inclined.
+    """
+
+    kind: Literal["inclinometer"]
+    frame: str
+    rpy: Triple | None = None
+    reads: Literal["elevation", "projection", "component"] = "elevation"
+    std: float | None = None
+    level: bool = False
+
+    def __post_init__(self) -> None:
+        _require_std(self.std, "rad")
+
+
+def _require_std(std: float | None, unit: str = "m") -> None:
     if std is not None and not std > 0:
-        raise FlexcalError("E-ROBOT-056", f"std must be positive, not {std:g} m.")
+        raise FlexcalError("E-ROBOT-056", f"std must be positive, not {std:g} {unit}.")
 
 
 @dataclass(frozen=True)
@@ -567,8 +589,8 @@ class RobotConfig:
     geometry: GeometryConfig = GeometryConfig()
     dynamics: DynamicsConfig = DynamicsConfig()
     stations: dict[str, StationConfig] = field(default_factory=dict)
-    measurements: dict[str, SocketsConfig | CameraConfig | WireConfig | FaceConfig] = field(
-        default_factory=dict
+    measurements: dict[str, SocketsConfig | CameraConfig | WireConfig | FaceConfig | InclinometerConfig] = (
+        field(default_factory=dict)
     )
     obstacles: tuple[str, ...] = ()
     limits: LimitsConfig = LimitsConfig()

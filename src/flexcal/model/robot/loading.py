@@ -66,6 +66,7 @@ def read_robot(robot_type: type[RobotModel], path: Path) -> RobotModel:
     if config.limits.acceleration is not None:
         _check_count(file, ("limits", "acceleration"), config.limits.acceleration, len(motors))
     points = {name: _point(file, description, name, config) for name in config.points}
+    points |= _inclinometers(file, description, config)
     payload = _payload(file, description, config)
     springs = _springs(file, config, joints, points, relations)
     stations = tuple(config.stations) or ("tracker",)
@@ -82,6 +83,7 @@ def read_robot(robot_type: type[RobotModel], path: Path) -> RobotModel:
             tool=np.zeros(6),
             point_error=np.zeros((len(points), 3)),
             point_turn=np.zeros((len(points), 3)),
+            point_zero=np.zeros((len(points), 3)),
             gravity_compliance=np.zeros(n),
             lateral_compliance=np.zeros((n, 2)),
             loops=np.zeros((len(config.loops), len(LOOP))),
@@ -200,6 +202,24 @@ def _carrier(file: YamlFile, description: Description, station: str, name: str) 
     """Frame that carries a station's instrument."""
     frame = _frame(file, ("stations", station, "frame"), description, name)
     return Point(station, name, frame.joint, frame.rotation, frame.translation, np.zeros(3))
+
+
+def _inclinometers(file: YamlFile, description: Description, config: RobotConfig) -> dict[str, Point]:
+    """Inclinometers as points at the origin of the frame that they are mounted on, turned as declared."""
+    points = {}
+    for name, entry in config.measurements.items():
+        if entry.kind != "inclinometer":
+            continue
+        if name in config.points:
+            raise file.error(
+                "E-ROBOT-061",
+                ("measurements", name),
+                f"'{name}' is a point under `points:` too; give the inclinometer another name.",
+            )
+        frame = _frame(file, ("measurements", name, "frame"), description, entry.frame)
+        rotation = frame.rotation @ rpy_rotation(np.array(entry.rpy or (0.0, 0.0, 0.0)))
+        points[name] = Point(name, entry.frame, frame.joint, rotation, frame.translation, np.zeros(3))
+    return points
 
 
 _ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}

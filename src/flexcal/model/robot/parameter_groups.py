@@ -18,8 +18,8 @@ class Geometry:
     `errors` (n, 6) of every joint and `tool` (6,) in the order of `GEOMETRY`, rad and m; `origin_error` (n, 3), m, of joints that branch
     off, in the parent link, zero for others; `point_error` (points, 3), m, in the order of
     the robot's points; `point_turn` (points, 3), rad, rotation vectors from the points' frames to the axes of a target whose orientation is
-    measured; `gravity_compliance` (n,) about the joints' axes and `lateral_compliance` (n, 2) across them, rad/(N m); `loops` (loops, 6),
-    m, in the order of `LOOP`.
+    measured; `point_zero` (points, 3), rad, what an inclinometer's axes read where they are level; `gravity_compliance` (n,) about the
+    joints' axes and `lateral_compliance` (n, 2) across them, rad/(N m); `loops` (loops, 6), m, in the order of `LOOP`.
     """
 
     errors: np.ndarray
@@ -27,6 +27,7 @@ class Geometry:
     tool: np.ndarray
     point_error: np.ndarray
     point_turn: np.ndarray
+    point_zero: np.ndarray
     gravity_compliance: np.ndarray
     lateral_compliance: np.ndarray
     loops: np.ndarray

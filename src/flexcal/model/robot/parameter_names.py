@@ -34,6 +34,9 @@ COUPLED = ("rotor_inertia", "viscous", "coulomb")
 MASS_AND_COM = ("mass", "com_x", "com_y", "com_z")
 MOMENTS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 STATION = ("x", "y", "z", "rx", "ry", "rz")
+VERTICAL = "vertical"
+"""Station whose z axis is the vertical, by which inclinometers read."""
+ZEROS = ("zero_x", "zero_y", "zero_z")
 SOCKET_SCALE = "sockets.scale"
 """Relative deviation of the distances between a fixture's sockets from the declared ones."""
 BOARD_SCALE = "board.scale"
@@ -54,6 +57,7 @@ SCATTER = (
 
 _UNITS = {
     **dict.fromkeys(LOOP, "m"),
+    **dict.fromkeys(("zero_x", "zero_y", "zero_z"), "rad"),
     "offset": "rad", "misalignment_1": "rad", "misalignment_2": "rad", "length_x": "m", "length_y": "m", "length_z": "m",
     "origin_x": "m", "origin_y": "m", "origin_z": "m",
     "x": "m", "y": "m", "z": "m", "zero": "m", "rx": "rad", "ry": "rad", "rz": "rad", "backlash": "rad", "gravity_compliance": "rad/(N m)",
@@ -201,6 +205,7 @@ def parameter_locations(model: RobotModel) -> dict[str, Location]:
         for k, key in enumerate("xyz"):
             table[f"point.{name}.{key}"] = Location("geometry", "point_error", (p, k))
             table[f"point.{name}.r{key}"] = Location("geometry", "point_turn", (p, k))
+            table[f"point.{name}.zero_{key}"] = Location("geometry", "point_zero", (p, k))
     for k, key in enumerate(SCATTER):
         table[f"scatter.{key}"] = Location("scatter", "std", (k,))
     return table
