@@ -124,14 +124,14 @@ def test_bad_input_is_told(tmp_path: Path) -> None:
     rows = measured(tmp_path, 4)
     degrees, mirrored = rows.copy(), measured(tmp_path, 4, projection)
     degrees[:, 6:] *= 180 / np.pi
-    with refused("E-POSES-067", "tilt_x", "unit: deg"):
+    with refused("E-POSES-073", "tilt_x", "unit: deg"):
         fitted(tmp_path, degrees)
     level = rows.copy()
     level[:, 6:] *= 1.5 / np.abs(rows[:, 6:]).max() * 0.1
-    with refused("E-CAL-024", "'level'"):
+    with refused("E-CAL-031", "'level'"):
         fitted(tmp_path, level)
     mirrored[:, 6] *= -1
-    with refused("E-CAL-024", "'level'", "sign"):
+    with refused("E-CAL-031", "'level'", "sign"):
         fitted(tmp_path, mirrored, "reads: projection")
 
 

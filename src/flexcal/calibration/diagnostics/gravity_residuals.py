@@ -31,8 +31,9 @@ def gravity_loads(fit: GeometricFit, residuals: Mapping[str, np.ndarray]) -> Gra
 
     Of more than 1500 points some, evenly chosen.
     """
-    rows = np.unique(np.linspace(0, len(fit.poses) - 1, min(len(fit.poses), _MOST)).astype(int))
-    model, poses = fit.model, fit.poses.subset(rows)
+    measured = fit.poses.pointed
+    rows = np.unique(np.linspace(0, len(measured) - 1, min(len(measured), _MOST)).astype(int))
+    model, poses = fit.model, measured.subset(rows)
     motion = points_kinematics(model, poses.q, None, poses.target, jacobians=True).motion_jacobian[
         :, :3, :, 2
     ]

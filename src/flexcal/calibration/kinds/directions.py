@@ -22,6 +22,8 @@ _FOREIGN = np.deg2rad(5)
 """Median misfit, rad, above which readings and robot do not belong together."""
 _STEEPEST = 1e-3
 """Least cosine of an elevation for its slope: at the vertical it is infinite."""
+_LARGEST_ZERO = 0.3
+"""Zero of an axis, rad, that no sensor has: with half a turn, projections of the wrong sign would fit."""
 _STEPS, _SMALL = 30, 1e-10
 _SPANNED = 1e-3
 """Extent of the vertical's directions in the sensor's frame, relative to the largest, below which they lie in a plane."""
@@ -42,7 +44,7 @@ class Directions(Kind):
         """As `Kind.read`: nothing of where the sensor is."""
         return np.zeros_like(located)
 
-    def slopes(self, located: np.ndarray) -> np.ndarray:
+    def slopes(self, model: RobotModel, station: np.ndarray, located: np.ndarray) -> np.ndarray:
         """As `Kind.slopes`."""
         return np.zeros((len(located), 3, 3))
 
@@ -108,7 +110,7 @@ class Directions(Kind):
         up, tilt = axes[rows, 2], at.poses.tilt[at.poses.tilted][rows]
         turn, zero, misfit = _mounting(sensor, up, tilt)
         if misfit > _FOREIGN:
-            raise FlexcalError("E-CAL-024", _cause(target, sensor, up, tilt, misfit))
+            raise FlexcalError("E-CAL-031", _cause(target, sensor, up, tilt, misfit))
         values = dict[str, float](zip(STATION[3:], rotation_vector(turn).tolist(), strict=True))
         return {**values, **dict[str, float](zip(ZEROS, zero.tolist(), strict=True))}
 
@@ -203,7 +205,8 @@ def _refined(
         if size < _SMALL:
             break
     left = _wrapped(sensor, tilt - _reading(sensor, up @ turn) - zero)[there]
-    return turn, zero, float(np.median(np.abs(left)))
+    misfit = float(np.median(np.abs(left)))
+    return turn, zero, misfit if np.abs(zero).max() < _LARGEST_ZERO else misfit + np.pi
 
 
 def _cube_rotations() -> list[np.ndarray]:

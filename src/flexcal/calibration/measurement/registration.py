@@ -10,6 +10,7 @@ from flexcal.calibration.kinds import ANGULAR, kind_of
 from flexcal.calibration.measurement.prediction import predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
+from flexcal.model.parts import wxyz_rotation
 from flexcal.model.robot import RobotModel
 
 FOREIGN = np.deg2rad(15)

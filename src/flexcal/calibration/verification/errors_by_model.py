@@ -40,17 +40,17 @@ class MeasuredPoints:
 
     @classmethod
     def of_fit(cls, fit: GeometricFit, errors: Mapping[str, np.ndarray]) -> MeasuredPoints:
-        """Points of a fit with what every model leaves of their readings, (N, 3) m.
+        """Points of a fit with what every model leaves of their readings, (N, 3) m; inclinometers tell none.
 
         Distances and contacts are put where the calibrated robot has its point, and their errors in the direction that they measure.
         """
-        poses = fit.poses
-        if poses.kind is not None:
+        poses = fit.poses.pointed
+        if poses.kind is not None and len(poses):
             at = predict_measurements(fit.model, poses)
             slopes = np.eye(3) if at.readings.slopes is None else at.readings.slopes
             errors = {name: np.matmul(left[:, None], slopes)[:, 0] for name, left in errors.items()}
             poses = replace(poses, position=at.located + errors[CALIBRATED])
-        return cls(poses, errors, fit.ambiguous)
+        return cls(poses, errors, fit.ambiguous[~fit.poses.tilted])
 
     @property
     def calibrated(self) -> np.ndarray:

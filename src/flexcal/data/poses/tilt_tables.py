@@ -42,7 +42,7 @@ def read_tilts(file: TableFile, model: RobotModel, further: Sequence[str] = ()) 
     """
     if measured := {"x", "y", "z", "length", "touched", "fixture", "image"} & set(file.columns):
         raise file.error(
-            "E-POSES-063",
+            "E-POSES-069",
             f"there are both tilts and {', '.join(sorted(measured))}; give every instrument a file of its own.",
         )
     texts = tuple(dict.fromkeys(n for n in (INCLINOMETER, *further) if n in file.columns))
@@ -95,13 +95,13 @@ def _declared(file: TableFile, model: RobotModel) -> Mapping[str, InclinometerCo
     declared = {k: item for k, item in model.config.measurements.items() if item.kind == INCLINOMETER}
     if not declared:
         raise file.error(
-            "E-POSES-064",
+            "E-POSES-070",
             "there are readings of an inclinometer, but robot.yaml declares none; add `measurements: {level: {kind: inclinometer, frame: "
             "FRAME, std: 5e-5}}` with the frame of the URDF that carries it, and its standard deviation in rad.",
         )
     if len(declared) > 1 and INCLINOMETER not in file.columns:
         raise file.error(
-            "E-POSES-065",
+            "E-POSES-071",
             f"robot.yaml declares the inclinometers {', '.join(declared)}; add a column '{INCLINOMETER}' with the name of that which was "
             "read.",
         )
@@ -118,7 +118,7 @@ def _names(table: Table, declared: Mapping[str, InclinometerConfig], rows: int) 
             known = list(declared)
             hint = suggestion(name, known) or f"; known are {', '.join(known)}."
             raise table.error(
-                "E-POSES-066",
+                "E-POSES-072",
                 row,
                 INCLINOMETER,
                 f"there is no inclinometer '{name}' under `measurements:` of robot.yaml{hint}",
@@ -147,7 +147,7 @@ def _check_range(
         else "these look like degrees: convert them to rad, or declare 'unit: deg' under `signals:`; or say `reads:` as the sensor does."
     )
     raise table.error(
-        "E-POSES-067",
+        "E-POSES-073",
         row,
         signal.columns[0],
         f"the inclinometer reads {values[row]:.4g}{unit}, but {reads} is at most {most:.4g}{unit}; {advice}",

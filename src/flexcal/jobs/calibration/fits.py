@@ -79,10 +79,14 @@ class Fits:
         )
         if bearings is not None and bearings.declared is None and bearings.preferred is not None:
             model = model.with_bearings(bearings.preferred)
+        if terms is None and not len(poses.pointed):
+            # errors in mm, by which terms are selected, are not to be had
+            terms = base
         if terms is None:
             progress("terms", 0.0)
-            good = np.setdiff1d(np.arange(len(poses)), rigid.estimate.outliers)
-            selection = select_terms(model, poses.subset(good), rigid if loss == "auto" else None)
+            good = np.setdiff1d(np.flatnonzero(~poses.tilted), rigid.estimate.outliers)
+            known = rigid if loss == "auto" and not poses.tilted.any() else None
+            selection = select_terms(model, poses.subset(good), known)
             progress("terms", 1.0)
             model, terms = selection.model, _with_random_waves(selection.terms)
         elastic = bool(model.elastic)

@@ -9,6 +9,7 @@ from typing import Literal
 
 from flexcal.calibration.fit import LossName
 from flexcal.data.poses import column_labels, read_poses, tables_of
+from flexcal.errors import FlexcalError
 from flexcal.files.formats import provenance, read_estimates
 from flexcal.jobs.calibration.procedure import calibrate
 from flexcal.jobs.calibration.result import Calibration
@@ -50,6 +51,11 @@ def calibrate_robot(
     target = estimates_target(source, out, "calibration")
     model = with_blocks(bare, blocks, source)
     poses = read_poses(list(files), model, further=() if hold_out is None else (hold_out,))
+    if out is not None and not len(poses.pointed):
+        raise FlexcalError(
+            "E-RUN-103",
+            "inclinometers alone have no page, for nothing is measured in mm; leave --out away, or give measured points too.",
+        )
     progress("reading", 1.0)
     calibration = calibrate(
         model,

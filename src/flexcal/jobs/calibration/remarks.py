@@ -323,12 +323,14 @@ def _contradicted(test: StatedNoise) -> str:
 
 def floor_remark(fit: GeometricFit, before: np.ndarray | None) -> tuple[str, ...]:
     """Remark where the scatter from pose to pose is what is left, and large; `before` (N, 3), m, are the errors without calibration."""
+    rows = int(fit.poses.present.sum())
+    if not rows:
+        return ()
     budget = fit.variances
     robot, model, instrument = (
         float(budget[key] or 0.0) for key in ("robot_mm", "model_mm", "instrument_mm")
     )
     dof = fit.estimate.degrees_of_freedom
-    rows = int(fit.poses.present.sum())
     parameters = robot * np.sqrt(max(rows - dof, 0) / rows)
     if (
         before is None

@@ -149,7 +149,7 @@ class Calibration(Identification):
         """Leave points.csv, arm.npz and gravity_loads.npz in a folder."""
         points, selected = self.points, self.selected
         write_points(folder, points)
-        write_arm(folder, arms_at(selected.model, selected.poses, points.shown))
+        write_arm(folder, arms_at(selected.model, selected.poses.pointed, points.shown))
         fits = {name: points.errors[name] for name in (RIGID, CALIBRATED) if name in points.errors}
         write_loads(folder, gravity_loads(selected, fits))
 
@@ -157,7 +157,10 @@ class Calibration(Identification):
     def points(self) -> MeasuredPoints:
         """Points of the fit with the errors of every model; includes the rigid model if it is not the selected one."""
         fit = self.selected
-        errors = errors_before(self.before) | {RIGID: self.rigid.residuals, CALIBRATED: fit.residuals}
+        errors = errors_before(self.before) | {
+            RIGID: self.rigid.residuals[~self.rigid.poses.tilted],
+            CALIBRATED: fit.residuals[~fit.poses.tilted],
+        }
         if self.rigid is fit:
             del errors[RIGID]
         return MeasuredPoints.of_fit(fit, errors)

@@ -212,7 +212,7 @@ def _inclinometers(file: YamlFile, description: Description, config: RobotConfig
             continue
         if name in config.points:
             raise file.error(
-                "E-ROBOT-061",
+                "E-ROBOT-077",
                 ("measurements", name),
                 f"'{name}' is a point under `points:` too; give the inclinometer another name.",
             )
