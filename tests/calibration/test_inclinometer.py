@@ -97,6 +97,7 @@ def test_with_noise_chi_squared_is_one_and_no_length_is_claimed(tmp_path: Path) 
     )
     said = calibration.summary()
     assert "nan" not in said and "nothing of lengths" in said
+    assert "no file has readings" not in said
     assert calibration.document()["inclination"]["level"]["rms_mrad"] == pytest.approx(0.05, rel=0.3)
 
 

@@ -287,6 +287,7 @@ def _without_readings(fit: GeometricFit) -> Sequence[str]:
     """Remark on declared instruments of which there are no readings."""
     poses = fit.poses
     read = {*poses.station.tolist(), *([] if poses.camera is None else poses.camera.tolist())}
+    read |= set(poses.target[poses.tilted].tolist())
     declared = fit.model.config.measurements.items()
     missing = [
         n for n, item in declared if n not in read and not (item.kind == "sockets" and poses.in_socket.any())
