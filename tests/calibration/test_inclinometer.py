@@ -101,6 +101,51 @@ def test_with_noise_chi_squared_is_one_and_no_length_is_claimed(tmp_path: Path) 
     assert calibration.document()["inclination"]["level"]["rms_mrad"] == pytest.approx(0.05, rel=0.3)
 
 
+def beside_points(folder: Path, seed: int) -> tuple[Path, Path, np.ndarray]:
+    """Files of points and tilts of one arm, and the vertical in the frame of its first joint's axis."""
+    rng = np.random.default_rng(seed)
+    errors, lengths = 2e-3 * rng.normal(size=(6, 3)), 3e-4 * rng.normal(size=(6, 3))
+    mounted, base = Rotation.from_rotvec(rng.normal(size=3)), Rotation.from_rotvec([0.1, 0.2, 1.0])
+    vertical = Rotation.from_rotvec([0.01, -0.02, 0]).apply([0, 0, 1])
+    tilts, points = [], []
+    while len(tilts) < 60:
+        q, turn, place = rng.uniform(-2, 2, 6), Rotation.identity(), np.zeros(3)
+        for error, length, axis, origin, angle in zip(errors, lengths, AXES, ORIGINS, q, strict=True):
+            place = place + turn.apply(np.array(origin) + length)
+            turn = turn * Rotation.from_rotvec(error) * Rotation.from_rotvec(angle * axis)
+        up = (turn * mounted).inv().apply(vertical)
+        if np.abs(up[:2]).max() < 0.95:
+            tilts.append([*q, *(elevation(up) + [0.003, -0.002] + NOISE * rng.normal(size=2))])
+            seen = (
+                base.apply(place + turn.apply([0.055, 0.02, 0.1])) + [2, -1, 0.5] + NOISE * rng.normal(size=3)
+            )
+            points.append([len(tilts), *q, *seen, NOISE])
+    lines = ["pose,q1,q2,q3,q4,q5,q6,x,y,z,sigma", *(",".join(map(repr, map(float, row))) for row in points)]
+    (folder / "points.csv").write_text("\n".join(lines) + "\n")
+    return (
+        folder / "points.csv",
+        written(folder, np.array(tilts)),
+        Rotation.from_rotvec(errors[0]).inv().apply(vertical),
+    )
+
+
+def test_beside_points_the_inclination_of_the_first_axis_is_true(tmp_path: Path) -> None:
+    robot(tmp_path)
+    declared = (tmp_path / "robot.yaml").read_text()
+    (tmp_path / "robot.yaml").write_text(declared + "points: {ball: {frame: l6, xyz: [0.05, 0.02, 0.1]}}\n")
+    model = RobotModel.from_yaml(tmp_path / "robot.yaml", estimates=False)
+    points, tilts, vertical = beside_points(tmp_path, 11)
+    fit = fit_geometry(model, read_poses([points, tilts], model), terms=("kinematic",))
+    up = Rotation.from_rotvec(
+        [fit.model.value(f"station.vertical.{key}") for key in ("rx", "ry", "rz")]
+    ).as_matrix()[2]
+    first = [fit.model.value(f"j1.misalignment_{k}") for k in (1, 2)]
+    axis = Rotation.from_rotvec([*first, 0.0]).apply([0, 0, 1])
+    assert np.arccos(up @ axis) == pytest.approx(np.arccos(vertical[2]), abs=1e-4)
+    assert fit.errors.mean < 1.5e-4 and fit.errors_by_kind == {}
+    assert 0.75 < fit.estimate.reduced_chi2 < 1.25
+
+
 def test_derivatives_agree_with_differences(tmp_path: Path) -> None:
     for declared in ("std: 5e-5", "reads: projection", "reads: component"):
         model = robot(tmp_path, declared)

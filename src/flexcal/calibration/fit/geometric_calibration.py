@@ -104,10 +104,10 @@ class GeometricFit:
 
     @property
     def errors_by_kind(self) -> dict[str, ErrorStatistics]:
-        """Differences from what was measured by each of several kinds of measurements; empty for one kind."""
-        kinds = kind_names(self.poses)
+        """Differences, m, from what was measured by each of several kinds of measurements; empty for one kind beside inclinometers."""
+        kinds, residuals = kind_names(self.poses.pointed), self.residuals[~self.poses.tilted]
         names = list(dict.fromkeys(kinds.tolist()))
-        return {n: ErrorStatistics.of(self.residuals[kinds == n]) for n in names} if len(names) > 1 else {}
+        return {n: ErrorStatistics.of(residuals[kinds == n]) for n in names} if len(names) > 1 else {}
 
     @property
     def variances(self) -> dict[str, float | None]:

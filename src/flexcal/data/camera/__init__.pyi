@@ -1,7 +1,7 @@
 from .board import board_corners
+from .board_symmetry import half_turns
 from .bundle import FEWEST_CORNERS, FreeViews, View, free_views, lens_prior
 from .detection import detected_views
-from .half_turns import half_turns
 from .lens import Lens, projected
 from .poses_of_views import ViewPoses, view_poses
 

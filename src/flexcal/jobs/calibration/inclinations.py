@@ -90,4 +90,7 @@ def _base_inclination(fit: GeometricFit) -> str | None:
     angle = float(np.arccos(np.clip(up @ gravity, -1, 1)))
     stds = [std for name in names if (std := fit.estimate.std(name)) is not None]
     spread = f" ± {float(np.max(stds)) / _MRAD:.2g}" if stds else ""
-    return f"the vertical is inclined to `gravity` of robot.yaml by {angle / _MRAD:.3g}{spread} mrad, in the base frame as registered"
+    return (
+        f"the vertical is inclined to `gravity` of robot.yaml by {angle / _MRAD:.3g}{spread} mrad, in the base frame that fits the nominal "
+        "robot best; the first joint's axis has its own misalignments in that frame"
+    )
