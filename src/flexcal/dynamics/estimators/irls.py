@@ -21,6 +21,8 @@ _NORMAL = 1.4826
 _SETTLED = 1e-2
 """Largest step of a parameter, in its standard deviations, at which the iteration has converged."""
 _ITERATIONS = 50
+_ROUNDING = 10.0
+"""Ratio to the least noise level up to which residuals are those of rounding."""
 
 
 def huber_least_squares(data: RegressionData, recorded: RecordedRows) -> Estimate:
@@ -40,7 +42,8 @@ def huber_least_squares(data: RegressionData, recorded: RecordedRows) -> Estimat
         estimate = linear_fit(recorded.weighted(weights), noise)
         seen = np.array(estimate.identifiable)
         step = np.abs(estimate.parameters.coordinates() - before)[seen]
-        if np.all(step <= _SETTLED * np.sqrt(np.diag(estimate.covariance))[seen]):
+        settled = np.all(step <= _SETTLED * np.sqrt(np.diag(estimate.covariance))[seen])
+        if settled or _is_rounding(data, noise):
             every = np.concatenate([own[np.isfinite(own)] for own in weights])
             bend = float(np.mean(every) / np.mean(every == 1.0))
             return replace(
@@ -61,6 +64,11 @@ def _robust_noise(data: RegressionData, residuals: Sequence[np.ndarray]) -> list
         s.floored(_NORMAL * float(np.nanmedian(np.abs(residuals[s.experiment][s.equation]))))
         for s in data.subsystems
     ]
+
+
+def _is_rounding(data: RegressionData, noise: Sequence[float]) -> bool:
+    """Whether equations without noise leave rounding alone, among which weights never settle."""
+    return all(n <= _ROUNDING * s.floored(0.0) for s, n in zip(data.subsystems, noise, strict=True))
 
 
 def _weights(residuals: Sequence[np.ndarray], noise: Sequence[float]) -> list[np.ndarray]:
