@@ -73,18 +73,18 @@ def held_out_errors(
 
     A fixture or an instrument whose rows are all in the group is placed by these: each socket is the mean of the predicted positions of the
     ball in it; the ball and the robot stay as calibrated on the rest. `left_out` is how many wrong readings are not among them. Raises
-    `FlexcalError` for fewer than two groups.
+    `FlexcalError` for fewer than two groups. Inclinometers, which tell no place, are calibrated with and not compared.
     """
-    names = list(dict.fromkeys(labels.tolist()))
+    names = list(dict.fromkeys(labels[~poses.tilted].tolist()))
     if len(names) < 2:
         raise FlexcalError(
-            "E-RUN-101", f"'{by}' is the same in all measurements; nothing can be held out by it."
+            "E-RUN-101", f"'{by}' is the same in all measurements of places; nothing can be held out by it."
         )
     groups = {}
     for name in names:
         own = labels == name
         groups[str(name)] = _compared(
-            calibrated(poses.subset(~own)), poses.subset(own), set(poses.station[~own])
+            calibrated(poses.subset(~own)), poses.subset(own).pointed, set(poses.station[~own])
         )
     return HeldOut(by, groups, left_out)
 
