@@ -5,7 +5,8 @@ from .jumps_in_readings import ReadingJump, reading_jumps
 from .nearest_socket import NearestSocket, nearest_sockets
 from .noise_test import StatedNoise, stated_noise
 from .place_agreement import FEWEST_PLACES, Disagreement, PlaceAgreement, PlaceErrors
-from .plausibility import implausible_shifts, is_implausible, residuals_implausible
+from .plausibility import FarZero, far_zeros, implausible_shifts, is_implausible, residuals_implausible
+from .repeatability_floor import RepeatabilityFloor
 from .size_of_board import board_size
 
 __all__ = [
@@ -13,14 +14,17 @@ __all__ = [
     "BearingAxes",
     "Disagreement",
     "Drift",
+    "FarZero",
     "GravityLoads",
     "NearestSocket",
     "PlaceAgreement",
     "PlaceErrors",
     "ReadingJump",
+    "RepeatabilityFloor",
     "StatedNoise",
     "board_size",
     "compare_bearings",
+    "far_zeros",
     "gravity_loads",
     "implausible_shifts",
     "is_implausible",

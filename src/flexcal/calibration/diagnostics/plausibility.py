@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.fit import GeometricFit, manufacturing_tolerances
+from flexcal.calibration.fit import TOLERANCE, GeometricFit, manufacturing_tolerances
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.model.parts import vector_rotation
+from flexcal.model.robot import RobotModel
 
 FAR = 50.0
 """Largest plausible deviation of a geometric parameter, in tolerances: 15 mm, 25 mrad."""
@@ -21,6 +22,12 @@ FAR_FROM_PRIOR = 5.0
 
 NOISY = 3.0
 """Ratio of errors after the fit to the known noise of a camera's single views below which they are that noise."""
+
+FAR_ZERO = 0.6
+"""Largest plausible error of a joint zero, rad, where the residuals are plausible: zeros that were set by eye."""
+
+PLAY = 6e-3
+"""Error after the fit, m (root mean square of a coordinate), up to which play in the joints of small arms explains it."""
 
 SCATTERED = 0.01
 """Ratio of errors after the fit to the extent of the points (root mean square both) from which data and robot do not belong together."""
@@ -49,7 +56,7 @@ def residuals_implausible(calibration: GeometricFit) -> bool:
     extent = np.sqrt(np.mean((position - position.mean(axis=0)) ** 2))
     size = float(np.sqrt(np.mean(calibration.residuals[rows] ** 2)))
     noise = np.where(calibration.poses.seen[:, None], calibration.poses.sigma, 0.0)[rows]
-    return size > SCATTERED * extent and size > NOISY * float(np.sqrt(np.mean(noise**2)))
+    return size > max(SCATTERED * extent, PLAY) and size > NOISY * float(np.sqrt(np.mean(noise**2)))
 
 
 def _in_base(calibration: GeometricFit) -> np.ndarray:
@@ -65,7 +72,7 @@ def _in_base(calibration: GeometricFit) -> np.ndarray:
 
 
 def implausible_shifts(calibration: GeometricFit) -> tuple[ImplausibleShift, ...]:
-    """Parameters with an implausibly large change from their start values, the largest first."""
+    """Parameters with an implausibly large change from their start values, beyond what their own noise (2σ) explains, the largest first."""
     estimate, prior = calibration.estimate.parameters, calibration.prior
     kept = [name for name in calibration.identifiability.kept_names if _has_size(name)]
     named = [*kept, *prior.parameters.names]
@@ -73,9 +80,15 @@ def implausible_shifts(calibration: GeometricFit) -> tuple[ImplausibleShift, ...
     size = np.concatenate(
         [manufacturing_tolerances(estimate.subset(kept)), np.sqrt(np.diag(prior.covariance))]
     )
-    limit = np.concatenate([_limits(kept, size), np.full(len(prior.parameters), FAR_FROM_PRIOR)])
+    limits = _limits(kept, size)
+    if calibration.poses.located.all() and not residuals_implausible(calibration):
+        zeros = np.array([name in _zeros(calibration.model) for name in kept], dtype=bool)
+        limits = np.where(zeros, FAR_ZERO / size[: len(kept)], limits)
+    limit = np.concatenate([limits, np.full(len(prior.parameters), FAR_FROM_PRIOR)])
     times = np.abs(end - start) / size
-    far = [k for k in np.argsort(-times / limit) if times[k] > limit[k]]
+    noise = np.array([calibration.estimate.std(name) or 0.0 for name in kept] + [0.0] * len(prior.parameters))
+    clear = times - 2 * noise / size
+    far = [k for k in np.argsort(-times / limit) if clear[k] > limit[k]]
     items = [(estimate[named[k]], float(start[k]), float(times[k])) for k in far]
     return tuple(ImplausibleShift(p.name, p.natural(x), p.value, p.unit, t) for p, x, t in items)
 
@@ -84,6 +97,37 @@ def _limits(kept: list[str], size: np.ndarray) -> np.ndarray:
     """Largest plausible change of each geometric parameter, in tolerances."""
     points = [name.startswith(("tool.length", "point.")) for name in kept]
     return np.where(points, FAR_POINT / size[: len(kept)], FAR)
+
+
+def _zeros(model: RobotModel) -> tuple[str, ...]:
+    return tuple(f"{joint.name}.offset" for joint in model.joints if joint.kind == "revolute")
+
+
+@dataclass(frozen=True)
+class FarZero:
+    """Joint whose zero is far from that of the URDF, by the `error` with the half width of its 95 % interval, rad."""
+
+    joint: str
+    error: float
+    half_width: float
+
+    def __str__(self) -> str:
+        return f"{self.joint} {np.rad2deg(self.error):+.1f} ± {np.rad2deg(self.half_width):.1f}°"
+
+
+def far_zeros(calibration: GeometricFit) -> tuple[FarZero, ...]:
+    """Joint zeros that are farther off than tolerances of manufacture explain, the farthest first."""
+    found, estimate = [], calibration.estimate
+    for joint in calibration.model.joints:
+        name = f"{joint.name}.offset"
+        # what the first joint is off is where the base is
+        if joint.kind != "revolute" or joint.parent < 0 or name not in estimate.parameters.names:
+            continue
+        interval, start = estimate.interval(name), estimate.parameters.subset([name]).prior_mean()
+        error = estimate.values[name] - float(start[0])
+        if interval is not None and abs(error) > FAR * TOLERANCE["rad"]:
+            found.append(FarZero(joint.name, error, (interval[1] - interval[0]) / 2))
+    return tuple(sorted(found, key=lambda zero: -abs(zero.error)))
 
 
 def _has_size(name: str) -> bool:

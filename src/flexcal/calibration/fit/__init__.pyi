@@ -11,6 +11,7 @@ from .least_squares_problem import LossName
 from .stratified_sample import StratifiedSample, all_errors
 from .terms import (
     LEAST_POSES,
+    LEVELS,
     PER_JOINT,
     TOLERANCE,
     declared_size,
@@ -24,6 +25,7 @@ from .terms import (
 __all__ = [
     "KNOWN_POINT_STD",
     "LEAST_POSES",
+    "LEVELS",
     "PER_JOINT",
     "TOLERANCE",
     "ElasticPrior",

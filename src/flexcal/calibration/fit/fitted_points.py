@@ -39,8 +39,10 @@ from flexcal.calibration.measurement import (
     ROBOT,
     PredictedMeasurements,
     Readings,
+    has_far_zeros,
     predict_measurements,
     register,
+    register_with_zeros,
     require_both_flanks,
     require_orientations,
     stated_sigma,
@@ -63,6 +65,8 @@ _CHI_MEDIAN = np.array([1.0, 0.455, 1.386, 2.366])
 """Medians of chi-square by degrees of freedom, up to three."""
 _SUSPICION = 1e-3
 """Probability of suspecting an outlier without one."""
+_FAR_ZERO = 0.2
+"""Plausible error of a joint zero, rad, where joint zeros are far off."""
 _SLACK = 1.5
 """Factor by which the squared scatter of few points, from their median, may be too small."""
 
@@ -74,7 +78,8 @@ _FREE_STIFFNESS = 0.3
 class PointFit:
     """Input of a fit: the registered robot `start`, its `geometric` parameters, their rank on the `poses`, the elastic `prior`.
 
-    `size` is the length that is held where no reading tells how large the robot is, `near` has values close to the solution.
+    `size` is the length that is held where no reading tells how large the robot is, `near` has values close to the solution, `far_zeros`
+    tells whether joint zeros are far off.
     """
 
     start: RobotModel
@@ -88,6 +93,7 @@ class PointFit:
     elastic: bool
     marginalised: bool
     near: Mapping[str, float]
+    far_zeros: bool
     progress: Progress
 
     @classmethod
@@ -113,6 +119,8 @@ class PointFit:
         model = model.with_lenses({name: lens.values for name, lens in poses.lenses.items()})
         bare = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
         start = register(model, poses, predict_measurements(bare, poses, elastic=elastic).located)
+        if far_zeros := has_far_zeros(start, poses):
+            start = register_with_zeros(start, poses)
         start = with_target_axes(with_camera_places(start, poses), poses)
         require_orientations(start, poses)
         prior = with_instruments(prior, start, poses)
@@ -121,13 +129,15 @@ class PointFit:
         held = held_lengths(start, poses)
         geometric = geometric_parameters(start, poses, terms)
         geometric = Parameters(item for item in geometric if item.name not in held)
-        seen = kinematic_identifiability(start, poses, geometric)
+        # zeros that are far off are to be found as such, not as lengths of links that are turned
+        zeros = [name for name in geometric.names if name.endswith(".offset")] if far_zeros else []
+        seen = kinematic_identifiability(start, poses, geometric, prefer=zeros)
         require_enough(start, poses, geometric, seen)
         structural = random_identifiability(start, poses, geometric, seen)
         if structural.rank > seen.rank or poses.kind is not None:
             # these poses hide something: what may be off most, as the place of the instrument, is to take it up
             sizes = np.array([plausible_size(start, name) for name in geometric.names])
-            seen = kinematic_identifiability(start, poses, geometric, scale=sizes)
+            seen = kinematic_identifiability(start, poses, geometric, scale=sizes, prefer=zeros)
             structural = random_identifiability(start, poses, geometric, seen, scale=sizes)
         return cls(
             start,
@@ -141,6 +151,7 @@ class PointFit:
             elastic,
             marginalised,
             near,
+            far_zeros,
             progress,
         )
 
@@ -179,6 +190,8 @@ class PointFit:
         """Plausible deviation of every geometric parameter, a kept one with that of the dropped ones that it takes up."""
         every = self.identifiability
         sizes = {name: plausible_size(self.start, name) for name in self.geometric.names}
+        if self.far_zeros:
+            sizes |= {name: max(sizes[name], _FAR_ZERO) for name in sizes if name.endswith(".offset")}
         own = np.array([sizes[name] for name in every.names])
         taken_up = np.linalg.norm(every.regrouping * own, axis=1)
         return sizes | dict(zip(every.kept_names, taken_up.tolist(), strict=True))

@@ -35,6 +35,8 @@ TOLERANCE = {"m": 3e-4, "rad": 5e-4, "rad/(N m)": 1e-6, "1": 1e-3}
 """Size of a relevant change (1σ of manufacture), by unit, which makes parameters of different units comparable."""
 
 
+LEVELS = ("offsets", "lengths", "kinematic")
+"""Terms of the rigid geometry, each with the parameters of those before it: joint zeros; lengths of links too; all errors of all axes."""
 PER_JOINT = ("gravity_compliance", "lateral_compliance")
 """Kinds of terms that may be named for one joint, as `<joint>.<kind>`: compliance about its axis, and about the two axes normal to it."""
 
@@ -55,14 +57,17 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
     target whose orientation was measured. A wire has a place and a zero, a touched plane a height and two tilts. Without an instrument of
     points nothing tells where the robot's base is: all places may turn, and errors of joints that move the whole robot as one are left out.
     An inclinometer has its mounting and the zeros of its axes, the vertical two inclinations unless the base is declared level.
+    `offsets` in its stead has of these the places of stations and points, joint offsets and the rotations of the base, `lengths` the
+    lengths of links too.
     `backlash`: the joints declared with it; `transmission` none, its waves being random effects (`random_waves`).
     `gravity_compliance`, `lateral_compliance`, `transmission_1`…: one or two for every revolute joint on the way, compliances only where
     no spring is declared in their place and gravity loads the axis: by moments that vary by more than 1 % of those that vary most.
     `<joint>.gravity_compliance` is that of one joint.
     """
     joints = moving_joints(model, poses)
-    names = _kinematic(model, poses, joints) if "kinematic" in terms else []
-    items = [_parameter(model, name) for name in names]
+    level = next((term for term in terms if term in LEVELS), None)
+    names = [] if level is None else _kinematic(model, poses, joints)
+    items = [_parameter(model, name) for name in names if level and _is_of_level(model, name, level)]
     if "backlash" in terms:
         items += [
             _parameter(model, f"{model.joints[i].name}.backlash", lower=0.0)
@@ -73,7 +78,7 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
     loaded = loaded_compliances(model, poses) if any(t.endswith(PER_JOINT) for t in terms) else frozenset()
     for term in terms:
         owner, _, kind = term.rpartition(".")
-        if kind in ("kinematic", "backlash", "transmission"):
+        if kind in (*LEVELS, "backlash", "transmission"):
             continue
         own = [model.joint_index(owner)] if owner else free_joints(model, kind, joints)
         for i in own:
@@ -101,6 +106,21 @@ def _kinematic(model: RobotModel, poses: PoseSet, joints: Sequence[int]) -> list
         for target in dict.fromkeys(poses.target[kind.rows(poses)].tolist()):
             names += [f"point.{target}.{key}" for key in kind.target_parameters(poses, target)]
     return names
+
+
+def _is_of_level(model: RobotModel, name: str, level: str) -> bool:
+    owner, _, key = name.rpartition(".")
+    if level == "kinematic" or key not in (*GEOMETRY, *ORIGIN):
+        return True
+    if key in ORIGIN:
+        return level == "lengths"
+    if owner == "tool" or level == "lengths":
+        return key.startswith("length") or (key == "offset" and owner != "tool") or _is_at_base(model, owner)
+    return key == "offset" or (_is_at_base(model, owner) and not key.startswith("length"))
+
+
+def _is_at_base(model: RobotModel, owner: str) -> bool:
+    return owner in model.joint_names and model.joints[model.joint_index(owner)].parent < 0
 
 
 def _moving_parts(model: RobotModel, poses: PoseSet, names: Sequence[str]) -> list[str]:
@@ -221,8 +241,7 @@ def plausible_size(model: RobotModel, name: str) -> float:
         return _PLAUSIBLE_COMPLIANCE
     if key.startswith(("length", "origin")) or key in LOOP:
         return _PLAUSIBLE_LENGTH
-    at_base = owner in model.joint_names and model.joints[model.joint_index(owner)].parent < 0
-    return _PLAUSIBLE_STATION if at_base and key != "backlash" else _PLAUSIBLE[key]
+    return _PLAUSIBLE_STATION if _is_at_base(model, owner) and key != "backlash" else _PLAUSIBLE[key]
 
 
 def declared_size(model: RobotModel, name: str) -> float | None:

@@ -1,5 +1,6 @@
 from .backlash_flanks import ambiguous_poses, require_both_flanks
 from .hand_eye import with_camera_places
+from .joint_zeros import has_far_zeros, register_with_zeros
 from .prediction import (
     PredictedMeasurements,
     predict_measurements,
@@ -20,12 +21,14 @@ __all__ = [
     "Readings",
     "ambiguous_poses",
     "covariance_root",
+    "has_far_zeros",
     "kind_names",
     "moving_parameters",
     "predict_measurements",
     "predicted_positions",
     "propagation",
     "register",
+    "register_with_zeros",
     "require_both_flanks",
     "require_orientations",
     "require_points",

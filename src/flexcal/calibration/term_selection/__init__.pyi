@@ -1,13 +1,17 @@
 from .cross_validation import CrossValidation, TermSelection, cross_validated, select_terms
 from .stored_trials import considered_document, considered_terms
 from .trials import TermComparison
+from .zeros_or_geometry import ZerosOrGeometry, asks_for_levels, zeros_or_geometry
 
 __all__ = [
     "CrossValidation",
     "TermComparison",
     "TermSelection",
+    "ZerosOrGeometry",
+    "asks_for_levels",
     "considered_document",
     "considered_terms",
     "cross_validated",
     "select_terms",
+    "zeros_or_geometry",
 ]

@@ -58,7 +58,7 @@ def cross_validated(fit: GeometricFit) -> CrossValidation | None:
     inside = replace(
         fit, poses=fit.poses.subset(rows), readings=fit.readings[np.isin(Readings.of(fit.poses).row, rows)]
     )
-    folds, distinct = _folds(inside.poses)
+    folds, distinct = folds_of(inside.poses)
     if distinct < LEAST_POSES:
         return None
     many = distinct >= MANY_POSES
@@ -68,7 +68,7 @@ def cross_validated(fit: GeometricFit) -> CrossValidation | None:
     return CrossValidation("folds" if many else "poses", mean, left.freedom)
 
 
-def _folds(poses: PoseSet) -> tuple[tuple[np.ndarray, ...], int]:
+def folds_of(poses: PoseSet) -> tuple[tuple[np.ndarray, ...], int]:
     """Folds (N,) in measuring order, in the workspace, and of single poses, and the number of single poses."""
     alone = repeated_pose_numbers(poses.q)
     held = poses.in_socket
@@ -82,8 +82,13 @@ def _folds(poses: PoseSet) -> tuple[tuple[np.ndarray, ...], int]:
     return folds, len(np.unique(alone))
 
 
-def select_terms(model: RobotModel, poses: PoseSet, fitted: GeometricFit | None = None) -> TermSelection:
-    """Forward selection of compliance under gravity, backlash and transmission harmonics on top of the rigid fit.
+def select_terms(
+    model: RobotModel,
+    poses: PoseSet,
+    fitted: GeometricFit | None = None,
+    level: str = "kinematic",
+) -> TermSelection:
+    """Forward selection of compliance under gravity, backlash and transmission harmonics on top of the rigid fit of a `level` of geometry.
 
     A term is added where it lowers the mean error on poses left out by more than one standard error of the paired difference, lowers the
     Bayesian information criterion, and does not raise the largest left-out error. Fewer than 80 different poses are left out one by one,
@@ -96,8 +101,8 @@ def select_terms(model: RobotModel, poses: PoseSet, fitted: GeometricFit | None 
     The random effects `transmission` are none of the terms: beside them compliance of every joint, which moves the points much alike,
     would not be found.
     """
-    base = ("kinematic", *(("backlash",) if model.backlash_joints else ()))
-    folds, distinct = _folds(poses)
+    base = (level, *(("backlash",) if model.backlash_joints else ()))
+    folds, distinct = folds_of(poses)
     if distinct < LEAST_POSES:
         more = LEAST_POSES - distinct
         return TermSelection(base, model, (), "nothing", _too_few(distinct, more))

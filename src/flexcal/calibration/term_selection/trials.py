@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from flexcal.calibration.fit import GeometricFit, geometric_parameters
+from flexcal.calibration.fit import LEVELS, GeometricFit, geometric_parameters
 from flexcal.calibration.measurement import (
     METRES,
     RADIANS,
@@ -17,7 +17,7 @@ from flexcal.calibration.measurement import (
 )
 from flexcal.calibration.term_selection.leave_out_errors import LeaveOutErrors, leave_out_fit
 from flexcal.model.robot import GEOMETRY, ORIGIN, STATION, RobotModel
-from flexcal.units import MILLIMETRE
+from flexcal.units import MILLIMETRE, decimals
 
 _WORSE = 1.05
 """Factor by which the largest error at a left-out pose may rise with a term."""
@@ -58,7 +58,16 @@ def not_tried(term: str, chosen: tuple[str, ...], reason: str) -> TermComparison
 
 
 def _change(old: LeaveOutErrors, new: LeaveOutErrors, kinds: Sequence[int]) -> str:
-    return f"{old.mean(kinds) / MILLIMETRE:.4f} to {new.mean(kinds) / MILLIMETRE:.4f} mm"
+    before, after = old.mean(kinds) / MILLIMETRE, new.mean(kinds) / MILLIMETRE
+    digits = decimals(before) + 1
+    return f"{before:.{digits}f} to {after:.{digits}f} mm"
+
+
+def mean_gain(fold: np.ndarray, old: np.ndarray, new: np.ndarray) -> tuple[float, float]:
+    """Mean gain (m) of new over old errors (N,) over the folds (N,), as independent units, and its standard error."""
+    gain = old - new
+    gains = np.array([gain[fold == k].mean() for k in np.unique(fold)])
+    return float(gains.mean()), float(gains.std(ddof=1) / np.sqrt(len(gains))) + _LEAST_GAIN
 
 
 class TermTrials:
@@ -121,10 +130,19 @@ class TermTrials:
         if terms not in self._fits:
             blocks = [self._block(term) for term in terms] + [self._held]
             penalty = [0.0] * len(terms) + [self._noise]
-            fit = leave_out_fit(blocks, penalty, self._residual, self._row_folds, self._places)
-            points = len(self.rigid.poses)
-            self._fits[terms] = replace(fit, distances=tuple(d[:points] for d in fit.distances))
+            self._fits[terms] = self._left_out(blocks, penalty)
         return self._fits[terms]
+
+    def _left_out(self, blocks: list[np.ndarray], penalty: list[float]) -> LeaveOutErrors:
+        fit = leave_out_fit(blocks, penalty, self._residual, self._row_folds, self._places)
+        points = len(self.rigid.poses)
+        return replace(fit, distances=tuple(d[:points] for d in fit.distances))
+
+    def determined(self) -> LeaveOutErrors:
+        """Fit of those parameters of the base fit that its points determine."""
+        held = [item.name for item in self.rigid.undetermined]
+        kept = [name for name in self.rigid.identifiability.kept_names if name not in held]
+        return self._left_out([self._seen(kept), self._held], [0.0, self._noise])
 
     def mean(self, terms: tuple[str, ...]) -> float:
         """Mean error at left-out poses, m, over the decisive kinds of folds."""
@@ -144,10 +162,7 @@ class TermTrials:
         return free * np.log(new.squares / old.squares) + (new.freedom - old.freedom) * np.log(free)
 
     def _gain(self, old: LeaveOutErrors, new: LeaveOutErrors, kind: int) -> tuple[float, float]:
-        """Mean gain (m) over the folds of a kind, as independent units, and its standard error."""
-        fold, gain = self.folds[kind], old.distances[kind] - new.distances[kind]
-        gains = np.array([gain[fold == k].mean() for k in np.unique(fold)])
-        return float(gains.mean()), float(gains.std(ddof=1) / np.sqrt(len(gains))) + _LEAST_GAIN
+        return mean_gain(self.folds[kind], old.distances[kind], new.distances[kind])
 
     @cached_property
     def _places(self) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -209,7 +224,7 @@ class TermTrials:
 
     def _block(self, term: str) -> np.ndarray:
         if term not in self._columns:
-            if term == "kinematic":
+            if term in LEVELS:
                 kept = self.rigid.identifiability.kept_names
                 names = tuple(
                     n for n in kept if n.rpartition(".")[2] in (*GEOMETRY, *ORIGIN, *STATION, "zero")

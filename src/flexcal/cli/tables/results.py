@@ -7,18 +7,23 @@ from typing import Any
 
 from rich.table import Table
 
+from flexcal.units import decimals
+
 NOTHING = "–"
 """Where there is no number."""
 
 
-def error_table(title: str, rows: Mapping[str, Mapping[str, Any]]) -> Table:
-    """Error statistics, one row per set: poses, mean, 90th percentile and maximum, mm; `rows` are blocks of results.json by label."""
+def error_table(title: str, rows: Mapping[str, Mapping[str, Any]], scatter: float | None = None) -> Table:
+    """Error statistics, one row per set: poses, mean, 90th percentile and maximum, mm; `rows` are blocks of results.json by label.
+
+    `scatter`, mm, of the points decides how many decimals mean something.
+    """
     table = Table(title=title, title_justify="left")
     table.add_column("")
     for heading in ("poses", "mean mm", "p90 mm", "max mm"):
         table.add_column(heading, justify="right")
     for label, block in rows.items():
-        numbers = [_millimetres(block[key]) for key in ("mean_mm", "p90_mm", "max_mm")]
+        numbers = [_millimetres(block[key], decimals(scatter)) for key in ("mean_mm", "p90_mm", "max_mm")]
         table.add_row(label, str(block["poses"]), *numbers)
     return table
 
@@ -192,8 +197,8 @@ def response_table(responses: Sequence[Mapping[str, Any]]) -> Table:
     return table
 
 
-def _millimetres(value: float | None) -> str:
-    return NOTHING if value is None else f"{value:.3f}"
+def _millimetres(value: float | None, digits: int = 3) -> str:
+    return NOTHING if value is None else f"{value:.{digits}f}"
 
 
 def base_parameter_table(rows: Sequence[Mapping[str, Any]]) -> Table:

@@ -122,7 +122,7 @@ class Calibrate:
         rows |= {f"  of its {kind}": own for kind, own in errors["by_kind"].items()}
         located = calibration.selected.poses.located
         read = "distance to the measured points" if located.all() else "difference from what was measured"
-        console.show(error_table(read, rows))
+        console.show(error_table(read, rows, document["variances"]["robot_mm"]))
         if document["orientation"] is not None:
             console.show(orientation_table(document["orientation"]))
         if calibration.held_out is not None:

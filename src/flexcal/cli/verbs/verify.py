@@ -18,6 +18,7 @@ from flexcal.cli.arguments.shared_options import (
 )
 from flexcal.cli.arguments.suggested_commands import estimates_option
 from flexcal.cli.terminal.console import Console
+from flexcal.units import decimals
 
 if TYPE_CHECKING:
     from flexcal.report.layout import Status
@@ -70,17 +71,19 @@ class Verify:
         rows = uncalibrated_rows(document) | {
             label: blocks[key] for key, label in labels.items() if key in blocks
         }
-        console.show(error_table("distance to the measured points", rows))
+        rms = document["rms_mm"]
+        console.show(error_table("distance to the measured points", rows, rms["expected"]))
         if document["orientation"] is not None:
             console.show(orientation_table(document["orientation"]))
-        rms = document["rms_mm"]
+        digits = decimals(rms["expected"])
         whole = (
             "; noise of instrument and robot is not known"
             if rms["expected"] is None
-            else f", {rms['expected']:.3f} mm with instrument, robot and model error"
+            else f", {rms['expected']:.{digits}f} mm with instrument, robot and model error"
         )
         console.say(
-            f"root mean square: {rms['measured']:.3f} mm; predicted from the parameters' covariance: {rms['parameters']:.3f} mm{whole}"
+            f"root mean square: {rms['measured']:.{digits}f} mm; predicted from the parameters' covariance: "
+            f"{rms['parameters']:.{digits}f} mm{whole}"
         )
         for remark in document["remarks"]:
             console.say(remark)

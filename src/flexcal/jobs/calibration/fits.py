@@ -11,7 +11,13 @@ import numpy as np
 from flexcal.calibration.diagnostics import BearingAxes, compare_bearings
 from flexcal.calibration.error_model import TRANSMISSION
 from flexcal.calibration.fit import GeometricFit, LossName, StratifiedSample, fit_geometry
-from flexcal.calibration.term_selection import TermSelection, select_terms
+from flexcal.calibration.term_selection import (
+    TermSelection,
+    ZerosOrGeometry,
+    asks_for_levels,
+    select_terms,
+    zeros_or_geometry,
+)
 from flexcal.data.poses import PoseSet
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
@@ -31,7 +37,8 @@ class FitSettings:
 class Fits:
     """The `rigid` fit and the one of the `selected` terms, of a `model` with the bearing axes and the backlash that they have.
 
-    `terms` are those asked for or selected, of which few poses may not support all.
+    `terms` are those asked for or selected, of which few poses may not support all; `levels` compares joint zeros alone with more of the
+    geometry, where the scatter may hide it.
     """
 
     model: RobotModel
@@ -39,6 +46,7 @@ class Fits:
     rigid: GeometricFit
     bearings: BearingAxes | None
     selection: TermSelection | None
+    levels: ZerosOrGeometry | None
     selected: GeometricFit
 
     @classmethod
@@ -53,7 +61,7 @@ class Fits:
     ) -> Fits:
         """Fit the nominal robot `model`, starting from the fits `near` of most of these poses, where there are some."""
         model = model.with_stations(poses.places)
-        loss, terms, selection = settings.loss, settings.terms, None
+        loss, terms = settings.loss, settings.terms
 
         def fit(
             robot: RobotModel, chosen: Sequence[str], stage: str, start: GeometricFit | None, *, elastic: bool
@@ -82,21 +90,38 @@ class Fits:
         if terms is None and not len(poses.pointed):
             # errors in mm, by which terms are selected, are not to be had
             terms = base
-        if terms is None:
-            progress("terms", 0.0)
-            good = np.setdiff1d(np.flatnonzero(~poses.tilted), rigid.estimate.outliers)
-            known = rigid if loss == "auto" and not poses.tilted.any() else None
-            selection = select_terms(model, poses.subset(good), known)
-            progress("terms", 1.0)
-            model, terms = selection.model, _with_random_waves(selection.terms)
         elastic = bool(model.elastic)
         start = rigid if near is None else near.selected
-        selected = (
-            rigid
-            if not elastic and terms == base
-            else fit(model, terms, "selected fit", start, elastic=elastic)
+        good = poses.subset(np.setdiff1d(np.flatnonzero(~poses.tilted), rigid.estimate.outliers))
+        alone = loss == "auto" and not poses.tilted.any()
+
+        def choose(begin: GeometricFit, level: str) -> tuple[TermSelection, GeometricFit]:
+            """Terms beyond a level of geometry, and the fit with them."""
+            progress("terms", 0.0)
+            chosen = select_terms(model, good, begin if alone else None, level)
+            progress("terms", 1.0)
+            found = _with_random_waves(chosen.terms)
+            return chosen, fit(chosen.model, found, "selected fit", start, elastic=elastic)
+
+        if terms is not None:
+            same = not elastic and terms == base
+            selected = rigid if same else fit(model, terms, "selected fit", start, elastic=elastic)
+            return cls(model, terms, rigid, bearings, None, None, selected)
+        selection, selected = choose(rigid, "kinematic")
+        levels = zeros_or_geometry(model, good) if asks_for_levels(selected) else None
+        if levels is not None and levels.answer.level != "kinematic":
+            level = levels.answer.level
+            rigid = fit(model, (level, *base[1:]), "rigid fit", levels.answer.fit, elastic=False)
+            selection, selected = choose(rigid, level)
+        return cls(
+            selection.model,
+            _with_random_waves(selection.terms),
+            rigid,
+            bearings,
+            selection,
+            levels,
+            selected,
         )
-        return cls(model, terms, rigid, bearings, selection, selected)
 
 
 def sampled(poses: PoseSet) -> PoseSet:

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from flexcal.calibration.error_model import TRANSMISSION
-from flexcal.calibration.fit import PER_JOINT, GeometricFit, LossName, StratifiedSample, all_errors
+from flexcal.calibration.fit import LEVELS, PER_JOINT, GeometricFit, LossName, StratifiedSample, all_errors
 from flexcal.calibration.term_selection import cross_validated
 from flexcal.calibration.verification import uncalibrated_model, uncalibrated_orientations
 from flexcal.data.poses import PoseSet
@@ -132,6 +132,7 @@ def calibrate(
         before=uncalibrated.errors(poses.pointed),
         rigid=fits.rigid,
         selection=fits.selection,
+        levels=fits.levels,
         selected=selected,
         bearings=fits.bearings,
         validated=None if fits.selection is None or poses.tilted.any() else cross_validated(selected),
@@ -164,7 +165,7 @@ def _terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str, ...] | 
     if asked == (AUTO,):
         return None
     harmonics = tuple(f"transmission_{order}" for order in model.drives.harmonics)
-    known = ("kinematic", "backlash", *PER_JOINT, TRANSMISSION, *harmonics)
+    known = (*LEVELS, "backlash", *PER_JOINT, TRANSMISSION, *harmonics)
     for term in asked:
         owner, _, kind = term.rpartition(".")
         if owner:
@@ -179,4 +180,10 @@ def _terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str, ...] | 
             "E-RUN-012",
             f"the term backlash is asked for but {model.path} names no joint with it; add `geometry: {{backlash: [joint]}}`.",
         )
-    return tuple(dict.fromkeys(["kinematic", *asked]))
+    levels = [term for term in LEVELS if term in asked]
+    if len(levels) > 1:
+        raise FlexcalError(
+            "E-RUN-103",
+            f"each of {', '.join(LEVELS)} has those before it in it; give one, not {' and '.join(levels)}.",
+        )
+    return tuple(dict.fromkeys([*(levels or ["kinematic"]), *asked]))

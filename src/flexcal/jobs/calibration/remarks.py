@@ -10,8 +10,10 @@ import numpy as np
 from flexcal.calibration.diagnostics import (
     Drift,
     NearestSocket,
+    RepeatabilityFloor,
     StatedNoise,
     board_size,
+    far_zeros,
     implausible_shifts,
     is_implausible,
     nearest_sockets,
@@ -23,7 +25,7 @@ from flexcal.calibration.fit import GeometricFit
 from flexcal.jobs.calibration.ignored_columns import ignored_columns_remarks
 from flexcal.jobs.calibration.inclinations import inclination_remarks
 from flexcal.model.robot import BOARD_SCALE, SOCKET_SCALE
-from flexcal.units import MILLIMETRE
+from flexcal.units import MILLIMETRE, decimals
 
 _LOOK = (
     "these data do not fit this robot: look for a column with wrong sign, unit or order, for points of another "
@@ -151,6 +153,8 @@ def calibration_remarks(fit: GeometricFit, cause: Sequence[str] = ()) -> tuple[s
             "robot or instrument warmed up, or position and measuring order are correlated"
         )
     remarks += cause
+    if not residuals_implausible(fit):
+        remarks += [*_floor(fit), *_zeros(fit)]
     far = implausible_shifts(fit)
     if far:
         named = [f"{m.name} ({m.start:.4g} to {m.value:.4g} {m.unit})" for m in far[:_SHOWN]]
@@ -164,6 +168,22 @@ def calibration_remarks(fit: GeometricFit, cause: Sequence[str] = ()) -> tuple[s
             "import' and the nominal geometry in the URDF, take fewer terms under `geometry:`, or measure more poses, farther apart"
         )
     return tuple(remarks)
+
+
+def _floor(fit: GeometricFit) -> Sequence[str]:
+    floor = RepeatabilityFloor.of(fit)
+    return () if floor is None else (floor.sentence,)
+
+
+def _zeros(fit: GeometricFit) -> Sequence[str]:
+    """Remark on joint zeros that are far from those of the URDF."""
+    zeros = far_zeros(fit)
+    if not zeros:
+        return ()
+    return (
+        f"joint zeros are far from those of the URDF: {', '.join(map(str, zeros))}; the calibrated robot takes them into account, and "
+        "'flexcal export offsets' lists them for the controller; set them there, and smaller errors will show",
+    )
 
 
 def _mislabelled(outliers: Sequence[Outlier]) -> Sequence[str]:
@@ -356,8 +376,11 @@ def _noise(fit: GeometricFit) -> Sequence[str]:
     if robot is None or model is None:
         return ()
     remarks = []
+    scatter = f"{robot:.{decimals(robot)}f} mm per coordinate"
     if instrument is None or stated is None:
-        text = f"no sigma in the files: scatter of instrument and robot together about the fit is {robot:.3f} mm per coordinate (1σ)"
+        text = (
+            f"no sigma in the files: scatter of instrument and robot together about the fit is {scatter} (1σ)"
+        )
         remarks.append(f"{text}, which is too large for noise" if residuals_implausible(fit) else text)
     elif instrument < _OVERSTATED * stated:
         remarks.append(
@@ -366,7 +389,7 @@ def _noise(fit: GeometricFit) -> Sequence[str]:
         )
     elif robot > _UNDERSTATED * stated:
         remarks.append(
-            f"in addition to the stated sigma of {stated:.3g} mm the points scatter by {robot:.3f} mm per coordinate: repeatability of the "
+            f"in addition to the stated sigma of {stated:.3g} mm the points scatter by {scatter}: repeatability of the "
             "robot, or a sigma that is too small; weights and intervals include both"
         )
     else:
@@ -374,6 +397,6 @@ def _noise(fit: GeometricFit) -> Sequence[str]:
         remarks += [_contradicted(test) for test in tests[1:] or tests if test.contradicted]
     if model > 0:
         remarks.append(
-            f"systematic model errors of {model:.3f} mm per coordinate (1σ) remain; intervals include them"
+            f"systematic model errors of {model:.{decimals(robot)}f} mm per coordinate (1σ) remain; intervals include them"
         )
     return remarks

@@ -13,6 +13,7 @@ from flexcal.calibration.diagnostics import (
     BearingAxes,
     Drift,
     PlaceAgreement,
+    RepeatabilityFloor,
     gravity_loads,
     is_implausible,
     stated_noise,
@@ -27,6 +28,7 @@ from flexcal.calibration.fit import (
 from flexcal.calibration.term_selection import (
     CrossValidation,
     TermSelection,
+    ZerosOrGeometry,
     considered_document,
 )
 from flexcal.calibration.verification import (
@@ -83,6 +85,9 @@ class Calibration(Identification):
         Fit without elasticity and further terms.
     selection : TermSelection or None
         Cross-validation of the terms; None where they were given.
+    levels : ZerosOrGeometry or None
+        Comparison of joint zeros alone with more of the geometry; None where terms were given, and where the points scatter by less than
+        tolerances of manufacture.
     selected : GeometricFit
         The fit that `estimate` is of.
     bearings : BearingAxes or None
@@ -110,6 +115,7 @@ class Calibration(Identification):
     before: UncalibratedErrors
     rigid: GeometricFit
     selection: TermSelection | None
+    levels: ZerosOrGeometry | None
     selected: GeometricFit
     bearings: BearingAxes | None = None
     stiffness: Estimate | None = None
@@ -199,6 +205,7 @@ class Calibration(Identification):
         # residuals of far more than the noise may leave no test
         drift = drift if drift is not None and np.isfinite(drift.probability) else None
         agreement, scale = PlaceAgreement.of(selected), scale_document(selected)
+        floor = RepeatabilityFloor.of(selected)
         bearings = bearing_remarks(self.bearings, selected)
         blamed = self.bearings is not None and self.bearings.contradicted
         misfit = None if self.stiffness is None else self.stiffness.misfit
@@ -213,6 +220,7 @@ class Calibration(Identification):
             },
             "terms": list(selected.terms),
             "term_selection": [considered_document(row) for row in chosen.considered] if chosen else [],
+            "zeros_or_geometry": None if self.levels is None else self.levels.document(),
             "term_selection_by": chosen.by if chosen else None,
             "cross_validation": None
             if self.validated is None
@@ -245,6 +253,7 @@ class Calibration(Identification):
                 "is_implausible": is_implausible(selected),
             },
             "variances": selected.variances,
+            "floor": None if floor is None else floor.document(),
             "drift": None if drift is None else drift.document(),
             "sample": subsample_document(self.sample, self.everywhere),
             "outliers": [outlier.document() for outlier in outliers_of(selected)],
@@ -257,6 +266,7 @@ class Calibration(Identification):
                 *([chosen.remark] if chosen and chosen.remark else []),
                 *scale_remark(scale),
                 *base_remark(selected),
+                *([] if self.levels is None else [self.levels.sentence]),
                 *calibration_remarks(selected, bearings if blamed else ()),
                 *(() if blamed else bearings),
                 *place_remarks(agreement),

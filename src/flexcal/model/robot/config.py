@@ -205,7 +205,8 @@ class GeometryConfig:
     backlash: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        known = ("kinematic", "backlash", "gravity_compliance", "lateral_compliance", "transmission")
+        levels = ("kinematic", "offsets", "lengths", "backlash")
+        known = (*levels, "gravity_compliance", "lateral_compliance", "transmission")
         if isinstance(self.terms, str) and self.terms != "auto":
             raise FlexcalError(
                 "E-ROBOT-015",
@@ -213,7 +214,7 @@ class GeometryConfig:
             )
         for term in () if isinstance(self.terms, str) else self.terms:
             owner, _, kind = term.rpartition(".")
-            if kind not in (known[2:4] if owner else known):
+            if kind not in (known[4:6] if owner else known):
                 raise FlexcalError(
                     "E-ROBOT-016", f"unknown geometry term '{term}'; known are {', '.join(known)}."
                 )

@@ -1,0 +1,65 @@
+"""Registration of the instrument together with the joint zeros, where these are far off, as of arms that were assembled by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.calibration.measurement.prediction import predict_measurements
+from flexcal.data.poses import PoseSet
+from flexcal.model.robot import STATION, RobotModel
+
+_FAR = 0.02
+"""Residual of a registration relative to the extent of the points (root mean square both) from which the zeros are fitted with it."""
+_FAR_OF_REACH = 0.005
+"""The same relative to the robot's reach: points of small motions tell nothing of the zeros."""
+_TYPICAL_ZERO, _TYPICAL_POINT = 0.1, 0.01
+"""Sizes of errors of joint zeros, rad, and of points on the tool, m, that count alike."""
+_STEPS = 50
+_SMALL_STEP = 1e-7
+
+
+def has_far_zeros(registered: RobotModel, poses: PoseSet) -> bool:
+    """Whether points of instruments that were registered by best fit are farther from the robot than errors of manufacture explain."""
+    if not poses.located.all():
+        return False
+    own = poses.without_orientations()
+    residual = predict_measurements(registered, own, elastic=False).residual
+    extent = own.position - own.position.mean(axis=0)
+    large = max(_FAR**2 * float(np.mean(extent**2)), (_FAR_OF_REACH * registered.reach) ** 2)
+    return bool(np.mean(residual**2) > large)
+
+
+def register_with_zeros(registered: RobotModel, poses: PoseSet) -> RobotModel:
+    """Robot with its stations as the best fit of stations, joint zeros and points has them; zeros and points stay as they are.
+
+    Wrong zeros bend the arm, and a registration of the nominal arm then tilts the base, by as much as the zeros are off.
+    Levenberg-Marquardt, with zeros of 0.1 rad and points off by 10 mm taken as likely.
+    """
+    poses = poses.without_orientations()
+    stations = [f"station.{name}.{key}" for name in poses.stations for key in STATION]
+    offsets = [f"{joint.name}.offset" for joint in registered.joints if joint.kind == "revolute"]
+    points = [f"point.{target}.{axis}" for target in poses.targets for axis in "xyz"]
+    names = [*stations, *offsets, *points]
+    likely = [np.inf] * len(stations) + [_TYPICAL_ZERO] * len(offsets) + [_TYPICAL_POINT] * len(points)
+    weak = 1 / np.array(likely)
+    start = np.array([registered.value(name) for name in names])
+    best, least, damping = start, np.inf, 1e-3
+    trial, equations, right = start, np.zeros((0, len(names))), np.zeros(0)
+    for _ in range(_STEPS):
+        model = registered.with_values(dict(zip(names, trial.tolist(), strict=True)))
+        at = predict_measurements(model, poses, elastic=False, jacobians=True)
+        if (cost := float(np.sum(at.residual**2))) < least:
+            best, least, damping = trial, cost, damping / 10
+            noise = np.sqrt(np.mean(at.residual**2)) + _SMALL_STEP
+            equations = np.concatenate([at.jacobian(names).reshape(-1, len(names)), noise * np.diag(weak)])
+            right = np.concatenate([at.residual.ravel(), noise * weak * (start - best)])
+        else:
+            damping *= 10
+        damped = np.sqrt(damping) * np.diag(np.linalg.norm(equations, axis=0))
+        step = np.linalg.lstsq(
+            np.concatenate([equations, damped]), np.concatenate([right, np.zeros(len(names))]), rcond=None
+        )[0]
+        if np.abs(step).max() < _SMALL_STEP:
+            break
+        trial = best + step
+    return registered.with_values(dict(zip(stations, best[: len(stations)].tolist(), strict=True)))

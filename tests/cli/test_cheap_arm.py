@@ -1,0 +1,81 @@
+"""`calibrate` of a low-cost arm: joint zeros far off, play of degrees, a camera of half a millimetre, and what that can tell."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cheap_arm import CheapArm
+
+from flexcal import RobotModel, calibrate, fit_geometry, read_poses, verify
+from flexcal.calibration.diagnostics import is_implausible
+from flexcal.model.parts import rotation_vector
+
+NAMES = ("pan", "lift", "elbow", "flex", "roll")
+
+
+def true_zeros(arm: CheapArm) -> np.ndarray:
+    """Errors (5,) of the joint zeros, rad, with the tilts of the axes about the joints' own."""
+    tilts = np.array([rotation_vector(tilt) for tilt in arm.tilts])
+    zeros = arm.zeros + np.einsum("ij,ij->i", tilts, arm.axis)
+    zeros[3] += tilts[4][1]
+    return zeros
+
+
+def test_zeros_are_found_and_play_is_the_floor(tmp_path: Path, run) -> None:
+    """One zero 17° off: it is found, the scatter is said to be the arm's, and nothing is told in micrometres."""
+    arm, rng = CheapArm(13), np.random.default_rng(1013)
+    robot = arm.write(tmp_path)
+    file = arm.write_poses(tmp_path / "poses.csv", arm.postures(40, rng), rng)
+    outcome = run("calibrate", robot, file, "--out", tmp_path / "out")
+    assert outcome.status == 0
+    found = json.loads((tmp_path / "out" / "results.json").read_text())
+    worst = NAMES[1 + int(np.argmax(np.abs(arm.zeros[1:4])))]
+    error = found["parameters"][f"{worst}.offset"]["estimate"] - true_zeros(arm)[NAMES.index(worst)]
+    assert abs(np.rad2deg(error)) < 2.5
+    assert not found["fit"]["is_implausible"]
+    answer = found["zeros_or_geometry"]
+    assert answer["answer"] in ("offsets", "lengths") and len(answer["levels"]) == 3
+    assert 3.0 < found["floor"]["rms_mm"] < 9.0
+    assert "zeros or geometry: these points support joint zeros" in outcome.out
+    assert f"joint zeros are far from those of the URDF: {worst}" in outcome.out
+    assert "no calibration goes much below" in outcome.out
+    rows = [line for line in outcome.out.splitlines() if line.startswith("│ selected")]
+    assert rows and not any(len(cell.split(".")[-1].strip()) > 1 for cell in rows[0].split("│")[3:6])
+
+
+@pytest.mark.parametrize("joint", [1, 4])
+def test_a_wrong_sign_is_no_play(tmp_path: Path, joint: int) -> None:
+    arm, rng = CheapArm(3), np.random.default_rng(3)
+    model = RobotModel.from_yaml(arm.write(tmp_path))
+    poses = read_poses(arm.write_poses(tmp_path / "p.csv", arm.postures(40, rng), rng), model)
+    wrong = poses.q * np.where(np.arange(5) == joint, -1, 1)
+    assert is_implausible(fit_geometry(model, replace(poses, q=wrong), terms=("kinematic",)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("count", "board"), [(25, True), (40, False), (60, True)])
+def test_twenty_cheap_arms(tmp_path: Path, count: int, board: bool) -> None:
+    """Zeros are found, errors at fresh poses are those predicted, and no data are refused."""
+    inside, ratios, far = [], [], []
+    for seed in range(20, 40):
+        arm, rng, folder = CheapArm(seed), np.random.default_rng(1000 + seed), tmp_path / str(seed)
+        model = RobotModel.from_yaml(arm.write(folder))
+        files = [
+            arm.write_poses(folder / f"{n}.csv", arm.postures(n, rng), rng, board=board) for n in (count, 41)
+        ]
+        calibration = calibrate(model, read_poses(files[0], model))
+        assert not calibration.document()["fit"]["is_implausible"], seed
+        rms = verify(calibration.robot, read_poses(files[1], model)).document()["rms_mm"]
+        ratios.append(rms["measured"] / rms["expected"])
+        for name, true in list(zip(NAMES, true_zeros(arm), strict=True))[1:4]:
+            far.append(np.rad2deg(calibration.model.value(f"{name}.offset") - true))
+            interval = calibration.estimate.interval(f"{name}.offset")
+            if interval is not None:
+                inside.append(interval[0] <= true <= interval[1])
+    assert np.sqrt(np.mean(np.square(far))) < 2.0
+    assert 0.75 < np.median(ratios) < 1.15 and max(ratios) < 1.5
+    assert np.mean(inside) > 0.75, "intervals take lengths and axes as exact"
