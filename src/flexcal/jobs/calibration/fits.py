@@ -108,7 +108,7 @@ class Fits:
             selected = rigid if same else fit(model, terms, "selected fit", start, elastic=elastic)
             return cls(model, terms, rigid, bearings, None, None, selected)
         selection, selected = choose(rigid, "kinematic")
-        levels = zeros_or_geometry(model, good) if asks_for_levels(selected) else None
+        levels = zeros_or_geometry(model, good) if not elastic and asks_for_levels(selected) else None
         if levels is not None and levels.answer.level != "kinematic":
             level = levels.answer.level
             rigid = fit(model, (level, *base[1:]), "rigid fit", levels.answer.fit, elastic=False)
