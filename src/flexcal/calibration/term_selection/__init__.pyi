@@ -1,7 +1,7 @@
 from .cross_validation import CrossValidation, TermSelection, cross_validated, select_terms
+from .geometry_levels import ZerosOrGeometry, asks_for_levels, zeros_or_geometry
 from .stored_trials import considered_document, considered_terms
 from .trials import TermComparison
-from .zeros_or_geometry import ZerosOrGeometry, asks_for_levels, zeros_or_geometry
 
 __all__ = [
     "CrossValidation",
