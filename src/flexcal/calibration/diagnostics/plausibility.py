@@ -72,7 +72,10 @@ def _in_base(calibration: GeometricFit) -> np.ndarray:
 
 
 def implausible_shifts(calibration: GeometricFit) -> tuple[ImplausibleShift, ...]:
-    """Parameters with an implausibly large change from their start values, beyond what their own noise (2σ) explains, the largest first."""
+    """Parameters with an implausibly large change from their start values, the largest first.
+
+    Where the residuals are plausible, beyond what the noise of the estimate (2σ) explains.
+    """
     estimate, prior = calibration.estimate.parameters, calibration.prior
     kept = [name for name in calibration.identifiability.kept_names if _has_size(name)]
     named = [*kept, *prior.parameters.names]
@@ -80,13 +83,14 @@ def implausible_shifts(calibration: GeometricFit) -> tuple[ImplausibleShift, ...
     size = np.concatenate(
         [manufacturing_tolerances(estimate.subset(kept)), np.sqrt(np.diag(prior.covariance))]
     )
-    limits = _limits(kept, size)
-    if calibration.poses.located.all() and not residuals_implausible(calibration):
-        zeros = np.array([name in _zeros(calibration.model) for name in kept], dtype=bool)
-        limits = np.where(zeros, FAR_ZERO / size[: len(kept)], limits)
+    limits, noise = _limits(kept, size), np.zeros(len(named))
+    if not residuals_implausible(calibration):
+        noise[: len(kept)] = [calibration.estimate.std(name) or 0.0 for name in kept]
+        if calibration.poses.located.all():
+            zeros = np.array([name in _zeros(calibration.model) for name in kept], dtype=bool)
+            limits = np.where(zeros, FAR_ZERO / size[: len(kept)], limits)
     limit = np.concatenate([limits, np.full(len(prior.parameters), FAR_FROM_PRIOR)])
     times = np.abs(end - start) / size
-    noise = np.array([calibration.estimate.std(name) or 0.0 for name in kept] + [0.0] * len(prior.parameters))
     clear = times - 2 * noise / size
     far = [k for k in np.argsort(-times / limit) if clear[k] > limit[k]]
     items = [(estimate[named[k]], float(start[k]), float(times[k])) for k in far]
