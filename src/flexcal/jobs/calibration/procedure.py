@@ -183,7 +183,7 @@ def _terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str, ...] | 
     levels = [term for term in LEVELS if term in asked]
     if len(levels) > 1:
         raise FlexcalError(
-            "E-RUN-103",
+            "E-RUN-104",
             f"each of {', '.join(LEVELS)} has those before it in it; give one, not {' and '.join(levels)}.",
         )
     return tuple(dict.fromkeys([*(levels or ["kinematic"]), *asked]))
