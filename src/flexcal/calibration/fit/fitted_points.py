@@ -119,8 +119,9 @@ class PointFit:
         model = model.with_lenses({name: lens.values for name, lens in poses.lenses.items()})
         bare = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
         start = register(model, poses, predict_measurements(bare, poses, elastic=elastic).located)
-        if far_zeros := has_far_zeros(start, poses):
-            start = register_with_zeros(start, poses)
+        placed = register_with_zeros(start, poses) if has_far_zeros(start, poses) else None
+        far_zeros = placed is not None
+        start = start if placed is None else placed
         start = with_target_axes(with_camera_places(start, poses), poses)
         require_orientations(start, poses)
         prior = with_instruments(prior, start, poses)

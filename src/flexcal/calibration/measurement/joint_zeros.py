@@ -14,6 +14,8 @@ _FAR_OF_REACH = 0.005
 """The same relative to the robot's reach: points of small motions tell nothing of the zeros."""
 _TYPICAL_ZERO, _TYPICAL_POINT = 0.1, 0.01
 """Sizes of errors of joint zeros, rad, and of points on the tool, m, that count alike."""
+_EXPLAINED, _PLAY = 0.5, 6e-3
+"""Zeros explain a residual that falls to this share, or to this size, m (root mean square of a coordinate), as play in joints leaves."""
 _STEPS = 50
 _SMALL_STEP = 1e-7
 
@@ -29,8 +31,10 @@ def has_far_zeros(registered: RobotModel, poses: PoseSet) -> bool:
     return bool(np.mean(residual**2) > large)
 
 
-def register_with_zeros(registered: RobotModel, poses: PoseSet) -> RobotModel:
+def register_with_zeros(registered: RobotModel, poses: PoseSet) -> RobotModel | None:
     """Robot with its stations as the best fit of stations, joint zeros and points has them; zeros and points stay as they are.
+
+    None where zeros do not explain what the registration leaves, as of data of another robot.
 
     Wrong zeros bend the arm, and a registration of the nominal arm then tilts the base, by as much as the zeros are off.
     Levenberg-Marquardt, with zeros of 0.1 rad and points off by 10 mm taken as likely.
@@ -44,6 +48,7 @@ def register_with_zeros(registered: RobotModel, poses: PoseSet) -> RobotModel:
     weak = 1 / np.array(likely)
     start = np.array([registered.value(name) for name in names])
     best, least, damping = start, np.inf, 1e-3
+    first = float(np.sum(predict_measurements(registered, poses, elastic=False).residual ** 2))
     trial, equations, right = start, np.zeros((0, len(names))), np.zeros(0)
     for _ in range(_STEPS):
         model = registered.with_values(dict(zip(names, trial.tolist(), strict=True)))
@@ -62,4 +67,7 @@ def register_with_zeros(registered: RobotModel, poses: PoseSet) -> RobotModel:
         if np.abs(step).max() < _SMALL_STEP:
             break
         trial = best + step
+    rms = [float(np.sqrt(squares / (3 * len(poses)))) for squares in (first, least)]
+    if rms[1] > max(_EXPLAINED * rms[0], _PLAY):
+        return None
     return registered.with_values(dict(zip(stations, best[: len(stations)].tolist(), strict=True)))
