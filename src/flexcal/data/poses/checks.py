@@ -31,11 +31,11 @@ def check_motion(poses: PoseSet, model: RobotModel, where: str) -> None:
             "E-POSES-004",
             f"{where}: all poses are equal (columns q1…q{len(travel)}); measure poses in which every joint moves.",
         )
-    pointing = {i for name in poses.pointed.targets for i in model.path_to(model.point(name).joint)}
-    # an inclinometer is of use while single joints move
-    still = np.array(
-        [i for i in np.flatnonzero(travel < STILL) if len(poses.pointed) == len(poses) or i in pointing]
-    )
+    still = np.flatnonzero(travel < STILL)
+    if len(poses.pointed) < len(poses):
+        # an inclinometer is of use while single joints move
+        pointing = {i for name in poses.pointed.targets for i in model.path_to(model.point(name).joint)}
+        still = np.array([i for i in still if model.motors[i] in pointing])
     if still.size:
         listed = ", ".join(f"{model.motor_names[i]} (column q{i + 1})" for i in still)
         word = "joints never move" if still.size > 1 else "joint never moves"
