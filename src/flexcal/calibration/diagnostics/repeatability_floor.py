@@ -29,7 +29,7 @@ class RepeatabilityFloor:
         if not fit.poses.located.all():
             return None
         turns = fit.linear.turns[fit.linear.readings.unit == METRES]
-        scatter = fit.scatter.evenly(turns)
+        scatter = fit.robot_scatter
         lever = float(np.sqrt(np.mean((turns**2).sum(axis=1)))) if turns.size else 0.0
         if scatter < TOLERANCE["m"] or lever == 0:
             return None

@@ -39,7 +39,6 @@ from flexcal.calibration.measurement import (
     ROBOT,
     PredictedMeasurements,
     Readings,
-    has_far_zeros,
     predict_measurements,
     register,
     register_with_zeros,
@@ -119,7 +118,7 @@ class PointFit:
         model = model.with_lenses({name: lens.values for name, lens in poses.lenses.items()})
         bare = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
         start = register(model, poses, predict_measurements(bare, poses, elastic=elastic).located)
-        placed = register_with_zeros(start, poses) if has_far_zeros(start, poses) else None
+        placed = register_with_zeros(start, poses)
         far_zeros = placed is not None
         start = start if placed is None else placed
         start = with_target_axes(with_camera_places(start, poses), poses)

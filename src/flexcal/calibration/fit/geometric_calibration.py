@@ -110,6 +110,11 @@ class GeometricFit:
         return {n: ErrorStatistics.of(residuals[kinds == n]) for n in names} if len(names) > 1 else {}
 
     @property
+    def robot_scatter(self) -> float:
+        """Scatter of the robot at the measured points, 1σ of a coordinate in m, the repeatability of the joints included."""
+        return self.scatter.evenly(self.linear.turns[self.linear.readings.unit == METRES])
+
+    @property
     def variances(self) -> dict[str, float | None]:
         """Uncertainty budget of a measured point, 1σ of a coordinate in mm, as in results.json.
 
@@ -118,14 +123,14 @@ class GeometricFit:
         measurements are fitted together, `robot_mm` is of the first, and `views_mm`, `sockets_mm`, `lengths_mm` and `contacts_mm` are
         what the others scatter by for themselves.
         """
-        scatter, lengths = self.scatter, self.linear.readings.unit == METRES
-        if not lengths.any():
+        scatter = self.scatter
+        if not (self.linear.readings.unit == METRES).any():
             return dict.fromkeys(("instrument_mm", "robot_mm", "model_mm", "stated_mm"))
         sigma = stated_sigma(self.linear.readings)
         stated = self.poses.sigma_given
         return {
             "instrument_mm": scatter.share * sigma / MILLIMETRE if stated else None,
-            "robot_mm": scatter.evenly(self.linear.turns[lengths]) / MILLIMETRE,
+            "robot_mm": self.robot_scatter / MILLIMETRE,
             "model_mm": scatter.model / MILLIMETRE,
             "stated_mm": sigma / MILLIMETRE if stated else None,
             **{f"{n}_mm": getattr(scatter, n) / MILLIMETRE for n in self.linear.readings.instruments},

@@ -13,11 +13,9 @@ from flexcal.calibration.kinds.robust_start import (
     principal_directions,
     require_fitting,
     require_targets,
-    station_numbers,
-    turn_to_z,
+    station_along,
 )
 from flexcal.data.poses import LINE, PoseSet
-from flexcal.model.parts import vector_rotation
 from flexcal.model.robot import RobotModel
 
 
@@ -43,8 +41,7 @@ class Lines(Kind):
         require_targets(station, targets, 4)
         direction, through, misfit = _line(targets)
         require_fitting(station, misfit, targets)
-        turn = turn_to_z(direction)
-        return station_numbers(-vector_rotation(turn) @ through, turn, 0.0)
+        return station_along(direction, through)
 
     def place(self, model: RobotModel, poses: PoseSet, station: str, *, turned: bool) -> Sequence[str]:
         """As `Kind.place`: a rotation about the line, and a motion along it, change nothing."""

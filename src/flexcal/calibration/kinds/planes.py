@@ -14,12 +14,10 @@ from flexcal.calibration.kinds.robust_start import (
     principal_directions,
     require_fitting,
     require_targets,
-    station_numbers,
-    turn_to_z,
+    station_along,
 )
 from flexcal.data.poses import PLANE, PoseSet
 from flexcal.errors import FlexcalError
-from flexcal.model.parts import vector_rotation
 from flexcal.model.robot import RobotModel
 
 
@@ -51,8 +49,7 @@ class Planes(Kind):
             )
         normal, through, misfit = _plane(targets, readings[:, 2])
         require_fitting(station, misfit, targets)
-        turn = turn_to_z(normal)
-        return station_numbers(-vector_rotation(turn) @ through, turn, 0.0)
+        return station_along(normal, through)
 
     def place(self, model: RobotModel, poses: PoseSet, station: str, *, turned: bool) -> Sequence[str]:
         """As `Kind.place`: motions in the plane change nothing."""

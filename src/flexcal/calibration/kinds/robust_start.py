@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexcal.errors import FlexcalError
+from flexcal.model.parts import vector_rotation
 from flexcal.units import MILLIMETRE
 
 PASSES = 50
@@ -47,6 +48,12 @@ def station_numbers(offset: np.ndarray, turn: np.ndarray, zero: float) -> dict[s
     """Numbers of a station by their keys: offset (3,), m, rotation vector (3,), rad, and zero, m."""
     numbers = zip(("x", "y", "z", "rx", "ry", "rz", "zero"), (*offset, *turn, zero), strict=True)
     return {key: float(value) for key, value in numbers}
+
+
+def station_along(direction: np.ndarray, through: np.ndarray) -> dict[str, float]:
+    """Numbers of a station whose z axis has a direction (3,) and passes through a point (3,), m, the origin, in the base frame."""
+    turn = turn_to_z(direction)
+    return station_numbers(-vector_rotation(turn) @ through, turn, 0.0)
 
 
 def cauchy_weights(misfit: np.ndarray) -> np.ndarray:

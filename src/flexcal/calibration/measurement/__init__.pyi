@@ -1,6 +1,6 @@
 from .backlash_flanks import ambiguous_poses, require_both_flanks
 from .hand_eye import with_camera_places
-from .joint_zeros import has_far_zeros, register_with_zeros
+from .joint_zeros import register_with_zeros
 from .prediction import (
     PredictedMeasurements,
     predict_measurements,
@@ -21,7 +21,6 @@ __all__ = [
     "Readings",
     "ambiguous_poses",
     "covariance_root",
-    "has_far_zeros",
     "kind_names",
     "moving_parameters",
     "predict_measurements",

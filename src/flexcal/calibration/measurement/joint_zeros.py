@@ -20,26 +20,22 @@ _STEPS = 50
 _SMALL_STEP = 1e-7
 
 
-def has_far_zeros(registered: RobotModel, poses: PoseSet) -> bool:
-    """Whether points of instruments that were registered by best fit are farther from the robot than errors of manufacture explain."""
-    if not poses.located.all():
-        return False
-    own = poses.without_orientations()
-    residual = predict_measurements(registered, own, elastic=False).residual
-    extent = own.position - own.position.mean(axis=0)
-    large = max(_FAR**2 * float(np.mean(extent**2)), (_FAR_OF_REACH * registered.reach) ** 2)
-    return bool(np.mean(residual**2) > large)
-
-
 def register_with_zeros(registered: RobotModel, poses: PoseSet) -> RobotModel | None:
     """Robot with its stations as the best fit of stations, joint zeros and points has them; zeros and points stay as they are.
 
-    None where zeros do not explain what the registration leaves, as of data of another robot.
+    None where all points of instruments, `registered` by best fit, are no farther from the robot than errors of manufacture explain, and
+    where zeros do not explain what the registration leaves, as of data of another robot.
 
     Wrong zeros bend the arm, and a registration of the nominal arm then tilts the base, by as much as the zeros are off.
     Levenberg-Marquardt, with zeros of 0.1 rad and points off by 10 mm taken as likely.
     """
+    if not poses.located.all():
+        return None
     poses = poses.without_orientations()
+    first = float(np.mean(predict_measurements(registered, poses, elastic=False).residual ** 2))
+    extent = poses.position - poses.position.mean(axis=0)
+    if first <= max(_FAR**2 * float(np.mean(extent**2)), (_FAR_OF_REACH * registered.reach) ** 2):
+        return None
     stations = [f"station.{name}.{key}" for name in poses.stations for key in STATION]
     offsets = [f"{joint.name}.offset" for joint in registered.joints if joint.kind == "revolute"]
     points = [f"point.{target}.{axis}" for target in poses.targets for axis in "xyz"]
@@ -48,14 +44,13 @@ def register_with_zeros(registered: RobotModel, poses: PoseSet) -> RobotModel | 
     weak = 1 / np.array(likely)
     start = np.array([registered.value(name) for name in names])
     best, least, damping = start, np.inf, 1e-3
-    first = float(np.sum(predict_measurements(registered, poses, elastic=False).residual ** 2))
     trial, equations, right = start, np.zeros((0, len(names))), np.zeros(0)
     for _ in range(_STEPS):
         model = registered.with_values(dict(zip(names, trial.tolist(), strict=True)))
         at = predict_measurements(model, poses, elastic=False, jacobians=True)
-        if (cost := float(np.sum(at.residual**2))) < least:
+        if (cost := float(np.mean(at.residual**2))) < least:
             best, least, damping = trial, cost, damping / 10
-            noise = np.sqrt(np.mean(at.residual**2)) + _SMALL_STEP
+            noise = np.sqrt(cost) + _SMALL_STEP
             equations = np.concatenate([at.jacobian(names).reshape(-1, len(names)), noise * np.diag(weak)])
             right = np.concatenate([at.residual.ravel(), noise * weak * (start - best)])
         else:
@@ -67,7 +62,6 @@ def register_with_zeros(registered: RobotModel, poses: PoseSet) -> RobotModel | 
         if np.abs(step).max() < _SMALL_STEP:
             break
         trial = best + step
-    rms = [float(np.sqrt(squares / (3 * len(poses)))) for squares in (first, least)]
-    if rms[1] > max(_EXPLAINED * rms[0], _PLAY):
+    if np.sqrt(least) > max(_EXPLAINED * np.sqrt(first), _PLAY):
         return None
     return registered.with_values(dict(zip(stations, best[: len(stations)].tolist(), strict=True)))

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from flexcal.calibration.fit import LEAST_POSES, LEVELS, TOLERANCE, GeometricFit, fit_geometry
-from flexcal.calibration.measurement import METRES
 from flexcal.calibration.term_selection.cross_validation import MANY_POSES, folds_of
 from flexcal.calibration.term_selection.leave_out_errors import LeaveOutErrors
 from flexcal.calibration.term_selection.trials import TermTrials, mean_gain
@@ -83,7 +82,7 @@ def asks_for_levels(fit: GeometricFit) -> bool:
     """Whether the scatter of a rigid fit to points exceeds tolerances of manufacture, so that it may hide errors of the geometry."""
     if not fit.poses.located.all() or len(fit.poses) < LEAST_POSES:
         return False
-    return fit.scatter.evenly(fit.linear.turns[fit.linear.readings.unit == METRES]) > TOLERANCE["m"]
+    return fit.robot_scatter > TOLERANCE["m"]
 
 
 def zeros_or_geometry(model: RobotModel, poses: PoseSet) -> ZerosOrGeometry | None:

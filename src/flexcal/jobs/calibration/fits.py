@@ -92,6 +92,10 @@ class Fits:
             terms = base
         elastic = bool(model.elastic)
         start = rigid if near is None else near.selected
+        if terms is not None:
+            same = not elastic and terms == base
+            selected = rigid if same else fit(model, terms, "selected fit", start, elastic=elastic)
+            return cls(model, terms, rigid, bearings, None, None, selected)
         good = poses.subset(np.setdiff1d(np.flatnonzero(~poses.tilted), rigid.estimate.outliers))
         alone = loss == "auto" and not poses.tilted.any()
 
@@ -103,10 +107,6 @@ class Fits:
             found = _with_random_waves(chosen.terms)
             return chosen, fit(chosen.model, found, "selected fit", start, elastic=elastic)
 
-        if terms is not None:
-            same = not elastic and terms == base
-            selected = rigid if same else fit(model, terms, "selected fit", start, elastic=elastic)
-            return cls(model, terms, rigid, bearings, None, None, selected)
         selection, selected = choose(rigid, "kinematic")
         levels = zeros_or_geometry(model, good) if not elastic and asks_for_levels(selected) else None
         if levels is not None and levels.answer.level != "kinematic":
