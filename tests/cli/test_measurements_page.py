@@ -16,6 +16,7 @@ MASK = {
     "Full poses": "turned",
     "Wires": "far",
     "Sockets": "in_socket",
+    "Inclinometers": "tilted",
     "Known forces": "located",
 }
 
@@ -46,6 +47,7 @@ def test_every_kind_of_the_table_has_an_example(root: Path) -> None:
         "Lines",
         "Spheres",
         "Sockets",
+        "Inclinometers",
         "Known forces",
     ],
 )

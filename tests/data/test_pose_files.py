@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refused
 
-from flexcal.data.poses import PoseSet, concatenate, read_pose_pool, read_poses, write_poses
+from flexcal.data.poses import PoseSet, column_labels, concatenate, read_pose_pool, read_poses, write_poses
 from flexcal.model.robot import RobotModel
 from flexcal.units import DEGREE, MILLIMETRE
 
@@ -111,6 +112,26 @@ def test_defaults(tmp_path: Path, robot: Any) -> None:
     assert poses.pose.tolist() == [1, 2, 3]
     sigma = read_poses(file(tmp_path / "s.csv", [line + ",2e-5" for line in GOOD], HEADER + ",sigma"), robot)
     assert sigma.sigma.tolist() == [[2e-5] * 3] * 3
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_columns_of_texts_are_left_out_and_said(tmp_path: Path, robot: RobotModel, suffix: str) -> None:
+    lines = [f"{line},{who},{what}" for line, who, what in zip(GOOD, "abc", ("", "again", ""), strict=False)]
+    path = file(tmp_path / "notes.csv", lines, HEADER + ",operator,remark")
+    if suffix == ".parquet":
+        pl.read_csv(path).write_parquet(path := path.with_suffix(suffix))
+    poses = read_poses(path, robot)
+    assert len(poses) == len(lines)
+    (note,) = poses.notes
+    assert note == f"{path.name}: the texts in operator, remark are not used"
+    with refused("E-POSES-074", "staton", "station"):
+        read_poses(file(tmp_path / "near.csv", [f"{line},a" for line in GOOD], HEADER + ",staton"), robot)
+
+
+def test_a_number_may_group_measurements(tmp_path: Path, robot: RobotModel) -> None:
+    path = file(tmp_path / "p.csv", GOOD, HEADER)
+    assert read_poses(path, robot, further=("pose",)).pose.tolist() == [1, 2, 3]
+    assert column_labels([path], "pose").tolist() == ["1", "2", "3"]
 
 
 @pytest.mark.parametrize(

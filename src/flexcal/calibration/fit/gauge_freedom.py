@@ -14,14 +14,17 @@ from dataclasses import replace
 import numpy as np
 
 from flexcal.calibration.fit.terms import TOLERANCE, carrying_joints
+from flexcal.calibration.kinds import is_inclinometer
 from flexcal.calibration.measurement import predict_measurements
-from flexcal.data.poses import PoseSet
+from flexcal.data.poses import DIRECTION, PoseSet
 from flexcal.estimation import Parameter, Parameters
 from flexcal.model.kinematics import found_xyz, joint_limits, random_configurations
 from flexcal.model.parts import rotation_wxyz
 from flexcal.model.robot import (
     GEOMETRY,
     STATION,
+    VERTICAL,
+    ZEROS,
     Posterior,
     RobotModel,
     geometric_errors,
@@ -56,7 +59,7 @@ def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotMod
     these in its posterior: what the measured points leave open. Both are the
     robot itself where nothing was calibrated.
     """
-    stations = [name for name in model.stations.names if f"station.{name}.x" in model.posterior.parameters]
+    stations = _calibrated_stations(model)
     if not stations or not targets:
         return model, model
     names = _names(model, targets, stations)
@@ -113,10 +116,16 @@ def _names(model: RobotModel, targets: Sequence[str], stations: Sequence[str]) -
     names = geometric_errors(model, carrying_joints(model, targets, stations))
     names += [f"tool.{key}" for key in GEOMETRY]
     first = next(iter(model.points))
-    names += [f"point.{t}.{axis}" for t in targets if t != first for axis in "xyz"]
+    names += [
+        f"point.{t}.{axis}" for t in targets if t != first and not is_inclinometer(model, t) for axis in "xyz"
+    ]
     names += [f"point.{t}.{key}" for t in targets if _is_turned(model, t) for key in STATION[3:]]
+    known = model.posterior.parameters
+    names += [name for t in targets for key in ZEROS if (name := f"point.{t}.{key}") in known]
     for k, station in enumerate(model.stations.names):
-        if station in stations:
+        if station == VERTICAL:
+            names += [name for key in STATION[3:] if (name := f"station.{station}.{key}") in known]
+        elif station in stations:
             turned = bool(model.stations.pose[k, 3:].any())
             names += [f"station.{station}.{key}" for key in STATION[: 6 if turned else 3]]
     return names
@@ -125,12 +134,22 @@ def _names(model: RobotModel, targets: Sequence[str], stations: Sequence[str]) -
 def _std(model: RobotModel, name: str, targets: Sequence[str]) -> float:
     """Prior 1σ of a parameter; infinite if nothing is known."""
     owner, _, key = name.rpartition(".")
-    if owner.startswith("station.") or (owner.startswith("point.") and key in STATION[3:]):
+    if owner.startswith("station.") or (owner.startswith("point.") and key in (*STATION[3:], *ZEROS)):
         return np.inf
     first = next(iter(model.points))
-    if owner.startswith("point.") or (owner == "tool" and key.startswith("length") and first in targets):
+    pointed = first in targets and not is_inclinometer(model, first)
+    if owner.startswith("point.") or (owner == "tool" and key.startswith("length") and pointed):
         return POINT_STD
     return TOLERANCE[unit_of(name)]
+
+
+def _calibrated_stations(model: RobotModel) -> list[str]:
+    """Instruments whose place was calibrated, and the vertical where inclinometers were read."""
+    known = model.posterior.parameters
+    read = any(name.startswith("point.") and name.rpartition(".")[2] in ZEROS for name in known.names)
+    return [
+        name for name in model.stations.names if f"station.{name}.x" in known or (name == VERTICAL and read)
+    ]
 
 
 def _is_turned(model: RobotModel, target: str) -> bool:
@@ -139,29 +158,41 @@ def _is_turned(model: RobotModel, target: str) -> bool:
 
 
 def _as_predicted(model: RobotModel, poses: PoseSet) -> PoseSet:
-    """Poses with what `model` predicts as measured: points, and the orientations of targets whose orientation was measured."""
-    turned = np.array([_is_turned(model, target) for target in poses.target.tolist()])
+    """Poses with what `model` predicts as measured: points, orientations of targets whose orientation was measured, and inclinations."""
+    turned = np.array([_is_turned(model, target) for target in poses.target.tolist()]) & ~poses.tilted
     quaternion = np.where(turned[:, None], [1.0, 0.0, 0.0, 0.0], np.nan)
-    at = predict_measurements(model, replace(poses, quaternion_wxyz=quaternion), elastic=False)
-    quaternion[turned] = rotation_wxyz(at.orientation)
-    return replace(poses, position=at.position, quaternion_wxyz=quaternion)
+    poses = replace(poses, quaternion_wxyz=quaternion)
+    at = predict_measurements(model, poses, elastic=False)
+    quaternion[turned] = rotation_wxyz(at.orientation[turned[poses.angled]])
+    tilt = poses.tilt
+    if tilt is not None:
+        tilt = tilt.copy()
+        tilt[poses.tilted] -= at.residual[len(poses) :][poses.tilted[poses.angled]]
+    return replace(poses, position=at.position, quaternion_wxyz=quaternion, tilt=tilt)
 
 
 def _random_poses(model: RobotModel, targets: Sequence[str], stations: Sequence[str]) -> PoseSet:
     reach = np.where([joint.kind == "prismatic" for joint in model.motor_joints], 1.0, np.pi)
     lower, upper = (np.clip(limit, -reach, reach) for limit in joint_limits(model))
-    pairs = [(target, station) for target in targets for station in stations]
+    inclined = [target for target in targets if is_inclinometer(model, target)]
+    pairs = [(t, s) for t in targets if t not in inclined for s in stations if s != VERTICAL]
+    pairs += [(target, VERTICAL) for target in inclined]
     size = _POSES * len(pairs)
+    target = np.repeat([target for target, _ in pairs], _POSES)
+    tilted = np.isin(target, inclined)
+    read = [[f"point.{t}.{key}" in model.posterior.parameters for key in ZEROS] for t in target.tolist()]
     return PoseSet(
         q=random_configurations(model, size, np.random.default_rng(0), lower, upper),
         position=np.zeros((size, 3)),
         sigma=np.ones((size, 3)),
         torque=None,
         payload=None,
-        target=np.repeat([target for target, _ in pairs], _POSES),
+        target=target,
         station=np.repeat([station for _, station in pairs], _POSES),
         temperature=None,
         pose=np.arange(size),
+        kind=np.where(tilted, DIRECTION, "") if inclined else None,
+        tilt=np.where(np.array(read) & tilted[:, None], 0.0, np.nan) if inclined else None,
     )
 
 

@@ -1,4 +1,4 @@
-from .directions import declared_level, inclinometer
+from .directions import Directions, declared_level, inclinometer, is_inclinometer
 from .kind import Kind
 from .registry import ANGULAR, KINDS, LOCATING, kind_of, tells_lengths
 from .rigid_motions import best_motion, rigid_motion
@@ -8,10 +8,12 @@ __all__ = [
     "ANGULAR",
     "KINDS",
     "LOCATING",
+    "Directions",
     "Kind",
     "best_motion",
     "declared_level",
     "inclinometer",
+    "is_inclinometer",
     "kind_of",
     "rigid_motion",
     "tells_lengths",

@@ -136,6 +136,12 @@ def inclinometer(model: RobotModel, name: str) -> InclinometerConfig:
     return declared
 
 
+def is_inclinometer(model: RobotModel, name: str) -> bool:
+    """Whether a point is an inclinometer."""
+    declared = model.config.measurements.get(name)
+    return declared is not None and declared.kind == "inclinometer"
+
+
 def declared_level(model: RobotModel, poses: PoseSet) -> bool:
     """Whether inclinometers were read and the base is declared level."""
     return any(inclinometer(model, name).level for name in dict.fromkeys(poses.target[poses.tilted].tolist()))

@@ -8,6 +8,7 @@ from .measured_orientations import (
     orientation_errors,
     uncalibrated_orientations,
 )
+from .measured_tilts import MILLIRADIAN, MeasuredTilts, TiltStatistics, tilt_differences
 from .refitted_placement import Refit, RefittedVerification, verify_refitted
 from .uncalibrated_robot import UncalibratedErrors, uncalibrated_model
 from .unseen_poses import (
@@ -20,6 +21,7 @@ from .unseen_poses import (
 __all__ = [
     "CALIBRATED",
     "DECLARED",
+    "MILLIRADIAN",
     "NOMINAL",
     "OWN",
     "RIGID",
@@ -27,10 +29,12 @@ __all__ = [
     "ErrorCovariance",
     "ErrorScale",
     "MeasuredPoints",
+    "MeasuredTilts",
     "OrientationErrors",
     "PredictionErrors",
     "Refit",
     "RefittedVerification",
+    "TiltStatistics",
     "UncalibratedErrors",
     "arms_at",
     "best_placement",
@@ -44,6 +48,7 @@ __all__ = [
     "prediction_errors",
     "prediction_errors_with_covariance",
     "rigid_placement",
+    "tilt_differences",
     "uncalibrated_model",
     "uncalibrated_orientations",
     "verify_refitted",

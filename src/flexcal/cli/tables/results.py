@@ -44,6 +44,19 @@ def orientation_table(block: Mapping[str, Any]) -> Table:
     return table
 
 
+def inclination_table(block: Mapping[str, Any]) -> Table:
+    """Errors of every inclinometer before and after, mrad; `block` is `inclination` of results.json."""
+    table = Table(title="difference from the inclinometers' readings", title_justify="left")
+    table.add_column("")
+    for heading in ("poses", "rms mrad", "p90 mrad", "max mrad"):
+        table.add_column(heading, justify="right")
+    for name, entry in block.items():
+        for label, row in (("before, mounting and base fitted", entry["before"]), ("calibrated", entry)):
+            numbers = [f"{row[key]:.3g}" for key in ("rms_mrad", "p90_mrad", "max_mrad")]
+            table.add_row(f"{name}: {label}", str(row["poses"]), *numbers)
+    return table
+
+
 def uncalibrated_rows(document: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
     """The three blocks `before` of a document as rows of `error_table`, dashes where one is not known."""
     labels = {

@@ -84,6 +84,7 @@ class Calibrate:
         from flexcal.cli.tables.results import (
             dropped_table,
             error_table,
+            inclination_table,
             orientation_table,
             uncalibrated_rows,
             weak_table,
@@ -122,7 +123,10 @@ class Calibrate:
         rows |= {f"  of its {kind}": own for kind, own in errors["by_kind"].items()}
         located = calibration.selected.poses.located
         read = "distance to the measured points" if located.all() else "difference from what was measured"
-        console.show(error_table(read, rows, document["variances"]["robot_mm"]))
+        if len(calibration.selected.poses.pointed):
+            console.show(error_table(read, rows, document["variances"]["robot_mm"]))
+        if document["inclination"] is not None:
+            console.show(inclination_table(document["inclination"]))
         if document["orientation"] is not None:
             console.show(orientation_table(document["orientation"]))
         if calibration.held_out is not None:
@@ -190,13 +194,17 @@ class Calibrate:
 
 def held_out_line(held_out: Mapping[str, Any]) -> str:
     """A sentence on the errors at groups that were left out."""
-    groups = ", ".join(f"{name} {group['mean_mm']:.3f}" for name, group in held_out["groups"].items())
+    key, unit = ("mean_mm", "mm") if held_out["mean_mm"] is not None else ("mean_mrad", "mrad")
+    listed = [f"{name} {group[key]:.3f}" for name, group in held_out["groups"].items()]
+    more = f" and {len(listed) - _GROUPS} more" if len(listed) > _GROUPS else ""
     without = f" without the {held_out['outliers']} outliers" if held_out["outliers"] else ""
-    line = f"left out by {held_out['by']}{without}, mean error {held_out['mean_mm']:.3f} mm ({groups})"
+    line = f"left out by {held_out['by']}{without}, mean error {held_out[key]:.3f} {unit} ({', '.join(listed[:_GROUPS])}{more})"
     known = held_out["distance_mm"]
     return line if known is None else f"{line}; known distances are off by {known:.3f} mm"
 
 
+_GROUPS = 20
+"""Largest number of groups that a sentence lists."""
 _FOUND_BESIDE = 5e-4
 """m: distance of a point from its declared position above which it is reported."""
 

@@ -111,6 +111,8 @@ class Compensate:
             console.say(
                 f"left out: {len(document['refused']) - _LISTED} more, with their reasons under refused in --json"
             )
+        for remark in document["remarks"]:
+            console.say(remark)
         console.say(
             f"wrote {self.out}: commands for {document['compensated']} of {document['targets']} targets"
         )

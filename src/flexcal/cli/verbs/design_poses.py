@@ -158,12 +158,13 @@ class DesignPoses:
         )
         if self.measure is not None:
             unseen, tracked = document["unseen_mm"], document["with_tracker_mm"]
-            console.say(f"with a tracker of points and as many poses: {tracked:.4f} mm")
             if unseen > _UNSEEN * document["tool_error_mm"]:
                 console.say(
                     f"besides, {unseen:.3f} mm are what these readings cannot tell, as how large the robot is, from typical tolerances and "
                     "the stated accuracy of board, wire or sockets"
                 )
+            console.say(f"with a tracker of points and as many poses: {tracked:.4f} mm")
+            console.say(zeros_line(document["zeros"], document["instrument"]))
         others = {name: value for name, value in document["criteria"].items() if name != "c"}
         console.say("criteria: " + ", ".join(f"{name} {value:.4g}" for name, value in others.items()))
         self._say_pool(console, document)
@@ -228,6 +229,22 @@ class DesignPoses:
             console.say(
                 f"{joint}: {sides['positive']} poses on one flank of its backlash, {sides['negative']} on the other"
             )
+
+
+def zeros_line(zeros: Mapping[str, Mapping[str, float]], instrument: str) -> str:
+    """A sentence on the predicted accuracy of joint zeros; `zeros` as in the document."""
+    from flexcal.design.poses import UNKNOWN_ZERO
+
+    told = [
+        f"{joint} {zero['std'] / MILLIMETRE:.3f} ({zero['with_tracker'] / MILLIMETRE:.3f})"
+        for joint, zero in zeros.items()
+        if zero["std"] < UNKNOWN_ZERO / 2
+    ]
+    lost = [joint for joint, zero in zeros.items() if zero["std"] >= UNKNOWN_ZERO / 2]
+    where = f"; {instrument} does not tell {', '.join(lost)}, or not apart from others" if lost else ""
+    if not told:
+        return f"{instrument} tells no joint zero of its own"
+    return f"joint zeros will be known to ± mrad (with the tracker): {', '.join(told)}{where}"
 
 
 def _where(document: Mapping[str, Any]) -> str:

@@ -185,6 +185,8 @@ class Import:
         from flexcal.jobs.inputs import stored_estimates
 
         calibrate, verify = (f"flexcal {verb} {self.robot} {self.out}" for verb in ("calibrate", "verify"))
+        if "x" not in imported.columns:
+            return calibrate
         if stored_estimates(imported.model, None).is_file():
             return (
                 f"{verify}, if these poses are outside the calibration; or, to calibrate again, {calibrate}"

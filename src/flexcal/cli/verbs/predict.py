@@ -45,6 +45,8 @@ class Predict:
         if document["ambiguous_poses"]:
             listed = len(document["ambiguous_poses"])
             console.say(f"in {listed} poses the flank of a backlash is uncertain: ambiguous_poses in --json")
+        for remark in document["remarks"]:
+            console.say(remark)
         console.say(f"wrote {self.out}: {document['poses']} poses of the tool in the base frame")
         console.finish(
             document,

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.data.poses.camera_tables import measures_images, read_views
+from flexcal.data.poses.camera_tables import CAMERA_COLUMNS, measures_images, read_views
 from flexcal.data.poses.candidate_pool import PosePool
 from flexcal.data.poses.checks import check_metres, check_motion, check_same_pose
 from flexcal.data.poses.columns import (
@@ -33,6 +35,7 @@ from flexcal.data.poses.pose_set import DEFAULT_SIGMA, PLANE, PoseSet, concatena
 from flexcal.data.poses.socket_tables import SOCKET_COLUMNS, measures_sockets, read_sockets
 from flexcal.data.poses.tilt_tables import INCLINOMETER, measures_tilts, read_tilts
 from flexcal.data.tables import (
+    UNITS,
     TableFile,
     assign,
     check_joint_limits,
@@ -52,6 +55,10 @@ _NUMBERS = (
     "quaternion", "sigma", "sigma_xyz", "sigma_angle", "tau", "payload", "force", "temperature", "t", *BASE,
 )  # fmt: skip
 _TEXTS = ("target", "station")
+_TEXT_COLUMNS = (*_TEXTS, *SOCKET_COLUMNS, *CAMERA_COLUMNS, WIRE, TOUCHED, INCLINOMETER)
+"""All columns of texts, of whatever kind of measurement."""
+_MISSPELT = 0.7
+"""Likeness of a column's name to a known one from which it is that, misspelt."""
 
 
 def read_poses(
@@ -203,18 +210,48 @@ def column_labels(paths: Sequence[Path], column: str) -> np.ndarray:
             raise file.error(
                 "E-POSES-041", f"there is no column '{column}' by which to hold out measurements."
             )
-        labels.append(file.read(_named_texts(file, (column,))).columns[column])
+        others = [name for name in file.text_columns() if name != column]
+        labels.append(file.leaving_out(others).read((column,)).columns[column])
     return np.concatenate(labels)
 
 
 def _named_texts(file: TableFile, further: Sequence[str]) -> tuple[str, ...]:
     """Columns of a file that hold texts, beside the `further` ones."""
-    named = (*_TEXTS, *SOCKET_COLUMNS, WIRE, TOUCHED, INCLINOMETER, *further)
+    named = (*_TEXT_COLUMNS, *further)
     return tuple(dict.fromkeys(name for name in named if name in file.columns))
 
 
 def _read(path: Path, model: RobotModel, further: tuple[str, ...]) -> PoseSet:
     file = open_table(path)
+    # a quantity of the file is read as such, even if its values group the measurements
+    quantities = {column for name in (*UNITS, "pose") for column in standard_columns(name, model.n)}
+    quantities |= {column for signal in model.config.signals.values() for column in signal.columns}
+    further = tuple(name for name in further if name not in quantities)
+    file = file.leaving_out(
+        _remarks(file, {*quantities, *model.joint_names, *_named_texts(file, further), *_TEXT_COLUMNS})
+    )
+    poses = _read_kind(file, model, further)
+    if not file.unread:
+        return poses
+    columns = ", ".join(file.unread)
+    note = f"{path.name}: the texts in {columns} are not used"
+    return replace(poses, notes=(*poses.notes, note))
+
+
+def _remarks(file: TableFile, known: Collection[str]) -> list[str]:
+    """Columns of texts that are none of the `known` ones; raises `InputError` for one whose name is nearly that of a known one."""
+    texts = [name for name in file.text_columns() if name not in known]
+    for name in texts:
+        if near := get_close_matches(name, sorted(known), n=1, cutoff=_MISSPELT):
+            raise file.error(
+                "E-POSES-074",
+                f"the column '{name}' is not known, and nearly called '{near[0]}': call it so, or, if it is a remark, otherwise.",
+            )
+    return texts
+
+
+def _read_kind(file: TableFile, model: RobotModel, further: tuple[str, ...]) -> PoseSet:
+    """Measurements of the kind that the columns of a file tell."""
     if measures_sockets(file):
         return read_sockets(file, model, further)
     if measures_images(file):

@@ -305,10 +305,7 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
         if entry.name == "sigma_given":
             unstated = [poses for poses in sets if not poses.sigma_given]
             if any(values) and any(poses.located.any() for poses in unstated):
-                raise FlexcalError(
-                    "E-POSES-025",
-                    f"only {sum(values)} of {len(sets)} pose sets have sigma; give it for all, or for none.",
-                )
+                raise FlexcalError("E-POSES-025", _stated_in_part(sets))
             joined[entry.name] = any(values)
         elif entry.name == "unstated":
             joined[entry.name] = _unstated(sets)
@@ -337,6 +334,24 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
         else:
             joined[entry.name] = None
     return PoseSet(**joined)
+
+
+def _stated_in_part(sets: Sequence[PoseSet]) -> str:
+    """Sentence on points without a stated noise beside measurements with one."""
+    points = [poses for poses in sets if poses.located.any()]
+    without = sum(not poses.sigma_given for poses in points)
+    if without < len(points):
+        return f"{without} of {len(points)} files of points have no sigma, and the others have; give it in all, or in none."
+    names = dict.fromkeys(
+        name
+        for poses in sets
+        if poses.sigma_given
+        for name in (poses.target if poses.tilted.any() else poses.station).tolist()
+    )
+    return (
+        f"the points have no sigma, but the noise of {', '.join(names)} is stated; add a column 'sigma' with the instrument's standard "
+        "deviation in m to the points, or leave the other out too (`std:` under `measurements:` in robot.yaml, or its column)."
+    )
 
 
 _PARTIAL: dict[str, tuple[tuple[int, ...], float | str]] = {

@@ -134,15 +134,18 @@ def _check_range(
     values: np.ndarray,
 ) -> None:
     """Raise `InputError` at the first reading (N,) that is larger than an axis can read."""
-    largest = np.array([_LARGEST[declared[name].reads] for name in names.tolist()])
+    limits = {name: item.range or _LARGEST[item.reads] for name, item in declared.items()}
+    largest = np.array([limits[name] for name in names.tolist()])
     wrong = np.abs(values) > largest * (1 + _SLACK)
     if not wrong.any():
         return
     row = int(np.argmax(wrong))
-    reads = declared[str(names[row])].reads
-    unit, most = ("", 1.0) if reads == "component" else (" rad", largest[row])
+    item = declared[str(names[row])]
+    unit, most, reads = "" if item.reads == "component" else " rad", largest[row], item.reads
     advice = (
-        "components are in units of gravity, as m/s² divided by 9.81."
+        "leave the row out where the sensor was at its end, or correct its `range:`."
+        if item.range is not None
+        else "components are in units of gravity, as m/s² divided by 9.81."
         if reads == "component"
         else "these look like degrees: convert them to rad, or declare 'unit: deg' under `signals:`; or say `reads:` as the sensor does."
     )

@@ -144,7 +144,7 @@ def assign(
     """Columns of a file for each quantity: the mapped ones if present, else the standard ones.
 
     Raises `InputError` for a required quantity that is missing, one that is only there in part, another number of
-    joints than the robot's, and every column that is not understood.
+    joints than the robot's, and every column that is read and not understood.
     """
     mapped = mapped_signals(model)
     assigned: dict[str, Signal] = {}
@@ -159,7 +159,7 @@ def assign(
         name for quantity in (*required, *optional) if quantity in mapped for name in mapped[quantity].columns
     ]
     for column in file.columns:
-        if column not in used:
+        if column not in used and column not in file.unread:
             hint = (
                 suggestion(column, [*known, *texts]) or "; rename it, map it under `signals:`, or remove it."
             )

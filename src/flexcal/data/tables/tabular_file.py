@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -23,6 +23,8 @@ _SHOWN = 4
 BLOCK_BYTES = 64 * 2**20
 _DECODED = 100_000
 """Rows of Parquet that are decoded together: to slice some, all of their row group is."""
+_PEEKED = 2**16
+"""Bytes of a table that are read, for every line of its header, to see which columns hold texts."""
 _QUOTED = 20
 """Largest number of characters of a number that a message quotes."""
 
@@ -46,15 +48,42 @@ class Table:
 
 @dataclass(frozen=True)
 class TableFile:
-    """Table whose header is read. `first` is the number of its first row: a line in CSV, else counted from 1."""
+    """Table whose header is read. `first` is the number of its first row: a line in CSV, else counted from 1; columns that are `unread` may
+    hold anything.
+    """
 
     path: Path
     columns: tuple[str, ...]
     first: int
+    unread: tuple[str, ...] = ()
 
     @property
     def row_word(self) -> str:
         return "line" if self.path.suffix == ".csv" else "row"
+
+    def leaving_out(self, columns: Collection[str]) -> TableFile:
+        """The same table without reading these columns."""
+        return replace(self, unread=tuple(columns))
+
+    def text_columns(self) -> tuple[str, ...]:
+        """Columns whose first cell that is not empty, in the first rows, is no number."""
+        if self.path.suffix == ".csv":
+            with _open(self.path) as stream:
+                lines = stream.readlines(self.first * _PEEKED)[self.first - 1 :]
+            rows = [
+                _row(self.path, self.first, raw.decode("utf-8", "replace").strip())
+                for raw in lines
+                if raw.strip()
+            ]
+            filled = [
+                next((row[k] for row in rows if k < len(row) and row[k]), "0")
+                for k in range(len(self.columns))
+            ]
+            return tuple(n for n, cell in zip(self.columns, filled, strict=True) if not _is_number(cell))
+        import polars as pl
+
+        schema = pl.read_parquet_schema(current_path(self.path))
+        return tuple(name for name in self.columns if schema[name] == pl.String)
 
     def error(self, code: str, sentence: str) -> InputError:
         """An `InputError` about the header."""
@@ -92,15 +121,14 @@ class TableFile:
         scan = pl.scan_parquet(current_path(self.path))
         try:
             schema = scan.collect_schema()
-            for column in self.columns:
+            read = [column for column in self.columns if column not in self.unread]
+            for column in read:
                 if column not in texts and not schema[column].is_numeric():
                     raise self.error(
                         "E-TABLE-020",
                         f"the column '{column}' holds {schema[column]}, not numbers; convert it.",
                     )
-            scan = scan.with_columns(
-                [pl.col(c).cast(pl.String if c in texts else pl.Float64) for c in self.columns]
-            )
+            scan = scan.select([pl.col(c).cast(pl.String if c in texts else pl.Float64) for c in read])
             start = 0
             while True:
                 decoded = scan if rows is None else scan.slice(start, max(1, _DECODED // rows) * rows)
@@ -270,11 +298,13 @@ def _whole_lines(stream: BinaryIO, size: int | None) -> Iterator[bytes]:
 def _parse(file: TableFile, content: bytes, texts: Collection[str], line: int) -> dict[str, np.ndarray]:
     import polars as pl
 
+    texts = {*texts, *file.unread}
     schema = {name: pl.String if name in texts else pl.Float64 for name in file.columns}
     try:
         frame = pl.read_csv(io.BytesIO(content), has_header=False, schema=schema)
     except pl.exceptions.PolarsError:
         return _read_cells(file, content, texts, line)
+    frame = frame.drop(file.unread)
     arrays = _arrays(frame)
     if any(frame[c].null_count() or (c not in texts and not _measurable(v).all()) for c, v in arrays.items()):
         return _read_cells(file, content, texts, line)
@@ -308,12 +338,14 @@ def _read_cells(file: TableFile, content: bytes, texts: Collection[str], line: i
                 "complete the line or remove it.",
             )
         for name, cell in zip(file.columns, row, strict=True):
-            fault = _fault(cell, name in texts)
+            fault = None if name in file.unread else _fault(cell, name in texts)
             if fault:
                 raise InputError("E-TABLE-036", f"{file.path} line {number}, column {name}: {fault}")
             cells[name].append(cell if name in texts else float(cell))
     return {
-        name: np.array(values, dtype=str if name in texts else np.float64) for name, values in cells.items()
+        name: np.array(values, dtype=str if name in texts else np.float64)
+        for name, values in cells.items()
+        if name not in file.unread
     }
 
 

@@ -15,8 +15,10 @@ from .selection import (
 )
 from .sequential_selection import NextPoses, select_next_poses
 from .working_volume import WorkingVolume, working_box, working_points
+from .zero_accuracy import UNKNOWN_ZERO, zero_stds
 
 __all__ = [
+    "UNKNOWN_ZERO",
     "CriterionName",
     "GeometricTolerances",
     "MeasurementOrder",
@@ -41,4 +43,5 @@ __all__ = [
     "tool_error",
     "working_box",
     "working_points",
+    "zero_stds",
 ]

@@ -19,6 +19,7 @@ from flexcal.design.poses.geometry_sensitivity import (
 from flexcal.design.poses.gravity_preload import preload_joints, preloaded
 from flexcal.design.poses.instrument_sensitivity import instrument_sensitivity
 from flexcal.design.poses.instruments import declared_instrument
+from flexcal.design.poses.tilt_setup import TiltSetup
 from flexcal.design.scene import STANDARD, CollisionChecker, MeasuringSetup, visible
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import point_kinematics
@@ -108,6 +109,13 @@ def _at_instrument(checker: CollisionChecker, q: np.ndarray, least: int, setup: 
             "E-DESIGN-054",
             f"only {len(q)} poses show the board to the camera {instrument.name} from {nearest:.2f} to {farthest:.2f} m, and {least} are "
             "to be chosen; correct its `xyz`, `normal`, `axis` or `distance`, or give more --candidates.",
+        )
+    if len(q) < least and isinstance(instrument, TiltSetup):
+        raise FlexcalError(
+            "E-DESIGN-057",
+            f"only {len(q)} poses keep the inclinometer {instrument.name} within ±{instrument.largest:.3g} "
+            f"{'rad' if instrument.config.reads != 'component' else 'of gravity'}, and {least} are to be chosen; correct its `range` or "
+            "`rpy`, or give more --candidates.",
         )
     if len(q) < least:
         raise FlexcalError(

@@ -96,12 +96,14 @@ class BaseSensitivity:
     """Sensitivity in the parameter combinations that the candidates separate, each in units of the kept parameter's tolerance.
 
     `sensitivity` has jacobian (candidates, 3, rank) and the prior of the combinations; `identifiability` says what was kept and what
-    absorbed the rest; `scale` (rank,) are the tolerances (rad, m). Only in such units do σ_min and O1-O5 mean anything.
+    absorbed the rest; `scale` (rank,) are the tolerances (rad, m). Only in such units do σ_min and O1-O5 mean anything. `tolerance` (p,)
+    is that of every parameter before the reduction.
     """
 
     sensitivity: Sensitivity
     identifiability: Identifiability
     scale: np.ndarray
+    tolerance: np.ndarray
 
     def columns(self, jacobian: np.ndarray) -> np.ndarray:
         """Columns (..., rank) of a `jacobian` (..., p) by all parameters for these combinations, with the same scales."""
@@ -130,7 +132,7 @@ def base_sensitivity(full: Sensitivity) -> BaseSensitivity:
     root = np.linalg.solve(factor, np.eye(len(kept)))
     parameters = Parameters(Parameter(name, "1", 0.0) for name in identifiability.kept_names)
     sensitivity = Sensitivity(full.jacobian[:, :, kept] * scale[kept], parameters, root @ root.T)
-    return BaseSensitivity(sensitivity, identifiability, scale[kept])
+    return BaseSensitivity(sensitivity, identifiability, scale[kept], tolerance)
 
 
 def _triangle(jacobian: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@ from flexcal.calibration.kinds import turn_to_z
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import DEFAULT_SIGMA, DISTANCE, LINE, PLANE, PoseSet
 from flexcal.design.poses.camera_setup import CameraSetup
+from flexcal.design.poses.tilt_setup import TiltSetup
 from flexcal.errors import FlexcalError
 from flexcal.files.structuring import suggestion
 from flexcal.model.kinematics import joint_ranges, point_kinematics
@@ -190,7 +191,7 @@ class Instrument:
         return white.reshape(-1, len(q), 3, len(names)).transpose(1, 0, 2, 3).reshape(len(q), -1, len(names))
 
 
-def declared_instrument(model: RobotModel, name: str) -> Instrument | CameraSetup:
+def declared_instrument(model: RobotModel, name: str) -> Instrument | CameraSetup | TiltSetup:
     """Instrument that robot.yaml declares under a name, or `POSE`.
 
     Raises `FlexcalError` for an unknown name, and where robot.yaml does not say where the instrument stands.
@@ -203,10 +204,7 @@ def declared_instrument(model: RobotModel, name: str) -> Instrument | CameraSetu
         raise FlexcalError("E-DESIGN-053", f"there is no '{name}' under `measurements:` of robot.yaml{hint}")
     item = model.config.measurements[name]
     if item.kind == "inclinometer":
-        raise FlexcalError(
-            "E-DESIGN-057",
-            f"poses for the inclinometer {name} cannot be designed yet; turn every joint whose axis is not vertical over its whole range.",
-        )
+        return TiltSetup(name, item)
     places = item.at if item.kind == "sockets" else (item.xyz,)
     if not places or places[0] is None:
         key = "at: [[0.5, 0, 0.1], [0.5, 0.3, 0.1]]" if item.kind == "sockets" else "xyz: [0.5, 0, 0.1]"

@@ -1,4 +1,5 @@
 from .assignment import ORIENTATIONS, ColumnAssignment
+from .base_and_tilts import TILTS
 from .excitation_records import ExcitationSource, ResponseRecords, read_response_records, record_paths
 from .map_option import apply_map
 from .nominal_consistency import NominalMismatch, check_nominal
@@ -7,6 +8,7 @@ from .rtde_names import TOOL
 
 __all__ = [
     "ORIENTATIONS",
+    "TILTS",
     "TOOL",
     "ColumnAssignment",
     "ExcitationSource",

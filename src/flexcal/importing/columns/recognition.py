@@ -11,6 +11,7 @@ import numpy as np
 
 from flexcal.data.tables import TIMESTAMP, VECTORS
 from flexcal.importing.columns.assignment import ORIENTATIONS, ColumnAssignment, units_of
+from flexcal.importing.columns.base_and_tilts import TILTS, base_columns, tilt_columns
 from flexcal.importing.columns.joints import joint_quantities
 from flexcal.importing.columns.orientation_names import (
     numbered_quaternion,
@@ -18,7 +19,13 @@ from flexcal.importing.columns.orientation_names import (
     orientation_of,
 )
 from flexcal.importing.columns.rtde_names import rtde_columns
-from flexcal.importing.columns.unit_inference import joint_units, point_unit, pose_time_unit, time_unit
+from flexcal.importing.columns.unit_inference import (
+    joint_units,
+    point_unit,
+    pose_time_unit,
+    tilt_unit,
+    time_unit,
+)
 from flexcal.importing.tables import (
     NEUTRAL,
     NO_POINT,
@@ -86,6 +93,9 @@ def guess_columns(foreign: ForeignTable, model: RobotModel) -> RecognisedColumns
     names = [parse_name(column, foreign.units.get(column)) for column in foreign.numbers]
     reasons: dict[str, str] = {}
     placed = rtde_columns(foreign, model, reasons)
+    rest = _left(names, placed, reasons)
+    for quantity, columns in (base_columns(rest) | tilt_columns(rest)).items():
+        placed[quantity] = place(foreign, model, quantity, columns, "their names")
     unnamed = numbered_quaternion(_left(names, placed, reasons), foreign)
     others = [name for name in _left(names, placed, reasons) if name.column not in unnamed]
     for quantity, columns in joint_quantities(others, model, reasons).items():
@@ -115,6 +125,10 @@ def guess_columns(foreign: ForeignTable, model: RobotModel) -> RecognisedColumns
         name.lower(): name
         for name, values in foreign.texts.items()
         if name.lower() == "station"
+        or (
+            name.lower() in ("wire", "inclinometer")
+            and set(values.tolist()) <= set(model.config.measurements)
+        )
         or (name.lower() in ("target", "point") and set(values.tolist()) <= set(model.points))
     }
     for name in foreign.texts.keys() - set(texts.values()):
@@ -250,7 +264,12 @@ def place(
     if quantity in ("q", "qa"):
         units = joint_units(model, values)
         return ColumnAssignment.plain(quantity, columns, units, f"{why}; the unit by the joints' limits")
-    if quantity == "xyz":
+    if quantity in TILTS:
+        unit = tilt_unit(
+            values[:, 0], [item for item in model.config.measurements.values() if item.kind == "inclinometer"]
+        )
+        return ColumnAssignment.plain(quantity, columns, (unit,), f"{why}; the unit by their size")
+    if quantity in ("xyz", "base_xyz"):
         units = (point_unit(model, values),) * 3
         return ColumnAssignment.plain(quantity, columns, units, f"{why}; the unit by the robot's reach")
     if quantity == "t":

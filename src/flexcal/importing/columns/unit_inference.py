@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from flexcal.units import LARGEST
 
 if TYPE_CHECKING:
-    from flexcal.model.robot import RobotModel
+    from flexcal.model.robot import InclinometerConfig, RobotModel
 
 _OVER = 1.05
 """Tolerance by which robots exceed the limits in their URDF, which are often rounded."""
@@ -20,6 +21,8 @@ _LARGEST = 4.0
 _SLOWEST_IN_MS = 110.0
 _LONGEST_AT_A_POSE = 1000.0
 """Longest time between measured poses, which takes seconds or minutes, s."""
+_MOST_OF_GRAVITY, _RIGHT_ANGLE, _HALF_A_TURN = 1.5, 1.7, 3.3
+"""Largest readings of inclinometers, of components and in rad."""
 
 
 def joint_units(model: RobotModel, q: np.ndarray) -> tuple[str, ...]:
@@ -54,6 +57,15 @@ def point_unit(model: RobotModel, xyz: np.ndarray) -> str:
         if spread * factor <= _LARGEST * max(model.reach, 0.1):
             return unit
     return "um"
+
+
+def tilt_unit(tilts: np.ndarray, declared: Sequence[InclinometerConfig]) -> str:
+    """The unit of readings (N,) of an inclinometer, of one of those `declared`: rad or degrees, 1 or m/s² of components, by their size."""
+    largest = float(np.nanmax(np.abs(tilts), initial=0.0))
+    if declared and all(item.reads == "component" for item in declared):
+        return "1" if largest <= _MOST_OF_GRAVITY else "m/s^2"
+    half_turns = any(item.reads == "projection" for item in declared)
+    return "rad" if largest <= (_HALF_A_TURN if half_turns else _RIGHT_ANGLE) else "deg"
 
 
 def time_unit(t: np.ndarray) -> str:

@@ -2,6 +2,7 @@ from .column_names import ColumnName, parse_name, unit_of
 from .foreign_table import ForeignTable
 from .header_rows import NUMBER, find_header
 from .vocabulary import (
+    BASE,
     CARTESIAN,
     COMMANDED,
     FORCE,
@@ -15,11 +16,13 @@ from .vocabulary import (
     SIGMA,
     SINGLE,
     SLIDING,
+    TILT,
     TURN,
     rank,
 )
 
 __all__ = [
+    "BASE",
     "CARTESIAN",
     "COMMANDED",
     "FORCE",
@@ -34,6 +37,7 @@ __all__ = [
     "SIGMA",
     "SINGLE",
     "SLIDING",
+    "TILT",
     "TURN",
     "ColumnName",
     "ForeignTable",

@@ -9,6 +9,7 @@ from unicodedata import normalize
 _UNITS = {
     "deg": ("deg", "degree", "degrees", "degs", "°", "º", "grad"),
     "rad": ("rad", "rads", "radian", "radians"),
+    "mrad": ("mrad", "milliradian", "milliradians", "mm/m"),
     "turn": ("turn", "turns", "rev"),
     "m": ("m", "meter", "meters", "metre", "metres"),
     "mm": ("mm", "millimeter", "millimeters", "millimetre", "millimetres"),

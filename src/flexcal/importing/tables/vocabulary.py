@@ -45,6 +45,10 @@ COMMANDED = _words(
 )
 NEUTRAL = MEASURED | COMMANDED | _words("robot arm motor link the of in")
 POINT = {"x": "x", "y": "y", "z": "z", "px": "x", "py": "y", "pz": "z"}
+BASE = _words("base basis platform cart agv chassis")
+"""Of the measured pose of a base that moves."""
+TILT = _words("tilt tilts inclination inclinometer incl neigung level niveau")
+"""Of the readings of an inclinometer."""
 NO_POINT = _words("force f error err deviation dev delta normal velocity vel v speed acc offset rpy")
 TURN = _words("orientation quaternion quat rotation rot")
 SIGMA = _words("sigma σ std sd uncertainty stddev")

@@ -260,7 +260,8 @@ def _checked_map(
     progress: Progress,
 ) -> AccuracyMap:
     """`accuracy_map` after the check by verification poses."""
-    model = robot.model
+    # what inclinometers alone leave open is uncertain by the tolerances
+    model = robot.model if robot.measured else robot.probable
     # a fixture with sockets is no instrument: what it tells is in the base frame
     instruments = robot.nominal.stations.names
     stations = [s for s in instruments if is_station_identified(model, s)]

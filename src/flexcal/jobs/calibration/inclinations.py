@@ -8,44 +8,34 @@ import numpy as np
 
 from flexcal.calibration.fit import GeometricFit
 from flexcal.calibration.kinds import declared_level, inclinometer
+from flexcal.calibration.verification import MILLIRADIAN, MeasuredTilts, TiltStatistics
 from flexcal.model.parts import vector_rotation
 from flexcal.model.robot import STATION, VERTICAL
 
 _TURNED = np.deg2rad(15)
 """Rotation of the found mounting from the declared one above which axes or signs are confused."""
-_MRAD = 1e-3
 
 
-def inclination_document(fit: GeometricFit) -> dict[str, Any] | None:
-    """Block `inclination` of results.json: residuals by inclinometer, mrad, and the mounting found; null without inclinometers."""
-    poses = fit.poses
-    if not poses.tilted.any():
-        return None
-    names, outliers = poses.target[poses.tilted], set(fit.estimate.outliers)
-    kept = np.array([row not in outliers for row in np.flatnonzero(poses.tilted).tolist()])
-    document = {}
-    for name in dict.fromkeys(names.tolist()):
-        left = np.abs(fit.tilts[(names == name) & kept])
-        read = left[np.isfinite(left)]
+def inclination_document(fit: GeometricFit, tilts: MeasuredTilts) -> dict[str, Any]:
+    """Block `inclination` of results.json: errors by inclinometer, mrad, without outliers, the same before, and the mounting found."""
+    outliers, document = set(fit.estimate.outliers), {}
+    kept = np.array([row not in outliers for row in np.flatnonzero(fit.poses.tilted).tolist()])
+    for name in tilts.sensors:
+        own = (tilts.sensor == name) & kept
         document[name] = {
-            "poses": len(left),
-            "rms_mrad": float(np.sqrt(np.mean(read**2))) / _MRAD,
-            "max_mrad": float(read.max()) / _MRAD,
+            **TiltStatistics.of(tilts.calibrated[own]).document(),
+            "before": TiltStatistics.of(tilts.before[own]).document(),
             "mounting_rad": [fit.model.value(f"point.{name}.{key}") for key in STATION[3:]],
         }
     return document
 
 
 def inclination_remarks(fit: GeometricFit) -> tuple[str, ...]:
-    """Remarks on inclinometers: scatter, confused axes, what they leave open, and the inclination of the base."""
-    document = inclination_document(fit)
-    if document is None:
+    """Remarks on inclinometers: confused axes, what they leave open, and the inclination of the base."""
+    names = dict.fromkeys(fit.poses.target[fit.poses.tilted].tolist())
+    if not names:
         return ()
-    remarks = [
-        f"the inclinometer {name} is fitted to {entry['rms_mrad']:.3g} mrad rms (max {entry['max_mrad']:.3g}) at {entry['poses']} poses"
-        for name, entry in document.items()
-    ]
-    remarks += [sentence for name in document if (sentence := _confused(fit, name))]
+    remarks = [sentence for name in names if (sentence := _confused(fit, name))]
     base = _base_inclination(fit)
     if base is not None:
         remarks.append(base)
@@ -89,8 +79,8 @@ def _base_inclination(fit: GeometricFit) -> str | None:
     gravity = -fit.model.gravity / np.linalg.norm(fit.model.gravity)
     angle = float(np.arccos(np.clip(up @ gravity, -1, 1)))
     stds = [std for name in names if (std := fit.estimate.std(name)) is not None]
-    spread = f" ± {float(np.max(stds)) / _MRAD:.2g}" if stds else ""
+    spread = f" ± {float(np.max(stds)) / MILLIRADIAN:.2g}" if stds else ""
     return (
-        f"the vertical is inclined to `gravity` of robot.yaml by {angle / _MRAD:.3g}{spread} mrad, in the base frame that fits the nominal "
-        "robot best; the first joint's axis has its own misalignments in that frame"
+        f"the vertical is inclined to `gravity` of robot.yaml by {angle / MILLIRADIAN:.3g}{spread} mrad, in the base frame that fits the "
+        "nominal robot best; the first joint's axis has its own misalignments in that frame"
     )

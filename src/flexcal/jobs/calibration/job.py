@@ -9,7 +9,6 @@ from typing import Literal
 
 from flexcal.calibration.fit import LossName
 from flexcal.data.poses import column_labels, read_poses, tables_of
-from flexcal.errors import FlexcalError
 from flexcal.files.formats import provenance, read_estimates
 from flexcal.jobs.calibration.procedure import calibrate
 from flexcal.jobs.calibration.result import Calibration
@@ -50,12 +49,8 @@ def calibrate_robot(
     blocks = read_estimates(source, without="calibration") if source.exists() else {}
     target = estimates_target(source, out, "calibration")
     model = with_blocks(bare, blocks, source)
+    labels = None if hold_out is None else (hold_out, column_labels(files, hold_out))
     poses = read_poses(list(files), model, further=() if hold_out is None else (hold_out,))
-    if out is not None and not len(poses.pointed):
-        raise FlexcalError(
-            "E-RUN-103",
-            "inclinometers alone have no page, for nothing is measured in mm; leave --out away, or give measured points too.",
-        )
     progress("reading", 1.0)
     calibration = calibrate(
         model,
@@ -64,7 +59,7 @@ def calibrate_robot(
         loss=loss,
         secant_scale=secant_scale,
         elasticity=elasticity,
-        hold_out=None if hold_out is None else (hold_out, column_labels(files, hold_out)),
+        hold_out=labels,
         progress=progress,
     )
     origin = provenance([robot_file, bare.urdf, *files], None, source if blocks else None, tuple(blocks))

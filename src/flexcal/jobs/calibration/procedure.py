@@ -18,6 +18,7 @@ from flexcal.files.formats import provenance
 from flexcal.jobs.calibration.fits import Fits, FitSettings, sampled
 from flexcal.jobs.calibration.fitted_measurements import measurement_digests
 from flexcal.jobs.calibration.held_out import held_out_errors
+from flexcal.jobs.calibration.held_out_tilts import held_out_tilts
 from flexcal.jobs.calibration.joint_ranges import joint_extents
 from flexcal.jobs.calibration.result import Calibration
 from flexcal.jobs.inputs import TARGETS, TARGETS_BETWEEN, is_station_identified
@@ -102,7 +103,8 @@ def calibrate(
         kept = (
             _without_wrong_readings(measured, fits.rigid) if sample is None else np.ones(len(measured), bool)
         )
-        held_out = held_out_errors(
+        compare = held_out_errors if len(measured.pointed) else held_out_tilts
+        held_out = compare(
             lambda rest: Fits.of(nominal, sampled(rest), settings, near=fits).selected.model,
             measured.subset(kept),
             hold_out[0],

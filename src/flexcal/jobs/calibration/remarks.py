@@ -135,7 +135,12 @@ def outliers_of(fit: GeometricFit) -> tuple[Outlier, ...]:
 
 def calibration_remarks(fit: GeometricFit, cause: Sequence[str] = ()) -> tuple[str, ...]:
     """Remarks on a calibration, the most important last; a known `cause` of a bad fit precedes its consequences."""
-    remarks = [*ignored_columns_remarks(fit.poses), *_without_readings(fit), *_nominal_springs(fit)]
+    remarks = [
+        *fit.poses.notes,
+        *ignored_columns_remarks(fit.poses),
+        *_without_readings(fit),
+        *_nominal_springs(fit),
+    ]
     if fit.ambiguous.any():
         remarks.append(f"the flank of a backlash is uncertain at {fit.ambiguous.sum()} poses")
     outliers = outliers_of(fit)
@@ -245,7 +250,6 @@ def _views(fit: GeometricFit) -> Sequence[str]:
     )
     return (
         *wrong,
-        *fit.poses.notes,
         f"{seen.sum()} poses were measured by a camera, each with the noise of its own view: {noise:.3f} mm rms expected, {found:.3f} mm "
         "found; the fit weighs the views by their noise, so the calibrated robot is far more accurate than one view",
     )

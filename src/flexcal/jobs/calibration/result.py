@@ -33,9 +33,12 @@ from flexcal.calibration.term_selection import (
 )
 from flexcal.calibration.verification import (
     CALIBRATED,
+    MILLIRADIAN,
     RIGID,
     MeasuredPoints,
+    MeasuredTilts,
     OrientationErrors,
+    TiltStatistics,
     UncalibratedErrors,
     arms_at,
     errors_before,
@@ -44,6 +47,7 @@ from flexcal.calibration.verification import (
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, json_values
 from flexcal.jobs.calibration.held_out import HeldOut
+from flexcal.jobs.calibration.held_out_tilts import HeldOutTilts
 from flexcal.jobs.calibration.inclinations import inclination_document
 from flexcal.jobs.calibration.remarks import calibration_remarks, floor_remark, outliers_of
 from flexcal.jobs.calibration.sockets import base_remark, place_remarks, scale_document, scale_remark
@@ -58,12 +62,13 @@ from flexcal.jobs.result_files import (
     write_arm,
     write_loads,
     write_points,
+    write_tilts,
 )
 from flexcal.jobs.stiffness import bearing_remarks, bearings_block
 from flexcal.model.kinematics import found_xyz
 from flexcal.model.robot import RobotModel
 from flexcal.report.checks import Trust, misfit_document, misfit_sentences
-from flexcal.report.pages import calibration_checks
+from flexcal.report.pages import calibration_checks, inclination_checks
 from flexcal.units import MILLIMETRE
 
 
@@ -100,7 +105,7 @@ class Calibration(Identification):
         Which points were fitted, where there are more than a fit takes.
     everywhere : ErrorStatistics or None
         Errors of `selected` at all points, where a sample was fitted.
-    held_out : HeldOut or None
+    held_out : HeldOut, HeldOutTilts or None
         Errors at groups of measurements that were left out whole, where they were asked for.
     orientation_before : OrientationErrors or None
         Errors of the orientations of the uncalibrated robot, where they were measured.
@@ -122,7 +127,7 @@ class Calibration(Identification):
     validated: CrossValidation | None = None
     sample: StratifiedSample | None = None
     everywhere: ErrorStatistics | None = None
-    held_out: HeldOut | None = None
+    held_out: HeldOut | HeldOutTilts | None = None
     orientation_before: OrientationErrors | None = None
     estimates: Path | None = None
     command: str = ""
@@ -145,6 +150,9 @@ class Calibration(Identification):
     @property
     def headline(self) -> str:
         """Errors at the poses of the fit."""
+        if self.tilts is not None and not len(self.selected.poses.pointed):
+            after = TiltStatistics.of(self.tilts.calibrated)
+            return f"{after.rms / MILLIRADIAN:.3g} mrad rms of {after.poses} readings of inclinometers"
         return str(self.errors)
 
     def summary(self) -> str:
@@ -152,7 +160,11 @@ class Calibration(Identification):
         return "\n".join([self.selected.summary(), *self._numbers["remarks"], self.trust.sentence])
 
     def write_arrays(self, folder: Path) -> None:
-        """Leave points.csv, arm.npz and gravity_loads.npz in a folder."""
+        """Leave points.csv, arm.npz and gravity_loads.npz in a folder, tilts.csv where there are readings of inclinometers."""
+        if self.tilts is not None:
+            write_tilts(folder, self.tilts)
+        if not len(self.selected.poses.pointed):
+            return
         points, selected = self.points, self.selected
         write_points(folder, points)
         write_arm(folder, arms_at(selected.model, selected.poses.pointed, points.shown))
@@ -172,8 +184,17 @@ class Calibration(Identification):
         return MeasuredPoints.of_fit(fit, errors)
 
     @cached_property
+    def tilts(self) -> MeasuredTilts | None:
+        """Readings of inclinometers beside the robot's; None where there are none."""
+        fit = self.selected
+        return MeasuredTilts.of(self.nominal, fit.poses, fit.tilts) if fit.poses.tilted.any() else None
+
+    @cached_property
     def trust(self) -> Trust:
         """The verdict, from the same checks as on the page."""
+        if self.tilts is not None and not len(self.selected.poses.pointed):
+            after = TiltStatistics.of(self.tilts.calibrated)
+            return Trust(inclination_checks(json_values(self._numbers), self.estimate, after))
         return Trust(calibration_checks(json_values(self._numbers), self.estimate, self.points))
 
     def document(self) -> dict[str, Any]:
@@ -233,7 +254,7 @@ class Calibration(Identification):
                 self.orientation_before,
                 OrientationErrors(selected.rotations) if len(selected.rotations) else None,
             ),
-            "inclination": inclination_document(selected),
+            "inclination": None if self.tilts is None else inclination_document(selected, self.tilts),
             "held_out": None if self.held_out is None else self.held_out.document(),
             "before": before,
             "points": self.found_points,

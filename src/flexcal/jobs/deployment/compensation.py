@@ -14,7 +14,7 @@ from flexcal.compensation import MotorCommands, best_posture, motor_commands
 from flexcal.data.poses import ToolTargets, read_targets, write_commands
 from flexcal.data.tables import TableFile, open_table
 from flexcal.errors import FlexcalError, InputError, naming
-from flexcal.jobs.inputs import CalibratedRobot, is_station_identified
+from flexcal.jobs.inputs import CalibratedRobot, is_station_identified, unmeasured_lengths_remark
 from flexcal.jobs.pages import Result
 from flexcal.model.kinematics import found_xyz, joint_limits
 from flexcal.model.robot import RobotModel, with_point_at_frame
@@ -46,6 +46,8 @@ class Compensation(Result):
         Points that the calibration measured.
     table : TableFile or None
         File that the targets were read from.
+    remarks : tuple of str
+        What makes the positions doubtful.
     """
 
     targets: ToolTargets
@@ -54,6 +56,7 @@ class Compensation(Result):
     nominal: RobotModel
     measured: tuple[str, ...]
     table: TableFile | None = None
+    remarks: tuple[str, ...] = ()
 
     @property
     def headline(self) -> str:
@@ -124,6 +127,7 @@ class Compensation(Result):
             else dict(zip(self.model.motor_names, self.start.tolist(), strict=True)),
             "from_other_postures": self.targets.pose[reached & commands.elsewhere].tolist(),
             "refused": self.refused,
+            "remarks": list(self.remarks),
         }
 
 
@@ -204,7 +208,15 @@ def compensate(
             "E-RUN-016",
             f"none of the {len(targets)} targets can be compensated; pose {targets.pose[0]}: {commands.reason[0]}.",
         )
-    return Compensation(model, targets, commands, origin, nominal, robot.measured)
+    return Compensation(
+        model,
+        targets,
+        commands,
+        origin,
+        nominal,
+        robot.measured,
+        remarks=unmeasured_lengths_remark(robot),
+    )
 
 
 def compensate_robot(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from flexcal.export import (
     write_rendered,
 )
 from flexcal.files.formats import read_estimates
-from flexcal.jobs.inputs import CalibratedRobot, stored_estimates
+from flexcal.jobs.inputs import CalibratedRobot, stored_estimates, unmeasured_lengths_remark
 from flexcal.jobs.pages import Result
 from flexcal.model.robot import RobotModel, with_blocks
 
@@ -126,7 +126,7 @@ def export_robot(
     ()
     """
     _check_options(format, {"point": point, "four_parameters": four_parameters, "keep_frames": keep_frames})
-    nominal, measured = robot.nominal, robot.measured
+    nominal, measured = robot.nominal, robot.targets
     probable, unseen = probable_robots(robot.model, measured) if measured else (robot.model, None)
     rendered: RenderedModel
     if format in _CONVENTIONS:
@@ -144,7 +144,9 @@ def export_robot(
         )
     else:
         rendered = render(format, probable, nominal)
-    return ExportedRobot(probable, write_rendered(probable, path, rendered), "calibration" in robot.blocks)
+    written = write_rendered(probable, path, rendered)
+    written = replace(written, remarks=(*written.remarks, *unmeasured_lengths_remark(robot)))
+    return ExportedRobot(probable, written, "calibration" in robot.blocks)
 
 
 def export_stored_robot(

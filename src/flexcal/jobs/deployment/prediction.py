@@ -11,7 +11,7 @@ import numpy as np
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.data.poses import ToolTargets, read_commands, write_targets
 from flexcal.errors import FlexcalError
-from flexcal.jobs.inputs import CalibratedRobot
+from flexcal.jobs.inputs import CalibratedRobot, unmeasured_lengths_remark
 from flexcal.jobs.pages import Result
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import carried_mass, certain_flank, points_kinematics, tool_at_rest
@@ -35,11 +35,14 @@ class Prediction(Result):
         Distance (N, 3), m, of these positions from those of the nominal robot.
     unambiguous : ndarray
         Whether (N,) the flank of every backlash is certain.
+    remarks : tuple of str
+        What makes the positions doubtful.
     """
 
     tool: ToolTargets
     beside: np.ndarray
     unambiguous: np.ndarray
+    remarks: tuple[str, ...] = ()
 
     @property
     def headline(self) -> str:
@@ -49,7 +52,8 @@ class Prediction(Result):
     def summary(self) -> str:
         """Distance from the nominal robot's tool, and poses whose flank is uncertain."""
         ambiguous = int((~self.unambiguous).sum())
-        return self.headline + (f"\nflank of a backlash uncertain in {ambiguous} poses" if ambiguous else "")
+        flanks = (f"flank of a backlash uncertain in {ambiguous} poses",) if ambiguous else ()
+        return "\n".join([self.headline, *flanks, *self.remarks])
 
     def document(self) -> dict[str, Any]:
         """The JSON document."""
@@ -57,6 +61,7 @@ class Prediction(Result):
             "poses": len(self.tool),
             "beside_nominal": ErrorStatistics.of(self.beside).in_millimetres(),
             "ambiguous_poses": self.tool.pose[~self.unambiguous].tolist(),
+            "remarks": list(self.remarks),
         }
 
 
@@ -105,7 +110,7 @@ def predict(robot: CalibratedRobot, commands: ToolTargets, *, progress: Progress
     progress("predicting", 1.0)
     position, rotation, beside, certain = (np.concatenate(part) for part in zip(*parts, strict=True))
     tool = replace(commands, q=None, position=position, rotation=rotation)
-    return Prediction(robot.probable, tool, beside, certain)
+    return Prediction(robot.probable, tool, beside, certain, unmeasured_lengths_remark(robot))
 
 
 def predict_robot(

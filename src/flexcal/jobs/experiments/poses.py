@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from flexcal.design.poses import (
     pose_curve,
     random_poses,
     tool_error,
+    zero_stds,
 )
 from flexcal.design.scene import MeasuringSetup
 from flexcal.errors import naming
@@ -96,6 +98,8 @@ class DesignedPoses(PlottedResult):
         What is to measure, as requested; None for a tracker of points.
     with_tracker : float or None
         Predicted tool error, m, of as many poses with a tracker of points, where something else is to measure.
+    tracker_zeros : mapping of float
+        Predicted standard deviations of the joint zeros, rad or m, with that tracker.
     """
 
     plan: PosePlan
@@ -109,6 +113,7 @@ class DesignedPoses(PlottedResult):
     record: RunRecord = NOT_RECORDED
     measure: str | None = None
     with_tracker: float | None = None
+    tracker_zeros: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def headline(self) -> str:
@@ -155,6 +160,7 @@ class DesignedPoses(PlottedResult):
                 "instrument": self.instrument,
                 "unseen_mm": design.unseen / MILLIMETRE,
                 "with_tracker_mm": None if self.with_tracker is None else self.with_tracker / MILLIMETRE,
+                "zeros": self._zeros(),
                 "working": working_block(self.working),
                 "criteria": design.criteria,
                 "identifiability": identifiability_block(design.identifiability),
@@ -173,6 +179,11 @@ class DesignedPoses(PlottedResult):
                 **self.record.document(),
             }
         )
+
+    def _zeros(self) -> dict[str, dict[str, float | None]]:
+        """Predicted standard deviations of the joint zeros, rad or m, with this instrument and with a tracker."""
+        stds = zero_stds(self.design.base, self.design.selection.chosen)
+        return {n: {"std": std, "with_tracker": self.tracker_zeros.get(n)} for n, std in stds.items()}
 
 
 def pool_block(design: PoseDesign, pool: PosePool | None, seed: int) -> dict[str, Any]:
@@ -257,20 +268,24 @@ def _designed(
     )
     if request.measure is None:
         return designed
-    return replace(
-        designed, measure=request.measure, with_tracker=_with_tracker(choice, request, len(plan), progress)
-    )
+    error, zeros = _with_tracker(choice, request, len(plan), progress)
+    return replace(designed, measure=request.measure, with_tracker=error, tracker_zeros=zeros)
 
 
-def _with_tracker(choice: CandidatePoses, request: PoseRequest, count: int, progress: Progress) -> float:
-    """Predicted tool error, m, of `count` poses for a tracker of points, chosen one by one from few candidates."""
+def _with_tracker(
+    choice: CandidatePoses, request: PoseRequest, count: int, progress: Progress
+) -> tuple[float, Mapping[str, float]]:
+    """Predicted tool error, m, and standard deviations of joint zeros of `count` poses for a tracker of points, chosen one by one from
+    few candidates.
+    """
     rng = np.random.default_rng([request.seed, 7])
     few = replace(request, measure=None, candidates=max(_FEW, 2 * count), working=choice.working)
     candidates = CandidatePoses.of(choice.checker.model, few, rng, progress).candidates
     chosen = greedy(
         candidates.base.sensitivity, count, TraceOptimal(candidates.tool_error_weight, "c")
     ).chosen
-    return tool_error(candidates.base, candidates.tool_error_weight, chosen)
+    error = tool_error(candidates.base, candidates.tool_error_weight, chosen)
+    return error, zero_stds(candidates.base, chosen)
 
 
 def plan_calibration_poses(

@@ -16,6 +16,7 @@ from .stored_model import (
     is_station_identified,
     measured_points,
     stored_estimates,
+    unmeasured_lengths_remark,
     unmeasured_targets_remark,
 )
 
@@ -35,5 +36,6 @@ __all__ = [
     "robot_file",
     "robot_provenance",
     "stored_estimates",
+    "unmeasured_lengths_remark",
     "unmeasured_targets_remark",
 ]

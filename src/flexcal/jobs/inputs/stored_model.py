@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 
 from flexcal.calibration.fit import probable_robot, with_calibrated_points
+from flexcal.calibration.kinds import is_inclinometer
 from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.files.formats import BLOCKS, Block, read_estimates, read_yaml_file
@@ -88,14 +89,19 @@ class CalibratedRobot:
         return cls(nominal, with_blocks(nominal, blocks, stored), blocks, stored)
 
     @property
+    def targets(self) -> tuple[str, ...]:
+        """Points measured in the calibration, and inclinometers read."""
+        return measured_points(self.nominal, self.blocks)
+
+    @property
     def measured(self) -> tuple[str, ...]:
         """Points measured in the calibration."""
-        return measured_points(self.nominal, self.blocks)
+        return tuple(name for name in self.targets if not is_inclinometer(self.nominal, name))
 
     @cached_property
     def probable(self) -> RobotModel:
         """Robot with the most probable values along the directions that the measured points do not determine; for all other frames."""
-        return probable_robot(self.model, self.measured)
+        return probable_robot(self.model, self.targets)
 
     @cached_property
     def with_points(self) -> RobotModel:
@@ -105,12 +111,24 @@ class CalibratedRobot:
 
 def unmeasured_targets_remark(calibrated: CalibratedRobot, targets: Iterable[str]) -> tuple[str, ...]:
     """Remark on `targets` that no calibration pose measured; none if all were."""
+    if not calibrated.measured:
+        return unmeasured_lengths_remark(calibrated)
     named = [name for name in targets if name not in calibrated.measured]
     if not named:
         return ()
     return (
         f"no calibration pose measured {' and '.join(named)}: its position on the tool is the declared one, whose error is not part of the "
         "predicted uncertainty",
+    )
+
+
+def unmeasured_lengths_remark(calibrated: CalibratedRobot) -> tuple[str, ...]:
+    """Remark on positions of a robot that was calibrated with inclinometers alone; none for others."""
+    if calibrated.measured or not calibrated.targets:
+        return ()
+    return (
+        "the calibration read inclinometers alone: lengths, base and tool are the nominal ones, and positions are as wrong as these; "
+        "'flexcal map' predicts by how much for typical tolerances of 0.3 mm and 0.5 mrad",
     )
 
 

@@ -26,6 +26,7 @@ from flexcal.jobs.result_files import (
     read_predictions,
     read_response_arrays,
     read_results,
+    read_tilts,
     read_verification,
 )
 from flexcal.report.layout import write_page
@@ -33,6 +34,7 @@ from flexcal.report.pages import (
     CalibrationStudy,
     DynamicsStudy,
     ExcitationStudy,
+    InclinationStudy,
     InertialsStudy,
     PayloadStudy,
     ResponseStudy,
@@ -42,6 +44,7 @@ from flexcal.report.pages import (
     dynamics_page,
     excitation_page,
     gains_page,
+    inclination_page,
     inertials_page,
     payload_page,
     response_page,
@@ -80,7 +83,11 @@ def report_folder(folder: Path) -> Path:
             points = read_points(folder, sigma=DEFAULT_SIGMA)
             page = verification_page(VerificationStudy(results, points, read_arm(folder)))
         elif kind == "calibration":
-            page = calibration_page(calibration_study(folder))
+            tilts = read_tilts(folder)
+            if tilts is not None and not results["calibration"]["selected"]["poses"]:
+                page = inclination_page(InclinationStudy(results, _block(folder, "calibration"), tilts))
+            else:
+                page = calibration_page(calibration_study(folder))
         elif kind == "demo":
             page = two_stage_page(two_stage_study(folder))
         elif kind == "stiffness":
@@ -114,7 +121,12 @@ def calibration_study(folder: Path) -> CalibrationStudy:
     results = read_results(folder)
     points = read_points(folder, sigma=results["fit"]["sigma_mm"] * MILLIMETRE)
     return CalibrationStudy(
-        results, _block(folder, "calibration"), points, read_arm(folder), read_loads(folder)
+        results,
+        _block(folder, "calibration"),
+        points,
+        read_arm(folder),
+        read_loads(folder),
+        read_tilts(folder),
     )
 
 

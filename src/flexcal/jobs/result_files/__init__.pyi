@@ -17,6 +17,7 @@ from .estimates import ESTIMATES, estimates_target
 from .fitted_responses import read_fitted_responses, write_fitted_responses
 from .points import read_arm, read_loads, read_points, write_arm, write_loads, write_points
 from .response_arrays import read_response_arrays, write_response_arrays
+from .tilts import read_tilts, write_tilts
 from .torque_predictions import read_predictions, write_predictions
 from .verification_points import VERIFICATION, read_verification, write_verification
 
@@ -41,6 +42,7 @@ __all__ = [
     "read_predictions",
     "read_response_arrays",
     "read_results",
+    "read_tilts",
     "read_verification",
     "springs_block",
     "write_arm",
@@ -50,5 +52,6 @@ __all__ = [
     "write_predictions",
     "write_response_arrays",
     "write_results",
+    "write_tilts",
     "write_verification",
 ]

@@ -21,6 +21,7 @@ from flexcal.data.tables import JOINT_QUANTITIES, Table, check_joint_units, stan
 from flexcal.errors import InputError
 from flexcal.importing.columns import (
     ORIENTATIONS,
+    TILTS,
     TOOL,
     ColumnAssignment,
     NominalMismatch,
@@ -40,7 +41,7 @@ from flexcal.jobs.setup.orientation_import import (
     import_orientations,
 )
 from flexcal.model.kinematics import point_kinematics
-from flexcal.model.parts import rotation_wxyz
+from flexcal.model.parts import rotation_wxyz, wxyz_rotation
 from flexcal.model.robot import RobotModel
 from flexcal.units import LARGEST, MILLIMETRE
 
@@ -48,7 +49,10 @@ _POSES = (
     "pose",
     "q",
     "xyz",
+    "base_xyz",
+    "base_quaternion",
     "length",
+    *TILTS,
     "quaternion",
     *ORIENTATIONS,
     "sigma",
@@ -58,6 +62,8 @@ _POSES = (
     "temperature",
     "t",
 )
+_MEASURED = {"xyz", "length", *TILTS}
+"""Quantities that poses are measured by."""
 _TURNS = ("quaternion", *ORIENTATIONS)
 _LOG = ("t", *JOINT_QUANTITIES, "temperature", "payload")
 
@@ -157,9 +163,9 @@ def import_file(
     remarks = list(foreign.notes)
     stated = {"sigma", "sigma_xyz"} & guess.placed.keys()
     if sigma is not None:
-        _check_sigma(sigma, file, kind, stated)
+        _check_sigma(sigma, file, stated, measured=bool({"xyz", "length"} & guess.placed.keys()))
         columns["sigma"] = np.full(len(foreign), sigma)
-    elif kind == "poses" and not stated:
+    elif {"xyz", "length"} & guess.placed.keys() and not stated:
         remarks.append(
             "the file does not state the instrument's noise: give it with --sigma MM (1σ per coordinate), or it is counted as "
             "an error of the robot"
@@ -203,7 +209,9 @@ def import_file(
         _check_time(foreign, guess, values["t"][:, 0])
     if turns and (imported.trusted or unchecked):
         source = OrientationColumns(foreign, turns[0], values[turns[0].quantity])
-        groups = _nominal_poses(model, columns, values, misfit) if imported.trusted else []
+        # the convention of orientations is told by a base that stands still
+        still = imported.trusted and "base_quaternion" not in values
+        groups = _nominal_poses(model, columns, values, misfit) if still else []
         turned = import_orientations(source, groups, orientation, unchecked=unchecked)
         imported = _with_orientations(imported, turned)
     if out is None or not (imported.trusted or unchecked):
@@ -217,7 +225,7 @@ def _kind(
 ) -> tuple[Literal["poses", "log", "joints"], RecognisedColumns]:
     """Kind of the file, and the guess restricted to its quantities, in the order of the columns to write."""
     unsure = [left for left in guess.left_out if "could both be" in left.why]
-    if "q" not in guess.placed or (unsure and not {"xyz", "length", "t"} & guess.placed.keys()):
+    if "q" not in guess.placed or (unsure and not {*_MEASURED, "t"} & guess.placed.keys()):
         left = "; ".join(reasons_unused(guess.left_out)) or "every column is something else"
         what = (
             f"the joint positions q1 … q{model.n}"
@@ -229,7 +237,7 @@ def _kind(
             "E-RUN-084",
             f"{foreign.table.file.path}: {what} were not recognised ({left}); say which they are: --map {example} and so on.",
         )
-    kind = "poses" if {"xyz", "length"} & guess.placed.keys() else "log" if "t" in guess.placed else "joints"
+    kind = "poses" if _MEASURED & guess.placed.keys() else "log" if "t" in guess.placed else "joints"
     wanted = {"poses": _POSES, "log": _LOG, "joints": ("pose", "q", "payload")}[kind]
     placed = {quantity: guess.placed[quantity] for quantity in wanted if quantity in guess.placed}
     reasons = {"payload": "robot.yaml declares no payload"}
@@ -261,7 +269,7 @@ def _converted(
     """Columns (N,) by flexcal's names, and quantities (N, m); raises `InputError` at the first missing value."""
     columns: dict[str, np.ndarray] = {}
     values: dict[str, np.ndarray] = {}
-    if "pose" not in guess.placed and ({"xyz", "length"} & guess.placed.keys() or "t" not in guess.placed):
+    if "pose" not in guess.placed and (_MEASURED & guess.placed.keys() or "t" not in guess.placed):
         columns["pose"] = np.arange(1, len(foreign) + 1)
     for quantity, placed in guess.placed.items():
         for column in placed.columns:
@@ -303,6 +311,8 @@ def _check_poses(
     for quantity in ("sigma", "sigma_xyz", "length"):
         if quantity in values:
             check_positive(table, guess.placed[quantity].signal(), values[quantity], zero=False)
+    if not {"xyz", "length"} & values.keys():
+        return
     place = "xyz" if "xyz" in values else "length"
     poses = PoseSet(
         q=values["q"],
@@ -319,10 +329,10 @@ def _check_poses(
     check_metres(poses, model, table, guess.placed[place].signal())
 
 
-def _check_sigma(sigma: float, file: Path, kind: str, stated: set[str]) -> None:
+def _check_sigma(sigma: float, file: Path, stated: set[str], *, measured: bool) -> None:
     if not 0 < sigma < np.inf:
         raise InputError("E-RUN-086", f"--sigma is {sigma / MILLIMETRE:g}; it must be positive, in mm.")
-    if kind != "poses":
+    if not measured:
         raise InputError("E-RUN-087", f"--sigma is of measured points, but {file} has none; leave it out.")
     if stated:
         raise InputError(
@@ -395,4 +405,12 @@ def _misfit(
     if "xyz" not in values or not model.points:
         return None
     rows, target = _groups(columns, len(values["q"]))[0]
-    return check_nominal(model, values["q"][rows], values["xyz"][rows], guess.placed["q"], point=target)
+    return check_nominal(model, values["q"][rows], _from_base(values)[rows], guess.placed["q"], point=target)
+
+
+def _from_base(values: dict[str, np.ndarray]) -> np.ndarray:
+    """Points (N, 3), m, as seen from a base that moves and was measured too; as measured without."""
+    if not {"base_xyz", "base_quaternion"} <= values.keys():
+        return values["xyz"]
+    turns = wxyz_rotation(values["base_quaternion"])
+    return np.einsum("nji,nj->ni", turns, values["xyz"] - values["base_xyz"])

@@ -446,8 +446,9 @@ class InclinometerConfig:
     rpy: how it is mounted in the frame, rad; found by the calibration, and compared where it is given. reads: "elevation", the angle of an
     axis above the horizontal plane; "projection", that in the plane with the sensor's z axis, atan2(x, z) and atan2(y, z); "component",
     the vertical component of the axis itself, as an accelerometer reads it in units of gravity. All are positive where the axis points
-    upwards. std: standard deviation of a reading, rad (1 for components); None where it is not known. level: whether `gravity` is exactly
-    the vertical in the robot's base frame; else the base may be inclined.
+    upwards. std: standard deviation of a reading, rad (1 for components); None where it is not known. range: largest reading of an axis,
+    rad (1 for components); None for what the readings can be. level: whether `gravity` is exactly the vertical in the robot's base frame;
+    else the base may be inclined.
     """
 
     kind: Literal["inclinometer"]
@@ -455,10 +456,13 @@ class InclinometerConfig:
     rpy: Triple | None = None
     reads: Literal["elevation", "projection", "component"] = "elevation"
     std: float | None = None
+    range: float | None = None
     level: bool = False
 
     def __post_init__(self) -> None:
         _require_std(self.std, "rad")
+        if self.range is not None and not self.range > 0:
+            raise FlexcalError("E-ROBOT-078", f"range must be positive, not {self.range:g}.")
 
 
 def _require_std(std: float | None, unit: str = "m") -> None:

@@ -235,6 +235,26 @@ def check_left_out(mean: float, left_out: float | None, share: float) -> Check:
     return Check(question, answer, "good")
 
 
+def check_held_out_tilts(mean: float, share: float, held_out: Mapping[str, Any] | None) -> Check:
+    """Whether readings of inclinometers that were held out are predicted, as `check_left_out`; `mean` error of the fit in mrad, `held_out`
+    of results.json.
+    """
+    question = "Are readings outside the fit predicted?"
+    if held_out is None:
+        return Check(
+            question,
+            "Cannot be judged: none was held out. Calibrate with --hold-out and a column that tells recordings or poses apart.",
+            "unknown",
+        )
+    left_out = held_out["mean_mrad"]
+    expected = float(np.sqrt((1 + share) / (1 - share))) * mean if share < 1 else np.inf
+    answer = (
+        f"Held out by {held_out['by']}, the mean error is {left_out:.3g} mrad; expected from {mean:.3g} mrad in the fit are "
+        f"{expected:.3g} mrad."
+    )
+    return Check(question, answer, "good" if left_out <= CHANCE * expected else "care")
+
+
 def check_outliers(outliers: int, fit: ErrorStatistics) -> Check:
     """Whether there are outliers: the number of `outliers` of a robust loss, or the largest error relative to P90."""
     question = "Are there outliers?"

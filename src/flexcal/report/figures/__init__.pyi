@@ -22,6 +22,7 @@ from .residuals import (
     residual_workspace,
 )
 from .robot_arm import arm_poses, links_at
+from .tilts import tilt_joints, tilt_order
 from .torques import torque_spectra, torque_traces
 from .trajectory_plan import limit_shares, prior_gains, swept_paths
 
@@ -65,6 +66,8 @@ __all__ = [
     "swept_paths",
     "term_label",
     "term_scores",
+    "tilt_joints",
+    "tilt_order",
     "torque_spectra",
     "torque_traces",
     "variance_shares",

@@ -7,6 +7,7 @@ from .dynamics import DynamicsStudy, dynamics_checks, dynamics_page
 from .excitation import ExcitationStudy, excitation_page
 from .frequency_design import FrequencyDesignStudy, frequency_page
 from .frequency_response import ResponseStudy, response_page
+from .inclinations import InclinationStudy, inclination_checks, inclination_page
 from .inertials import InertialsStudy, inertials_checks, inertials_page
 from .payload import PayloadStudy, payload_page
 from .pose_design import PoseStudy, pose_page
@@ -24,6 +25,7 @@ __all__ = [
     "DynamicsStudy",
     "ExcitationStudy",
     "FrequencyDesignStudy",
+    "InclinationStudy",
     "InertialsStudy",
     "MapStudy",
     "PayloadStudy",
@@ -40,6 +42,8 @@ __all__ = [
     "excitation_page",
     "frequency_page",
     "gains_page",
+    "inclination_checks",
+    "inclination_page",
     "inertials_checks",
     "inertials_page",
     "map_page",

@@ -9,7 +9,7 @@ from typing import Any
 from flexcal.calibration.diagnostics import GravityLoads
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.term_selection import considered_terms
-from flexcal.calibration.verification import CALIBRATED, RIGID, ArmPoses, MeasuredPoints
+from flexcal.calibration.verification import CALIBRATED, RIGID, ArmPoses, MeasuredPoints, MeasuredTilts
 from flexcal.estimation import Estimate
 from flexcal.report.checks import (
     Trust,
@@ -53,6 +53,7 @@ from flexcal.report.sections import (
     provenance_section,
     residuals_section,
     terms_section,
+    tilts_section,
     uncalibrated_ranges,
     uncalibrated_rows,
 )
@@ -64,7 +65,8 @@ class CalibrationStudy:
     """A calibration on measured poses, as its folder has it.
 
     `results` is the document of results.json, `estimate` the block of estimates.yaml. `points` are those of the fit; they have errors of
-    the rigid model where it is not the calibrated one. `arms` is the calibrated robot at them.
+    the rigid model where it is not the calibrated one. `arms` is the calibrated robot at them,
+    `tilts` are the readings of inclinometers.
     """
 
     results: Mapping[str, Any]
@@ -72,6 +74,7 @@ class CalibrationStudy:
     points: MeasuredPoints
     arms: ArmPoses
     loads: GravityLoads | None = None
+    tilts: MeasuredTilts | None = None
 
 
 def determined(results: Mapping[str, Any]) -> IdentifiableParameters:
@@ -90,6 +93,7 @@ def calibration_page(study: CalibrationStudy) -> Page:
         residuals_section(
             results["joints"], points.poses, points.calibrated, study.estimate.outliers, study.loads
         ),
+        *(() if study.tilts is None else (tilts_section(results["joints"], study.tilts),)),
         Section(
             "geometry",
             "Parameters",

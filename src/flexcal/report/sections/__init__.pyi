@@ -15,6 +15,7 @@ from .selected_terms import terms_section
 from .signal_processing import signals_table
 from .springs import hardening_sentence, spring_table, unseen_springs
 from .stiffness import response_blocks, stiffness_section
+from .tilts import tilts_section
 from .torques import recording_labels, torque_blocks
 from .uncalibrated import BEFORE, BEFORE_NOTE, uncalibrated_ranges, uncalibrated_rows, uncalibrated_table
 from .uncertainty_budget import budget_table, noise_tables
@@ -53,6 +54,7 @@ __all__ = [
     "spring_table",
     "stiffness_section",
     "terms_section",
+    "tilts_section",
     "torque_blocks",
     "uncalibrated_ranges",
     "uncalibrated_rows",
