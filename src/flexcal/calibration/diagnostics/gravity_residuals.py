@@ -16,10 +16,10 @@ _MOST = 1500
 
 @dataclass(frozen=True, eq=False)
 class GravityLoads:
-    """Loads and residuals at N points of a robot with n joints.
+    """Loads and residuals at N points of a robot with n motors.
 
     `torque` (N, n) is the gravity torque on the drives, N m; `along` (N, n), m, by model the residual along the motion of the point by
-    each joint.
+    each motor.
     """
 
     torque: np.ndarray
@@ -34,9 +34,9 @@ def gravity_loads(fit: GeometricFit, residuals: Mapping[str, np.ndarray]) -> Gra
     measured = fit.poses.pointed
     rows = np.unique(np.linspace(0, len(measured) - 1, min(len(measured), _MOST)).astype(int))
     model, poses = fit.model, measured.subset(rows)
-    motion = points_kinematics(model, poses.q, None, poses.target, jacobians=True).motion_jacobian[
-        :, :3, :, 2
-    ]
+    motors = list(model.motors)
+    at = points_kinematics(model, poses.q, None, poses.target, jacobians=True)
+    motion = at.motion_jacobian[:, :3, motors, 2]
     size = np.linalg.norm(motion, axis=1, keepdims=True)
     direction = np.divide(motion, size, out=np.zeros_like(motion), where=size > 1e-9)
     turns = {
@@ -46,4 +46,4 @@ def gravity_loads(fit: GeometricFit, residuals: Mapping[str, np.ndarray]) -> Gra
     seen = np.matmul(turn, direction)
     masses = carried_mass(model, poses.payload, len(poses))
     along = {name: np.matmul(errors[rows, None, :], seen)[:, 0] for name, errors in residuals.items()}
-    return GravityLoads(gravity_torque(model, poses.q, masses), along)
+    return GravityLoads(gravity_torque(model, poses.q, masses)[:, motors], along)

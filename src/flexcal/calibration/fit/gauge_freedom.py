@@ -29,7 +29,7 @@ from flexcal.model.robot import (
     RobotModel,
     geometric_errors,
     propagated_covariance_root,
-    unit_of,
+    unit_in,
 )
 
 KNOWN_POINT_STD = 0.002
@@ -76,15 +76,12 @@ def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotMod
     poses = _as_predicted(stiff, poses)
     scale = np.where(np.isfinite(std), std, 1.0)
     weight = np.where(np.isfinite(std), 1 / std, 0.0)
-    robot, free = stiff, np.zeros((len(names), 0))
+    seen, free = _directions(stiff, poses, names, scale)
+    robot = stiff
     for _ in range(_STEPS):
         at = predict_measurements(robot, poses, elastic=False, jacobians=True)
-        columns = at.jacobian(names).reshape(-1, len(names)) * scale
-        left, sizes, right = np.linalg.svd(columns, full_matrices=len(columns) < len(names))
-        rank = int(np.sum(sizes > _UNSEEN * sizes[0]))
-        missing = left[:, :rank].T @ at.residual.ravel()
-        step = scale * (right[:rank].T @ (missing / sizes[:rank]))
-        free = scale[:, None] * right[rank:].T
+        columns = at.jacobian(names).reshape(-1, len(names)) @ seen
+        step = seen @ np.linalg.lstsq(columns, at.residual.ravel(), rcond=_UNSEEN)[0]
         values = np.array([robot.value(name) for name in names]) + step
         step += free @ np.linalg.lstsq(weight[:, None] * free, -weight * values, rcond=None)[0]
         changed = np.array([robot.value(name) for name in names]) + step
@@ -94,6 +91,21 @@ def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotMod
     robot = model.with_values({name: robot.value(name) for name in names})
     whole, unseen = _propagated(robot, names, free, weight)
     return replace(robot, posterior=whole), replace(robot, posterior=unseen)
+
+
+def _directions(
+    model: RobotModel, poses: PoseSet, names: list[str], scale: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Directions (p, r) of the parameters `names` that move the measured points, and those (p, p - r) that do not, in units of `scale`.
+
+    Of the geometry of the URDF, as for the rank of the fit: axes that are not quite parallel show faintly what nothing measures.
+    """
+    drawn = model.with_values({name: 0.0 for name in names if not name.startswith("station.")})
+    columns = predict_measurements(drawn, poses, elastic=False, jacobians=True).jacobian(names)
+    columns = columns.reshape(-1, len(names)) * scale
+    _, sizes, right = np.linalg.svd(columns, full_matrices=len(columns) < len(names))
+    rank = int(np.sum(sizes > _UNSEEN * sizes[0]))
+    return scale[:, None] * right[:rank].T, scale[:, None] * right[rank:].T
 
 
 def with_calibrated_points(nominal: RobotModel, model: RobotModel, targets: Sequence[str]) -> RobotModel:
@@ -140,7 +152,7 @@ def _std(model: RobotModel, name: str, targets: Sequence[str]) -> float:
     pointed = first in targets and not is_inclinometer(model, first)
     if owner.startswith("point.") or (owner == "tool" and key.startswith("length") and pointed):
         return POINT_STD
-    return TOLERANCE[unit_of(name)]
+    return TOLERANCE[unit_in(model, name)]
 
 
 def _calibrated_stations(model: RobotModel) -> list[str]:
@@ -219,5 +231,5 @@ def _propagated(
         replace(item, value=moved[item.name], prior_mean=None) if item.name in moved else item
         for item in old.parameters
     )
-    more = Parameters(Parameter(name, unit_of(name), moved[name]) for name in added)
+    more = Parameters(Parameter(name, unit_in(model, name), moved[name]) for name in added)
     return Posterior(kept + more, covariance + unseen), Posterior(kept + more, unseen)

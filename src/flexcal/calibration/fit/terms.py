@@ -18,7 +18,7 @@ from flexcal.model.robot import (
     STATION,
     RobotModel,
     geometric_errors,
-    unit_of,
+    unit_in,
 )
 from flexcal.model.statics import (
     carried_mass,
@@ -212,7 +212,7 @@ def manufacturing_tolerances(parameters: Parameters) -> np.ndarray:
 
 def _parameter(model: RobotModel, name: str, lower: float = -np.inf) -> Parameter:
     std = declared_size(model, name) or np.inf
-    return Parameter(name, unit_of(name), model.value(name), lower=lower, prior_std=std)
+    return Parameter(name, unit_in(model, name), model.value(name), lower=lower, prior_std=std)
 
 
 _PLAUSIBLE = {"offset": 5e-3, "misalignment_1": 2e-3, "misalignment_2": 2e-3, "backlash": 1e-3}
@@ -256,4 +256,4 @@ def declared_size(model: RobotModel, name: str) -> float | None:
         return prior.length
     if owner not in model.joint_names or key not in (*GEOMETRY, *ORIGIN):
         return None
-    return prior.angle if unit_of(name) == "rad" else prior.length
+    return prior.angle if unit_in(model, name) == "rad" else prior.length

@@ -25,6 +25,7 @@ from flexcal.units import MILLIMETRE
 
 if TYPE_CHECKING:
     from flexcal.jobs.calibration import Calibration
+    from flexcal.model.robot import RobotModel
     from flexcal.progress import Progress
 
 
@@ -97,7 +98,7 @@ class Calibrate:
             calibration = self._calibrated(self.terms, progress)
             known = all(point["std_m"] <= KNOWN_POINT_STD for point in calibration.found_points.values())
             write = self.write_point and known and not is_implausible(calibration.selected)
-            told = point_lines(calibration.found_points) if write else []
+            told = point_lines(calibration.selected.model, calibration.found_points) if write else []
             if write:
                 calibration = self._with_points_written(calibration, progress)
         document = calibration.document()
@@ -138,7 +139,7 @@ class Calibrate:
                 console.say(f"{line}: written to {self.robot}, and calibrated with it")
         else:
             known = all(point["std_m"] <= KNOWN_POINT_STD for point in document["points"].values())
-            for line in point_lines(document["points"]):
+            for line in point_lines(calibration.selected.model, document["points"]):
                 console.say(f"{line}; --write-point writes it to {self.robot}" if known else line)
         console.say(calibration.trust.sentence)
         where = estimates_option(self.out)
@@ -209,15 +210,28 @@ _FOUND_BESIDE = 5e-4
 """m: distance of a point from its declared position above which it is reported."""
 
 
-def undetermined_point_remark(name: str, std: float) -> str:
+def undetermined_point_remark(model: RobotModel, name: str, std: float) -> str:
     """A sentence on a measured point whose position on the tool the calibration does not determine."""
+    from flexcal.model.kinematics import rotation_freedom
+
+    freedom, where = rotation_freedom(model, name), f"(± {std / MILLIMETRE:.2g} mm)"
+    if freedom < 2:
+        turns, part = (
+            ("turns its tool about one direction only", "along it")
+            if freedom
+            else ("does not turn its tool", "")
+        )
+        return (
+            f"{model.name} {turns}, so points do not tell where {name} is on the tool {part}{' ' if part else ''}{where}: positions are "
+            "those of this point, and another tool is as accurate as its distance from it is known"
+        )
     return (
-        f"these poses do not determine the position of the point {name} on the tool (± {std / MILLIMETRE:.2g} mm): its orientation hardly "
+        f"these poses do not determine the position of the point {name} on the tool {where}: its orientation hardly "
         "changes. The calibration is valid at such orientations only; measure poses with other tool orientations, and calibrate again"
     )
 
 
-def point_lines(points: Mapping[str, Mapping[str, Any]]) -> list[str]:
+def point_lines(model: RobotModel, points: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """A line for each point whose calibrated position differs from the declared one; `points` as in the document."""
     from flexcal.calibration.fit import KNOWN_POINT_STD
 
@@ -225,7 +239,7 @@ def point_lines(points: Mapping[str, Mapping[str, Any]]) -> list[str]:
     for name, point in points.items():
         off = math.dist(point["found_xyz_m"], point["declared_xyz_m"])
         if point["std_m"] > KNOWN_POINT_STD:
-            lines.append(undetermined_point_remark(name, point["std_m"]))
+            lines.append(undetermined_point_remark(model, name, point["std_m"]))
         elif off > _FOUND_BESIDE:
             calibrated, declared = (
                 ", ".join(f"{v:.5f}" for v in point[key]) for key in ("found_xyz_m", "declared_xyz_m")

@@ -93,7 +93,7 @@ class Compensate:
                 "configuration: from_other_postures in --json"
             )
         for name, std in document["points_not_found_m"].items():
-            console.say(undetermined_point_remark(name, std))
+            console.say(undetermined_point_remark(compensation.model, name, std))
         for name, point in document["points"].items():
             console.say(_point_words(name, point))
         before = document["error_before_mm"]

@@ -12,6 +12,7 @@ from flexcal.design.poses.camera_setup import CameraSetup
 from flexcal.design.poses.candidates import random_candidates
 from flexcal.design.poses.geometry_sensitivity import (
     BaseSensitivity,
+    as_drawn,
     base_sensitivity,
     geometry_jacobian,
     pose_sensitivity,
@@ -62,14 +63,15 @@ def pose_candidates(
 ) -> PoseCandidates:
     """Random poses, or those of a pool, with gravity surely preloading every backlash; at least `least` of them.
 
-    Random ones keep to the joint limits, collide with nothing (`checker`, by default with 10 mm of margin and a floor at the base) and
-    show the target to the instrument. Those of a pool are taken to be free of collision; in those left out the flank is not sure, or
-    the instrument does not see the target. The tool error counts over the `working` poses (W, n), by default random ones over the
-    whole workspace. A pool's payload counts for it where `setup` has none.
+    Random ones keep to the joint limits, collide with nothing (`checker`, by default with 10 mm of margin and a floor at the base of
+    a robot that stands) and show the target to the instrument. Those of a pool are taken to be free of collision; in those left out
+    the flank is not sure, or the instrument does not see the target. The tool error counts over the `working` poses (W, n), by
+    default random ones over the whole workspace. A pool's payload counts for it where `setup` has none.
 
     Raises `FlexcalError` where too few poses pass the checks, and where all of them press a backlash onto one flank.
     """
     checker = CollisionChecker(model) if checker is None else checker
+    model = as_drawn(model)
     if isinstance(candidates, PosePool):
         if setup.payload is None:
             setup = replace(setup, payload=candidates.payload)

@@ -10,7 +10,7 @@ from flexcal.design.scene import STANDARD, MeasuringSetup, station_position
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Identifiability, Parameter, Parameters, Sensitivity, analyse
 from flexcal.model.kinematics import point_kinematics
-from flexcal.model.robot import GEOMETRY, RobotModel, unit_of
+from flexcal.model.robot import GEOMETRY, RobotModel, unit_in
 from flexcal.model.statics import gravity_torque
 from flexcal.units import MILLIMETRE
 
@@ -23,17 +23,23 @@ class GeometricTolerances:
     angle: float = 0.5e-3
     station: float = 10 * MILLIMETRE
 
-    def of(self, name: str) -> float:
+    def of(self, model: RobotModel, name: str) -> float:
         """Tolerance of a parameter by its name."""
         if name.startswith("station."):
             return self.station
-        return self.angle if unit_of(name) == "rad" else self.length
+        return self.angle if unit_in(model, name) == "rad" else self.length
 
 
 BLOCK = 512
 """Number of poses whose rows are computed together, sized for the processor's cache."""
 TYPICAL = GeometricTolerances()
 """Tolerances of a well-made industrial robot, and an instrument whose place was measured with a tape."""
+
+
+def as_drawn(model: RobotModel) -> RobotModel:
+    """Robot with the geometry of its URDF: axes that calibration made not quite parallel would show faintly what no instrument sees."""
+    names = [*model.geometry_columns, *(f"tool.{key}" for key in GEOMETRY)]
+    return model.with_values(dict.fromkeys(names, 0.0))
 
 
 def geometry_jacobian(
@@ -74,7 +80,7 @@ def pose_sensitivity(
     names, _ = geometry_jacobian(model, q[:1], setup)
     std = measuring_noise(model, q, setup)
     parameters = Parameters(
-        Parameter(name, unit_of(name), 0.0, prior_std=tolerances.of(name)) for name in names
+        Parameter(name, unit_in(model, name), 0.0, prior_std=tolerances.of(model, name)) for name in names
     )
     whitened = np.empty((len(q), 3, len(names)))
     for first in range(0, len(q), BLOCK):

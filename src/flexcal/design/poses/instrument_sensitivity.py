@@ -29,7 +29,7 @@ def instrument_sensitivity(
         for name in geometry_jacobian(model, q[:1], setup)[0]
         if instrument.tells_base or not name.startswith(station)
     ]
-    stds = {name: tolerances.of(name) for name in names} | instrument.nuisances(target)
+    stds = {name: tolerances.of(model, name) for name in names} | instrument.nuisances(target)
     rows = instrument.rows(instrument.placed(model, target), q, target, tuple(stds))
     parameters = Parameters(Parameter(name, unit_of(name), 0.0, prior_std=std) for name, std in stds.items())
     seen = np.abs(rows).max(axis=(0, 2)) > 0

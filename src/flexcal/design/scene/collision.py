@@ -9,12 +9,19 @@ from typing import Any
 import numpy as np
 
 from flexcal.errors import InputError
-from flexcal.model.kinematics import joint_batch, joint_positions, low_discrepancy_configurations
+from flexcal.model.kinematics import (
+    joint_batch,
+    joint_positions,
+    low_discrepancy_configurations,
+    point_kinematics,
+)
 from flexcal.model.robot import RobotModel
 from flexcal.model.urdf import locked_joints, read_elements
 
 _SAMPLES = 200
 _FLOOR = "floor"
+_STANDING = 0.1
+"""Share of configurations with the target above the floor, below which the robot hangs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,13 +39,14 @@ class CollisionChecker:
     """Collision of the nominal robot with itself, with `floor` and with the obstacles that robot.yaml declares.
 
     `margin` (m): bodies nearer than this count as touching. `floor` is the height (m, along z of the base frame) below which nothing
-    but the base and the first link may reach: the surface on which the robot stands; None for no such surface. Shapes of one link
-    (those on fixed and locked joints belong to the link that carries them) and of neighbouring links are never compared. Nor are pairs
-    that overlap in each of 200 configurations spread evenly over the joint ranges: their shapes are drawn too large; `permanent` names
-    them. Pairs that never come apart by the margin, as in a compact wrist, are compared without it. A mesh counts as its convex hull;
-    `package://name/` is looked for in every folder above the URDF. A payload, the reflector's mount and cables have no shape and are
-    not seen. Without collision shapes in the URDF nothing collides. `kinematics` and `geometry` are Pinocchio's. Raises `InputError`
-    where shapes or obstacles cannot be read, and for an obstacle that a link touches in each of the 200 configurations.
+    but the base and the first link may reach: the surface on which the robot stands; None for no such surface, as for a robot that
+    hangs: one whose target is above it in hardly any configuration. Shapes of one link (those on fixed and locked joints belong to
+    the link that carries them) and of neighbouring links are never compared. Nor are pairs that overlap in each of 200 configurations
+    spread evenly over the joint ranges: their shapes are drawn too large; `permanent` names them. Pairs that never come apart by the
+    margin, as in a compact wrist, are compared without it. A mesh counts as its convex hull; `package://name/` is looked for in every
+    folder above the URDF. A payload, the reflector's mount and cables have no shape and are not seen. Without collision shapes in the
+    URDF nothing collides. `kinematics` and `geometry` are Pinocchio's. Raises `InputError` where shapes or obstacles cannot be read,
+    and for an obstacle that a link touches in each of the 200 configurations.
     """
 
     def __init__(self, model: RobotModel, *, margin: float = 0.01, floor: float | None = 0.0) -> None:
@@ -47,7 +55,7 @@ class CollisionChecker:
 
         self.model = model
         self.margin = margin
-        self.floor = floor
+        self.floor = None if floor is None or _hangs(model, floor) else floor
         whole = pin.buildModelFromXML(read_elements(model.urdf).text())
         shapes = _shapes(whole, model.urdf)
         self.kinematics: Any
@@ -58,8 +66,8 @@ class CollisionChecker:
         for name in model.config.obstacles:
             _add_obstacle(self.geometry, model.path.parent / name)
         self._obstacles = range(own, self.geometry.ngeoms)
-        if floor is not None:
-            plane = coal.Halfspace(np.array([0.0, 0.0, 1.0]), floor)
+        if self.floor is not None:
+            plane = coal.Halfspace(np.array([0.0, 0.0, 1.0]), self.floor)
             self.geometry.addGeometryObject(pin.GeometryObject(_FLOOR, 0, 0, pin.SE3.Identity(), plane))
         self._data = self.kinematics.createData()
         pairs = self._comparable()
@@ -180,6 +188,15 @@ class CollisionChecker:
             else:
                 result[:, joint.idx_q], result[:, joint.idx_q + 1] = np.cos(q[:, i]), np.sin(q[:, i])
         return result
+
+
+def _hangs(model: RobotModel, floor: float) -> bool:
+    """Whether the first target is above the height `floor` in hardly any configuration."""
+    if not model.points:
+        return False
+    q = low_discrepancy_configurations(model, _SAMPLES)
+    height = point_kinematics(model, q, jacobians=False).position[:, 2]
+    return bool(np.mean(height > floor) < _STANDING)
 
 
 def _shapes(pin_model: Any, urdf: Path) -> Any:

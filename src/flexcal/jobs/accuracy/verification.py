@@ -197,7 +197,7 @@ class Verification(ReportedResult):
             blocks["nominal"] = before["registered"]
         return {
             "robot": self.model.name,
-            "joints": {joint.name: joint.kind for joint in self.model.joints},
+            "joints": {joint.name: joint.kind for joint in self.model.motor_joints},
             "backlash": list(self.model.backlash_joints),
             "before": before,
             "verification": blocks,

@@ -232,7 +232,7 @@ class Calibration(Identification):
         misfit = None if self.stiffness is None else self.stiffness.misfit
         return {
             "robot": selected.model.name,
-            "joints": {joint.name: joint.kind for joint in selected.model.joints},
+            "joints": {joint.name: joint.kind for joint in selected.model.motor_joints},
             "identifiability": identifiability_block(self.rigid.identifiability)
             | {
                 "selected": identifiability_block(identifiability)

@@ -78,7 +78,7 @@ def two_stage_document(run: TwoStageRun, exported: ExportedFile) -> dict[str, An
         "seed": run.seed,
         "truth": dict(run.truth),
         "robot": run.nominal.name,
-        "joints": {joint.name: joint.kind for joint in run.nominal.joints},
+        "joints": {joint.name: joint.kind for joint in run.nominal.motor_joints},
         "plan": run.plan.name,
         "cell": run.cell,
         "command": run.command,

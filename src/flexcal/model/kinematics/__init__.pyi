@@ -6,6 +6,7 @@ from .link_poses import joint_origins, link_frames
 from .link_surface import LinkSurface
 from .placements import bearing_placement, found_xyz, joint_placement, link_placement, point_placement
 from .relative import carrier_kinematics, relative_kinematics, relative_motion
+from .tool_rotations import rotation_freedom
 
 __all__ = [
     "JointMotion",
@@ -33,4 +34,5 @@ __all__ = [
     "reach_points",
     "relative_kinematics",
     "relative_motion",
+    "rotation_freedom",
 ]

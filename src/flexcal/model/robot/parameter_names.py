@@ -75,17 +75,20 @@ _UNITS = {
 }  # fmt: skip
 
 
-_OF_DRIVES = ("rotor_inertia", "viscous", "coulomb", "torque_offset", *FRICTION_PARAMETERS, *PARALLEL)
+_OF_DRIVES = (
+    *("offset", "backlash", "transmission_"),
+    *("rotor_inertia", "viscous", "coulomb", "torque_offset", *FRICTION_PARAMETERS, *PARALLEL),
+)
 _SLIDING = {
-    "kg m²": "kg", "N m": "N", "N m/rad": "N/m", "N m s/rad": "N s/m", "N m √(s/rad)": "N √(s/m)",
+    "rad": "m", "kg m²": "kg", "N m": "N", "N m/rad": "N/m", "N m s/rad": "N s/m", "N m √(s/rad)": "N √(s/m)",
 }  # fmt: skip
 
 
 def unit_in(model: RobotModel, name: str) -> str:
-    """SI unit of a robot's parameter; drive, spring and friction of a prismatic joint are in N and m."""
+    """SI unit of a robot's parameter; offset, drive, spring and friction of a prismatic joint are in N and m."""
     unit, (owner, _, key) = unit_of(name), name.rpartition(".")
     key, _, other = key.partition("_at_")
-    if key not in _OF_DRIVES or owner not in model.joint_names:
+    if owner not in model.joint_names or not key.startswith(_OF_DRIVES):
         return unit
     slides = [model.joints[model.joint_index(j)].kind == "prismatic" for j in (owner, other or owner)]
     return _SLIDING.get(unit, unit) if all(slides) else unit

@@ -1,0 +1,69 @@
+"""A stranger's SCARA: motors coupled by a ball screw spline, parallel axes, a tool that turns about the vertical only."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cli_files import write_csv
+from scara import Scara, poses, write_robot
+
+from flexcal import RobotModel, tool_at_rest
+
+NOISE = 0.032
+"""mm, mean distance by the tracker's noise."""
+
+
+def write_points(path: Path, robot: Scara, count: int, rng: np.random.Generator) -> Path:
+    q = poses(count, rng)
+    rows = np.column_stack([1 + np.arange(count), q, robot.measured(q, rng)])
+    return write_csv(path, ["pose", "q1", "q2", "q3", "q4", "x", "y", "z"], rows)
+
+
+def test_the_spline_lifts_the_quill(tmp_path: Path) -> None:
+    model = RobotModel.from_yaml(write_robot(tmp_path))
+    q = poses(30, np.random.default_rng(0))
+    at = tool_at_rest(model, q, None, np.full(30, "smr"), jacobians=True)
+    np.testing.assert_allclose(at.kinematics.position, Scara.nominal().reflector(q), rtol=0, atol=1e-12)
+    nominal, h = Scara.nominal(), 1e-6 * np.eye(4)
+    slopes = np.stack([(nominal.reflector(q + e) - nominal.reflector(q - e)) / 2e-6 for e in h], axis=2)
+    np.testing.assert_allclose(at.command_jacobian()[:, :3], slopes, rtol=0, atol=1e-8)
+
+
+def test_calibrated_with_default_options(run, tmp_path: Path) -> None:
+    """What cannot be told by a tool that stays upright is said as such, and not asked of further poses."""
+    robot, true, rng = write_robot(tmp_path), Scara.drawn(1), np.random.default_rng(1)
+    outcome = run(
+        "calibrate", robot, write_points(tmp_path / "points.csv", true, 60, rng), "--out", tmp_path / "out"
+    )
+    assert outcome.status == 0, outcome.err
+    assert "turns its tool about one direction only" in outcome.out
+    assert "measure poses with other tool orientations" not in outcome.out
+    text = (tmp_path / "out" / "estimates.yaml").read_text()
+    assert (
+        "j3.offset: {estimate: " in text and "unit: m" in text.partition("j3.offset: ")[2].partition("std")[0]
+    )
+    fresh = write_points(tmp_path / "fresh.csv", true, 40, rng)
+    verified = run("verify", robot, fresh, "--estimates", tmp_path / "out", "--json").document
+    errors = verified["verification"]
+    assert errors["measured"]["mean_mm"] < 1.4 * NOISE and errors["nominal"]["mean_mm"] > 0.5, errors
+
+
+@pytest.mark.slow
+def test_intervals_cover(run, tmp_path: Path) -> None:
+    """Fresh points of 20 SCARAs, by default options."""
+    inside, ratios = [], []
+    for seed in range(20):
+        robot, true, rng = (
+            write_robot(tmp_path / str(seed)),
+            Scara.drawn(100 + seed),
+            np.random.default_rng(seed),
+        )
+        assert run("calibrate", robot, write_points(robot.parent / "points.csv", true, 60, rng)).status == 0
+        fresh = write_points(robot.parent / "fresh.csv", true, 60, rng)
+        prediction = run("verify", robot, fresh, "--json").document["prediction"]
+        inside.append(prediction["inside_95_percent"])
+        ratios.append(prediction["ratio"])
+    assert 0.93 <= np.mean(inside) <= 0.97, np.mean(inside)
+    assert 0.95 < np.mean(ratios) < 1.05, np.mean(ratios)
