@@ -75,23 +75,23 @@ _UNITS = {
 }  # fmt: skip
 
 
-_OF_DRIVES = (
-    *("offset", "backlash", "transmission_"),
-    *("rotor_inertia", "viscous", "coulomb", "torque_offset", *FRICTION_PARAMETERS, *PARALLEL),
-)
+_OF_DRIVES = ("rotor_inertia", "viscous", "coulomb", "torque_offset", *FRICTION_PARAMETERS, *PARALLEL)
 _SLIDING = {
-    "rad": "m", "kg m²": "kg", "N m": "N", "N m/rad": "N/m", "N m s/rad": "N s/m", "N m √(s/rad)": "N √(s/m)",
+    "kg m²": "kg", "N m": "N", "N m/rad": "N/m", "N m s/rad": "N s/m", "N m √(s/rad)": "N √(s/m)",
 }  # fmt: skip
 
 
+_OF_POSITIONS = ("offset", "backlash", "transmission_")
+
+
 def unit_in(model: RobotModel, name: str) -> str:
-    """SI unit of a robot's parameter; offset, drive, spring and friction of a prismatic joint are in N and m."""
+    """SI unit of a robot's parameter; positions, drive, spring and friction of a prismatic joint are in m and N."""
     unit, (owner, _, key) = unit_of(name), name.rpartition(".")
     key, _, other = key.partition("_at_")
-    if owner not in model.joint_names or not key.startswith(_OF_DRIVES):
+    if owner not in model.joint_names or not key.startswith((*_OF_POSITIONS, *_OF_DRIVES)):
         return unit
     slides = [model.joints[model.joint_index(j)].kind == "prismatic" for j in (owner, other or owner)]
-    return _SLIDING.get(unit, unit) if all(slides) else unit
+    return ({"rad": "m"} | _SLIDING).get(unit, unit) if all(slides) else unit
 
 
 def geometric_errors(model: RobotModel, joints: Sequence[int]) -> list[str]:
