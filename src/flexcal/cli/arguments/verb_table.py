@@ -209,7 +209,7 @@ STEPS = (
                 "Calibrate",
                 "geometry from measured positions; lists the parameters that are not identifiable",
                 "flexcal calibrate robot.yaml poses.csv",
-                ("results.json", "points.csv", "arm.npz", "gravity_loads.npz", "report.html"),
+                ("results.json", "points.csv", "arm.npz", "gravity_loads.npz", "tilts.csv", "report.html"),
             ),
         ),
     ),

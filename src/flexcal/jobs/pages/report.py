@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from flexcal.calibration.verification import MeasuredTilts
 from flexcal.data.plans import MultisinePlan, read_plan_of
 from flexcal.data.poses import DEFAULT_SIGMA
 from flexcal.errors import InputError
@@ -83,7 +84,7 @@ def report_folder(folder: Path) -> Path:
             points = read_points(folder, sigma=DEFAULT_SIGMA)
             page = verification_page(VerificationStudy(results, points, read_arm(folder)))
         elif kind == "calibration":
-            tilts = read_tilts(folder)
+            tilts = _tilts(folder, results)
             if tilts is not None and not results["calibration"]["selected"]["poses"]:
                 page = inclination_page(InclinationStudy(results, _block(folder, "calibration"), tilts))
             else:
@@ -126,7 +127,7 @@ def calibration_study(folder: Path) -> CalibrationStudy:
         points,
         read_arm(folder),
         read_loads(folder),
-        read_tilts(folder),
+        _tilts(folder, results),
     )
 
 
@@ -145,6 +146,11 @@ def two_stage_study(folder: Path) -> TwoStageStudy:
         exact=exact,
         paper=TX90L_PAPER if results["robot"] == "tx90l" else None,
     )
+
+
+def _tilts(folder: Path, results: Mapping[str, Any]) -> MeasuredTilts | None:
+    """Readings of inclinometers, where the calibration had some."""
+    return read_tilts(folder) if results.get("inclination") else None
 
 
 def _responses(folder: Path, results: Mapping[str, Any]) -> tuple[FrequencyResponse, ...]:
