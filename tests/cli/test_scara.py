@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from cli_files import write_csv
-from scara import Scara, poses, write_robot
+from scara import LEAD, Scara, poses, write_robot
 
 from flexcal import RobotModel, tool_at_rest
 
@@ -48,6 +49,27 @@ def test_calibrated_with_default_options(run, tmp_path: Path) -> None:
     verified = run("verify", robot, fresh, "--estimates", tmp_path / "out", "--json").document
     errors = verified["verification"]
     assert errors["measured"]["mean_mm"] < 1.4 * NOISE and errors["nominal"]["mean_mm"] > 0.5, errors
+
+
+@pytest.mark.parametrize(
+    "forgotten", [True, pytest.param(False, marks=pytest.mark.slow)], ids=["forgotten", "wrong sign"]
+)
+def test_a_coupling_that_is_not_as_declared(run, tmp_path: Path, forgotten: bool) -> None:
+    """The sentence has the relation that robot.yaml lacks, and nothing is trusted; with it, everything is as above."""
+    robot, true, rng = write_robot(tmp_path), Scara.drawn(2), np.random.default_rng(2)
+    right = robot.read_text()
+    relation = right[right.index("relations:") :]
+    wrong = "" if forgotten else relation.replace(repr(-LEAD), repr(LEAD))
+    robot.write_text(right.replace(relation, wrong))
+    points = write_points(tmp_path / "points.csv", true, 60, rng)
+    outcome = run("calibrate", robot, points, "--terms", "kinematic")
+    assert "Trusted: no" in outcome.out and "repeat no better" not in outcome.out
+    said = re.search(
+        r"declare `(relations: \[\{joint: j3, of: \{j3: 1, j4: (-?[0-9.]+)\}\}\])` in robot.yaml", outcome.out
+    )
+    assert said is not None and float(said[2]) == pytest.approx(-true.lead, rel=2e-3), outcome.out
+    robot.write_text(right.replace(relation, said[1] + "\n"))
+    assert "Trusted: no" not in run("calibrate", robot, points, "--terms", "kinematic").out
 
 
 @pytest.mark.slow

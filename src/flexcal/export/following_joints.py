@@ -7,8 +7,6 @@ import numpy as np
 from flexcal.model.kinematics import joint_motion
 from flexcal.model.robot import RobotModel
 
-_SMALL = 1e-12
-
 
 def joint_values(model: RobotModel, q: np.ndarray) -> np.ndarray:
     """Positions (samples, N) of all joints of an exported robot at the motors' `q` (samples, n), its offsets being in the placements."""
@@ -23,10 +21,9 @@ def followed_joints(model: RobotModel) -> dict[int, tuple[dict[int, float], floa
     relations = model.relations
     if relations is None:
         return {}
-    direct = np.eye(len(model.joints)) - np.linalg.inv(relations.carry)
-    result = {}
+    direct, result = relations.ratios, {}
     for i in range(len(model.joints)):
-        of = {int(j): float(direct[i, j]) for j in np.flatnonzero(np.abs(direct[i]) > _SMALL)}
+        of = {int(j): float(direct[i, j]) for j in np.flatnonzero(direct[i])}
         own = float(relations.by_motor[i].sum())
         if of or own not in (0.0, 1.0) or relations.shift[i]:
             result[i] = ({i: own} | of if own else of), float(relations.shift[i])

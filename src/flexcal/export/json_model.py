@@ -13,7 +13,7 @@ from flexcal.export.transforms import transform
 from flexcal.export.written_file import RenderedModel
 from flexcal.model.kinematics import bearing_placement, link_placement, point_placement
 from flexcal.model.parts import LoopEnd, rotation_wxyz, vector_rotation
-from flexcal.model.robot import LATERAL, RobotModel, unit_in
+from flexcal.model.robot import LATERAL, RATIO, RobotModel, ratio_errors, unit_in
 
 FORMAT = "flexcal robot"
 VERSION = 1
@@ -73,6 +73,10 @@ def _joint(model: RobotModel, i: int, parent: str | None) -> dict[str, Any]:
             | {key: _quantity(model, f"{joint.name}.transmission_{order}_{key}") for key in ("sin", "cos")}
             for order in model.drives.harmonics
         ],
+        "ratio_error": {
+            model.joint_names[k]: _quantity(model, f"{joint.name}.{RATIO}{model.joint_names[k]}")
+            for k in ratio_errors(model, i)
+        },
         "springs": None
         if spring is None
         else {

@@ -197,8 +197,9 @@ def _leave_out(model: RobotModel, term: str) -> RobotModel:
         geometry = replace(geometry, lateral_compliance=np.zeros_like(geometry.lateral_compliance))
     elif term == HARDENING and springs.hardening.any():
         springs = replace(springs, hardening=np.zeros_like(springs.hardening))
-    elif term == TRANSMISSION and drives.transmission.any():
-        drives = replace(drives, transmission=np.zeros_like(drives.transmission))
+    elif term == TRANSMISSION and (drives.transmission.any() or drives.ratio_error.any()):
+        waves, ratios = np.zeros_like(drives.transmission), np.zeros_like(drives.ratio_error)
+        drives = replace(drives, transmission=waves, ratio_error=ratios)
     else:
         return model
     return replace(model, geometry=geometry, springs=springs, drives=drives)

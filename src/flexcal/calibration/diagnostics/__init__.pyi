@@ -1,4 +1,5 @@
 from .bearing_axes import BearingAxes, compare_bearings
+from .coupled_drives import Coupling, undeclared_coupling
 from .drift_test import Drift
 from .gravity_residuals import GravityLoads, gravity_loads
 from .jumps_in_readings import ReadingJump, reading_jumps
@@ -12,6 +13,7 @@ from .size_of_board import board_size
 __all__ = [
     "FEWEST_PLACES",
     "BearingAxes",
+    "Coupling",
     "Disagreement",
     "Drift",
     "FarZero",
@@ -32,4 +34,5 @@ __all__ = [
     "reading_jumps",
     "residuals_implausible",
     "stated_noise",
+    "undeclared_coupling",
 ]

@@ -167,7 +167,7 @@ def fit_geometry(
         Names of the error terms. `transmission`, transmission errors of all revolute joints as waves in the joint position, is
         a random effect: all waves are normal with one variance, which falls with the square of their order and is estimated
         with those of the scatter (best linear unbiased prediction). Few poses leave them near zero and uncertain.
-        `transmission_1`… are free waves of one order.
+        `transmission_1`… are free waves of one order; `ratio` are leads of slides and ratios by which joints follow others.
     elastic : bool
         Whether the arm deflects; without, it is fitted as rigid.
     elasticity : {"reestimated", "marginalised"}

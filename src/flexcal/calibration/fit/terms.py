@@ -15,9 +15,11 @@ from flexcal.model.robot import (
     GEOMETRY,
     LATERAL,
     ORIGIN,
+    RATIO,
     STATION,
     RobotModel,
     geometric_errors,
+    ratio_errors,
     unit_in,
 )
 from flexcal.model.statics import (
@@ -31,7 +33,7 @@ from flexcal.model.statics import (
 LEAST_POSES = 20
 """Least number of different poses for a selection of terms and for the variance of transmission errors."""
 
-TOLERANCE = {"m": 3e-4, "rad": 5e-4, "rad/(N m)": 1e-6, "1": 1e-3}
+TOLERANCE = {"m": 3e-4, "rad": 5e-4, "rad/(N m)": 1e-6, "1": 1e-3, "m/rad": 1e-5, "rad/m": 1e-3}
 """Size of a relevant change (1σ of manufacture), by unit, which makes parameters of different units comparable."""
 
 
@@ -79,6 +81,9 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
     for term in terms:
         owner, _, kind = term.rpartition(".")
         if kind in (*LEVELS, "backlash", "transmission"):
+            continue
+        if kind == "ratio":
+            further |= dict.fromkeys(ratio_parameters(model, joints))
             continue
         own = [model.joint_index(owner)] if owner else free_joints(model, kind, joints)
         for i in own:
@@ -155,6 +160,12 @@ def random_waves(model: RobotModel, poses: PoseSet, free: Parameters) -> dict[st
     return {name: size for name, size in every.items() if name not in free}
 
 
+def ratio_parameters(model: RobotModel, joints: Sequence[int]) -> list[str]:
+    """Names of the term `ratio`: scales of slides, and ratios by which joints follow others, of some `joints`."""
+    names = model.joint_names
+    return [f"{names[i]}.{RATIO}{names[k]}" for i in joints for k in ratio_errors(model, i)]
+
+
 def free_joints(model: RobotModel, kind: str, joints: Sequence[int]) -> list[int]:
     """Revolute joints that may have a term of this kind: those without a spring declared in robot.yaml in its place.
 
@@ -218,6 +229,7 @@ def _parameter(model: RobotModel, name: str, lower: float = -np.inf) -> Paramete
 _PLAUSIBLE = {"offset": 5e-3, "misalignment_1": 2e-3, "misalignment_2": 2e-3, "backlash": 1e-3}
 _PLAUSIBLE_LENGTH, _PLAUSIBLE_POINT, _PLAUSIBLE_STATION = 1e-3, 1e-2, 1.0
 _PLAUSIBLE_COMPLIANCE, _PLAUSIBLE_TRANSMISSION = 1e-4, 1e-3
+_PLAUSIBLE_RATIO = 1e-3
 
 
 def plausible_size(model: RobotModel, name: str) -> float:
@@ -225,7 +237,7 @@ def plausible_size(model: RobotModel, name: str) -> float:
 
     What robot.yaml declares under `prior:` comes first; else joint offsets 5 mrad, misalignments 2 mrad, lengths 1 mm, the place of a
     reflector on the tool 10 mm, the instrument 1 m or rad, and so the rotations of a joint at the base, which take up that of the first
-    station; half a backlash and a wave of a transmission error 1 mrad, compliances 0.1 mrad/(N m), the softest of small arms.
+    station; half a backlash and a wave of a transmission error 1 mrad, compliances 0.1 mrad/(N m), the softest of small arms; ratios 1 ‰.
     """
     declared = declared_size(model, name)
     if declared is not None:
@@ -237,11 +249,20 @@ def plausible_size(model: RobotModel, name: str) -> float:
         return _PLAUSIBLE_POINT
     if key.startswith("transmission_"):
         return _PLAUSIBLE_TRANSMISSION
+    if key.startswith(RATIO):
+        return _PLAUSIBLE_RATIO * declared_ratio(model, owner, key.removeprefix(RATIO))
     if key.startswith("gravity_compliance"):
         return _PLAUSIBLE_COMPLIANCE
     if key.startswith(("length", "origin")) or key in LOOP:
         return _PLAUSIBLE_LENGTH
     return _PLAUSIBLE_STATION if _is_at_base(model, owner) and key != "backlash" else _PLAUSIBLE[key]
+
+
+def declared_ratio(model: RobotModel, joint: str, other: str) -> float:
+    """Size of the declared ratio of a joint's motion to that of another, or to that of its own motor."""
+    i, k = model.joint_index(joint), model.joint_index(other)
+    relations = model.relations
+    return 1.0 if relations is None or i == k else abs(float(relations.ratios[i, k]))
 
 
 def declared_size(model: RobotModel, name: str) -> float | None:

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.model.kinematics import PointKinematics, joint_positions, relative_motion
-from flexcal.model.robot import GEOMETRY, LATERAL, ORIGIN, SPRINGS, RobotModel
+from flexcal.model.kinematics import PointKinematics, relative_motion
+from flexcal.model.robot import GEOMETRY, LATERAL, ORIGIN, RATIO, SPRINGS, RobotModel
 from flexcal.model.statics import (
     carried_mass,
     force_moments,
     lateral_axes,
     lateral_slopes,
+    transmission_column,
     twist_by_hardening,
     twist_from_torque,
 )
@@ -38,7 +39,7 @@ class ArmColumns:
             return self._point(owner.removeprefix("point."), key)
         if name in self.at.model.geometry_columns:
             return self._by_geometry[:, :, self.at.model.geometry_columns[name]]
-        kind = "transmission" if key.startswith("transmission_") else key
+        kind = "transmission" if key.startswith(("transmission_", RATIO)) else key
         if kind in _BY_KEY:
             return _BY_KEY[kind](self, owner, key)
         return np.matmul(self._by_load, self.at.by_row(self._load(name))[:, :, None])[:, :, 0]
@@ -119,14 +120,12 @@ class ArmColumns:
         return np.matmul(self._by_motion[:, :, joint, :2], tilt[:, :, None])[:, :, 0]
 
     def _twist(self, joint: int, key: str) -> np.ndarray:
-        """Rotation (N,) of a joint by its backlash, gravity compliance or one wave of its transmission error."""
+        """Motion (N,) of a joint by its backlash, gravity compliance or one wave or ratio of its transmission."""
         if key == "backlash":
             return -self.at.rest.flank[:, joint]
         if key == "gravity_compliance":
             return -self.at.rest.torque[:, joint]
-        order, wave = key.split("_")[1:]
-        phase = int(order) * joint_positions(self.at.model, self.at.poses.q)[:, joint]
-        return np.sin(phase) if wave == "sin" else np.cos(phase)
+        return transmission_column(self.at.model, self.at.poses.q, joint, key)
 
     @cached_property
     def _lateral(self) -> np.ndarray:

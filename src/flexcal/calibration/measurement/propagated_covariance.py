@@ -9,12 +9,11 @@ import numpy as np
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import (
     carrier_kinematics,
-    joint_positions,
     point_kinematics,
     relative_kinematics,
 )
 from flexcal.model.parts import LOOP, left_jacobian, vector_rotation
-from flexcal.model.robot import GEOMETRY, LATERAL, MASS_AND_COM, ORIGIN, SPRINGS, STATION, RobotModel
+from flexcal.model.robot import GEOMETRY, LATERAL, MASS_AND_COM, ORIGIN, RATIO, SPRINGS, STATION, RobotModel
 from flexcal.model.statics import (
     carried_mass,
     elastic_axes,
@@ -22,6 +21,7 @@ from flexcal.model.statics import (
     lateral_slopes,
     spring_loads,
     tangent_ratio,
+    transmission_column,
     twist_by_hardening,
     twist_from_torque,
 )
@@ -124,10 +124,7 @@ class Propagation:
             elif kind in LATERAL:
                 columns[:, k] = 0.0
             else:
-                order, wave = kind.split("_")[1:]
-                columns[:, k] = (np.sin if wave == "sin" else np.cos)(
-                    int(order) * joint_positions(self.model, q)[:, joint]
-                )
+                columns[:, k] = transmission_column(self.model, q, joint, kind)
         return columns
 
     def _tilt(self, q: np.ndarray, by_tilt: np.ndarray, twists: np.ndarray) -> None:
@@ -239,7 +236,7 @@ def propagation(
 
 def _twisting(model: RobotModel, name: str) -> tuple[int, str] | None:
     owner, _, key = name.rpartition(".")
-    if key in ("backlash", "gravity_compliance", *LATERAL) or key.startswith("transmission_"):
+    if key in ("backlash", "gravity_compliance", *LATERAL) or key.startswith(("transmission_", RATIO)):
         return model.joint_index(owner), key
     if key == "hardening":
         return model.joint_index(owner.removesuffix(".drive")), key
@@ -254,4 +251,4 @@ def _is_geometric(name: str) -> bool:
     owner, _, key = name.rpartition(".")
     if owner.startswith("point.") and key in STATION[3:]:
         return False
-    return key in _GEOMETRIC or key.startswith("transmission_")
+    return key in _GEOMETRIC or key.startswith(("transmission_", RATIO))

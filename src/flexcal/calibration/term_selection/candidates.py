@@ -84,6 +84,7 @@ def candidates(model: RobotModel, poses: PoseSet) -> CandidateTerms:
         else:
             model = wider
             kinds.append("backlash")
+    kinds += ["ratio"] if geometric_parameters(model, poses, ["ratio"]).names else []
     kinds += [f"transmission_{order}" for order in model.drives.harmonics]
     return CandidateTerms(model, tuple(kinds), single, tuple(excluded))
 

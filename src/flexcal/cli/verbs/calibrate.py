@@ -62,7 +62,7 @@ class Calibrate:
     terms: Annotated[
         tuple[str, ...], arg(metavar="TERM...", help_behavior_hint="(default: as robot.yaml declares)")
     ] = ()
-    """auto, or some of: kinematic (or offsets or lengths), backlash, gravity_compliance, lateral_compliance, transmission;
+    """auto, or some of: kinematic (or offsets or lengths), backlash, gravity_compliance, lateral_compliance, transmission, ratio;
     JOINT.gravity_compliance is that of one joint. auto: those that cross-validation supports, and transmission."""
     loss: Literal["auto", "squares", "huber", "cauchy"] = "auto"
     """Loss function; cauchy is robust and lists outliers; auto uses it where there are outliers."""
@@ -80,7 +80,6 @@ class Calibrate:
 
     def run(self) -> None:
         """Calibrate, and print identifiability, errors and remarks."""
-        from flexcal.calibration.diagnostics import is_implausible
         from flexcal.calibration.fit import KNOWN_POINT_STD
         from flexcal.cli.tables.results import (
             dropped_table,
@@ -97,7 +96,7 @@ class Calibrate:
         with console.progress() as progress:
             calibration = self._calibrated(self.terms, progress)
             known = all(point["std_m"] <= KNOWN_POINT_STD for point in calibration.found_points.values())
-            write = self.write_point and known and not is_implausible(calibration.selected)
+            write = self.write_point and known and not calibration.is_implausible
             told = point_lines(calibration.selected.model, calibration.found_points) if write else []
             if write:
                 calibration = self._with_points_written(calibration, progress)
@@ -139,7 +138,12 @@ class Calibrate:
                 console.say(f"{line}: written to {self.robot}, and calibrated with it")
         else:
             known = all(point["std_m"] <= KNOWN_POINT_STD for point in document["points"].values())
-            for line in point_lines(calibration.selected.model, document["points"]):
+            lines = (
+                []
+                if calibration.is_implausible
+                else point_lines(calibration.selected.model, document["points"])
+            )
+            for line in lines:
                 console.say(f"{line}; --write-point writes it to {self.robot}" if known else line)
         console.say(calibration.trust.sentence)
         where = estimates_option(self.out)
@@ -149,7 +153,7 @@ class Calibrate:
         following = (
             f"correct the data or {self.robot}, and calibrate again; "
             f"flexcal import {self.robot} {self.poses[0]} looks for the error"
-            if is_implausible(calibration.selected)
+            if calibration.is_implausible
             else f"flexcal verify {self.robot} OTHER_POSES…{where}, on poses outside this fit "
             "(flexcal design poses --random plans some)"
             if located.any()

@@ -167,7 +167,7 @@ def _terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str, ...] | 
     if asked == (AUTO,):
         return None
     harmonics = tuple(f"transmission_{order}" for order in model.drives.harmonics)
-    known = (*LEVELS, "backlash", *PER_JOINT, TRANSMISSION, *harmonics)
+    known = (*LEVELS, "backlash", *PER_JOINT, TRANSMISSION, *harmonics, "ratio")
     for term in asked:
         owner, _, kind = term.rpartition(".")
         if owner:

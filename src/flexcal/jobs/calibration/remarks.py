@@ -158,7 +158,7 @@ def calibration_remarks(fit: GeometricFit, cause: Sequence[str] = ()) -> tuple[s
             "robot or instrument warmed up, or position and measuring order are correlated"
         )
     remarks += cause
-    if not residuals_implausible(fit):
+    if not cause and not residuals_implausible(fit):
         remarks += [*_floor(fit), *_zeros(fit)]
     far = implausible_shifts(fit)
     if far:

@@ -11,12 +11,14 @@ import numpy as np
 
 from flexcal.calibration.diagnostics import (
     BearingAxes,
+    Coupling,
     Drift,
     PlaceAgreement,
     RepeatabilityFloor,
     gravity_loads,
     is_implausible,
     stated_noise,
+    undeclared_coupling,
 )
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.fit import (
@@ -218,6 +220,23 @@ class Calibration(Identification):
         }
 
     @cached_property
+    def coupling(self) -> Coupling | None:
+        """Coupled drive that robot.yaml does not declare, where that is why the points are not met."""
+        return undeclared_coupling(self.nominal, self.selected)
+
+    @property
+    def is_implausible(self) -> bool:
+        """Whether data and robot are inconsistent, so that the calibration must not be used."""
+        return self.coupling is not None or is_implausible(self.selected)
+
+    @property
+    def _cause(self) -> tuple[str, ...]:
+        """Sentences on what is wrong where the points are not met."""
+        blamed = self.bearings is not None and self.bearings.contradicted
+        bearings = bearing_remarks(self.bearings, self.selected) if blamed else ()
+        return (*bearings, *(() if self.coupling is None else (self.coupling.sentence,)))
+
+    @cached_property
     def _numbers(self) -> dict[str, Any]:
         selected, chosen, before = self.selected, self.selection, self.before.document()
         identifiability = selected.identifiability
@@ -226,7 +245,8 @@ class Calibration(Identification):
         # residuals of far more than the noise may leave no test
         drift = drift if drift is not None and np.isfinite(drift.probability) else None
         agreement, scale = PlaceAgreement.of(selected), scale_document(selected)
-        floor = RepeatabilityFloor.of(selected)
+        coupling = self.coupling
+        floor = RepeatabilityFloor.of(selected) if coupling is None else None
         bearings = bearing_remarks(self.bearings, selected)
         blamed = self.bearings is not None and self.bearings.contradicted
         misfit = None if self.stiffness is None else self.stiffness.misfit
@@ -271,10 +291,11 @@ class Calibration(Identification):
                 "sigma_given": selected.poses.sigma_given,
                 "sigma_mm": float(np.sqrt(np.mean(selected.poses.sigma**2))) / MILLIMETRE,
                 "ambiguous_poses": int(selected.ambiguous.sum()),
-                "is_implausible": is_implausible(selected),
+                "is_implausible": self.is_implausible,
             },
             "variances": selected.variances,
             "floor": None if floor is None else floor.document(),
+            "undeclared_coupling": None if coupling is None else coupling.document(),
             "drift": None if drift is None else drift.document(),
             "sample": subsample_document(self.sample, self.everywhere),
             "outliers": [outlier.document() for outlier in outliers_of(selected)],
@@ -287,11 +308,11 @@ class Calibration(Identification):
                 *([chosen.remark] if chosen and chosen.remark else []),
                 *scale_remark(scale),
                 *base_remark(selected),
-                *([] if self.levels is None else [self.levels.sentence]),
-                *calibration_remarks(selected, bearings if blamed else ()),
+                *([] if self.levels is None or coupling is not None else [self.levels.sentence]),
+                *calibration_remarks(selected, self._cause),
                 *(() if blamed else bearings),
                 *place_remarks(agreement),
-                *floor_remark(selected, self.before.robots_own),
+                *(() if coupling is not None else floor_remark(selected, self.before.robots_own)),
                 *(
                     []
                     if misfit is None

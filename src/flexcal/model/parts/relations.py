@@ -14,6 +14,9 @@ LOOP = ("a_x", "a_y", "a_z", "b_x", "b_y", "b_z")
 """Displacements of the frames a and b of a loop in their links, along their own axes, m."""
 
 
+_ROUNDING = 1e-12
+
+
 @dataclass(frozen=True, eq=False)
 class LoopEnd:
     """Frame of a loop at `rotation` (3, 3), `translation` (3,) in the link of joint `joint`; -1 is the base."""
@@ -64,6 +67,12 @@ class Relations:
         """Joints on whose own motion it depends how the loops close."""
         around = [joint for loop in self.loops for joint in loop.around]
         return tuple(np.flatnonzero(self.carry[around].any(axis=0)).tolist())
+
+    @property
+    def ratios(self) -> np.ndarray:
+        """Ratios R (N, N) of every joint to those that it follows, C = (I - R)⁻¹."""
+        direct = np.eye(len(self.carry)) - np.linalg.inv(self.carry)
+        return np.where(np.abs(direct) > _ROUNDING, direct, 0.0)
 
     @property
     def passive(self) -> tuple[int, ...]:

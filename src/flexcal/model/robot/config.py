@@ -206,7 +206,7 @@ class GeometryConfig:
 
     def __post_init__(self) -> None:
         levels = ("kinematic", "offsets", "lengths", "backlash")
-        known = (*levels, "gravity_compliance", "lateral_compliance", "transmission")
+        known = (*levels, "gravity_compliance", "lateral_compliance", "transmission", "ratio")
         if isinstance(self.terms, str) and self.terms != "auto":
             raise FlexcalError(
                 "E-ROBOT-015",

@@ -165,6 +165,7 @@ def _drives(file: YamlFile, config: RobotConfig, n: int, motors: Sequence[int]) 
         ratio=declared("ratio"),
         backlash=np.zeros(n),
         transmission=np.zeros((n, len(HARMONICS), 2)),
+        ratio_error=np.zeros((n, n)),
         harmonics=HARMONICS,
     )
 

@@ -57,7 +57,8 @@ class Drives:
     its links'; `viscous`, N m s/rad, and `coulomb`, N m, friction; `torque_offset`, N m; `delay` of the torque signal, s; `ratio`, motor
     turns per joint turn; `backlash`, half the gap, rad. `friction` (n, terms) in the order of `FRICTION_PARAMETERS`; `parallel` (n, 3),
     springs and cables beside the motor, in that of `PARALLEL`; `coupling` (declared couplings, 3) in that of `COUPLED`. `transmission`
-    (n, harmonics, 2), rad: sine and cosine of the transmission errors of the orders `harmonics`. NaN where robot.yaml gives no value.
+    (n, harmonics, 2), rad: sine and cosine of the transmission errors of the orders `harmonics`; `ratio_error` (n, n):
+    what a joint moves beyond what is declared per motion of another, or of its own motor. NaN where robot.yaml gives no value.
     """
 
     rotor_inertia: np.ndarray
@@ -72,6 +73,7 @@ class Drives:
     ratio: np.ndarray
     backlash: np.ndarray
     transmission: np.ndarray
+    ratio_error: np.ndarray
     harmonics: tuple[int, ...]
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from flexcal.model.parts import LOOP
 from flexcal.model.robot.parameter_groups import Location
 
@@ -12,6 +14,8 @@ if TYPE_CHECKING:
     from flexcal.model.robot.robot_model import RobotModel
 
 GEOMETRY = ("offset", "misalignment_1", "misalignment_2", "length_x", "length_y", "length_z")
+RATIO = "ratio_"
+"""What a joint moves more than declared per motion of another, whose name follows, or of its own motor."""
 ORIGIN = ("origin_x", "origin_y", "origin_z")
 """Displacement of a joint that branches off, in its parent link."""
 SPRINGS = ("bearing_x", "bearing_y", "drive")
@@ -87,6 +91,9 @@ _OF_POSITIONS = ("offset", "backlash", "transmission_")
 def unit_in(model: RobotModel, name: str) -> str:
     """SI unit of a robot's parameter; positions, drive, spring and friction of a prismatic joint are in m and N."""
     unit, (owner, _, key) = unit_of(name), name.rpartition(".")
+    if owner in model.joint_names and key.startswith(RATIO):
+        kinds = [model.joints[model.joint_index(j)].kind for j in (owner, key.removeprefix(RATIO))]
+        return "1" if kinds[0] == kinds[1] else "m/rad" if kinds[0] == "prismatic" else "rad/m"
     key, _, other = key.partition("_at_")
     if owner not in model.joint_names or not key.startswith((*_OF_POSITIONS, *_OF_DRIVES)):
         return unit
@@ -108,6 +115,13 @@ def geometric_errors(model: RobotModel, joints: Sequence[int]) -> list[str]:
         *(f"{model.joints[i].name}.{key}" for i in branching for key in ORIGIN),
         *(f"loop.{loop.name}.{key}" for loop in own for key in loop.errors),
     ]
+
+
+def ratio_errors(model: RobotModel, joint: int) -> tuple[int, ...]:
+    """Joints by whose motion a joint may move more or less than declared: those it follows, and a slide's own motor."""
+    own = model.joints[joint].kind == "prismatic" and joint in model.motors
+    followed = () if model.relations is None else np.flatnonzero(model.relations.ratios[joint]).tolist()
+    return (*((joint,) if own else ()), *followed)
 
 
 def torque_units(model: RobotModel) -> dict[str, str]:
@@ -182,6 +196,8 @@ def parameter_locations(model: RobotModel) -> dict[str, Location]:
                 table[f"{joint.name}.transmission_{order}_{key}"] = Location(
                     "drives", "transmission", (i, h, k)
                 )
+        for k in ratio_errors(model, i):
+            table[f"{joint.name}.{RATIO}{model.joints[k].name}"] = Location("drives", "ratio_error", (i, k))
         for key in ("rotor_inertia", "viscous", "coulomb", "torque_offset", "delay"):
             table[f"{joint.name}.{key}"] = Location("drives", key, (i,))
         for key in unknown_parallel(model, joint.name):

@@ -12,6 +12,7 @@ from .equilibrium import (
 )
 from .flank import certain_flank
 from .hardening import REFERENCE_TWIST, tangent_ratio, twist_by_hardening, twist_from_torque
+from .transmission import transmission_column
 
 __all__ = [
     "REFERENCE_TWIST",
@@ -30,6 +31,7 @@ __all__ = [
     "static_equilibrium",
     "tangent_ratio",
     "tool_at_rest",
+    "transmission_column",
     "twist_by_hardening",
     "twist_from_torque",
 ]

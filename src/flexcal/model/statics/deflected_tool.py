@@ -7,10 +7,11 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.model.kinematics import PointKinematics, joint_positions, motor_motion, point_kinematics
+from flexcal.model.kinematics import PointKinematics, point_kinematics
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics.applied_force import force_moments, under_force
 from flexcal.model.statics.equilibrium import Equilibrium, static_equilibrium
+from flexcal.model.statics.transmission import transmission_slopes
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +34,7 @@ class ToolAtRest:
         if len(axes):
             by_load = np.matmul(by_motion[:, :, axes[:, 0], axes[:, 1]], self.rest.compliance)
             by_joint -= np.matmul(by_load, self.rest.coupling[:, :, : 6 * len(self.model.joints) : 6])
-        if self.model.drives.transmission.any():
-            orders = np.array(self.model.drives.harmonics)
-            phase = joint_positions(self.model, self.q)[:, :, None] * orders
-            sine, cosine = np.moveaxis(orders[:, None] * self.model.drives.transmission, 2, 0)
-            by_joint *= 1 + (sine * np.cos(phase) - cosine * np.sin(phase)).sum(axis=2)[:, None, :]
-        return by_joint @ motor_motion(self.model)
+        return by_joint @ transmission_slopes(self.model, self.q)
 
 
 def carried_mass(model: RobotModel, payload: np.ndarray | None, samples: int) -> np.ndarray:

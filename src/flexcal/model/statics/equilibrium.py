@@ -11,6 +11,7 @@ from flexcal.model.kinematics import joint_batch, joint_positions
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics.hardening import tangent_ratio, twist_from_torque
 from flexcal.model.statics.related_equilibrium import related_equilibrium
+from flexcal.model.statics.transmission import transmission_error
 
 
 def lateral_axes(model: RobotModel, q: np.ndarray) -> np.ndarray:
@@ -295,14 +296,3 @@ def static_equilibrium(
     return Equilibrium(
         deflection, torque, sign * has_backlash, np.array(axes, dtype=int).reshape(-1, 2), *derivatives
     )
-
-
-def transmission_error(model: RobotModel, q: np.ndarray) -> np.ndarray:
-    """Harmonic transmission error (samples, N), rad: Σ a_k sin(k q) + b_k cos(k q)."""
-    if not model.drives.transmission.any():
-        return np.zeros((len(q), len(model.joints)))
-    phase = joint_positions(model, q)[:, :, None] * np.array(model.drives.harmonics)
-    return (
-        model.drives.transmission[:, :, 0] * np.sin(phase)
-        + model.drives.transmission[:, :, 1] * np.cos(phase)
-    ).sum(axis=2)
