@@ -25,7 +25,7 @@ from flexcal.elasticity.response_model import stiffness_parameters
 from flexcal.frequency.periodic import FrequencyResponse
 from flexcal.frequency.periodic.response import POOLED_LINES, SMALLEST_FREEDOM
 from flexcal.model.parts import LOOP
-from flexcal.model.robot import ArmSensor, RobotModel, unit_of
+from flexcal.model.robot import RATIO, ArmSensor, RobotModel, unit_of
 from flexcal.model.robot.config import ArmSensorConfig
 
 NUMBERS = {"nine": 9, "twelve": 12, "thirteen": 13, "fourteen": 14, "fifteen": 15}
@@ -88,7 +88,7 @@ def produced(model: RobotModel) -> dict[str, str]:
     )
     gains = [gain_name(joint) for joint in model.joint_names]
     forked = replace(model, joints=(*model.joints[:-1], replace(model.joints[-1], parent=3)))
-    loops = [f"loop.four_bar.{key}" for key in LOOP]
+    loops = [*(f"loop.four_bar.{key}" for key in LOOP), f"joint_3.{RATIO}joint_2"]
     names = {name: unit_of(name) for name in (*model.values, *forked.values, *gains, *loops)}
     return names | {item.name: item.unit for item in stiffness_parameters(model, [response], backlash=True)}
 

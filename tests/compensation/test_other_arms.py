@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 from flexcal.compensation import motor_commands
 from flexcal.data.poses import ToolTargets
 from flexcal.model.kinematics import point_kinematics
-from flexcal.model.parts import rotation_vector
+from flexcal.model.parts import rotation_vector, vector_rotation
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import tool_at_rest
 
@@ -99,7 +99,7 @@ def test_a_spare_joint_makes_up_for_one_at_its_limit(tmp_path: Path) -> None:
     np.testing.assert_allclose(at.orientation, wanted.orientation, atol=1e-6)
 
 
-def test_four_joints_bring_the_point_there_and_take_no_orientation(tmp_path: Path) -> None:
+def test_four_joints_bring_the_point_there_and_turn_the_tool_as_far_as_they_can(tmp_path: Path) -> None:
     nominal = arm(tmp_path, 4)
     robot = real(nominal)
     q = np.array([[0.3, 1.0, 1.9, 1.3], [0.1, -0.5, 0.7, 1.4]])
@@ -107,9 +107,25 @@ def test_four_joints_bring_the_point_there_and_take_no_orientation(tmp_path: Pat
     wanted = point_kinematics(nominal, q)
     at = tool_at_rest(robot, found.q, None, np.full(2, "tip")).kinematics
     np.testing.assert_allclose(at.position, wanted.position, atol=1e-6)
-    posed = replace(targets_at(q), position=wanted.position, rotation=wanted.orientation)
-    with refused("E-COMP-001", "4", "tip"):
-        motor_commands(robot, nominal, posed)
+    free = rotation_vector(np.matmul(wanted.orientation, np.swapaxes(at.orientation, 1, 2)))
+    for known in (q, None):
+        posed = replace(targets_at(q), q=known, position=wanted.position, rotation=wanted.orientation)
+        found = motor_commands(robot, nominal, posed)
+        assert found.reached.all()
+        at = tool_at_rest(robot, found.q, None, np.full(2, "tip")).kinematics
+        np.testing.assert_allclose(at.position, wanted.position, atol=1e-6)
+        missed = rotation_vector(np.matmul(wanted.orientation, np.swapaxes(at.orientation, 1, 2)))
+        assert (np.linalg.norm(missed, axis=1) < np.linalg.norm(free, axis=1)).all()
+        exact = point_kinematics(nominal, motor_commands(nominal, nominal, posed).nominal)
+        np.testing.assert_allclose(exact.orientation, wanted.orientation, atol=1e-8)
+    tilted = vector_rotation(np.array([0.0, 0.15, 0.15])) @ wanted.orientation
+    found = motor_commands(robot, nominal, replace(posed, rotation=tilted))
+    assert all(reason.startswith("orientation: an arm of 4 joints") for reason in found.reason)
+    nominal = arm(tmp_path, 3)
+    at = point_kinematics(nominal, q[:, :3])
+    posed = replace(targets_at(q[:, :3]), q=None, position=at.position, rotation=at.orientation)
+    with refused("E-COMP-001", "3", "tip"):
+        motor_commands(nominal, nominal, posed)
 
 
 def test_two_hands(tree: RobotModel, tmp_path: Path) -> None:

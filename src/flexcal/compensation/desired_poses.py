@@ -11,18 +11,20 @@ from flexcal.model.parts import vector_rotation
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import points_kinematics
 
-_POSE = 6
+_POINT, _POSE = 3, 6
 
 
 def desired_pose(model: RobotModel, nominal: RobotModel, targets: ToolTargets) -> ToolPoseTarget:
     """Desired position and, if it counts, rotation of every target in the base frame.
 
     Points and orientations are those of the file, else those that the `nominal` robot takes at the file's joint positions. A point alone
-    leaves the orientation free, and so does an arm with fewer than six joints before the tool. Points in an instrument's frame are brought
-    to the base frame by where `model` has its station. Raises `FlexcalError` for an orientation that such an arm cannot be asked for.
+    leaves the orientation free, and so do joint positions of an arm with fewer than six joints before the tool. Points in an instrument's
+    frame are brought to the base frame by where `model` has its station. Raises `FlexcalError` for an orientation asked of an arm whose
+    joints are all needed for the position, or beside another arm.
     """
-    short = [name for name in dict.fromkeys(targets.target.tolist()) if joints_before(model, name) < _POSE]
-    if targets.rotation is not None and short:
+    counts = {name: joints_before(model, name) for name in targets.target.tolist()}
+    short = [name for name, count in counts.items() if count < _POSE]
+    if targets.rotation is not None and short and not _POINT < min(counts.values()) == max(counts.values()):
         raise FlexcalError(
             "E-COMP-001",
             f"{model.name} has {joints_before(model, short[0])} joints before '{short[0]}' and cannot take every orientation; "
@@ -37,7 +39,13 @@ def desired_pose(model: RobotModel, nominal: RobotModel, targets: ToolTargets) -
         position = at.position if position is None else position
         rotation = at.orientation if rotation is None else rotation
     assert position is not None
-    return ToolPoseTarget(targets.target, position, None if short else rotation)
+    return ToolPoseTarget(targets.target, position, None if short and targets.rotation is None else rotation)
+
+
+def spare_joints(model: RobotModel, targets: ToolTargets) -> int | None:
+    """Number of joints with which an arm turns its tool, where orientations are asked of one that cannot take every one; else None."""
+    count = min(joints_before(model, name) for name in set(targets.target.tolist()))
+    return count - _POINT if targets.rotation is not None and count < _POSE else None
 
 
 def joints_before(model: RobotModel, target: str) -> int:

@@ -76,7 +76,7 @@ class _Search:
         self.reached, self.turned = np.zeros((2, len(nominal)), dtype=bool)
         start = self._at_rest(self.rows, nominal, None, jacobians=True)
         self.flank, self.torque = start.rest.flank, start.rest.torque
-        self.jacobian = start.command_jacobian()[:, : aim.rows]
+        self.jacobian = aim.own_rows(start.command_jacobian())
         self.before = aim.residual(start.kinematics)
         self.after = self.before.copy()
 
@@ -122,7 +122,7 @@ class _Search:
         self.torque[rows] = at.rest.torque
         self.after[rows] = self.aim.subset(rows).residual(at.kinematics)
         if jacobians:
-            self.jacobian[rows] = at.command_jacobian()[:, : self.aim.rows]
+            self.jacobian[rows] = self.aim.subset(rows).own_rows(at.command_jacobian())
 
     def _far(self, rows: np.ndarray) -> np.ndarray:
         correction = np.abs(self.q[rows] - self.nominal[rows])

@@ -36,6 +36,12 @@ def best_posture(model: RobotModel, target: str | None = None) -> np.ndarray:
     return postures[int(np.argmax(whole * room))]
 
 
+def other_postures(model: RobotModel, start: np.ndarray) -> np.ndarray:
+    """32 further postures (32, n), the nearest to `start` (n,) first."""
+    others = low_discrepancy_configurations(model, _OTHER_STARTS)
+    return others[np.argsort(np.linalg.norm(others - start, axis=1))]
+
+
 def inverse_kinematics_from_postures(
     model: RobotModel, aim: ToolPoseTarget, start: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -45,8 +51,7 @@ def inverse_kinematics_from_postures(
     """
     q, reached = inverse_kinematics(model, aim, np.tile(start, (len(aim.position), 1)))
     first = reached.copy()
-    others = low_discrepancy_configurations(model, _OTHER_STARTS)
-    for other in others[np.argsort(np.linalg.norm(others - start, axis=1))]:
+    for other in other_postures(model, start):
         rows = np.flatnonzero(~reached)
         if not len(rows):
             break

@@ -6,11 +6,16 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from flexcal.compensation.desired_poses import desired_pose
+from flexcal.compensation.desired_poses import desired_pose, spare_joints
 from flexcal.compensation.failure_reasons import given_past_limit, nominal_reasons, real_reasons
 from flexcal.compensation.inverse_kinematics import inverse_kinematics
 from flexcal.compensation.newton_search import solve_commands
-from flexcal.compensation.start_postures import best_posture, inverse_kinematics_from_postures
+from flexcal.compensation.partial_orientation import partly_oriented
+from flexcal.compensation.start_postures import (
+    best_posture,
+    inverse_kinematics_from_postures,
+    other_postures,
+)
 from flexcal.data.poses import ToolTargets
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import carried_mass, certain_flank
@@ -77,15 +82,22 @@ def _solve(
     size = len(targets)
     aim = desired_pose(model, nominal, targets)
     elsewhere = np.zeros(size, dtype=bool)
-    if targets.q is not None:
+    reason = np.full(size, "", dtype=object)
+    spare = spare_joints(model, targets)
+    if spare is not None:
+        starts = [] if start is None else [start, *other_postures(nominal, start)]
+        had = partly_oriented(nominal, aim, spare, starts if targets.q is None else [targets.q])
+        aim, known, reached, elsewhere, reason = had.aim, had.q, had.reached, had.elsewhere, had.reason
+    elif targets.q is not None:
         known, reached = inverse_kinematics(nominal, aim, targets.q)
     else:
         assert start is not None
         known, reached, elsewhere = inverse_kinematics_from_postures(nominal, aim, start)
     q, before = np.full((size, model.n), np.nan), np.full(size, np.nan)
-    unambiguous, reason = np.zeros(size, dtype=bool), np.full(size, "", dtype=object)
+    unambiguous = np.zeros(size, dtype=bool)
     if targets.q is not None:
-        reason = given_past_limit(nominal, targets.q)
+        past = given_past_limit(nominal, targets.q)
+        reason = np.where(past == "", reason, past)
     lost = np.flatnonzero(~reached & (reason == ""))
     reason[lost] = nominal_reasons(nominal, aim.subset(lost), known[lost])
     rows = np.flatnonzero(reason == "")
