@@ -4,7 +4,7 @@ from .columns import check_positive, unit_quaternions, whole_numbers
 from .frame_touches import FrameMethod, FrameTouches
 from .image_folders import tables_of
 from .measured_tables import column_labels, read_pose_pool, read_poses, write_poses
-from .pose_set import DEFAULT_SIGMA, DIRECTION, DISTANCE, LINE, PLANE, PoseSet, concatenate
+from .pose_set import DEFAULT_SIGMA, DIRECTION, DISTANCE, LINE, PLANE, PoseSet, concatenate, kind_of_face
 from .target_files import read_commands, read_targets, write_commands, write_targets
 from .tool_targets import ToolTargets
 from .touch_tables import read_frame_touches, read_touches
@@ -28,6 +28,7 @@ __all__ = [
     "check_same_pose",
     "column_labels",
     "concatenate",
+    "kind_of_face",
     "read_commands",
     "read_frame_touches",
     "read_pose_pool",

@@ -15,7 +15,7 @@ from flexcal.data.poses.columns import (
     target_column,
     whole_numbers,
 )
-from flexcal.data.poses.pose_set import DEFAULT_SIGMA, DISTANCE, LINE, PLANE, PoseSet
+from flexcal.data.poses.pose_set import DEFAULT_SIGMA, DISTANCE, PLANE, PoseSet, kind_of_face
 from flexcal.data.tables import (
     Table,
     TableFile,
@@ -25,12 +25,12 @@ from flexcal.data.tables import (
     with_seconds,
 )
 from flexcal.files.structuring import suggestion
+from flexcal.model.robot import FACES
 
 if TYPE_CHECKING:
     from flexcal.model.robot import FaceConfig, RobotModel, WireConfig
 
 WIRE, TOUCHED, READING, LENGTH = "wire", "touched", "reading", "length"
-_KINDS = {"wire": DISTANCE, "sphere": DISTANCE, "plane": PLANE, "line": LINE}
 _COORDINATE = {DISTANCE: 0, PLANE: 2}
 
 
@@ -74,7 +74,7 @@ def read_distances(file: TableFile, model: RobotModel, further: Sequence[str] = 
             check_positive(table, signals[name], values[name], zero=False)
     declared = _declared(file, model, touched=touched)
     names = _names(table, declared, name_column, rows)
-    kind = np.array([_KINDS[declared[name].kind] for name in names.tolist()])
+    kind = np.array([kind_of_face(declared[name].kind) for name in names.tolist()])
     position = np.zeros((rows, 3))
     read = values[value][:, 0] if value in values else np.zeros(rows)
     for own, coordinate in _COORDINATE.items():
@@ -107,12 +107,12 @@ def _declared(file: TableFile, model: RobotModel, *, touched: bool) -> Mapping[s
     """Instruments under `measurements:` of robot.yaml that such a file may name."""
     measurements = cast("Mapping[str, Any]", model.config.measurements)
     if touched:
-        faces = {k: item for k, item in measurements.items() if item.kind in ("plane", "line", "sphere")}
+        faces = {k: item for k, item in measurements.items() if item.kind in FACES}
         if not faces:
             raise file.error(
                 "E-POSES-058",
                 f"there is a column '{TOUCHED}', but robot.yaml declares nothing to touch; add `measurements: {{table: {{kind: plane}}}}` "
-                "(or line, or sphere) with the names in that column.",
+                f"(or {', or '.join(list(FACES)[1:])}) with the names in that column.",
             )
         return faces
     wires = {k: item for k, item in measurements.items() if item.kind == "wire"}

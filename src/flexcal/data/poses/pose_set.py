@@ -10,17 +10,20 @@ import numpy as np
 
 from flexcal.data.camera import Lens
 from flexcal.errors import FlexcalError
+from flexcal.model.robot import FACES
 
 DISTANCE, PLANE, LINE, DIRECTION = "distance", "plane", "line", "direction"
 """Kinds of measurements that are not of three coordinates."""
-_COORDINATES = {
-    DISTANCE: (True, False, False),
-    PLANE: (False, False, True),
-    LINE: (True, True, False),
-    DIRECTION: (False, False, False),
-}
+_COORDINATES = {**FACES, DISTANCE: (True, False, False), DIRECTION: (False, False, False)}
+_SAME = {"wire": DISTANCE, "sphere": DISTANCE}
+"""What is read alike is of one kind."""
 DEFAULT_SIGMA = 1e-4
 """Default 1σ of a measured coordinate (m); only its size relative to priors matters."""
+
+
+def kind_of_face(declared: str) -> str:
+    """Kind of the measurements of a wire, or of contacts with a face, by the `kind` that robot.yaml declares."""
+    return _SAME.get(declared, declared)
 
 
 @dataclass(frozen=True, eq=False)

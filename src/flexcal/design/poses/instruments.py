@@ -8,7 +8,7 @@ import numpy as np
 
 from flexcal.calibration.kinds import turn_to_z
 from flexcal.calibration.measurement import predict_measurements
-from flexcal.data.poses import DEFAULT_SIGMA, DISTANCE, LINE, PLANE, PoseSet
+from flexcal.data.poses import DEFAULT_SIGMA, DISTANCE, LINE, PLANE, PoseSet, kind_of_face
 from flexcal.design.poses.camera_setup import CameraSetup
 from flexcal.design.poses.tilt_setup import TiltSetup
 from flexcal.errors import FlexcalError
@@ -26,10 +26,10 @@ from flexcal.model.robot import (
 
 POSE = "pose"
 """Name of a tracker that measures orientations too."""
+_SOCKETS = "sockets"
 _TURN_SIGMA = 1e-4
 """Standard deviation, rad, of a measured orientation."""
 _STEPS, _REACHED = 25, 1e-9
-_KINDS = {"wire": DISTANCE, "sphere": DISTANCE, "plane": PLANE, "line": LINE}
 _DISTANT, _TILTED = 0.02, 0.02
 """Standard deviations, m and rad, of a place that was measured with a tape."""
 
@@ -59,7 +59,7 @@ class Instrument:
         if item.kind == "sockets":
             return cls(
                 name,
-                "sockets",
+                _SOCKETS,
                 DEFAULT_SIGMA,
                 np.array(places, dtype=float),
                 sockets=np.array(list(item.sockets.values()), dtype=float),
@@ -72,7 +72,7 @@ class Instrument:
         normal = np.array(item.normal) / np.linalg.norm(item.normal)
         return cls(
             name,
-            _KINDS[item.kind],
+            kind_of_face(item.kind),
             sigma,
             np.array(places, dtype=float),
             normal,
@@ -90,7 +90,7 @@ class Instrument:
         """Names of the places."""
         return (
             tuple(f"{self.name}_{k + 1}" for k in range(len(self.at)))
-            if self.kind == "sockets"
+            if self.kind == _SOCKETS
             else (self.name,)
         )
 
@@ -108,7 +108,7 @@ class Instrument:
             stds = {"x": _DISTANT, "y": _DISTANT, "rx": _TILTED, "ry": _TILTED}
         else:
             stds |= tilts if len(self.sockets) > 1 else {}
-        scale = SOCKET_SCALE if self.kind == "sockets" else f"station.{self.name}.scale"
+        scale = SOCKET_SCALE if self.kind == _SOCKETS else f"station.{self.name}.scale"
         placed = {f"station.{station}.{key}": std for station in self.stations for key, std in stds.items()}
         return placed | ({scale: self.scale_std} if self.scale_std > 0 else {})
 
@@ -128,7 +128,7 @@ class Instrument:
 
     def poses(self, model: RobotModel, q: np.ndarray, target: str, spot: np.ndarray | None = None) -> PoseSet:
         """Pose set of readings at `q` (N, n), of which only their kind counts; `spot` (N,) numbers socket and place, else the nearest."""
-        held, tracked, rows = self.kind == "sockets", self.name == POSE, len(q)
+        held, tracked, rows = self.kind == _SOCKETS, self.name == POSE, len(q)
         if held:
             number = self._nearest(model, q, target) if spot is None else spot
             names = np.array(self.stations)[number // len(self.sockets)]
@@ -152,7 +152,7 @@ class Instrument:
             quaternion_wxyz=rotation_wxyz(_axes(model, q, target)) if tracked else None,
             orientation_sigma=np.full(rows, _TURN_SIGMA) if tracked else None,
             socket=np.full(rows, "held") if held else None,
-            kind=np.full(rows, self.kind) if self.kind in (DISTANCE, PLANE, LINE) else None,
+            kind=None if self.kind in ("", _SOCKETS) else np.full(rows, self.kind),
         )
 
     def _nearest(self, model: RobotModel, q: np.ndarray, target: str) -> np.ndarray:

@@ -1,6 +1,7 @@
 from .arm_sensor import ArmSensor, mounting_names, sensitivity_name, sensor_column, sensor_delay_name
 from .attached_payload import carried_inertias, last_frame, with_payload, with_point, with_point_at_frame
 from .config import (
+    FACES,
     AcceptanceConfig,
     BoardConfig,
     CameraConfig,
@@ -60,6 +61,7 @@ from .stored_estimates import NUISANCE, PAYLOAD_FRAME, with_blocks
 __all__ = [
     "ANGLE_TOLERANCE",
     "BOARD_SCALE",
+    "FACES",
     "FRICTION_LOG_STD",
     "FRICTION_PARAMETERS",
     "FRICTION_TOLERANCE",

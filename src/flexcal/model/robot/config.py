@@ -421,6 +421,14 @@ class WireConfig:
             raise FlexcalError("E-ROBOT-057", f"scale_std must be positive, not {self.scale_std:g}.")
 
 
+FACES: dict[str, tuple[bool, bool, bool]] = {
+    "plane": (False, False, True),
+    "line": (True, True, False),
+    "sphere": (True, False, False),
+}
+"""What may be touched, and which coordinates in its axes a contact tells."""
+
+
 @dataclass(frozen=True)
 class FaceConfig:
     """Plane, line or sphere anywhere in the cell that the measured point touches; a plane may be read by a dial gauge.
