@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from flexcal.calibration.error_model import ErrorStatistics
+from flexcal.calibration.kinds import kind_of
 from flexcal.calibration.measurement import predict_measurements, predicted_positions, register
 from flexcal.calibration.verification.best_fit_registration import (
     best_placement,
@@ -22,7 +23,7 @@ from flexcal.calibration.verification.best_fit_registration import (
     rigid_placement,
 )
 from flexcal.data.poses import PoseSet
-from flexcal.model.robot import STATION, RobotModel
+from flexcal.model.robot import RobotModel
 
 _BLOCK = 20_000
 _STEPS = 20
@@ -118,7 +119,9 @@ def _placed_by_readings(at_base: RobotModel, poses: PoseSet) -> UncalibratedRobo
     located = predict_measurements(at_base, poses, elastic=False).located
     registered = register(at_base, poses, located)
     numbers = [
-        name for s in poses.stations for name in (*(f"station.{s}.{k}" for k in STATION), f"station.{s}.zero")
+        f"station.{s}.{key}"
+        for s in poses.stations
+        for key in kind_of(poses, s).place(registered, poses.subset(poses.station == s), s, turned=True)
     ]
     points = [f"point.{target}.{axis}" for target in poses.targets for axis in "xyz"]
     return UncalibratedRobot(
