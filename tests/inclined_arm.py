@@ -14,7 +14,7 @@ NOISE = 5e-5
 ZEROS = np.array([0.003, -0.002])
 
 
-def robot(folder: Path, declared: str = "std: 5e-5") -> RobotModel:
+def write_urdf(folder: Path) -> None:
     parts, before = ['<robot name="strange"><link name="base"/>'], "base"
     for k, (axis, origin) in enumerate(zip(AXES, ORIGINS, strict=True), 1):
         parts.append(
@@ -24,6 +24,10 @@ def robot(folder: Path, declared: str = "std: 5e-5") -> RobotModel:
         )
         before = f"l{k}"
     (folder / "r.urdf").write_text("".join([*parts, "</robot>"]))
+
+
+def robot(folder: Path, declared: str = "std: 5e-5") -> RobotModel:
+    write_urdf(folder)
     (folder / "robot.yaml").write_text(
         f"robot: r.urdf\nmeasurements: {{level: {{kind: inclinometer, frame: l6, {declared}}}}}\n"
     )
