@@ -21,8 +21,13 @@ from flexcal.model.robot import RobotModel
 
 FASTER = 50.0
 """Ratio that is wanted."""
+MOST_OVER_POINTS = 1.5
+"""Largest ratio of a fit of full poses to that of the same points."""
 POSES = 200
-_NOISE, _TURN_NOISE = 3e-5, 1e-4
+NOISE, TURN_NOISE = 3e-5, 1e-4
+NOMINAL = np.zeros((7, 6))
+NOMINAL[-1] = [0, 0, 0, 0.05, 0.03, 0.1]
+_PLACE = np.array([0.4, -0.2, 1.9, 2.5, 0.3, 0.6])
 _SPREAD = np.array([0.6, 0.5, 0.5, 0.9, 0.9, 1.2])
 _BENT = np.array([0.2, -1.2, 1.4, -0.3, 1.2, 0.1])
 _CAMERA = np.array([1100.0, 1090.0, 630.0, 490.0, -0.1, 0.05, 0.0, 0.0, 0.0])
@@ -51,25 +56,69 @@ class PlainArm:
         return at @ last
 
 
+@dataclass(frozen=True, eq=False)
+class FullPoses:
+    """Full poses of a UR5 with errors at every joint, as a tracker reads them: the arm, and `q` (N, 6), `points` (N, 3) and `turns`."""
+
+    arm: PlainArm
+    q: np.ndarray
+    points: np.ndarray
+    turns: Rotation
+
+    @classmethod
+    def measured(cls, seed: int, poses: int = POSES, *, noisy: bool = True, draw: int = 0) -> FullPoses:
+        """Poses of the robot of a seed; of another `draw`, other poses of the same robot."""
+        arm, rng = PlainArm(_ur5()), np.random.default_rng(seed)
+        truth = NOMINAL + rng.normal(size=(7, 6)) * [*3 * [5e-4], *3 * [3e-4]]
+        rng = np.random.default_rng([seed, draw])
+        q = _BENT + _SPREAD * rng.uniform(-1, 1, (poses, 6))
+        station, noise = Rotation.from_rotvec(_PLACE[:3]), float(noisy)
+        at = np.array([arm.carried(row, truth) for row in q])
+        points = station.apply(at[:, :3, 3]) + _PLACE[3:] + noise * NOISE * rng.normal(size=(poses, 3))
+        turns = Rotation.from_rotvec(noise * TURN_NOISE * rng.normal(size=(poses, 3))) * station
+        return cls(arm, q, points, turns * Rotation.from_matrix(at[:, :3, :3]))
+
+    def pose_set(self) -> PoseSet:
+        """The same poses as flexcal has them."""
+        names = np.full(len(self.q), "seen"), np.full(len(self.q), self.arm.model.stations.names[0])
+        return PoseSet(
+            self.q,
+            self.points,
+            np.full((len(self.q), 3), NOISE),
+            None,
+            None,
+            *names,
+            None,
+            np.arange(len(self.q)),
+            quaternion_wxyz=self.turns.as_quat()[:, [3, 0, 1, 2]],
+            orientation_sigma=np.full(len(self.q), TURN_NOISE),
+        )
+
+
 def run() -> list[tuple[str, float, str]]:
     """Ratios of wall time."""
-    return [_full_poses(), _views()]
+    return [_full_poses(), _orientations(), _views()]
+
+
+def _orientations() -> tuple[str, float, str]:
+    """Time of a fit of full poses over that of the same points alone, medians of processor time side by side."""
+    measured = FullPoses.measured(3)
+    model, full = measured.arm.model, measured.pose_set()
+    bare, seconds = full.without_orientations(), []
+    for _ in range(15):
+        for poses in (full, bare):
+            began = time.process_time()
+            fit_geometry(model, poses, terms=("kinematic",))
+            seconds.append(time.process_time() - began)
+    with_turns, points = np.median(seconds[::2]), np.median(seconds[1::2])
+    note = f"{1e3 * with_turns:.0f} ms against {1e3 * points:.0f} ms of processor time"
+    return f"{POSES} full poses over points, {MOST_OVER_POINTS:g} at most", float(with_turns / points), note
 
 
 def _full_poses() -> tuple[str, float, str]:
-    model = _ur5()
-    arm, rng = PlainArm(model), np.random.default_rng(3)
-    q = _BENT + _SPREAD * rng.uniform(-1, 1, (POSES, 6))
-    nominal = np.zeros((7, 6))
-    nominal[-1] = [0, 0, 0, 0.05, 0.03, 0.1]
-    truth = nominal + rng.normal(size=(7, 6)) * [*3 * [5e-4], *3 * [3e-4]]
-    place = np.array([0.4, -0.2, 1.9, 2.5, 0.3, 0.6])
-    station = Rotation.from_rotvec(place[:3])
-    at = np.array([arm.carried(row, truth) for row in q])
-    points = station.apply(at[:, :3, 3]) + place[3:] + _NOISE * rng.normal(size=(POSES, 3))
-    turns = Rotation.from_rotvec(_TURN_NOISE * rng.normal(size=(POSES, 3))) * station
-    turns = turns * Rotation.from_matrix(at[:, :3, :3])
-    poses = _pose_set(model, q, points, turns)
+    measured = FullPoses.measured(3)
+    arm, q, points, turns = measured.arm, measured.q, measured.points, measured.turns
+    model, poses, nominal = arm.model, measured.pose_set(), NOMINAL
     start = np.concatenate(
         [_kabsch(np.array([arm.carried(r, nominal)[:3, 3] for r in q]), points), nominal.ravel()]
     )
@@ -79,15 +128,15 @@ def _full_poses() -> tuple[str, float, str]:
         left = []
         for row, point, turn in zip(q, points, turns, strict=True):
             reached = arm.carried(row, errors)
-            left.append((point - seen.apply(reached[:3, 3]) - x[3:6]) / _NOISE)
+            left.append((point - seen.apply(reached[:3, 3]) - x[3:6]) / NOISE)
             left.append(
-                (turn * (seen * Rotation.from_matrix(reached[:3, :3])).inv()).as_rotvec() / _TURN_NOISE
+                (turn * (seen * Rotation.from_matrix(reached[:3, :3])).inv()).as_rotvec() / TURN_NOISE
             )
         return np.concatenate(left)
 
     peer, peer_seconds = _solved(residual, start)
     seconds, fit = min(
-        (_timed(lambda: fit_geometry(model, poses, terms=("kinematic",))) for _ in range(3)),
+        (timed(lambda: fit_geometry(model, poses, terms=("kinematic",))) for _ in range(3)),
         key=lambda r: r[0],
     )
     note = (
@@ -101,8 +150,7 @@ def _views() -> tuple[str, float, str]:
     with tempfile.TemporaryDirectory() as folder:
         model = _ur5(folder)
         arm, rng = PlainArm(model), np.random.default_rng(4)
-        nominal = np.zeros((7, 6))
-        nominal[-1] = [0, 0, 0, 0.05, 0.03, 0.1]
+        nominal = NOMINAL
         truth = nominal + rng.normal(size=(7, 6)) * [*3 * [5e-4], *3 * [3e-4]]
         first = arm.carried(_BENT, truth)
         turn = Rotation.from_matrix(first[:3, :3])
@@ -134,7 +182,7 @@ def _views() -> tuple[str, float, str]:
         # a script starts from a calibrated camera and a board whose place it knows to centimetres
         start = np.concatenate([_CAMERA * 1.01, board + 0.01, nominal.ravel()])
         peer, peer_seconds = _solved(residual, start)
-        seconds, fit = _timed(lambda: fit_geometry(model, read_poses(file, model), terms=("kinematic",)))
+        seconds, fit = timed(lambda: fit_geometry(model, read_poses(file, model), terms=("kinematic",)))
     note = (
         f"{peer_seconds:.1f} s ({peer.nfev} steps, rms {_rms(peer):.3f} σ) against {seconds:.2f} s with reading "
         f"(chi² {fit.estimate.reduced_chi2:.3f})"
@@ -173,22 +221,6 @@ def _ur5(folder: str | None = None) -> RobotModel:
         return replace(RobotModel.from_yaml(file), path=file)
 
 
-def _pose_set(model: RobotModel, q: np.ndarray, points: np.ndarray, turns: Rotation) -> PoseSet:
-    names = np.full(len(q), "seen"), np.full(len(q), model.stations.names[0])
-    return PoseSet(
-        q,
-        points,
-        np.full((len(q), 3), _NOISE),
-        None,
-        None,
-        *names,
-        None,
-        np.arange(len(q)),
-        quaternion_wxyz=turns.as_quat()[:, [3, 0, 1, 2]],
-        orientation_sigma=np.full(len(q), _TURN_NOISE),
-    )
-
-
 def _kabsch(source: np.ndarray, target: np.ndarray) -> np.ndarray:
     turn = Rotation.align_vectors(target - target.mean(axis=0), source - source.mean(axis=0))[0]
     return np.concatenate([turn.as_rotvec(), target.mean(axis=0) - turn.apply(source.mean(axis=0))])
@@ -204,7 +236,8 @@ def _rms(result: OptimizeResult) -> float:
     return float(np.sqrt(2 * result.cost / (len(result.fun) - np.linalg.matrix_rank(result.jac, tol=1e-4))))
 
 
-def _timed(action):
+def timed(action):
+    """Wall time of an action, s, and what it returns."""
     began = time.perf_counter()
     result = action()
     return time.perf_counter() - began, result
