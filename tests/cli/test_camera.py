@@ -253,3 +253,39 @@ def test_a_camera_beside_a_tracker_makes_the_robot_more_accurate(folder: Path) -
     alone, mixed, expected = np.sum(squares, axis=0)
     assert mixed < alone
     assert mixed == pytest.approx(expected, rel=0.3)
+
+
+@pytest.mark.slow
+def test_points_a_wire_and_a_camera_are_better_than_points(folder: Path) -> None:
+    """Errors at fresh poses of 16 arms: all three together beside the tracker alone, and as large as predicted."""
+    (folder / "robot.yaml").write_text(
+        ROBOT.format(square=SQUARE).replace(
+            "points: {", "points: {smr: {frame: l6, xyz: [0.05, 0.03, 0.12]}, "
+        )
+        + "  rope: {kind: wire, std: 1.0e-4, scale_std: 1.0e-4}\n"
+    )
+    model, squares = RobotModel.from_yaml(folder / "robot.yaml"), []
+    for seed in range(520, 536):
+        cell = Cell(seed)
+        lines = cell.corners(folder / "views.csv", 40).read_text().splitlines()
+        rows = [f"{lines[0]},target", *(f"{line},camera" for line in lines[1:])]
+        (folder / "views.csv").write_text("\n".join(rows) + "\n")
+        lengths = ["q1,q2,q3,q4,q5,q6,length,target"]
+        for q in cell.rng.uniform(-1.5, 1.5, (80, 6)):
+            at = cell.arm.seen.T @ (cell.arm.measured(q)[0] - cell.arm.from_)
+            length = float(np.linalg.norm(at - [1.5, 0.8, 0.1]) - 0.02 + 1e-4 * cell.rng.normal())
+            lengths.append(",".join(map(repr, [*q.tolist(), length])) + ",smr")
+        (folder / "wire.csv").write_text("\n".join(lengths) + "\n")
+        tracked = read_poses(recorded(folder / "points.csv", cell.arm, cell.rng, 30, turned=False), model)
+        views = read_poses(folder / "views.csv", model)
+        fresh = read_poses(recorded(folder / "fresh.csv", cell.arm, cell.rng, 150, turned=False), model)
+        fresh = replace(fresh, position=np.array([cell.arm.measured(q)[0] for q in fresh.q]))
+        together = concatenate([tracked, read_poses(folder / "wire.csv", model), views])
+        fits = [calibrate(model, poses, terms=["kinematic"]) for poses in (tracked, together)]
+        errors = [prediction_errors(fit.model, fresh, noise_free=True) for fit in fits]
+        squares.append(
+            [*(float(np.sum(e.errors**2)) for e in errors), float(np.sum(errors[1].parameter_rms ** 2))]
+        )
+    alone, mixed, expected = np.sum(squares, axis=0)
+    assert mixed < alone
+    assert mixed == pytest.approx(expected, rel=0.3)

@@ -11,9 +11,13 @@ from stranger_readings import Asked, ReadArm, readings, right
 
 from flexcal import PoseSet, RobotModel, calibrate, read_poses
 from flexcal.calibration.diagnostics import stated_noise
+from flexcal.calibration.error_model import ErrorComponents
 from flexcal.calibration.fit import GeometricFit, fit_geometry
+from flexcal.calibration.fit.elastic_prior import NOTHING_ELASTIC
+from flexcal.calibration.fit.fitted_points import PointFit
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.robot import propagated_covariance_root
+from flexcal.progress import silent
 
 KINDS = {
     "points of a few poses": [right("points", 30)],
@@ -141,7 +145,33 @@ MIXTURES = {
     "a wire more exact than its default": [right("points", 30), Asked("wires", 150, 1e-5, None)],
     "a wire whose sigma is wrong": [right("points", 30, 2e-5), Asked("wire", 150, 5e-4, 5e-5)],
     "sockets ten times less exact": [right("points", 30), right("sockets", 120, 5e-4)],
+    "sockets and rough wires, nothing stated": [
+        Asked("sockets", 120, 2e-5, None),
+        Asked("wires", 90, 3e-4, None),
+    ],
 }
+_SCATTER = {"points": "robot", "sockets": "sockets", "wire": "lengths", "wires": "lengths"}
+
+
+def true_weights(asked: Sequence[Asked]) -> ErrorComponents:
+    """The error components that the readings were drawn with."""
+    own = {_SCATTER[one.kind]: one.sigma for one in asked}
+    if "robot" not in own:
+        own["robot"] = own.pop(_SCATTER[asked[0].kind])
+    return ErrorComponents(share=0.0, **own)
+
+
+def with_true_weights(folder: Path, asked: Sequence[Asked], seed: int) -> float:
+    """Root mean square error of the arm from all readings, each with the weight of the noise that it was drawn with."""
+    arm = ReadArm.drawn(seed)
+    model, poses = readings(folder, arm, asked, seed)
+    fit = PointFit.of(
+        model, poses, ("kinematic",), NOTHING_ELASTIC, False, marginalised=False, near={}, progress=silent
+    )
+    rough, weights = fit.solved(fit.first_scatter, "squares"), true_weights(asked)
+    solved = fit.solved(weights, "squares", rough)
+    solved = fit.solved(weights, "squares", solved, fixed=solved.undetermined(weights))
+    return float(np.sqrt(np.mean(errors(arm, solved.model, seed)[0] ** 2)))
 
 
 @pytest.mark.parametrize("case", list(MIXTURES)[1:4])
@@ -176,12 +206,20 @@ def test_a_wire_whose_drum_is_larger_than_declared_does_no_harm(tmp_path: Path) 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", list(MIXTURES))
 def test_more_instruments_do_no_harm_on_twenty_arms(tmp_path: Path, case: str) -> None:
-    """Never significantly worse than the better kind alone, and not by a fifth on any arm."""
-    found = np.array([alone_and_together(tmp_path / str(s), MIXTURES[case], s) for s in range(840, 860)])
+    """On average never worse than the better kind alone, and on every arm as accurate as with the weights of the true noise.
+
+    On a single arm the better kind alone may come out ahead by luck, by a factor of two and with the true weights too, where its own errors
+    happen to be far smaller than their standard deviation.
+    """
+    seeds = range(840, 860)
+    found = np.array([alone_and_together(tmp_path / str(s), MIXTURES[case], s) for s in seeds])
+    best = np.array([with_true_weights(tmp_path / str(s), MIXTURES[case], s) for s in seeds])
     better = int(np.argmin(np.log(found[:, :2]).mean(axis=0)))
     ratio = np.log(found[:, 2] / found[:, better])
     assert ratio.mean() < 2 * ratio.std(ddof=1) / np.sqrt(len(ratio))
-    assert ratio.max() < np.log(1.25)
+    loss = np.log(found[:, 2] / best)
+    assert loss.mean() < np.log(1.03)
+    assert loss.max() < np.log(1.25)
 
 
 @pytest.mark.slow
