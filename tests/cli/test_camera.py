@@ -17,7 +17,7 @@ from test_full_poses import Arm, recorded, urdf
 from flexcal import RobotModel, calibrate, prediction_errors, read_poses, verify
 from flexcal.cli.main import main
 from flexcal.data.camera import projected
-from flexcal.data.poses import concatenate
+from flexcal.data.poses import concatenate, read_grouped_poses
 
 CAMERA = np.array([[1100, 0, 630], [0, 1090, 490], [0, 0, 1.0]])
 DISTORTION = np.array([-0.2, 0.1, 0.001, -0.0005, 0.02])
@@ -209,6 +209,17 @@ def test_bad_boards_and_images_are_refused(folder: Path, capsys: pytest.CaptureF
     (folder / "none.csv").write_text("pose,q1,q2,q3,q4,q5,q6,image\n1,0,0,0,0,0,0,none.png\n")
     assert main(["calibrate", robot, str(folder / "none.csv")]) == 2
     assert_refusal(capsys.readouterr().err, "E-POSES-053", "none.png")
+
+
+def test_views_that_are_left_out_are_in_no_group(folder: Path) -> None:
+    header, *rows = Cell(6).corners(folder / "views.csv", 8).read_text().splitlines()
+    seen = [row for k, row in enumerate(rows) if not row.startswith("3,") or rows[k - 3].startswith("2,")]
+    grouped = [f"{row},day{int(row.split(',')[0]) % 2}" for row in seen]
+    (folder / "views.csv").write_text("\n".join([f"{header},day", *grouped]) + "\n")
+    model = RobotModel.from_yaml(folder / "robot.yaml")
+    poses, labels = read_grouped_poses([folder / "views.csv"], model, "day")
+    assert poses.pose.tolist() == [1, 2, 4, 5, 6, 7, 8]
+    assert labels.tolist() == [f"day{number % 2}" for number in poses.pose.tolist()]
 
 
 def test_a_board_of_another_size_is_told(folder: Path) -> None:

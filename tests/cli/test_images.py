@@ -8,13 +8,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from refusals import assert_refusal
+from refusals import assert_refusal, refused
 from scipy.spatial.transform import Rotation
 from test_camera import DISTORTION, SQUARE, Cell
 from test_full_poses import urdf
 
 from flexcal import RobotModel, read_poses
 from flexcal.cli.main import main
+from flexcal.jobs.inputs import image_provenance
 
 SIZE = (640, 480)
 LENS = np.array([[550, 0, 315], [0, 545, 245], [0, 0, 1.0]])
@@ -129,9 +130,49 @@ def test_bad_images_among_good_ones_are_named(tmp_path: Path, capsys: pytest.Cap
     status = main(["calibrate", str(tmp_path / "robot.yaml"), str(images), "--terms", "kinematic"])
     said = capsys.readouterr()
     assert status == 0
-    assert re.search(r"views show fewer than 6 corners of the board: (4.png, )?8.png, 12.png", said.out)
-    assert "4.png" in said.out
+    assert re.search(r"2 views show fewer than 6 corners of the board: 8.png, 12.png", said.out)
+    assert re.search(r"eye: blurred and left out, their edges .*: 4.png", said.out)
     assert "1 outlier: pose 16" in said.out
+    (stored,) = re.findall(
+        r"input.20 images of joints.csv: (\w{64})", (tmp_path / "estimates.yaml").read_text()
+    )
+    assert stored in image_provenance([images / "joints.csv"]).values()
+    cv2.imwrite(str(images / "12.png"), np.full((480, 640), 181, np.uint8))
+    assert stored not in image_provenance([images / "joints.csv"]).values()
+
+
+@pytest.mark.parametrize("kind", ["charuco", "tags"])
+def test_images_that_are_blurred_in_any_way_are_named(tmp_path: Path, kind: str) -> None:
+    """Out of focus, moved sideways, moved along a diagonal; and an image of the cell without the board is not blurred."""
+    cell = Cell(25)
+    poses = folder_of(tmp_path, kind, cell, 14)
+    page, dots = printed(kind)
+    moved = np.zeros((15, 15), np.float32)
+    moved[7] = 1 / 15
+    kernels = {2: moved, 5: np.eye(13, dtype=np.float32) / 13}
+    for k in (2, 5, 9):
+        sharp = rendered(cell, poses[k - 1], page, dots)
+        soft = cv2.GaussianBlur(sharp, (0, 0), 4) if k == 9 else cv2.filter2D(sharp, -1, kernels[k])
+        cv2.imwrite(str(tmp_path / "images" / f"{k}.png"), soft)
+    cell_wall = np.full((480, 640), 90, np.uint8)
+    for k in range(1, 9):
+        cv2.rectangle(cell_wall, (70 * k, 40 * k), (70 * k + 50, 40 * k + 90), 30 * k % 256, -1)
+        cv2.circle(cell_wall, (600 - 60 * k, 30 * k), 20, 255 - 30 * k, -1)
+    cv2.imwrite(str(tmp_path / "images" / "12.png"), cell_wall)
+    poses = read_poses(tmp_path / "images", RobotModel.from_yaml(tmp_path / "robot.yaml"))
+    said = "; ".join(poses.notes)
+    (blurred,) = re.findall(r"blurred and left out, [^:]*: ([^;]*)", said)
+    assert {name.split(" ")[0] for name in blurred.split(", ")} == {"2.png", "5.png", "9.png"}
+    assert "1 views show fewer than 6 corners of the board: 12.png" in said
+
+
+def test_images_that_are_all_blurred_are_refused_as_such(tmp_path: Path) -> None:
+    cell = Cell(26)
+    folder_of(tmp_path, "charuco", cell, 5)
+    for file in (tmp_path / "images").glob("*.png"):
+        cv2.imwrite(str(file), cv2.GaussianBlur(cv2.imread(str(file)), (0, 0), 6))
+    with refused("E-POSES-055", "5 of 5", "edges", "sharper"):
+        read_poses(tmp_path / "images", RobotModel.from_yaml(tmp_path / "robot.yaml"))
 
 
 def test_chessboards_are_turned_the_same_way_up(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

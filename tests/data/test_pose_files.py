@@ -13,7 +13,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refused
 
-from flexcal.data.poses import PoseSet, column_labels, concatenate, read_pose_pool, read_poses, write_poses
+from flexcal.data.poses import (
+    PoseSet,
+    concatenate,
+    read_grouped_poses,
+    read_pose_pool,
+    read_poses,
+    write_poses,
+)
 from flexcal.model.robot import RobotModel
 from flexcal.units import DEGREE, MILLIMETRE
 
@@ -130,8 +137,8 @@ def test_columns_of_texts_are_left_out_and_said(tmp_path: Path, robot: RobotMode
 
 def test_a_number_may_group_measurements(tmp_path: Path, robot: RobotModel) -> None:
     path = file(tmp_path / "p.csv", GOOD, HEADER)
-    assert read_poses(path, robot, further=("pose",)).pose.tolist() == [1, 2, 3]
-    assert column_labels([path], "pose").tolist() == ["1", "2", "3"]
+    poses, labels = read_grouped_poses([path], robot, "pose")
+    assert poses.pose.tolist() == [1, 2, 3] and labels.tolist() == ["1", "2", "3"]
 
 
 @pytest.mark.parametrize(

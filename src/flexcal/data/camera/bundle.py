@@ -37,11 +37,15 @@ def lens_prior(size: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """Corners of a board in one image: `points` (K, 3) on the board, m, and `pixels` (K, 2)."""
+    """Corners of a board in one image: `points` (K, 3) on the board, m, and `pixels` (K, 2).
+
+    `edge` is the width of the image's edges, pixels, infinite where it has no contrast; not a number where there is no image.
+    """
 
     name: str
     points: np.ndarray
     pixels: np.ndarray
+    edge: float = float("nan")
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,10 +10,14 @@ import numpy as np
 
 from flexcal.data.camera.board import board_corners
 from flexcal.data.camera.bundle import FEWEST_CORNERS, View
+from flexcal.data.camera.sharpness import edge_width
 from flexcal.errors import FlexcalError, InputError
 
 if TYPE_CHECKING:
     from flexcal.model.robot import BoardConfig, CameraConfig
+
+_BLURRED = 3.0
+"""Width of edges, pixels, from which hardly any board is found."""
 
 
 def detected_views(camera: CameraConfig, paths: Sequence[Path]) -> tuple[list[View], np.ndarray]:
@@ -42,14 +46,21 @@ def detected_views(camera: CameraConfig, paths: Sequence[Path]) -> tuple[list[Vi
                 f"{path} has {image.shape[1]} × {image.shape[0]} pixels, but robot.yaml says {width} × {height}; correct `size:`.",
             )
         numbers, pixels = find(image)
-        views.append(View(path.name, board[numbers], pixels))
+        views.append(View(path.name, board[numbers], pixels, edge_width(cv2, image)))
     without = [path for path, view in zip(paths, views, strict=True) if len(view.points) < FEWEST_CORNERS]
     if 2 * len(without) > len(paths):
         named = f", as {without[0].name}" if len(without) > 1 else f", {without[0].name}"
+        widths = [view.edge for view in views if len(view.points) < FEWEST_CORNERS and np.isfinite(view.edge)]
+        blurred = widths and float(np.median(widths)) > _BLURRED
+        advice = (
+            f"their edges are {np.median(widths):.0f} pixels wide: take sharper images, standing still and in focus."
+            if blurred
+            else "correct `board:` (its kind, columns, rows and dictionary), or take unmirrored images."
+        )
         raise InputError(
             "E-POSES-055",
             f"{without[0].parent}: {len(without)} of {len(paths)} images{named}, show fewer than {FEWEST_CORNERS} corners of the board "
-            "that robot.yaml declares; correct `board:` (its kind, columns, rows and dictionary), take sharper images, or unmirrored ones.",
+            f"that robot.yaml declares; {advice}",
         )
     return views, np.array(camera.size, dtype=float)
 

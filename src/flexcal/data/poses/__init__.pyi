@@ -2,8 +2,8 @@ from .candidate_pool import PosePool
 from .checks import check_metres, check_same_pose
 from .columns import check_positive, unit_quaternions, whole_numbers
 from .frame_touches import FrameMethod, FrameTouches
-from .image_folders import tables_of
-from .measured_tables import column_labels, read_pose_pool, read_poses, write_poses
+from .image_folders import images_of, tables_of
+from .measured_tables import read_grouped_poses, read_pose_pool, read_poses, write_poses
 from .pose_set import DEFAULT_SIGMA, DIRECTION, DISTANCE, LINE, PLANE, PoseSet, concatenate, kind_of_face
 from .target_files import read_commands, read_targets, write_commands, write_targets
 from .tool_targets import ToolTargets
@@ -26,11 +26,12 @@ __all__ = [
     "check_metres",
     "check_positive",
     "check_same_pose",
-    "column_labels",
     "concatenate",
+    "images_of",
     "kind_of_face",
     "read_commands",
     "read_frame_touches",
+    "read_grouped_poses",
     "read_pose_pool",
     "read_poses",
     "read_targets",

@@ -30,8 +30,10 @@ if TYPE_CHECKING:
     from flexcal.model.robot import CameraConfig, RobotModel
 
 CAMERA_COLUMNS = ("camera", "image")
-_BLURRED = 5.0
-"""Ratio of a view's residual to the median of all views from which it is not used."""
+_WRONG, _WORSE = 5.0, 2.5
+"""Ratios of a view's residual to the median of all views from which it is not used, and from which a blurred one is not."""
+_BLURRED = 1.7
+"""Ratio of the width of an image's edges to the median of those that show the board from which it is blurred."""
 _CORNERS = ("corner", "u", "v")
 _NAMED = 8
 """Number of views that a sentence names."""
@@ -69,11 +71,19 @@ def read_views(file: TableFile, model: RobotModel, further: Sequence[str] = ()) 
     else:
         views, size = _tabled_views(table, camera, pose, first), np.array(camera.size, dtype=float)
     shown = np.array([len(view.points) >= FEWEST_CORNERS for view in views])
-    blank = [view.name for view, enough in zip(views, shown, strict=True) if not enough]
+    sharp = np.median([view.edge for view, enough in zip(views, shown, strict=True) if enough] or [np.nan])
+    # without contrast an image is empty, not blurred
+    blurred = np.array([np.isfinite(view.edge) and view.edge > _BLURRED * sharp for view in views])
+    blank = [
+        (view.name, bool(soft))
+        for view, enough, soft in zip(views, shown, blurred, strict=True)
+        if not enough
+    ]
+    blurred = blurred[shown]
     views, first = [view for view, enough in zip(views, shown, strict=True) if enough], first[shown]
     found = free_views(views, size)
-    usable = _usable(file, views, found)
-    notes = _left_out(name, views, found, usable, blank)
+    usable = _usable(file, views, found, blurred)
+    notes = _left_out(name, views, found, usable, blurred, blank)
     rows = first[usable]
     _check_side(file, found)
     target = _targets(table, model, name)
@@ -160,36 +170,55 @@ def _tabled_views(table: Table, camera: CameraConfig, pose: np.ndarray, first: n
     return views
 
 
-def _usable(file: TableFile, views: Sequence[View], found: FreeViews) -> np.ndarray:
-    """Numbers of the views that are not blurred; raises `InputError` where most corners fit no camera."""
+def _usable(file: TableFile, views: Sequence[View], found: FreeViews, blurred: np.ndarray) -> np.ndarray:
+    """Numbers of the views whose corners are where they should be, `blurred` (V,) ones judged sooner; raises `InputError` where most
+    corners fit no camera.
+    """
     wrong, corners = int(found.wrong.sum()), sum(len(view.points) for view in views)
     if wrong > corners // 4:
         raise file.error(
             "E-POSES-050",
             f"{wrong} of {corners} corners fit no camera; check columns, rows and corner numbers of the board.",
         )
-    return np.flatnonzero(found.residuals <= _BLURRED * np.median(found.residuals))
+    most = np.where(blurred, _WORSE, _WRONG) * np.median(found.residuals)
+    return np.flatnonzero(found.residuals <= most)
 
 
 def _left_out(
-    name: str, views: Sequence[View], found: FreeViews, usable: np.ndarray, blank: Sequence[str]
+    name: str,
+    views: Sequence[View],
+    found: FreeViews,
+    usable: np.ndarray,
+    blurred: np.ndarray,
+    blank: Sequence[tuple[str, bool]],
 ) -> list[str]:
     """Sentences on the views of a camera that are not used."""
-    blurred = [
-        f"{views[k].name} ({found.residuals[k]:.1f} px)"
-        for k in range(len(views))
-        if k not in set(usable.tolist())
-    ]
+    out = [k for k in range(len(views)) if k not in set(usable.tolist())]
+    named = {
+        soft: [f"{views[k].name} ({found.residuals[k]:.1f} px)" for k in out if blurred[k] == soft]
+        for soft in (True, False)
+    }
+    soft = [*(view for view, unsharp in blank if unsharp), *named[True]]
+    empty = [view for view, unsharp in blank if not unsharp]
     usual = float(np.median(found.residuals))
     notes = []
-    if blurred:
+    if soft:
         notes.append(
-            f"{name}: {len(blurred)} views are left out as blurred or wrongly detected, with corners that scatter by far more than the "
-            f"usual {usual:.2g} px: {_some(blurred)}"
+            f"{name}: blurred and left out, their edges being far wider than those of the others: {_some(soft)}"
         )
-    if blank:
+    if named[False]:
+        cause = (
+            "wrongly detected"
+            if np.isfinite([view.edge for view in views]).all()
+            else "blurred or wrongly detected"
+        )
         notes.append(
-            f"{name}: {len(blank)} views show fewer than {FEWEST_CORNERS} corners of the board: {_some(blank)}"
+            f"{name}: {len(named[False])} views are left out as {cause}, with corners that scatter by far more than the usual "
+            f"{usual:.2g} px: {_some(named[False])}"
+        )
+    if empty:
+        notes.append(
+            f"{name}: {len(empty)} views show fewer than {FEWEST_CORNERS} corners of the board: {_some(empty)}"
         )
     return notes
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from flexcal.data.tables import open_table
 from flexcal.errors import InputError
 
 _IMAGES = (".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".tif", ".tiff")
@@ -17,6 +18,16 @@ def tables_of(paths: Sequence[str | Path]) -> list[Path]:
     Raises `InputError` for a folder of images with no table, or several.
     """
     return [_table_of(Path(path)) for path in paths]
+
+
+def images_of(table: Path) -> list[Path]:
+    """Paths of the images that a table names, once each in their order; none for a table of other measurements."""
+    file = open_table(table)
+    if "image" not in file.columns:
+        return []
+    others = [name for name in file.text_columns() if name != "image"]
+    names = file.leaving_out(others).read(("image",)).columns["image"]
+    return [table.parent / name for name in dict.fromkeys(names.tolist())]
 
 
 def _table_of(path: Path) -> Path:

@@ -106,10 +106,26 @@ def read_poses(
     ((20, 6), (20, 3))
     """
     listed = tables_of([paths] if isinstance(paths, str | Path) else list(paths))
-    poses = concatenate([_read(path, model, tuple(further)) for path in listed])
-    _check_cameras(poses, " and ".join(str(path) for path in listed))
-    if require_motion:
-        check_motion(poses, model, " and ".join(str(path) for path in listed))
+    return _joined([_read(path, model, tuple(further)) for path in listed], listed, model, require_motion)
+
+
+def read_grouped_poses(paths: Sequence[Path], model: RobotModel, column: str) -> tuple[PoseSet, np.ndarray]:
+    """Poses as `read_poses` reads them, and the texts (N,) of a `column` that groups them.
+
+    Raises `InputError` as `read_poses` does, and for a file without the column.
+    """
+    listed = tables_of(paths)
+    labels = [_labels(path, column) for path in listed]
+    sets = [_read(path, model, (column,)) for path in listed]
+    kept = [_of_views(path, own, poses) for path, own, poses in zip(listed, labels, sets, strict=True)]
+    return _joined(sets, listed, model, True), np.concatenate(kept)
+
+
+def _joined(sets: Sequence[PoseSet], listed: Sequence[Path], model: RobotModel, moving: bool) -> PoseSet:
+    poses, where = concatenate(sets), " and ".join(str(path) for path in listed)
+    _check_cameras(poses, where)
+    if moving:
+        check_motion(poses, model, where)
     return poses
 
 
@@ -201,18 +217,24 @@ def _read_by_one(path: str | Path, poses: PoseSet) -> Mapping[str, np.ndarray]:
     return {TOUCHED: poses.station, READING: np.where(poses.kind == PLANE, poses.position[:, 2], 0.0)}
 
 
-def column_labels(paths: Sequence[Path], column: str) -> np.ndarray:
-    """Texts (N,) of one column of tables, joined in order; raises `InputError` for a file without it."""
-    labels = []
-    for path in tables_of(paths):
-        file = open_table(path)
-        if column not in file.columns:
-            raise file.error(
-                "E-POSES-041", f"there is no column '{column}' by which to hold out measurements."
-            )
-        others = [name for name in file.text_columns() if name != column]
-        labels.append(file.leaving_out(others).read((column,)).columns[column])
-    return np.concatenate(labels)
+def _labels(path: Path, column: str) -> np.ndarray:
+    """Texts (rows,) of one column of a table; raises `InputError` for a file without it."""
+    file = open_table(path)
+    if column not in file.columns:
+        raise file.error("E-POSES-041", f"there is no column '{column}' by which to hold out measurements.")
+    others = [name for name in file.text_columns() if name != column]
+    return file.leaving_out(others).read((column,)).columns[column]
+
+
+def _of_views(path: Path, labels: np.ndarray, poses: PoseSet) -> np.ndarray:
+    """Labels (N,) of the measurements of a file from those of its rows, of which a view has several, and views left out none."""
+    if not poses.seen.any():
+        return labels
+    file = open_table(path)
+    others = [name for name in file.text_columns() if name != "pose"]
+    numbers = file.leaving_out(others).read().columns["pose"].astype(np.int64)
+    first = dict(zip(reversed(numbers.tolist()), reversed(labels.tolist()), strict=True))
+    return np.array([first[number] for number in poses.pose.tolist()])
 
 
 def _named_texts(file: TableFile, further: Sequence[str]) -> tuple[str, ...]:

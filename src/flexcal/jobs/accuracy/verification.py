@@ -46,6 +46,7 @@ from flexcal.jobs.calibration import (
 )
 from flexcal.jobs.inputs import (
     CalibratedRobot,
+    image_provenance,
     is_station_identified,
     require_distinct_files,
 )
@@ -312,6 +313,7 @@ def verify_robot(
     progress("reading", 1.0)
     verification = verify(robot, poses, refit=refit, progress=progress)
     origin = provenance([robot_file, robot.nominal.urdf, *files], None, robot.stored, tuple(robot.blocks))
+    origin |= image_provenance(files)
     fitted = fitted_files(robot, files) or verification.fitted
     result = replace(verification, fitted=fitted, record=RunRecord(origin, command))
     if out is not None:

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Literal
 
 from flexcal.calibration.fit import LossName
-from flexcal.data.poses import column_labels, read_poses, tables_of
+from flexcal.data.poses import read_grouped_poses, read_poses, tables_of
 from flexcal.files.formats import provenance, read_estimates
 from flexcal.jobs.calibration.procedure import calibrate
 from flexcal.jobs.calibration.result import Calibration
-from flexcal.jobs.inputs import require_distinct_files
+from flexcal.jobs.inputs import image_provenance, require_distinct_files
 from flexcal.jobs.result_files import estimates_target
 from flexcal.model.robot import RobotModel, with_blocks
 from flexcal.progress import Progress, silent
@@ -49,8 +49,12 @@ def calibrate_robot(
     blocks = read_estimates(source, without="calibration") if source.exists() else {}
     target = estimates_target(source, out, "calibration")
     model = with_blocks(bare, blocks, source)
-    labels = None if hold_out is None else (hold_out, column_labels(files, hold_out))
-    poses = read_poses(list(files), model, further=() if hold_out is None else (hold_out,))
+    labels = None
+    if hold_out is None:
+        poses = read_poses(list(files), model)
+    else:
+        poses, groups = read_grouped_poses(files, model, hold_out)
+        labels = hold_out, groups
     progress("reading", 1.0)
     calibration = calibrate(
         model,
@@ -63,6 +67,7 @@ def calibrate_robot(
         progress=progress,
     )
     origin = provenance([robot_file, bare.urdf, *files], None, source if blocks else None, tuple(blocks))
+    origin |= image_provenance(files)
     estimate = replace(calibration.estimate, provenance=origin | dict(calibration.estimate.provenance))
     result = replace(
         calibration,

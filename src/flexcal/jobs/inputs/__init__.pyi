@@ -8,7 +8,7 @@ from .experiment_files import (
     read_responses,
     robot_file,
 )
-from .provenance import robot_provenance
+from .provenance import image_provenance, robot_provenance
 from .stored_model import (
     TARGETS,
     TARGETS_BETWEEN,
@@ -27,6 +27,7 @@ __all__ = [
     "CalibratedRobot",
     "common_plan",
     "example_robot",
+    "image_provenance",
     "is_station_identified",
     "measured_points",
     "plan_files",
