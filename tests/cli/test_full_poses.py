@@ -105,6 +105,21 @@ def test_orientations_make_the_orientation_of_the_tool_accurate(folder: Path) ->
     assert full["mean_deg"] <= alone["mean_deg"]
 
 
+def test_a_coupling_that_robot_yaml_lacks_is_found_in_full_poses(folder: Path) -> None:
+    """The fifth joint follows a tenth of the fourth; the orientations of the bad fit do no harm."""
+    rng = np.random.default_rng(8)
+    arm = Arm(rng)
+    measured = arm.measured
+    arm.measured = lambda q: measured(q + 0.1 * q[3] * np.eye(6)[4])  # type: ignore[method-assign]
+    model = RobotModel.from_yaml(folder / "robot.yaml")
+    found = calibrate(
+        model, read_poses(recorded(folder / "full.csv", arm, rng, 40), model), terms=["kinematic"]
+    )
+    assert found.coupling is not None
+    assert (found.coupling.joint, found.coupling.other) == (model.joint_names[4], model.joint_names[3])
+    assert found.coupling.ratio == pytest.approx(0.1, abs=0.01)
+
+
 def test_the_command_line_tells_the_orientations(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rng = np.random.default_rng(6)
     arm = Arm(rng)

@@ -66,11 +66,11 @@ def undeclared_coupling(nominal: RobotModel, fit: GeometricFit) -> Coupling | No
     """The ratio of a motor to a joint that explains most of a bad fit to points; None where the fit is good or no single one does.
 
     The best of all pairs to first order is tried, else the best with a ratio of ±1: with it, the geometry is fitted anew, and has to meet
-    the points three times as well.
+    the points three times as well. Orientations do not count, and views of a camera, which scatter by more than a bad fit, are not judged.
     """
-    poses = fit.poses
+    poses = fit.poses.without_orientations()
     small = _size(fit.residuals) < np.sqrt(3) * TOLERANCE["m"]
-    if small or poses.kind is not None or not poses.located.all():
+    if small or poses.kind is not None or poses.seen.any() or not poses.located.all():
         return None
     first = fit_geometry(nominal, poses, terms=("kinematic",), loss="squares")
     if 3 * len(poses) < len(first.identifiability.kept_names) + _LEAST:
