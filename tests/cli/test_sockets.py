@@ -208,6 +208,14 @@ def test_the_arms_of_delft(examples: Path, tmp_path: Path, capsys: pytest.Captur
     assert "of 45 parameters of the robot itself 25 combinations are seen, of which 2 are hidden" in said
     assert "from the axis of panda_joint7" in said and "moves the whole robot: panda_joint1.offset" in said
     assert "± 2.0 ‰" in said and found["places"]["disagree"] == []
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert (
+        "387 poses with a ball in sockets, at 6 places of the fixture" in page
+        and "Errors outside the fit" in page
+    )
+    for word in ("instruments", "measured point ", "flexcal verify", "instrument's frame", "no sigma"):
+        assert word not in page and word not in said, f"nothing that a ball in sockets has: {word}"
+    assert found["verdict"]["reasons"] == ["left_out", "groups_left_out"]
     assert held["mean_mm"] <= 0.17 and held["distance_mm"] <= 0.045
     assert set(held["groups"]["backleft"]) == {"poses", "mean_mm", "p90_mm", "max_mm", "distance_mm"}
     assert (
@@ -295,8 +303,11 @@ def test_what_is_wrong_is_named(
         ]
     )
     assert status == (0 if refusal is None else 2)
+    said = capsys.readouterr()
     if refusal is not None:
-        assert_refusal(capsys.readouterr().err, *refusal)
+        assert_refusal(said.err, *refusal)
+    else:
+        assert "Trusted: yes" in said.out and "no poses outside the fit" not in said.out
 
 
 def test_wrong_rows_and_places_are_named(seven: tuple[Path, Arm], tmp_path: Path) -> None:

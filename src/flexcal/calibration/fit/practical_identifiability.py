@@ -80,17 +80,17 @@ def _cause(at: PredictedMeasurements, name: str, partners: tuple[tuple[str, floa
         lever = float(np.linalg.norm(at.jacobian([f"{joint.name}.offset"])[: len(poses)], axis=1).max())
         if joint.kind == "revolute" and lever < _ON_AXIS * start.reach:
             return (
-                f"the measured point lies {lever / MILLIMETRE:.1f} mm from the axis of {joint.name}, whose errors are then hardly told "
-                "from its neighbours'"
+                f"the point {poses.target[0]} lies {lever / MILLIMETRE:.1f} mm from the axis of {joint.name}, whose errors are then hardly "
+                "told from its neighbours'"
             )
     shape = _shape(poses.position) if poses.located.all() else ""
     if shape:
         return shape
     with_ = " and ".join(partner for partner, _ in partners[:2])
     return (
-        f"it is not identifiable beside {with_} at the scatter of these points"
+        f"it is not identifiable beside {with_} at the scatter of these measurements"
         if with_
-        else "these points do not depend on it"
+        else "these measurements do not depend on it"
     )
 
 

@@ -23,7 +23,8 @@ MANY_POSES = 10 * FOLDS
 class TermSelection:
     """Result of the selection: `terms` supported by cross-validation, for a `model` that declares them, and every term `considered`.
 
-    `by` says what was left out: "poses" one by one, or "folds"; "nothing" where there are too few, as `remark` then says.
+    `by` says what was left out: "poses" one by one, "folds", or "places" of a fixture; "nothing"
+    where there are too few, as `remark` then says.
     """
 
     terms: tuple[str, ...]
@@ -42,7 +43,7 @@ class TermSelection:
 
 @dataclass(frozen=True)
 class CrossValidation:
-    """Cross-validated `mean` error (m): `by` "poses", left out one by one, or by "folds", the larger of both kinds.
+    """Cross-validated `mean` error (m): `by` "poses", left out one by one, "folds", the larger of both kinds, or "places" of a fixture.
 
     `freedom` is the number of parameters of the fit, the trace of its hat matrix.
     """
@@ -61,11 +62,11 @@ def cross_validated(fit: GeometricFit) -> CrossValidation | None:
     folds, distinct = folds_of(inside.poses)
     if distinct < LEAST_POSES:
         return None
-    many = distinct >= MANY_POSES
-    trials = TermTrials(inside, fit.model, fit.terms, folds, many=many)
+    by = left_out_by(inside.poses, distinct)
+    trials = TermTrials(inside, fit.model, fit.terms, folds, by=by)
     left = trials.fit(fit.terms)
     mean = max(float(left.distances[kind].mean()) for kind in trials.deciding)
-    return CrossValidation("folds" if many else "poses", mean, left.freedom)
+    return CrossValidation(by, mean, left.freedom)
 
 
 def folds_of(poses: PoseSet) -> tuple[tuple[np.ndarray, ...], int]:
@@ -80,6 +81,13 @@ def folds_of(poses: PoseSet) -> tuple[tuple[np.ndarray, ...], int]:
         order, workspace = np.where(held, place, order), np.where(held, place, workspace)
     folds = (order, workspace, alone)
     return folds, len(np.unique(alone))
+
+
+def left_out_by(poses: PoseSet, distinct: int) -> str:
+    """What decides: errors at "places" of a fixture, at "folds", or at single "poses" where few are `distinct`."""
+    if distinct < MANY_POSES:
+        return "poses"
+    return "places" if poses.in_socket.all() else "folds"
 
 
 def select_terms(
@@ -112,7 +120,8 @@ def select_terms(
     else:
         near = None if fitted is None else fitted.estimate.values
         rigid = fit_geometry(model, poses, terms=base, elastic=bool(model.elastic), near=near)
-    trials = TermTrials(rigid, open_terms.model, base, folds, many=distinct >= MANY_POSES)
+    by = left_out_by(poses, distinct)
+    trials = TermTrials(rigid, open_terms.model, base, folds, by=by)
     chosen, rows = base, [trials.start()]
     left: dict[str, TermComparison] = {}
 
@@ -138,7 +147,6 @@ def select_terms(
         grow([kind for kind in remaining if kind not in open_terms.single], 0.0)
     excluded = [not_tried(term, chosen, reason) for term, reason in open_terms.excluded]
     kept = open_terms.model if "backlash" in chosen else model
-    by = "folds" if distinct >= MANY_POSES else "poses"
     return TermSelection(chosen, kept, (*rows, *left.values(), *excluded), by, "")
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from flexcal.calibration.fit import LEAST_POSES, LEVELS, TOLERANCE, GeometricFit, fit_geometry
-from flexcal.calibration.term_selection.cross_validation import MANY_POSES, folds_of
+from flexcal.calibration.term_selection.cross_validation import folds_of, left_out_by
 from flexcal.calibration.term_selection.leave_out_errors import LeaveOutErrors
 from flexcal.calibration.term_selection.trials import TermTrials, mean_gain
 from flexcal.data.poses import PoseSet
@@ -94,7 +94,7 @@ def zeros_or_geometry(model: RobotModel, poses: PoseSet) -> ZerosOrGeometry | No
     levels = []
     for level in LEVELS:
         fit = fit_geometry(model, poses, terms=(level, *further), elastic=False)
-        trials = TermTrials(fit, fit.model, fit.terms, folds, many=distinct >= MANY_POSES)
+        trials = TermTrials(fit, fit.model, fit.terms, folds, by=left_out_by(poses, distinct))
         levels.append(LevelFit(level, fit, trials.determined(), trials.deciding))
     best = min(levels, key=lambda level: level.mean)
     answer = next(level for level in levels if _as_well(level, best, folds))

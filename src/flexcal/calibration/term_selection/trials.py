@@ -28,7 +28,8 @@ _LEAST_GAIN = 1e-12
 
 _TINY = 1e-24
 """Mean square, rad², of orientations that were fitted exactly."""
-_OUT = ("left out in measuring order", "left out in the workspace", "left out one by one")
+_OUT = ("poses left out in measuring order", "poses left out in the workspace", "poses left out one by one")
+_PLACES_OUT = "places of the fixture that are left out"
 
 
 @dataclass(frozen=True)
@@ -73,8 +74,8 @@ def mean_gain(fold: np.ndarray, old: np.ndarray, new: np.ndarray) -> tuple[float
 class TermTrials:
     """Linear fits of sets of terms about the fit of the `base` terms to all poses.
 
-    `model` declares the joints with backlash; `folds` (N,) are those in measuring order, in the workspace, and single poses. With
-    `many` the first two decide, otherwise the third.
+    `model` declares the joints with backlash; `folds` (N,) are those in measuring order, in the workspace, and single poses; `by` says
+    which decide: the first two ("folds", or "places", of which they are), or the third ("poses").
     """
 
     def __init__(
@@ -84,12 +85,13 @@ class TermTrials:
         base: tuple[str, ...],
         folds: tuple[np.ndarray, ...],
         *,
-        many: bool,
+        by: str,
     ) -> None:
         self.rigid = rigid
         self.model = replace(rigid.model, config=model.config)
         self.folds = folds
-        self.deciding = (0, 1) if many else (2,)
+        self.deciding = {"folds": (0, 1), "places": (0,), "poses": (2,)}[by]
+        self._out = [_PLACES_OUT if by == "places" else text for text in _OUT]
         self._columns: dict[str, np.ndarray] = {}
         self._fits: dict[tuple[str, ...], LeaveOutErrors] = {}
         self._base = base
@@ -108,9 +110,9 @@ class TermTrials:
         most = [fit.largest(self.deciding) for fit in (old, new)]
         taken = False
         if gains[poorest][0] <= 0:
-            reason = f"the mean error at poses {_OUT[poorest]} does not fall ({_change(old, new, [poorest])})"
+            reason = f"the mean error at {self._out[poorest]} does not fall ({_change(old, new, [poorest])})"
         elif gains[poorest][0] <= gains[poorest][1]:
-            reason = f"the mean error at poses {_OUT[poorest]} falls by less than the standard error ({_change(old, new, [poorest])})"
+            reason = f"the mean error at {self._out[poorest]} falls by less than the standard error ({_change(old, new, [poorest])})"
         elif bic >= -extra:
             reason = (
                 f"the BIC rises by {bic:.0f}"

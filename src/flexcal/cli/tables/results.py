@@ -57,13 +57,18 @@ def inclination_table(block: Mapping[str, Any]) -> Table:
     return table
 
 
-def uncalibrated_rows(document: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    """The three blocks `before` of a document as rows of `error_table`, dashes where one is not known."""
+def uncalibrated_rows(document: Mapping[str, Any], *, held: bool = False) -> dict[str, Mapping[str, Any]]:
+    """The blocks `before` of a document as rows of `error_table`, dashes where one is not known; `held`: of a ball in sockets."""
     labels = {
         "declared": "before, as declared",
         "registered": "before, best-fit registered",
         "own": "before, the robot's own: point found too",
     }
+    if held:
+        labels = {
+            "registered": "before, fixture placed by best fit",
+            "own": "before, the robot's own: ball found too",
+        }
     unknown = {"poses": NOTHING, "mean_mm": None, "p90_mm": None, "max_mm": None}
     return {label: document["before"][key] or unknown for key, label in labels.items()}
 

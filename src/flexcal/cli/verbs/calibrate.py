@@ -114,15 +114,16 @@ class Calibrate:
             )
         for line in considered_lines(document["term_selection"]):
             console.say(line)
-        errors = document["calibration"]
+        errors, poses = document["calibration"], calibration.selected.poses
+        located, held = poses.located, bool(poses.in_socket.all())
         terms = ("elastic, " if calibration.selected.model.elastic else "") + " + ".join(
             calibration.selected.terms
         )
         labels = {"rigid": "rigid", "selected": f"selected: {terms}"}
-        rows = uncalibrated_rows(document) | {label: errors[key] for key, label in labels.items()}
+        rows = uncalibrated_rows(document, held=held) | {label: errors[key] for key, label in labels.items()}
         rows |= {f"  of its {kind}": own for kind, own in errors["by_kind"].items()}
-        located = calibration.selected.poses.located
         read = "distance to the measured points" if located.all() else "difference from what was measured"
+        read = "distance of the ball from its socket" if held else read
         if len(calibration.selected.poses.pointed):
             console.show(error_table(read, rows, document["variances"]["robot_mm"]))
         if document["inclination"] is not None:
@@ -157,6 +158,8 @@ class Calibrate:
             else f"flexcal verify {self.robot} OTHER_POSES…{where}, on poses outside this fit "
             "(flexcal design poses --random plans some)"
             if located.any()
+            else f"{command_line()} --hold-out fixture, for errors at places of the fixture outside the fit"
+            if self.hold_out is None and len(poses.fixtures) > 1
             else f"{command_line()} --hold-out COLUMN, where a column tells recordings apart, for errors outside the fit"
             if self.hold_out is None
             else f"flexcal export urdf {self.robot}{where}"

@@ -383,7 +383,9 @@ def _noise(fit: GeometricFit) -> Sequence[str]:
     scatter = f"{robot:.{decimals(robot)}f} mm per coordinate"
     if instrument is None or stated is None:
         text = (
-            f"no sigma in the files: scatter of instrument and robot together about the fit is {scatter} (1σ)"
+            f"the ball in its socket and the robot together scatter by {scatter} about the fit (1σ)"
+            if fit.poses.in_socket.all()
+            else f"no sigma in the files: scatter of instrument and robot together about the fit is {scatter} (1σ)"
         )
         remarks.append(f"{text}, which is too large for noise" if residuals_implausible(fit) else text)
     elif instrument < _OVERSTATED * stated:

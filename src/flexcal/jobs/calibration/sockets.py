@@ -52,7 +52,8 @@ def base_remark(fit: GeometricFit) -> tuple[str, ...]:
     hidden = f", of which {held} are hidden by the scatter" if held else ""
     return (
         f"of {len(every) + len(lost)} parameters of the robot itself {len(kept)} combinations are seen{hidden}; where its base stands "
-        f"cannot be told, so nothing is claimed of what moves the whole robot: {', '.join(lost)}",
+        f"cannot be told, so nothing is claimed of what moves the whole robot: {', '.join(lost)}. Parameters station.PLACE.… are where "
+        "the fixture stood",
     )
 
 

@@ -26,13 +26,15 @@ from flexcal.units import LARGEST
 
 POINTS, ARM, LOADS = "points.csv", "arm.npz", "gravity_loads.npz"
 _MODELS = (DECLARED, NOMINAL, OWN, RIGID, CALIBRATED)
-_TEXTS = ("target", "station")
+_TEXTS = ("target", "station", "socket")
 
 
 def write_points(folder: Path, points: MeasuredPoints) -> None:
     """Write `points` to points.csv in `folder`, atomically; rad and m."""
     poses = points.poses
     columns: dict[str, np.ndarray] = {"pose": poses.pose, "target": poses.target, "station": poses.station}
+    if poses.socket is not None:
+        columns["socket"] = poses.socket
     columns |= {f"q{i + 1}": poses.q[:, i] for i in range(poses.q.shape[1])}
     columns |= _vectors("", poses.position)
     if poses.sigma_given:
@@ -83,6 +85,7 @@ def read_points(folder: Path, *, sigma: float) -> MeasuredPoints:
             station=table["station"].to_numpy(),
             temperature=column("temperature"),
             time=column("t"),
+            socket=table["socket"].fill_null("").to_numpy() if "socket" in table.columns else None,
             pose=table["pose"].to_numpy(),
             sigma_given=given,
         )

@@ -19,13 +19,13 @@ def check_places(places: Mapping[str, Any]) -> Check:
             f"No: the squared errors at {places['inconsistent']}, predicted from the others, are {worst['ratio']:.1f} times what these let "
             f"expect (p = {p_value(worst['p'])}). {said}."
         )
-        return Check(question, answer, "care")
+        return Check(question, answer, "care", "one_robot")
     if not places["judged"]:
         answer = f"Cannot be judged: with {len(errors)} places the one that is wrong cannot be told from the others. {said}."
-        return Check(question, answer, "unknown")
+        return Check(question, answer, "unknown", "places")
     disagree = places["disagree"]
     if not disagree:
-        return Check(question, f"{said}, and none stands out.", "good")
+        return Check(question, f"{said}, and none stands out.", "good", "places")
     suspects = list(dict.fromkeys(item["place"] for item in disagree))
     others = [error for name, error in errors.items() if name not in suspects]
     own = ", ".join(f"{name} {document_millimetres(errors[name])} mm" for name in suspects)
@@ -35,7 +35,7 @@ def check_places(places: Mapping[str, Any]) -> Check:
         f"No: {' and '.join(suspects)} {verb} with the others (p = {chance}). Predicted from these, the mean error is {own}, and "
         f"{_range(others)} mm at the others; the remarks say what differs."
     )
-    return Check(question, answer, "care")
+    return Check(question, answer, "care", "places")
 
 
 def _range(errors: Iterable[float]) -> str:

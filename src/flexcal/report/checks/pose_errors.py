@@ -11,6 +11,7 @@ from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.verification import PredictionErrors
 from flexcal.estimation import Estimate
 from flexcal.report.layout import Check, document_millimetres, millimetres, p_value
+from flexcal.units import MILLIMETRE
 
 CHANCE, MISSING = 1.35, 2.0
 """Ratio of observed to predicted errors exceeded by chance once in a hundred robots, and from which the model must lack something.
@@ -101,16 +102,24 @@ def check_claimed_uncertainty(prediction: Mapping[str, Any] | None) -> Check:
 
 
 def check_error_budget(
-    estimate: Estimate, variances: Mapping[str, float | None], *, is_implausible: bool
+    estimate: Estimate, variances: Mapping[str, float | None], *, is_implausible: bool, held: bool = False
 ) -> Check:
-    """Whether the residuals of the geometry are noise of instrument and robot; `variances` is that of results.json."""
-    question = "Are the residuals noise of instrument and robot?"
+    """Whether the residuals of the geometry are noise of instrument and robot; `variances` is that of results.json.
+
+    `held`: the noise is that of a ball held in sockets.
+    """
+    question = (
+        "Are the residuals noise of robot and ball?"
+        if held
+        else "Are the residuals noise of instrument and robot?"
+    )
     if estimate.status != "converged":
         return Check(question, f"The fit did not converge: {estimate.message}.", "bad")
     instrument, stated = variances["instrument_mm"], variances["stated_mm"]
     robot, model = (float(variances[key] or 0.0) for key in ("robot_mm", "model_mm"))
     said = "" if instrument is None else f"instrument {instrument:.3f}, "
     with_ = " (instrument included, because no sigma is stated)" if instrument is None else ""
+    with_ = " (play of the ball in its socket included)" if held else with_
     answer = (
         f"Standard deviation of a coordinate: {said}robot {robot:.3f}{with_}, model error {model:.3f} mm."
     )
@@ -207,25 +216,44 @@ def check_truth(covered: int, total: int) -> Check:
     return Check(question, answer, "good" if share >= 0.88 else "care" if share >= 0.75 else "bad")
 
 
-def check_left_out(mean: float, left_out: float | None, share: float) -> Check:
+_FRESH = "Measure fresh poses and run flexcal verify before relying on it."
+
+
+def check_left_out(mean: float, left_out: float | None, share: float, remedy: str = _FRESH) -> Check:
     """Whether the cross-validation error is as small as expected from that of the fit.
 
-    `mean` is the mean error (m) of the fit, `left_out` that of poses left out, `share` the number of parameters over that of measured
-    coordinates. A fit of p parameters to n values of variance σ² has residuals of variance σ² (1 − p/n) and
-    prediction errors of variance σ² (1 + p/n), to first order.
+    `mean` is the mean error (m) of the fit without its outliers, `left_out` that of poses left out, `share` the number of parameters over
+    that of measured coordinates. A fit of p parameters to n values of variance σ² has residuals of variance σ² (1 − p/n) and prediction
+    errors of variance σ² (1 + p/n), to first order. `remedy` is what to do where no pose was left out.
     """
     question = "Are poses left out of the fit predicted?"
     if left_out is None or share >= 1:
-        return Check(
-            question,
-            "Cannot be judged: no pose was left out. Measure fresh poses and run flexcal verify before relying on it.",
-            "unknown",
-        )
-    expected = float(np.sqrt((1 + share) / (1 - share))) * mean
-    answer = (
-        f"In cross-validation the mean error is {millimetres(left_out)} mm; expected from {millimetres(mean)} mm in the fit are "
-        f"{millimetres(expected)} mm."
+        return Check(question, f"Cannot be judged: no pose was left out. {remedy}", "unknown")
+    return _compared_with_fit(question, "In cross-validation the mean error is", left_out, mean, share)
+
+
+def check_held_out(held_out: Mapping[str, Any], mean: float, share: float) -> Check:
+    """Whether groups that were left out are predicted as well as expected; `held_out` is the block of results.json, the rest as in
+    `check_left_out`.
+    """
+    groups = held_out["groups"]
+    worst = max(groups, key=lambda name: groups[name]["mean_mm"])
+    found = (
+        f"With each of the {len(groups)} groups of equal '{held_out['by']}' left out in turn, the largest mean error at one is "
+        f"{document_millimetres(groups[worst]['mean_mm'])} mm ({worst}), and the mean of all"
     )
+    return _compared_with_fit(
+        "Are whole groups left out of the fit predicted?",
+        found,
+        held_out["mean_mm"] * MILLIMETRE,
+        mean,
+        share,
+    )
+
+
+def _compared_with_fit(question: str, found: str, left_out: float, mean: float, share: float) -> Check:
+    expected = float(np.sqrt((1 + share) / (1 - share))) * mean if share < 1 else mean
+    answer = f"{found} {millimetres(left_out)} mm; expected from {millimetres(mean)} mm in the fit are {millimetres(expected)} mm."
     if left_out > CHANCE * expected:
         return Check(
             question,
@@ -259,7 +287,7 @@ def check_outliers(outliers: int, fit: ErrorStatistics) -> Check:
     """Whether there are outliers: the number of `outliers` of a robust loss, or the largest error relative to P90."""
     question = "Are there outliers?"
     if outliers:
-        answer = f"{outliers} of {fit.poses} points have a weight below 0.2 in the robust loss; they are listed below."
+        answer = f"{outliers} of {fit.poses} measurements have a weight below 0.2 in the robust loss; they are listed below."
         return Check(question, answer, "good" if outliers <= 0.02 * fit.poses else "care")
     if fit.max > 4 * fit.p90:
         return Check(

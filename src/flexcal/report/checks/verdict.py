@@ -112,6 +112,10 @@ PHRASES: dict[str, dict[str, str]] = {
         "unknown": "no poses outside the fit were predicted",
         "else": "poses left out of the fit are predicted worse than expected",
     },
+    "groups_left_out": {
+        "good": "whole groups left out of the fit are predicted as accurately as expected",
+        "else": "whole groups left out of the fit are predicted worse than expected",
+    },
     "improvement": {
         "good": "the errors are smaller than before",
         "else": "the errors are not smaller than before",
@@ -162,6 +166,7 @@ PHRASES: dict[str, dict[str, str]] = {
         "unknown": "there are too few places of the fixture to compare",
         "else": "a place of the fixture disagrees with the others",
     },
+    "one_robot": {"else": "the places of the fixture are not consistent with one robot"},
     "springs": {
         "good": "all stiffnesses are determined",
         "else": "the data do not determine every stiffness",

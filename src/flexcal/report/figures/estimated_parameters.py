@@ -203,7 +203,9 @@ def correlation_map(names: Sequence[str], correlation: np.ndarray) -> go.Figure:
 
 
 def term_scores(rows: Sequence[TermComparison], by: str = "folds") -> go.Figure:
-    """Mean error (mm) on left-out poses by term: of whole "folds" in measuring order and in the workspace, or of single "poses"."""
+    """Mean error (mm) on left-out poses by term: of whole "folds" in measuring order and in the workspace, of single "poses", or of whole
+    "places" of a fixture.
+    """
     rows = [row for row in rows if np.isfinite(row.order)]
     labels = [term_label(row) for row in rows]
     figure = canvas(120 + 46 * len(labels))
@@ -213,6 +215,8 @@ def term_scores(rows: Sequence[TermComparison], by: str = "folds") -> go.Figure:
     }
     if by == "poses":
         series = {"left out one by one": ([row.single for row in rows], ELASTIC)}
+    elif by == "places":
+        series = {"left out by place of the fixture": ([row.order for row in rows], ELASTIC)}
     for name, (values, colour) in series.items():
         figure.add_trace(
             go.Bar(

@@ -148,18 +148,18 @@ def residual_trend(
     return figure
 
 
-def residual_workspace(poses: PoseSet, residuals: np.ndarray) -> go.Figure:
-    """Measured points in the instrument's frame, coloured by the distance (mm) of residuals (N, 3) m."""
+def residual_workspace(pose: np.ndarray, position: np.ndarray, residuals: np.ndarray) -> go.Figure:
+    """Points (N, 3) m of poses with numbers (N,), coloured by the distance (mm) of residuals (N, 3) m."""
     figure = canvas(560, legend=False)
     distance = np.linalg.norm(residuals, axis=1) / MILLIMETRE
     figure.add_trace(
         go.Scatter3d(
-            x=as_float32(poses.position[:, 0]),
-            y=as_float32(poses.position[:, 1]),
-            z=as_float32(poses.position[:, 2]),
+            x=as_float32(position[:, 0]),
+            y=as_float32(position[:, 1]),
+            z=as_float32(position[:, 2]),
             mode="markers",
             marker={
-                "size": 5 if len(poses) <= 300 else 3.5,
+                "size": 5 if len(pose) <= 300 else 3.5,
                 "color": as_float32(distance),
                 "cmin": 0,
                 "cmax": float(np.quantile(distance, 0.99)) if len(distance) else 1.0,
@@ -167,7 +167,7 @@ def residual_workspace(poses: PoseSet, residuals: np.ndarray) -> go.Figure:
                 "line": {"width": 0.5, "color": AXIS},
                 "colorbar": {"title": {"text": "error / mm", "side": "top"}, "thickness": 12, "len": 0.6, "x": 1, "xanchor": "right"},
             },
-            text=[f"pose {k}: {d:.3f} mm" for k, d in zip(poses.pose, distance, strict=True)],
+            text=[f"pose {k}: {d:.3f} mm" for k, d in zip(pose, distance, strict=True)],
             hovertemplate="%{text}<extra></extra>",
         )
     )  # fmt: skip

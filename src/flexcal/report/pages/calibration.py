@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from flexcal.calibration.diagnostics import GravityLoads
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.term_selection import considered_terms
@@ -16,6 +18,7 @@ from flexcal.report.checks import (
     check_bearings,
     check_drift,
     check_error_budget,
+    check_held_out,
     check_left_out,
     check_misfit,
     check_outliers,
@@ -31,6 +34,7 @@ from flexcal.report.layout import (
     Table,
     Text,
     Verdict,
+    document_millimetres,
     millimetres,
     ratio,
     sentences,
@@ -39,12 +43,13 @@ from flexcal.report.layout import (
 from flexcal.report.pages.two_stage import HEADLINES
 from flexcal.report.results import IdentifiableParameters
 from flexcal.report.sections import (
-    BEFORE_NOTE,
+    MeasuredWords,
     arm_figure,
     budget_table,
     error_figures,
     error_range,
     headline_facts,
+    held_out_section,
     identifiability_blocks,
     noise_tables,
     orientation_tables,
@@ -86,18 +91,26 @@ def calibration_page(study: CalibrationStudy) -> Page:
     """The page before it becomes HTML."""
     results, points = study.results, study.points
     sections, considered = [_accuracy_section(study)], considered_terms(results)
+    if results["held_out"] is not None:
+        sections.append(held_out_section(results["held_out"]))
     kept = tuple(results["identifiability"]["selected"]["kept"])
+    held = _held(points)
     if considered:
         sections.append(terms_section(considered, results["term_selection_by"]))
     sections += [
         residuals_section(
-            results["joints"], points.poses, points.calibrated, study.estimate.outliers, study.loads
+            results["joints"],
+            points.poses,
+            points.calibrated,
+            study.estimate.outliers,
+            study.loads,
+            study.arms if held else None,
         ),
         *(() if study.tilts is None else (tilts_section(results["joints"], study.tilts),)),
         Section(
             "geometry",
             "Parameters",
-            "Parameters that the measured points do not determine keep their nominal values; the parameters that absorb them are named "
+            "Parameters that the measurements do not determine keep their nominal values; the parameters that absorb them are named "
             "beside them.",
             (
                 *identifiability_blocks(determined(results), None),
@@ -108,10 +121,12 @@ def calibration_page(study: CalibrationStudy) -> Page:
         provenance_section(results["command"], None, {}, study.estimate.provenance),
     ]
     stations = len(points.poses.stations)
+    where = f" of {stations} stations or instruments" if stations > 1 else ""
+    if held:
+        where = f" with a ball in sockets, at {stations} place{'s' * (stations > 1)} of the fixture"
     return Page(
         title=f"{results['robot']}: calibration report",
-        subtitle=f"Calibration on {len(points.poses)} measurements"
-        + (f" of {stations} stations or instruments" if stations > 1 else "")
+        subtitle=f"Calibration on {len(points.poses)} {'poses' if held else 'measurements'}{where}"
         + f" · terms: {', '.join(term.replace('_', ' ') for term in results['terms'])}",
         verdict=calibration_verdict(study),
         sections=sections,
@@ -123,7 +138,7 @@ def calibration_verdict(study: CalibrationStudy) -> Verdict:
     """Accuracy before and after calibration at the measured poses, and the verdict."""
     before, after = study.points.before, study.points.statistics(CALIBRATED)
     checks = calibration_checks(study.results, study.estimate, study.points)
-    trust = Trust(checks)
+    trust, words = Trust(checks), MeasuredWords.of(study.points.poses)
     ranges = uncalibrated_ranges(study.points)
     if RIGID in study.points.errors:
         ranges.append(error_range("rigid geometry", study.points.statistics(RIGID), "rigid"))
@@ -131,24 +146,39 @@ def calibration_verdict(study: CalibrationStudy) -> Verdict:
     return Verdict(
         trust.status,
         HEADLINES[trust.status],
-        f"{_was(before)}At the same {after.poses} points the calibrated model has a P90 of {millimetres(after.p90)} mm and a "
-        f"maximum of {millimetres(after.max)} mm{_better(before, after)}.",
-        headline_facts(before, after, trust, "points of the fit"),
+        f"{_was(before, words)}At the same {after.poses} {words.rows} the calibrated model has a P90 of {millimetres(after.p90)} mm and a "
+        f"maximum of {millimetres(after.max)} mm{_better(before, after)}.{_outside(study.results)}",
+        headline_facts(before, after, trust, f"{words.rows} of the fit"),
         tuple(ranges),
         f"Differences of the {after.poses} measurements from the robot",
         checks,
     )
 
 
-def _was(before: ErrorStatistics | None) -> str:
+def _held(points: MeasuredPoints) -> bool:
+    """Whether every measurement is of a ball in a socket."""
+    return bool(points.poses.in_socket.all())
+
+
+def _was(before: ErrorStatistics | None, words: MeasuredWords) -> str:
     if before is None:
         return ""
     largest = f"{millimetres(before.max)} mm"
-    return f"Before, with instrument and measured point registered by best fit, the robot's own error was up to {largest}. "
+    return f"Before, {words.placed}, the robot's own error was up to {largest}. "
 
 
 def _better(before: ErrorStatistics | None, after: ErrorStatistics) -> str:
     return "" if before is None else f": {ratio(before.p90, after.p90)} better"
+
+
+def _outside(results: Mapping[str, Any]) -> str:
+    held_out = results["held_out"]
+    if held_out is None:
+        return ""
+    return (
+        f" With each {held_out['by']} left out in turn, the mean error at those outside the fit is "
+        f"{document_millimetres(held_out['mean_mm'])} mm."
+    )
 
 
 def calibration_checks(
@@ -158,16 +188,31 @@ def calibration_checks(
     identifiable, errors = determined(results), points.statistics(CALIBRATED)
     validated = results["cross_validation"]
     left_out = None if validated is None else validated["mean_mm"] * MILLIMETRE
-    share = 1.0 if validated is None else validated["parameters"] / (3 * errors.poses)
+    share = (identifiable.rank if validated is None else validated["parameters"]) / (3 * errors.poses)
+    groups, held = results["held_out"], _held(points)
+    remedy = "Run it with --hold-out COLUMN" + (
+        "." if held else ", or measure fresh poses and run flexcal verify, before relying on it."
+    )
+    inside = np.setdiff1d(np.arange(errors.poses), list(estimate.outliers))
+    good = ErrorStatistics.of(points.calibrated[inside]).mean if len(inside) else errors.mean
     return (
-        check_left_out(errors.mean, left_out, share).named("left_out", independent=True),
+        *(
+            [check_left_out(good, left_out, share, remedy).named("left_out", independent=True)]
+            if groups is None or left_out is not None
+            else []
+        ),
+        *(
+            []
+            if groups is None
+            else [check_held_out(groups, errors.mean, share).named("groups_left_out", independent=True)]
+        ),
         check_error_budget(
-            estimate, results["variances"], is_implausible=results["fit"]["is_implausible"]
+            estimate, results["variances"], is_implausible=results["fit"]["is_implausible"], held=held
         ).named("residual"),
         check_rank(identifiable.parameters, identifiable.rank, identifiable.gap).named("rank"),
         *([] if results["drift"] is None else [check_drift(results["drift"]).named("drift")]),
         check_outliers(len(estimate.outliers), errors).named("outliers"),
-        *([] if results.get("places") is None else [check_places(results["places"]).named("places")]),
+        *([] if results.get("places") is None else [check_places(results["places"])]),
         *check_bearings(results.get("bearings")),
         *_stage_one_checks(results.get("stage1")),
     )
@@ -180,6 +225,7 @@ def _stage_one_checks(stage_one: Mapping[str, Any] | None) -> tuple[Check, ...]:
 
 def _accuracy_section(study: CalibrationStudy) -> Section:
     points, seen = study.points, study.results["identifiability"]
+    words, held = MeasuredWords.of(points.poses), _held(points)
     ranks = {RIGID: str(seen["rank"]), CALIBRATED: str(seen["selected"]["rank"])}
     rows = [(*row, NOTHING) for row in uncalibrated_rows(points)]
     for model, label in _LABELS.items():
@@ -194,25 +240,29 @@ def _accuracy_section(study: CalibrationStudy) -> Section:
     table = Table(
         "table-accuracy",
         "Errors at the measured poses",
-        ("model", "points", "mean / mm", "P90 / mm", "max / mm", "determined parameters"),
+        ("model", words.rows, "mean / mm", "P90 / mm", "max / mm", "determined parameters"),
         tuple(rows),
-        note=BEFORE_NOTE,
+        note=words.note,
         strong=(len(rows) - 1 - len(kinds),),
     )
     remarks, before = study.results["remarks"], points.delivered
     return Section(
         "accuracy",
         "Before and after",
-        "Differences between what was measured and what is predicted; of points, their distances. These are the poses of the fit; "
-        "measure others "
-        "and run flexcal verify.",
+        (
+            f"{words.distance}. These are the poses of the fit; errors outside it are in a section of their own"
+            + ("." if study.results["held_out"] is not None else " after a run with --hold-out COLUMN.")
+            if held
+            else "Differences between what was measured and what is predicted; of points, their distances. These are the poses of the fit; "
+            "measure others and run flexcal verify."
+        ),
         (
             table,
             *orientation_tables(study.results.get("orientation")),
             *([Text((), "Remarks", sentences(remarks))] if remarks else []),
-            budget_table(study.results["variances"]),
+            budget_table(study.results["variances"], "ball in its socket" if held else "instrument"),
             *noise_tables(study.results["fit"].get("stated_noise", ())),
-            arm_figure(study.arms, len(points.poses)),
+            arm_figure(study.arms, points.poses),
             *(() if before is None else error_figures(points.poses, before, points.calibrated)),
         ),
     )

@@ -24,7 +24,7 @@ from flexcal.report.layout import (
 )
 from flexcal.report.pages.certificate import error_strip
 from flexcal.report.results import MeasurementDetails
-from flexcal.report.sections import BEFORE
+from flexcal.report.sections import MeasuredWords
 
 _MARKS = {"good": "✓", "care": "!", "bad": "✗", "unknown": "?"}
 _FILES = 8
@@ -64,7 +64,9 @@ def customer_html(study: CustomerStudy) -> str:
             results=study.results,
             particulars=study.particulars.rows(),
             conditions=_conditions(study),
-            noun="verification points, outside the fit" if study.verified else "points of the fit",
+            noun="verification points, outside the fit"
+            if study.verified
+            else f"{MeasuredWords.of(study.points.poses).rows} of the fit",
             before=study.points.before and millimetres(study.points.before.p90),
             after=millimetres(after.p90),
             rows=accuracy_rows(study.points),
@@ -86,7 +88,7 @@ def customer_html(study: CustomerStudy) -> str:
 
 def accuracy_rows(points: MeasuredPoints) -> list[tuple[str, str, str, str]]:
     """Label, mean, P90 and maximum in mm, before and after."""
-    labels = {**BEFORE, CALIBRATED: "after calibration"}
+    labels = {**MeasuredWords.of(points.poses).before, CALIBRATED: "after calibration"}
     return [
         (label, *statistics_cells(points.statistics(model)))
         for model, label in labels.items()
@@ -112,9 +114,15 @@ def uncertainty_rows(results: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 def _conditions(study: CustomerStudy) -> list[tuple[str, str]]:
     poses = study.points.poses
-    rows = [("measured points", f"{len(poses)} ({', '.join(poses.targets)})")]
+    held = poses.in_socket.all()
+    rows = [
+        (
+            "poses with the ball in a socket" if held else "measured points",
+            f"{len(poses)} ({', '.join(poses.targets)})",
+        )
+    ]
     if len(poses.stations) > 1:
-        rows.append(("instrument stations", str(len(poses.stations))))
+        rows.append(("places of the fixture" if held else "instrument stations", str(len(poses.stations))))
     if poses.payload is not None:
         masses = sorted(set(np.unique(poses.payload.round(3)).tolist()))
         rows.append(("payload", ", ".join(f"{significant(mass, 4)} kg" for mass in masses)))

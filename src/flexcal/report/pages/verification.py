@@ -35,7 +35,7 @@ from flexcal.report.layout import (
     statistics_cells,
 )
 from flexcal.report.sections import (
-    BEFORE_NOTE,
+    MeasuredWords,
     arm_figure,
     error_range,
     headline_facts,
@@ -163,11 +163,11 @@ def _errors_section(study: VerificationStudy) -> Section:
             "Distances",
             ("model", "points", "mean / mm", "P90 / mm", "max / mm"),
             tuple(rows),
-            note=BEFORE_NOTE,
+            note=MeasuredWords.of(study.points.poses).note,
         ),
         *orientation_tables(study.results.get("orientation")),
         *([Text((), "Remarks", sentences(remarks))] if remarks else []),
-        arm_figure(study.arms, len(poses)),
+        arm_figure(study.arms, poses),
         FigureBlock(
             "figure-errors",
             "Error at every point",

@@ -3,9 +3,11 @@ from .first_screen import error_range, headline_facts
 from .friction import friction_section
 from .geometry import arm_figure, error_figures, geometry_section
 from .headline_numbers import comparison_section
+from .held_out import held_out_section
 from .identifiability import identifiability_blocks
 from .learned_residual import learned_section
 from .link_inertials import link_inertials_section
+from .measured_words import MeasuredWords
 from .orientations import orientation_tables
 from .parameters import coverage, parameter_figures, parameter_table
 from .provenance import common_origin, input_files, provenance_section
@@ -17,13 +19,12 @@ from .springs import hardening_sentence, spring_table, unseen_springs
 from .stiffness import response_blocks, stiffness_section
 from .tilts import tilts_section
 from .torques import recording_labels, torque_blocks
-from .uncalibrated import BEFORE, BEFORE_NOTE, uncalibrated_ranges, uncalibrated_rows, uncalibrated_table
+from .uncalibrated import uncalibrated_ranges, uncalibrated_rows, uncalibrated_table
 from .uncertainty_budget import budget_table, noise_tables
 from .verification import verification_section
 
 __all__ = [
-    "BEFORE",
-    "BEFORE_NOTE",
+    "MeasuredWords",
     "arm_figure",
     "base_parameters_section",
     "budget_table",
@@ -36,6 +37,7 @@ __all__ = [
     "geometry_section",
     "hardening_sentence",
     "headline_facts",
+    "held_out_section",
     "identifiability_blocks",
     "input_files",
     "learned_section",

@@ -10,6 +10,7 @@ from flexcal.report.figures import arm_poses, calibration_errors, error_componen
 from flexcal.report.layout import FigureBlock, Section, Selector, Slider, millimetres
 from flexcal.report.results import TwoStageStudy
 from flexcal.report.sections.identifiability import identifiability_blocks
+from flexcal.report.sections.measured_words import MeasuredWords
 from flexcal.report.sections.parameters import parameter_table
 from flexcal.report.sections.uncertainty_budget import budget_table
 
@@ -34,7 +35,7 @@ def geometry_section(study: TwoStageStudy) -> Section:
         f"computed for each pose; the remaining errors are geometric: axes that are not parallel, link lengths, joint offsets and "
         f"backlash.",
         (
-            arm_figure(study.arms, len(poses)),
+            arm_figure(study.arms, poses),
             *([] if before is None else [error_figure(poses, before, after)]),
             component_figure(poses, after),
             budget_table(study.results["variances"]),
@@ -44,12 +45,13 @@ def geometry_section(study: TwoStageStudy) -> Section:
     )
 
 
-def arm_figure(arms: ArmPoses, total: int) -> FigureBlock:
-    """Fig. 10; `total` points were measured, and `arms` shows some or all of them."""
+def arm_figure(arms: ArmPoses, poses: PoseSet) -> FigureBlock:
+    """Fig. 10; `arms` shows some or all of the measured `poses`."""
+    total, words = len(poses), MeasuredWords.of(poses)
     labels = {model: words for model, words in _ARROWS.items() if model in arms.errors}
     length = min(_ARROW_LENGTH, _OVER_SPACING * _spacing(arms.tip))
     factors = {model: exaggeration(arms.errors[model], length) for model in labels}
-    some = "" if len(arms.pose) == total else f"{len(arms.pose)} of the {total} points, evenly chosen. "
+    some = "" if len(arms.pose) == total else f"{len(arms.pose)} of the {total} {words.rows}, evenly chosen. "
     drawn = f"in {len(arms.corners)} poses" if len(arms.corners) < len(arms.pose) else "in every pose"
     largest = ", ".join(
         f"{millimetres(float(np.linalg.norm(arms.errors[model], axis=1).max()))} mm {words}"
@@ -57,11 +59,10 @@ def arm_figure(arms: ArmPoses, total: int) -> FigureBlock:
     )
     return FigureBlock(
         "figure-10",
-        f"Arm and error vectors of the {total} measured points",
+        f"Arm and error vectors of the {total} measured {words.rows}",
         arm_poses(arms, labels, factors),
         f"{some}The links in {len(arms.surface)} poses, and lines from joint to joint {drawn}. Drag to rotate, Ctrl and the wheel to "
-        f"zoom. Arrows point from the predicted to the measured point, "
-        f"exaggerated as chosen above; the longest is {largest}.",
+        f"zoom. Arrows point {words.arrow}, exaggerated as chosen above; the longest is {largest}.",
         f"Three-dimensional drawing of the arm {drawn} with exaggerated error arrows; the longest is {largest}.",
         (Selector("Error arrows", "arrows", tuple(labels.values())),),
         Slider("Exaggeration", "arrows", _FACTORS, {labels[model]: factors[model] for model in labels}),
@@ -75,7 +76,7 @@ def error_figure(poses: PoseSet, before: np.ndarray, after: np.ndarray) -> Figur
         "figure-11",
         "Error at the calibration poses, before and after",
         calibration_errors(poses, before, after),
-        "Distance between measured and predicted point. The scale is logarithmic: one step of the grid is about a factor of two. These "
+        f"{MeasuredWords.of(poses).distance}. The scale is logarithmic: one step of the grid is about a factor of two. These "
         "poses were used for the fit, so this is not yet the accuracy to expect elsewhere.",
         f"Error of each of {len(poses)} poses before (the robot's own), up to {was} mm, and calibrated, up to {now} mm.",
     )
@@ -90,7 +91,8 @@ def error_figures(poses: PoseSet, before: np.ndarray, after: np.ndarray) -> tupl
             "figure-histogram",
             "Histogram of the errors, before and after",
             error_histogram({NOMINAL: before, CALIBRATED: after}),
-            "Share of the points in each range of distance; ranges are equally wide on the logarithmic scale. Dotted lines: medians.",
+            f"Share of the {MeasuredWords.of(poses).rows} in each range of distance; ranges are equally wide on the logarithmic scale. "
+            "Dotted lines: medians.",
             f"Two histograms of distances; the median is {was} mm before and {now} mm after.",
         ),
     )

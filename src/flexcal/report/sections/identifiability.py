@@ -21,7 +21,7 @@ def identifiability_blocks(
     """The gap, the dropped parameters and the weakest directions that were kept."""
     dropped = identifiable.parameters - identifiable.rank
     words = (
-        f"Of {identifiable.parameters} geometric parameters, the measured points determine {identifiable.rank} combinations. The other "
+        f"Of {identifiable.parameters} geometric parameters, the measurements determine {identifiable.rank} combinations. The other "
         f"{dropped} would move the tool exactly as some of the kept ones do: a longer first link and a higher base, for example, are not "
         "separately identifiable. They keep their nominal values and are absorbed by the kept ones, which does not affect predictions."
     )
@@ -61,7 +61,9 @@ def dropped_table(dropped: Sequence[Dropped]) -> Table:
         more = len(absorbed) - len(terms)
         if more > 0:
             terms.append(f"and {more} more")
-        rows.append((item.name, "; ".join(terms) if terms else "nothing: the points do not depend on it"))
+        rows.append(
+            (item.name, "; ".join(terms) if terms else "nothing: the measurements do not depend on it")
+        )
     return Table(
         "table-dropped",
         f"The {len(rows)} dropped parameters, and what absorbed each",

@@ -16,17 +16,13 @@ def terms_section(considered: Sequence[TermComparison], by: str) -> Section:
     """Every term that was considered, as a table, and what the terms gain, as a figure; `by` says what was left out."""
     rows = []
     for row in considered:
-        errors = (row.single,) if by == "poses" else (row.order, row.workspace)
+        errors = {"poses": (row.single,), "places": (row.order,)}.get(by, (row.order, row.workspace))
         bic = f"{row.bic:+.0f}".replace("-", "−") if row.term and np.isfinite(row.bic) else NOTHING
         verdict = "" if row.term is None else f"{'taken' if row.taken else 'left'}: {row.reason}"
         rows.append(
             (term_label(row).removeprefix("left: "), *(_millimetres(e) for e in errors), bic, verdict)
         )
-    out = (
-        ("left out one by one / mm",)
-        if by == "poses"
-        else ("left out by order / mm", "left out by place / mm")
-    )
+    out = _LEFT_OUT[by][0]
     shown = [row for row in considered if row.taken or row.term is None or "." not in row.term]
     return Section(
         "terms",
@@ -34,14 +30,9 @@ def terms_section(considered: Sequence[TermComparison], by: str) -> Section:
         "Compliance under gravity (of joints about their axes, and lateral, which tilts the axes), backlash and transmission errors are "
         "added one by one. A term is taken where it lowers the mean error at poses left out of the fit by more than its standard error, "
         "lowers the Bayesian information criterion (BIC) and does not raise the largest error at a left-out pose. "
-        + (
-            "Poses are few, so they are left out one by one."
-            if by == "poses"
-            else "Neighbours in time and neighbours in space are left out together: left out at random, a pose would have near twins in "
-            "the fit, and every term would be flattered."
-        )
+        + _LEFT_OUT[by][1]
         + " Transmission errors, taken here or not, are random effects of the calibration: waves in the position of every revolute joint, "
-        "with one variance that is estimated from the points.",
+        "with one variance that is estimated from the residuals.",
         (
             Table(
                 "table-terms",
@@ -60,6 +51,21 @@ def terms_section(considered: Sequence[TermComparison], by: str) -> Section:
             ),
         ),
     )
+
+
+_LEFT_OUT = {
+    "poses": (("left out one by one / mm",), "Poses are few, so they are left out one by one."),
+    "places": (
+        ("left out by place / mm",),
+        "Each place of the fixture is left out with all its poses: the rest of them would tell where it stands.",
+    ),
+    "folds": (
+        ("left out by order / mm", "left out by place / mm"),
+        "Neighbours in time and neighbours in space are left out together: left out at random, a pose would have near twins in the fit, "
+        "and every term would be flattered.",
+    ),
+}
+"""Headings and a sentence by what was left out."""
 
 
 def _millimetres(value: float) -> str:

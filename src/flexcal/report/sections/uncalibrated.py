@@ -5,27 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from flexcal.calibration.verification import DECLARED, NOMINAL, OWN, MeasuredPoints
+from flexcal.calibration.verification import DECLARED, NOMINAL, MeasuredPoints
 from flexcal.report.layout import ErrorRange, Table, document_millimetres, statistics_cells
 from flexcal.report.sections.first_screen import error_range
-
-BEFORE = {
-    DECLARED: "before, as declared",
-    NOMINAL: "before, best-fit registered",
-    OWN: "before, the robot's own (registered, point found too)",
-}
-
-BEFORE_NOTE = (
-    "As declared: with the measured point where robot.yaml says, in the declared frame; a dash where the instrument measures in a frame of "
-    "its own. Best-fit registered: with the instrument's frame fitted (6 parameters a station). The robot's own: with the place of the "
-    "measured point on the tool fitted too (3 a point), because an error of its declared place is not one of the robot."
-)
+from flexcal.report.sections.measured_words import POINTS, MeasuredWords
 
 
 def uncalibrated_rows(points: MeasuredPoints) -> list[tuple[str, ...]]:
     """Label, number of points, mean, P90 and maximum in mm of all three; dashes where one is not known."""
     rows = []
-    for model, label in BEFORE.items():
+    for model, label in MeasuredWords.of(points.poses).before.items():
         statistics = points.statistics(model) if model in points.errors else None
         count = str(len(points.poses)) if statistics else ""
         rows.append((label, count, *statistics_cells(statistics)))
@@ -34,7 +23,7 @@ def uncalibrated_rows(points: MeasuredPoints) -> list[tuple[str, ...]]:
 
 def uncalibrated_table(before: Mapping[str, Mapping[str, Any] | None]) -> Table:
     """The block `before` of a document as a table."""
-    labels = dict(zip(("declared", "registered", "own"), BEFORE.values(), strict=True))
+    labels = {"registered" if name == NOMINAL else name: label for name, label in POINTS.before.items()}
     rows = []
     for name, label in labels.items():
         block = before[name] or {}
@@ -46,15 +35,14 @@ def uncalibrated_table(before: Mapping[str, Mapping[str, Any] | None]) -> Table:
         "Errors at the verification poses before calibration",
         columns,
         tuple(rows),
-        note=BEFORE_NOTE,
+        note=POINTS.note,
     )
 
 
 def uncalibrated_ranges(points: MeasuredPoints) -> list[ErrorRange]:
     """The error range of the best-fit registered robot, and that of the robot's own error, as far as they are known."""
-    labels = {NOMINAL: "best-fit registered", OWN: "the robot's own"}
     return [
-        error_range(f"before, {label}", points.statistics(model), "nominal")
-        for model, label in labels.items()
-        if model in points.errors
+        error_range(label.partition(" (")[0], points.statistics(model), "nominal")
+        for model, label in MeasuredWords.of(points.poses).before.items()
+        if model in points.errors and model != DECLARED
     ]

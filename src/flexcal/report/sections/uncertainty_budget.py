@@ -43,7 +43,7 @@ def noise_tables(stated_noise: Sequence[Mapping[str, Any]]) -> tuple[Table, ...]
     )
 
 
-def budget_table(variances: Mapping[str, float | None]) -> Table:
+def budget_table(variances: Mapping[str, float | None], instrument_name: str = "instrument") -> Table:
     """The three standard deviations of a coordinate and their sum; `variances` is that of results.json."""
     instrument, robot, model = (variances[key] for key in ("instrument_mm", "robot_mm", "model_mm"))
     whole = float(np.sqrt(sum((value or 0.0) ** 2 for value in (instrument, robot, model))))
@@ -54,7 +54,7 @@ def budget_table(variances: Mapping[str, float | None]) -> Table:
     stated = variances["stated_mm"]
     said = "not stated: in the robot's" if stated is None else f"stated as {document_millimetres(stated)} mm"
     rows = (
-        (f"instrument ({said})", document_millimetres(instrument), share(instrument)),
+        (f"{instrument_name} ({said})", document_millimetres(instrument), share(instrument)),
         ("robot: repeatability", document_millimetres(robot), share(robot)),
         ("model: systematic errors common to neighbouring poses", document_millimetres(model), share(model)),
         ("sum of the variances", document_millimetres(whole), share(whole)),
@@ -71,5 +71,5 @@ def budget_table(variances: Mapping[str, float | None]) -> Table:
         ("source", "1σ / mm", "share of the variance"),
         rows,
         strong=(len(rows) - 1 - len(other),),
-        note="Estimated from the points by restricted maximum likelihood. Intervals and predictions include all three.",
+        note="Estimated from the residuals by restricted maximum likelihood. Intervals and predictions include all three.",
     )

@@ -19,7 +19,7 @@ from flexcal.report.layout import (
 )
 from flexcal.report.layout import RIGID as RIGID_COLOUR
 from flexcal.report.results import TwoStageStudy
-from flexcal.report.sections.uncalibrated import BEFORE
+from flexcal.report.sections.measured_words import POINTS
 
 
 def verification_section(study: TwoStageStudy) -> Section:
@@ -89,7 +89,9 @@ def accuracy_table(study: TwoStageStudy) -> Table:
         return (label, str(s.poses), *statistics_cells(s), reference)
 
     fresh = study.fresh
-    rows = [row(label, fresh.statistics(model)) for model, label in BEFORE.items() if model in fresh.errors]
+    rows = [
+        row(label, fresh.statistics(model)) for model, label in POINTS.before.items() if model in fresh.errors
+    ]
     rows += [row(f"rigid calibration, {fit.poses} poses, rank {fit.rank}", fit.errors) for fit in study.rigid]
     elastic = study.verification
     strong = len(rows)
