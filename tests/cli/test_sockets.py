@@ -204,7 +204,13 @@ def test_the_arms_of_delft(examples: Path, tmp_path: Path, capsys: pytest.Captur
     found = json.loads((tmp_path / "out" / "results.json").read_text())
     held = found["held_out"]
     assert held["by"] == "fixture" and len(held["groups"]) == 6
-    assert found["scale"] == {"relative_std": pytest.approx(2e-3), "distance_mm": 50.0, "std_mm": 0.1}
+    assert found["scale"] == {
+        "fixture": "fixture",
+        "relative_std": pytest.approx(2e-3),
+        "distance_mm": 50.0,
+        "std_mm": 0.1,
+        "others": {},
+    }
     assert "of 45 parameters of the robot itself 25 combinations are seen, of which 2 are hidden" in said
     assert "from the axis of panda_joint7" in said and "moves the whole robot: panda_joint1.offset" in said
     assert "± 2.0 ‰" in said and found["places"]["disagree"] == []
@@ -308,6 +314,73 @@ def test_what_is_wrong_is_named(
         assert_refusal(said.err, *refusal)
     else:
         assert "Trusted: yes" in said.out and "no poses outside the fit" not in said.out
+
+
+@pytest.fixture
+def two(seven: tuple[Path, Arm], tmp_path: Path) -> Path:
+    """Three places each of a fixture with 50 mm, printed 3 per mille too long, and of a bar with 200 mm."""
+    folder, arm = seven
+    shutil.copy(folder / "seven.urdf", tmp_path)
+    (tmp_path / "robot.yaml").write_text(
+        "robot: seven.urdf\npoints: {ball: {frame: ball, xyz: [0, 0, 0]}}\nmeasurements:\n"
+        "  small: {kind: sockets, sockets: {a: [0, 0, 0], b: [0, 0.05, 0]}, std: 1.5e-4}\n"
+        "  bar: {kind: sockets, sockets: {a: [0, 0, 0], c: [0.2, 0, 0]}, std: 1.0e-4}\n"
+    )
+    rng, rows = (
+        np.random.default_rng(77),
+        ["fixture,sockets,socket," + ",".join(f"q{k + 1}" for k in range(7))],
+    )
+    for k in range(6):
+        name, other, distance = ("small", "b", 0.05015) if k % 2 else ("bar", "c", 0.2)
+        at = np.array([0.45, 0.4 * (k / 5 - 0.5), 0.15]) + 0.1 * rng.normal(size=3)
+        across = rng.normal(size=3) * [1, 1, 0.1]
+        for socket, place in (("a", at), (other, at + distance * across / np.linalg.norm(across))):
+            for _ in range(14):
+                q = arm.held_at(place, rng) + 5e-5 * rng.normal(size=7)
+                rows.append(f"place{k},{name},{socket}," + ",".join(map(repr, q.tolist())))
+    (tmp_path / "held.csv").write_text("\n".join(rows) + "\n")
+    return tmp_path
+
+
+def test_two_fixtures_have_a_distance_and_a_tolerance_each(seven: tuple[Path, Arm], two: Path) -> None:
+    """The robot has its size from the bar, known to 0.5 per mille, and the small fixture is found to be 3 per mille too long."""
+    model = RobotModel.from_yaml(two / "robot.yaml")
+    result = calibrate(model, read_poses(two / "held.csv", model), terms=["kinematic"])
+    q = np.random.default_rng(3).uniform(-1.6, 1.6, (300, 7))
+    truth = np.array([seven[1].ball(row) for row in q])
+    sizes = [
+        np.linalg.norm(p[::2] - p[1::2], axis=1).sum() for p in (calibrated_points(result.model, q), truth)
+    ]
+    assert sizes[0] / sizes[1] == pytest.approx(1, abs=4e-4)
+    document = result.document()
+    assert document["scale"]["fixture"] == "bar" and document["scale"]["relative_std"] == pytest.approx(5e-4)
+    found = document["scale"]["others"]["small"]["found"]
+    assert found["low"] < 3e-3 < found["high"] < found["low"] + 2.5e-3
+    said = " ".join(document["remarks"])
+    assert "200 mm ± 0.1 mm of the fixture bar" in said
+    assert "the declared distances of the sockets of small are wrong by" in said
+    assert document["places"]["disagree"] == [] and "station" not in said.replace("station.PLACE", "")
+    lengths = [n for n in result.estimate.parameters.names if n.startswith("j") and ".length_" in n]
+    longest = max(std for n in lengths if (std := result.estimate.std(n)) is not None)
+    assert longest < 2 * 5e-4 * 0.35, "known as well as the bar"
+
+
+@pytest.mark.parametrize(
+    ("change", "refusal"),
+    [
+        (("place0,bar,a", "place0,,a"), ["E-POSES-075", "'a'", "sockets"]),
+        (("place0,bar", "place0,bars"), ["E-POSES-040", "'bars'"]),
+        (("place1,small,b", "place1,bar,c"), ["E-POSES-076", "'place1'"]),
+        (("place1,small,b", "place1,small,c"), ["E-POSES-037", "'c'"]),
+    ],
+)
+def test_rows_of_no_or_another_fixture_are_refused(
+    two: Path, capsys: pytest.CaptureFixture, change: tuple[str, str], refusal: list[str]
+) -> None:
+    file = two / "held.csv"
+    file.write_text(file.read_text().replace(*change))
+    assert main(["calibrate", str(two / "robot.yaml"), str(file)]) == 2
+    assert_refusal(capsys.readouterr().err, *refusal)
 
 
 def test_wrong_rows_and_places_are_named(seven: tuple[Path, Arm], tmp_path: Path) -> None:

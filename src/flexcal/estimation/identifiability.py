@@ -179,7 +179,9 @@ def _select(
 
     Modified Gram-Schmidt, each direction projected out twice, which is as accurate as reflections.
     """
-    remainder = scaled.copy()
+    from scipy.linalg.blas import dger  # pyright: ignore[reportAttributeAccessIssue]
+
+    remainder = np.array(scaled, order="F")
     limit = tolerance * np.max(np.linalg.norm(scaled, axis=0), initial=0.0)
     kept: list[int] = []
     sizes: list[float] = []
@@ -188,7 +190,7 @@ def _select(
         sizes.append(float(np.linalg.norm(remainder[:, column])))
         direction = remainder[:, column] / sizes[-1]
         for _ in range(2):
-            remainder[:, :] -= np.outer(direction, direction @ remainder)
+            dger(-1.0, direction, direction @ remainder, a=remainder, overwrite_x=0, overwrite_a=1)
         remainder[:, column] = 0.0
 
     for column in preferred:

@@ -29,14 +29,17 @@ class NearestSocket:
 def nearest_sockets(fit: GeometricFit, rows: Sequence[int]) -> tuple[NearestSocket, ...]:
     """Nearest sockets of the rows with these indices, the positions of the ball being those of the fitted robot."""
     poses, model = fit.poses, fit.model
-    assert poses.socket is not None
+    assert poses.socket is not None and poses.holder is not None
     held = np.flatnonzero(poses.in_socket)
-    known = {(str(poses.station[k]), str(poses.socket[k])): poses.position[k] for k in held}
+    scale = dict(zip(model.stations.fixtures, 1 + model.stations.socket_scale, strict=True))
+    known = {
+        (str(poses.station[k]), str(poses.socket[k])): scale[poses.holder[k]] * poses.position[k]
+        for k in held
+    }
     sockets = []
     for (place, _), position in known.items():
         pose = model.stations.pose[model.station_index(place)]
-        scaled = (1 + model.stations.scale[0]) * position
-        sockets.append((scaled - pose[:3]) @ vector_rotation(pose[3:]))
+        sockets.append((position - pose[:3]) @ vector_rotation(pose[3:]))
     chosen = poses.subset(rows)
     at = predict_measurements(model, chosen, flank=fit.flank[list(rows)], elastic=bool(model.elastic))
     distances = np.linalg.norm(at.kinematics.position[:, None] - np.array(sockets), axis=2)

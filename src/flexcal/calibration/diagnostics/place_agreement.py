@@ -170,7 +170,7 @@ def place_errors(fit: GeometricFit) -> tuple[PlaceErrors, ...]:
         added = max(freedom - degrees, 1)
         ratio = max(whole - others, 0.0) / added * degrees / others if degrees > 0 and others > 0 else 0.0
         p = float(fdtrc(added, max(degrees, 1), ratio))
-        result.append(_errors(poses.subset(own), ball, inside[own], ratio, p))
+        result.append(_errors(poses.subset(own), ball, inside[own], ratio, p, several=len(poses.holders) > 1))
     return tuple(result)
 
 
@@ -186,8 +186,13 @@ def _prior_std(name: str, fit: GeometricFit) -> float:
     return fit.estimate.parameters[name].prior_std
 
 
-def _errors(poses: PoseSet, ball: np.ndarray, inside: np.ndarray, ratio: float, p: float) -> PlaceErrors:
-    """Errors at one place: `ball` (N, 3) m are the predicted positions in the fixture, `inside` (N,) the rows that are no outliers."""
+def _errors(
+    poses: PoseSet, ball: np.ndarray, inside: np.ndarray, ratio: float, p: float, *, several: bool
+) -> PlaceErrors:
+    """Errors at one place: `ball` (N, 3) m are the predicted positions in the fixture, `inside` (N,) the rows that are no outliers.
+
+    With `several` fixtures the sockets have their fixture's name too, for distances of different fixtures are not compared.
+    """
     centres, off = {}, np.empty(len(poses))
     assert poses.socket is not None
     for socket in dict.fromkeys(poses.socket.tolist()):
@@ -196,8 +201,9 @@ def _errors(poses: PoseSet, ball: np.ndarray, inside: np.ndarray, ratio: float, 
         centre = ball[good].mean(axis=0)
         off[rows] = np.linalg.norm(ball[rows] - centre, axis=1)
         centres[socket] = centre, poses.position[np.argmax(rows)]
+    prefix = f"{poses.holders[0]} " if several else ""
     distances = {
-        (a, b): float(
+        (prefix + a, prefix + b): float(
             np.linalg.norm(centres[a][0] - centres[b][0]) - np.linalg.norm(centres[a][1] - centres[b][1])
         )
         for a, b in combinations(sorted(centres), 2)
@@ -247,13 +253,27 @@ def _larger(values: Mapping[str, float], what: Finding, *, either: bool) -> list
     ]
 
 
+def hypergeometric_tail(found: int, rows: int, marked: int, drawn: int) -> float:
+    """Probability of `found` or more of the `marked` ones among `drawn` of all `rows`."""
+    from scipy.special import gammaln
+
+    def choices(whole: np.ndarray, part: np.ndarray) -> np.ndarray:
+        return gammaln(whole + 1.0) - gammaln(part + 1.0) - gammaln(whole - part + 1.0)
+
+    counts = np.arange(max(found, drawn - (rows - marked), 0), min(marked, drawn) + 1)
+    logarithms = (
+        choices(np.array(marked), counts)
+        + choices(np.array(rows - marked), drawn - counts)
+        - choices(np.array(rows), np.array(drawn))
+    )
+    return float(np.exp(logarithms).sum())
+
+
 def _more_outliers(places: Sequence[PlaceErrors]) -> list[Disagreement]:
     """Places with more outliers than the others, by Fisher's exact test."""
-    from scipy.stats import hypergeom
-
     rows, outliers = sum(place.poses for place in places), sum(place.outliers for place in places)
     found = []
     for place in places:
-        tail = float(hypergeom.sf(place.outliers - 1, rows, outliers, place.poses))
+        tail = hypergeometric_tail(place.outliers, rows, outliers, place.poses)
         found.append(Disagreement(place.name, "outliers", min(1.0, len(places) * tail)))
     return [item for item in found if item.p < _CHANCE / _KINDS]

@@ -1,4 +1,5 @@
 from .elastic_prior import ElasticPrior
+from .fitted_points import CONVERGED
 from .gauge_freedom import (
     KNOWN_POINT_STD,
     point_uncertainty,
@@ -23,6 +24,7 @@ from .terms import (
 )
 
 __all__ = [
+    "CONVERGED",
     "KNOWN_POINT_STD",
     "LEAST_POSES",
     "LEVELS",

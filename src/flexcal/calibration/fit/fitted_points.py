@@ -235,12 +235,12 @@ class PointFit:
     @property
     def _size_is_a_scale(self) -> bool:
         """Whether lengths are told by sockets and boards alone, and not by wires or an instrument that measures points."""
-        return not any(kind.tells_lengths(self.poses) and not kind.scale for kind in KINDS)
+        return not any(kind.tells_lengths(self.poses) and not kind.scales(self.poses) for kind in KINDS)
 
     @property
     def _scales(self) -> list[Parameter]:
         """Scales of sockets' distances and boards with their declared standard deviations, the best known first."""
-        own = [kind.scale for kind in KINDS if kind.scale and kind.scaled(self.poses).any()]
+        own = [name for kind in KINDS for name in kind.scales(self.poses)]
         sizes = {name: declared_size(self.start, name) for name in own}
         scales = [Parameter(name, "1", 0.0, prior_std=std) for name, std in sizes.items() if std is not None]
         return sorted(scales, key=lambda item: item.prior_std)
@@ -331,15 +331,18 @@ class FittedPoints:
         elastic = prior.parameters.names
         items = [estimate.parameters[name] for name in elastic]
         moved = Parameters(items)
-        slopes = self.at.jacobian(elastic) * moved.natural_slope(moved.coordinates())
+        names = tuple(self.fit.waves)
+        slopes, waves, columns = np.split(
+            self.at.jacobian([*elastic, *names, *self.task.kept.names]),
+            [len(elastic), len(elastic) + len(names)],
+            axis=2,
+        )
+        slopes = slopes * moved.natural_slope(moved.coordinates())
         wide = [_FREE_STIFFNESS**2 if name.endswith(".stiffness") else 0.0 for name in elastic]
         values, vectors = np.linalg.eigh(prior.covariance + np.diag(wide))
         tied = slopes @ (vectors * np.sqrt(np.maximum(values, 0.0)))
         residual = self.at.residual + slopes @ (moved.coordinates() - moved.prior_mean())
-        names = tuple(self.fit.waves)
-        waves = self.at.jacobian(names)
         residual = residual + waves @ np.array([estimate.values.get(name, 0.0) for name in names])
-        columns = self.at.jacobian(self.task.kept.names)
         free = ~np.isfinite(self.task.kept.prior_std())
         known = self.task.kept.prior_std()[~free]
         shift = estimate.parameters.subset(self.task.kept.names).coordinates() - self.task.kept.prior_mean()
@@ -386,6 +389,11 @@ class FittedPoints:
         kept = Parameters(p for p in fit.free if not np.isfinite(p.prior_std))
         whitening = scatter.whitening(self.at.readings, self.turns)
         return undetermined(fit.straight, kept, whitening, fit.hidden, fit.plausible)
+
+    def has_residuals_of(self, other: FittedPoints) -> bool:
+        """Whether the scatter would be estimated from the same residuals, outliers and parameters."""
+        same = self.fixed == other.fixed and self.estimate.outliers == other.estimate.outliers
+        return same and np.array_equal(self.at.residual, other.at.residual)
 
     @property
     def suspects_outliers(self) -> bool:

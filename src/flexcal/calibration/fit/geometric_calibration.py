@@ -10,8 +10,8 @@ import numpy as np
 
 from flexcal.calibration.error_model import ErrorComponents, ErrorStatistics, LinearFit
 from flexcal.calibration.fit.elastic_prior import NOTHING_ELASTIC, ElasticPrior
-from flexcal.calibration.fit.fitted_points import FittedPoints, PointFit
-from flexcal.calibration.fit.least_squares_problem import LossName
+from flexcal.calibration.fit.fitted_points import CONVERGED, FittedPoints, PointFit
+from flexcal.calibration.fit.least_squares_problem import LossName, PlainLoss
 from flexcal.calibration.fit.practical_identifiability import Undetermined
 from flexcal.calibration.fit.terms import moving_joints
 from flexcal.calibration.measurement import METRES, ambiguous_poses, kind_names, stated_sigma
@@ -147,6 +147,7 @@ def fit_geometry(
     secant_scale: float = 0.0,
     loss: Loss | LossName = "auto",
     near: Mapping[str, float] | None = None,
+    tolerance: float = CONVERGED,
     progress: Progress = silent,
 ) -> GeometricFit:
     """Fit the geometry of a robot to measured points by the Levenberg-Marquardt method (vector error (28), Jacobian (29)).
@@ -179,6 +180,8 @@ def fit_geometry(
         Loss function; "cauchy" finds outliers, "auto" takes it where squares leave some.
     near : mapping of float, optional
         Values of parameters from which to start, as of a fit to nearly the same points; by default those of the `model`.
+    tolerance : float
+        Relative offset at which the fit has converged (Bates and Watts 1981, who suggest 1e-3).
     progress : Progress
         Called with the stage and the share of it that is done.
 
@@ -221,12 +224,13 @@ def fit_geometry(
         near=near or {},
         progress=progress,
     )
-    first = _rough(fit)
-    fitted = _settled(first, "squares" if loss == "auto" else loss)
+    first, plain = _rough(fit), "squares" if loss == "auto" else loss
+    fitted = _settled(first, plain)
     if loss == "auto" and elasticity == "reestimated" and fitted.suspects_outliers:
-        again = _settled(first, "cauchy")
-        fitted = again if again.estimate.outliers else fitted
-    return _calibration(fitted)
+        again = _polished(_settled(first, "cauchy"), "cauchy", tolerance)
+        if again.estimate.outliers:
+            return _calibration(again)
+    return _calibration(_polished(fitted, plain, tolerance))
 
 
 def _rough(fit: PointFit) -> FittedPoints:
@@ -237,21 +241,35 @@ def _rough(fit: PointFit) -> FittedPoints:
     return fit.solved(fit.first_scatter, "squares", fitted)
 
 
-def _settled(fitted: FittedPoints, loss: Loss | Literal["squares", "huber", "cauchy"]) -> FittedPoints:
-    """Fit with the scatter of its own residuals, with the parameters undetermined under that scatter held, from a rough one."""
-    fit = fitted.fit
+def _settled(fitted: FittedPoints, loss: Loss | PlainLoss) -> FittedPoints:
+    """Fit with the scatter of its own residuals, with the parameters undetermined under that scatter held, from a rough one.
+
+    With a robust loss a point may be an outlier under one scatter and none under the next, and so on: a scatter that comes again ends it.
+    """
+    fit, seen = fitted.fit, []
     if not isinstance(loss_named(loss), Squares):
         for _ in range(_PASSES):
             before, fitted = fitted, fit.solved(fitted.robust_scatter(), loss, fitted, tolerance=_ROUGH)
-            if fitted.scatter.settled(before.scatter, 1e-2):
+            if not fitted.estimate.iterations or fitted.scatter.settled(before.scatter, 1e-2):
                 break
     for _ in range(_PASSES):
         scatter, spread = fitted.estimated_scatter()
         fixed = fitted.undetermined(scatter)
-        if scatter.settled(fitted.scatter, _SETTLED) and fixed == fitted.fixed:
+        seen.append(fitted.scatter)
+        if fixed == fitted.fixed and any(scatter.settled(before, _SETTLED) for before in seen):
             break
+        before = fitted
         fitted = fit.solved(scatter, loss, fitted, fixed=fixed, spread=spread, tolerance=_NEAR)
-    return fit.solved(fitted.scatter, loss, fitted, fixed=fitted.fixed, spread=fitted.spread)
+        if not fitted.estimate.iterations and fitted.has_residuals_of(before):
+            break
+    return fitted
+
+
+def _polished(fitted: FittedPoints, loss: Loss | PlainLoss, tolerance: float) -> FittedPoints:
+    """Fit that has converged, under the same scatter."""
+    return fitted.fit.solved(
+        fitted.scatter, loss, fitted, fixed=fitted.fixed, spread=fitted.spread, tolerance=tolerance
+    )
 
 
 def _calibration(fitted: FittedPoints) -> GeometricFit:

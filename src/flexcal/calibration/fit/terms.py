@@ -268,9 +268,10 @@ def declared_ratio(model: RobotModel, joint: str, other: str) -> float:
 def declared_size(model: RobotModel, name: str) -> float | None:
     """Standard deviation of a geometric parameter in robot.yaml's `prior:`, by name or by kind; None if not given."""
     prior, (owner, _, key) = model.prior, name.rpartition(".")
-    scaled = next((kind for kind in KINDS if name == kind.scale), None)
-    if scaled is not None:
-        return scaled.scale_std(model)
+    for kind in KINDS:
+        scale = kind.scale_std(model, name)
+        if scale is not None:
+            return scale
     if name in prior.parameters:
         return prior.parameters[name]
     if key in LOOP:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from flexcal.calibration.kinds.rigid_motions import registered, rigid_motion
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameters
 from flexcal.model.parts import left_jacobian
-from flexcal.model.robot import SCALES, STATION, RobotModel
+from flexcal.model.robot import STATION, RobotModel
 
 if TYPE_CHECKING:
     from flexcal.calibration.measurement import PredictedMeasurements
@@ -23,9 +23,6 @@ class Kind(ABC):
 
     Arm, deflection and station are common to all kinds; without more said, a kind reads the target's coordinates in the station's axes.
     """
-
-    scale: ClassVar[str] = ""
-    """Parameter that is the relative deviation of its readings from the true lengths; empty where it has none."""
 
     @abstractmethod
     def rows(self, poses: PoseSet) -> np.ndarray:
@@ -47,18 +44,17 @@ class Kind(ABC):
         """Change (K, 3, 3) of the read angles with a rotation of the target about the station's axes, rad; only of kinds that read some."""
         raise NotImplementedError
 
-    def scaled(self, poses: PoseSet) -> np.ndarray:
-        """Rows (N,) whose readings the `scale` changes."""
-        return self.rows(poses)
+    def scales(self, poses: PoseSet) -> dict[str, np.ndarray]:
+        """Parameters that are relative deviations of the readings from the true lengths, with the rows (N,) that each changes."""
+        return {}
 
-    def scale_std(self, model: RobotModel) -> float | None:
-        """Declared standard deviation of the `scale`; None where none is declared."""
+    def scale_std(self, model: RobotModel, name: str) -> float | None:
+        """Declared standard deviation of one of the `scales`; None for another parameter, and where none is declared."""
         return None
 
     def stretch(self, model: RobotModel, poses: PoseSet) -> np.ndarray | None:
-        """What the readings (N, 3), m, are too short by, due to the `scale`; None where nothing."""
-        deviation = model.stations.scale[SCALES.index(self.scale)] if self.scale else 0.0
-        return None if deviation == 0 else (deviation * self.scaled(poses))[:, None] * poses.position
+        """What the readings (N, 3), m, are too short by, due to the `scales`; None where nothing."""
+        return None
 
     def shift(self, at: PredictedMeasurements) -> np.ndarray | None:
         """Change (R, 3) of what was measured with parameters of the instrument; None where nothing changes."""
@@ -70,12 +66,13 @@ class Kind(ABC):
 
     def owns(self, name: str) -> bool:
         """Whether a parameter belongs to this kind alone."""
-        return name == self.scale != ""
+        return False
 
     def column(self, at: PredictedMeasurements, name: str) -> np.ndarray:
         """Derivative (R, 3) of the readings by a parameter that `owns` names."""
-        column = np.zeros((len(at.readings.row), 3))
-        column[: len(at.poses)] = -np.where(self.scaled(at.poses)[:, None], at.poses.position, 0.0)
+        column, rows = np.zeros((len(at.readings.row), 3)), self.scales(at.poses).get(name)
+        if rows is not None:
+            column[: len(at.poses)] = -np.where(rows[:, None], at.poses.position, 0.0)
         return column
 
     def start(

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar
 
 import numpy as np
 
 from flexcal.calibration.kinds.kind import Kind, tilts_across
 from flexcal.calibration.kinds.rigid_motions import best_motion, registered
 from flexcal.data.poses import PoseSet
-from flexcal.model.robot import SOCKET_SCALE, STATION, RobotModel
+from flexcal.model.robot import STATION, RobotModel, socket_scale
 
+_OWN = "sockets."
 _FLAT = 0.01
 """Extent of sockets normal to a line, relative to that along it, below which they lie on the line."""
 
@@ -19,17 +19,33 @@ _FLAT = 0.01
 class Sockets(Kind):
     """Declared place of the socket in the fixture, whose pose is the station's. They tell lengths by their distances alone."""
 
-    scale: ClassVar[str] = SOCKET_SCALE
-
     def rows(self, poses: PoseSet) -> np.ndarray:
         """As `Kind.rows`."""
         return poses.in_socket
 
-    def scale_std(self, model: RobotModel) -> float | None:
+    def owns(self, name: str) -> bool:
+        """As `Kind.owns`."""
+        return name.startswith(_OWN)
+
+    def scales(self, poses: PoseSet) -> dict[str, np.ndarray]:
+        """As `Kind.scales`: one a fixture."""
+        return {socket_scale(name): poses.in_socket & (poses.holder == name) for name in poses.holders}
+
+    def scale_std(self, model: RobotModel, name: str) -> float | None:
         """As `Kind.scale_std`."""
-        declared = model.config.measurements.values()
-        fixtures = [item for item in declared if item.kind == "sockets" and item.extent > 0]
-        return fixtures[0].std / fixtures[0].extent if fixtures else None
+        for fixture, item in model.config.measurements.items():
+            if item.kind == "sockets" and name == socket_scale(fixture) and item.extent > 0:
+                return item.std / item.extent
+        return None
+
+    def stretch(self, model: RobotModel, poses: PoseSet) -> np.ndarray | None:
+        """As `Kind.stretch`."""
+        if poses.holder is None or not model.stations.socket_scale.any():
+            return None
+        deviation = np.zeros(len(poses))
+        for name, scale in zip(model.stations.fixtures, model.stations.socket_scale, strict=True):
+            deviation[poses.holder == name] = scale
+        return deviation[:, None] * poses.position
 
     def start(
         self, model: RobotModel, station: str, targets: np.ndarray, readings: np.ndarray

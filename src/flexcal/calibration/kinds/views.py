@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexcal.calibration.kinds.kind import Kind
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameter, Parameters
-from flexcal.model.robot import BOARD_SCALE, LENS, SCALES, RobotModel, unit_of
+from flexcal.model.robot import BOARD_SCALE, LENS, RobotModel, unit_of
 
 if TYPE_CHECKING:
     from flexcal.calibration.measurement import PredictedMeasurements
@@ -20,20 +20,20 @@ _CAMERA = "camera."
 class Views(Kind):
     """Coordinates and orientation in the board's axes, in lengths of the board, and with the lens of the view's own fit."""
 
-    scale: ClassVar[str] = BOARD_SCALE
-
     def rows(self, poses: PoseSet) -> np.ndarray:
         """As `Kind.rows`."""
         return poses.seen
 
-    def scale_std(self, model: RobotModel) -> float | None:
+    def scales(self, poses: PoseSet) -> dict[str, np.ndarray]:
+        """As `Kind.scales`: of the board's size, which changes what was measured (`shift`)."""
+        return {BOARD_SCALE: poses.seen} if poses.seen.any() else {}
+
+    def scale_std(self, model: RobotModel, name: str) -> float | None:
         """As `Kind.scale_std`."""
+        if name != BOARD_SCALE:
+            return None
         declared = model.config.measurements.values()
         return next((item.board.std for item in declared if item.kind == "camera"), None)
-
-    def stretch(self, model: RobotModel, poses: PoseSet) -> np.ndarray | None:
-        """As `Kind.stretch`: none, for the board's size changes what was measured (`shift`)."""
-        return None
 
     def shift(self, at: PredictedMeasurements) -> np.ndarray | None:
         """As `Kind.shift`: by the board's size, and by lenses that differ from those that the poses were measured with.
@@ -43,9 +43,7 @@ class Views(Kind):
         if not at.poses.seen.any():
             return None
         lenses, shift = at.model.lenses, np.zeros((len(at.readings.row), 3))
-        shift[: len(at.poses)] = (
-            at.model.stations.scale[SCALES.index(BOARD_SCALE)] * at.poses.position * at.poses.seen[:, None]
-        )
+        shift[: len(at.poses)] = at.model.stations.board_scale[0] * at.poses.position * at.poses.seen[:, None]
         for name, lens in at.poses.lenses.items():
             if name in lenses.names:
                 values = lenses.values[lenses.names.index(name)]
@@ -72,11 +70,11 @@ class Views(Kind):
 
     def owns(self, name: str) -> bool:
         """As `Kind.owns`."""
-        return name.startswith(_CAMERA) or super().owns(name)
+        return name.startswith(_CAMERA) or name == BOARD_SCALE
 
     def column(self, at: PredictedMeasurements, name: str) -> np.ndarray:
         """As `Kind.column`."""
-        if name == self.scale:
+        if name == BOARD_SCALE:
             return super().column(at, name)
         camera, _, key = name.removeprefix(_CAMERA).rpartition(".")
         return -_by_lens(at, camera)[:, :, LENS.index(key)]

@@ -15,7 +15,7 @@ from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import PointKinematics, carrier_kinematics, relative_kinematics
 from flexcal.model.parts import left_jacobian, vector_rotation
-from flexcal.model.robot import RobotModel
+from flexcal.model.robot import STATION, RobotModel
 from flexcal.model.statics import Equilibrium, tool_at_rest
 from flexcal.progress import Progress, silent
 
@@ -73,6 +73,10 @@ class PredictedMeasurements:
                 residual += shift
         return residual
 
+    @cached_property
+    def _stations(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        return {}
+
     @property
     def _angular(self) -> list[tuple[Kind, np.ndarray]]:
         """Kinds that read angles at the poses, with a mask (M,) of those that each reads."""
@@ -128,31 +132,36 @@ class PredictedMeasurements:
 
         Raises `FlexcalError` for a name without effect on the readings.
         """
-        result, arm = np.empty((len(self.readings.row), 3, len(names))), ArmColumns(self)
+        result, arm = np.zeros((len(self.readings.row), 3, len(names))), ArmColumns(self)
+        joints = self.model.joint_names
         for k, name in enumerate(names):
-            kind = next((kind for kind in KINDS if kind.owns(name)), None)
-            if kind is not None:
-                result[:, :, k] = kind.column(self, name)
-            elif name.startswith("station."):
-                result[:, :, k] = self._by_station(*name.removeprefix("station.").rsplit(".", 1))
-            else:
-                result[:, :, k] = arm.column(name)
+            owner, _, key = name.rpartition(".")
+            if owner.startswith("station.") and key in STATION:
+                rows, columns = self._by_station(owner.removeprefix("station."))
+                result[rows, :, k] = columns[:, :, STATION.index(key)]
+                continue
+            kind = next((kind for kind in KINDS if owner not in joints and kind.owns(name)), None)
+            result[:, :, k] = arm.column(name) if kind is None else kind.column(self, name)
         return result
 
-    def _by_station(self, station: str, key: str) -> np.ndarray:
-        """Derivative (R, 3) of the readings by one number of a station's pose."""
-        own, turned = self.poses.station == station, self.poses.angled
-        rows, slopes = np.flatnonzero(own), self.readings.slopes
-        result = np.zeros((len(self.readings.row), 3))
-        if key in ("x", "y", "z"):
-            moved = np.tile(np.eye(3)["xyz".index(key)], (len(rows), 1))
-        else:
+    def _by_station(self, station: str) -> tuple[np.ndarray, np.ndarray]:
+        """Readings (K,) from a station, and their derivatives (K, 3, 6) by the numbers of its pose."""
+        if station not in self._stations:
+            own, turned = self.poses.station == station, self.poses.angled
+            rows, slopes = np.flatnonzero(own), self.readings.slopes
             pose = self.model.stations.pose[self.model.station_index(station)]
-            axis = left_jacobian(pose[3:])[:, "xyz".index(key[1])]
-            moved = np.cross(axis, self.located[rows] - pose[:3])
-            result[len(own) :] = own[turned][:, None] * (self.angle_slopes @ axis)
-        result[rows] = moved if slopes is None else np.matmul(slopes[rows], moved[:, :, None])[:, :, 0]
-        return result
+            axes = left_jacobian(pose[3:])
+            moved = np.empty((len(rows), 3, 6))
+            moved[:, :, :3] = np.eye(3)
+            moved[:, :, 3:] = np.cross(axes.T, (self.located[rows] - pose[:3])[:, None]).swapaxes(1, 2)
+            moved = moved if slopes is None else np.matmul(slopes[rows], moved)
+            if own[turned].any():
+                turns = np.zeros((int(own[turned].sum()), 3, 6))
+                turns[:, :, 3:] = self.angle_slopes[own[turned]] @ axes
+                rows = np.concatenate([rows, len(own) + np.flatnonzero(own[turned])])
+                moved = np.concatenate([moved, turns])
+            self._stations[station] = rows, moved
+        return self._stations[station]
 
 
 def _read(model: RobotModel, poses: PoseSet, located: np.ndarray) -> np.ndarray:

@@ -101,8 +101,8 @@ def select_terms(
     A term is added where it lowers the mean error on poses left out by more than one standard error of the paired difference, lowers the
     Bayesian information criterion, and does not raise the largest left-out error. Fewer than 80 different poses are left out one by one,
     more in folds contiguous in measuring order and in the workspace, where both must agree. Fits are linear, about the fit of the base
-    terms to all poses. Compliances that are not supported for all joints are tried joint by joint, and must then lower the criterion by
-    2 log(number of such candidates) more (Chen and Chen 2008). Fewer than 20 different poses support no choice.
+    terms to all poses by squares. Compliances that are not supported for all joints are tried joint by joint, and must then lower the
+    criterion by 2 log(number of such candidates) more (Chen and Chen 2008). Fewer than 20 different poses support no choice.
 
     `fitted` is a fit of the base terms to these poses, or more, without springs: where there is one it is the one, or its start.
 
@@ -119,7 +119,7 @@ def select_terms(
         rigid = fitted
     else:
         near = None if fitted is None else fitted.estimate.values
-        rigid = fit_geometry(model, poses, terms=base, elastic=bool(model.elastic), near=near)
+        rigid = fit_geometry(model, poses, terms=base, elastic=bool(model.elastic), loss="squares", near=near)
     by = left_out_by(poses, distinct)
     trials = TermTrials(rigid, open_terms.model, base, folds, by=by)
     chosen, rows = base, [trials.start()]

@@ -136,7 +136,12 @@ class TermTrials:
         return self._fits[terms]
 
     def _left_out(self, blocks: list[np.ndarray], penalty: list[float]) -> LeaveOutErrors:
-        fit = leave_out_fit(blocks, penalty, self._residual, self._row_folds, self._places)
+        order, workspace, alone = self._row_folds
+        # folds in measuring order are those in the workspace where both are places of a fixture
+        folds = (order, alone) if (order == workspace).all() else (order, workspace, alone)
+        fit = leave_out_fit(blocks, penalty, self._residual, folds, self._places)
+        if len(folds) < len(self._row_folds):
+            fit = replace(fit, distances=(fit.distances[0], *fit.distances))
         points = len(self.rigid.poses)
         return replace(fit, distances=tuple(d[:points] for d in fit.distances))
 

@@ -73,6 +73,8 @@ class PoseSet:
     socket : ndarray, optional
         Names (N,) of the sockets that held the target; empty where an instrument measured it. `position` then is the socket's in
         the fixture, and `station` the place of the fixture.
+    holder : ndarray, optional
+        Names (N,) under `measurements:` of the fixtures with these sockets; empty where an instrument measured.
     force : ndarray, optional
         Known forces (N, 3) on the measured points, N in the base frame, as of a wire that pulls; zero where there are none.
     notes : tuple of str
@@ -107,6 +109,7 @@ class PoseSet:
     tilt: np.ndarray | None = None
     time: np.ndarray | None = None
     socket: np.ndarray | None = None
+    holder: np.ndarray | None = None
     force: np.ndarray | None = None
     notes: tuple[str, ...] = ()
     sigma_given: bool = True
@@ -136,6 +139,7 @@ class PoseSet:
             "tilt": (n_rows, 3),
             "time": (n_rows,),
             "socket": (n_rows,),
+            "holder": (n_rows,),
             "force": (n_rows, 3),
             "unstated": (n_rows,),
         }
@@ -145,6 +149,11 @@ class PoseSet:
                 raise FlexcalError(
                     "E-POSES-022", f"{name} of a pose set has shape {values.shape}; {shape} is needed."
                 )
+
+        if self.socket is not None and self.holder is None:
+            raise FlexcalError(
+                "E-POSES-078", "a pose set with sockets needs `holder`, the name of the fixture of each row."
+            )
 
     def __len__(self) -> int:
         return self.q.shape[0]
@@ -246,6 +255,11 @@ class PoseSet:
         return tuple(dict.fromkeys(self.station[self.seen].tolist()))
 
     @property
+    def holders(self) -> tuple[str, ...]:
+        """Fixtures with sockets by their names under `measurements:`, in the order in which they first appear."""
+        return () if self.holder is None else tuple(dict.fromkeys(self.holder[self.in_socket].tolist()))
+
+    @property
     def fixtures(self) -> tuple[str, ...]:
         """Places of a fixture with sockets, in the order in which they first appear."""
         return tuple(dict.fromkeys(self.station[self.in_socket].tolist()))
@@ -336,6 +350,7 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
             )
         else:
             joined[entry.name] = None
+    _require_one_fixture(joined["station"], joined["holder"])
     return PoseSet(**joined)
 
 
@@ -357,8 +372,20 @@ def _stated_in_part(sets: Sequence[PoseSet]) -> str:
     )
 
 
+def _require_one_fixture(station: np.ndarray, holder: np.ndarray | None) -> None:
+    """Raise `FlexcalError` where two fixtures have a place of one name."""
+    first: dict[str, str] = {}
+    for place, name in zip(station.tolist(), [] if holder is None else holder.tolist(), strict=False):
+        if name and first.setdefault(place, name) != name:
+            raise FlexcalError(
+                "E-POSES-077",
+                f"'{place}' is a place of {first[place]} and of {name}; give every place of each fixture a name of its own.",
+            )
+
+
 _PARTIAL: dict[str, tuple[tuple[int, ...], float | str]] = {
     "socket": ((), ""),
+    "holder": ((), ""),
     "camera": ((), ""),
     "kind": ((), ""),
     "tilt": ((3,), np.nan),

@@ -16,12 +16,12 @@ from flexcal.files.structuring import suggestion
 from flexcal.model.kinematics import joint_ranges, point_kinematics
 from flexcal.model.parts import rotation_wxyz, vector_rotation
 from flexcal.model.robot import (
-    SOCKET_SCALE,
     STATION,
     FaceConfig,
     RobotModel,
     SocketsConfig,
     WireConfig,
+    socket_scale,
 )
 
 POSE = "pose"
@@ -108,7 +108,7 @@ class Instrument:
             stds = {"x": _DISTANT, "y": _DISTANT, "rx": _TILTED, "ry": _TILTED}
         else:
             stds |= tilts if len(self.sockets) > 1 else {}
-        scale = SOCKET_SCALE if self.kind == _SOCKETS else f"station.{self.name}.scale"
+        scale = socket_scale(self.name) if self.kind == _SOCKETS else f"station.{self.name}.scale"
         placed = {f"station.{station}.{key}": std for station in self.stations for key, std in stds.items()}
         return placed | ({scale: self.scale_std} if self.scale_std > 0 else {})
 
@@ -152,6 +152,7 @@ class Instrument:
             quaternion_wxyz=rotation_wxyz(_axes(model, q, target)) if tracked else None,
             orientation_sigma=np.full(rows, _TURN_SIGMA) if tracked else None,
             socket=np.full(rows, "held") if held else None,
+            holder=np.full(rows, self.name) if held else None,
             kind=None if self.kind in ("", _SOCKETS) else np.full(rows, self.kind),
         )
 

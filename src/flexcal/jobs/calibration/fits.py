@@ -10,7 +10,7 @@ import numpy as np
 
 from flexcal.calibration.diagnostics import BearingAxes, compare_bearings
 from flexcal.calibration.error_model import TRANSMISSION
-from flexcal.calibration.fit import GeometricFit, LossName, StratifiedSample, fit_geometry
+from flexcal.calibration.fit import CONVERGED, GeometricFit, LossName, StratifiedSample, fit_geometry
 from flexcal.calibration.term_selection import (
     TermSelection,
     ZerosOrGeometry,
@@ -21,6 +21,9 @@ from flexcal.calibration.term_selection import (
 from flexcal.data.poses import PoseSet
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
+
+_COMPARED = 1e-4
+"""Relative offset at which fits to most of the poses have converged, of which nothing but errors elsewhere is told."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,7 @@ class Fits:
                 secant_scale=settings.secant_scale,
                 loss=loss,
                 near=None if start is None else start.estimate.values,
+                tolerance=CONVERGED if near is None else _COMPARED,
             )
             progress(stage, 1.0)
             return calibration

@@ -24,7 +24,7 @@ from flexcal.calibration.diagnostics import (
 from flexcal.calibration.fit import GeometricFit
 from flexcal.jobs.calibration.ignored_columns import ignored_columns_remarks
 from flexcal.jobs.calibration.inclinations import inclination_remarks
-from flexcal.model.robot import BOARD_SCALE, SOCKET_SCALE
+from flexcal.model.robot import BOARD_SCALE, socket_scale
 from flexcal.units import MILLIMETRE, decimals
 
 _LOOK = (
@@ -44,7 +44,6 @@ _ANOTHER_SIZE = 0.01
 """Relative deviation of a board's size from the nominal robot's above which the declared size is doubtful."""
 
 _LENGTHS = {
-    SOCKET_SCALE: "by the other readings, the declared distances of the sockets are wrong",
     BOARD_SCALE: "by the other readings, the declared size of the board is wrong",
 }
 """What is said where readings of another kind show the scale of lengths."""
@@ -267,9 +266,17 @@ def _size(fit: GeometricFit) -> Sequence[str]:
         )
     estimate = fit.estimate
     wires = {f"station.{name}.scale": name for name in fit.poses.stations}
-    what = _LENGTHS | {
-        scale: f"by the other readings, the lengths of {name} are wrong" for scale, name in wires.items()
+    sockets = {
+        socket_scale(name): "by the other readings, the declared distances of the sockets"
+        + (f" of {name}" if len(fit.poses.holders) > 1 else "")
+        + " are wrong"
+        for name in fit.poses.holders
     }
+    what = (
+        sockets
+        | _LENGTHS
+        | {scale: f"by the other readings, the lengths of {name} are wrong" for scale, name in wires.items()}
+    )
     remarks = [
         f"{what[name]} by {abs(interval[0] + interval[1]) / 2 / _PER_MILLE:.2g} ± {(interval[1] - interval[0]) / 2 / _PER_MILLE:.1g} per "
         "mille (95 %), which the fit takes into account"
@@ -311,11 +318,9 @@ def _without_readings(fit: GeometricFit) -> Sequence[str]:
     """Remark on declared instruments of which there are no readings."""
     poses = fit.poses
     read = {*poses.station.tolist(), *([] if poses.camera is None else poses.camera.tolist())}
-    read |= set(poses.target[poses.tilted].tolist())
-    declared = fit.model.config.measurements.items()
-    missing = [
-        n for n, item in declared if n not in read and not (item.kind == "sockets" and poses.in_socket.any())
-    ]
+    read |= {*poses.target[poses.tilted].tolist(), *poses.holders}
+    declared = fit.model.config.measurements
+    missing = [name for name in declared if name not in read]
     if not missing:
         return ()
     return (f"robot.yaml declares {', '.join(missing)} under `measurements:`, of which no file has readings",)

@@ -26,15 +26,15 @@ from flexcal.units import LARGEST
 
 POINTS, ARM, LOADS = "points.csv", "arm.npz", "gravity_loads.npz"
 _MODELS = (DECLARED, NOMINAL, OWN, RIGID, CALIBRATED)
-_TEXTS = ("target", "station", "socket")
+_TEXTS = ("target", "station", "socket", "holder")
 
 
 def write_points(folder: Path, points: MeasuredPoints) -> None:
     """Write `points` to points.csv in `folder`, atomically; rad and m."""
     poses = points.poses
     columns: dict[str, np.ndarray] = {"pose": poses.pose, "target": poses.target, "station": poses.station}
-    if poses.socket is not None:
-        columns["socket"] = poses.socket
+    if poses.socket is not None and poses.holder is not None:
+        columns |= {"socket": poses.socket, "holder": poses.holder}
     columns |= {f"q{i + 1}": poses.q[:, i] for i in range(poses.q.shape[1])}
     columns |= _vectors("", poses.position)
     if poses.sigma_given:
@@ -74,6 +74,9 @@ def read_points(folder: Path, *, sigma: float) -> MeasuredPoints:
         def column(name: str) -> np.ndarray | None:
             return _numbers(path, table.select(name))[:, 0] if name in table.columns else None
 
+        def texts(name: str) -> np.ndarray | None:
+            return table[name].fill_null("").to_numpy() if name in table.columns else None
+
         given = "sigma_x" in table.columns
         poses = PoseSet(
             q=_numbers(path, table.select(joints)),
@@ -85,7 +88,8 @@ def read_points(folder: Path, *, sigma: float) -> MeasuredPoints:
             station=table["station"].to_numpy(),
             temperature=column("temperature"),
             time=column("t"),
-            socket=table["socket"].fill_null("").to_numpy() if "socket" in table.columns else None,
+            socket=texts("socket"),
+            holder=texts("holder"),
             pose=table["pose"].to_numpy(),
             sigma_given=given,
         )

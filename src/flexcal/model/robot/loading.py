@@ -91,7 +91,9 @@ def read_robot(robot_type: type[RobotModel], path: Path) -> RobotModel:
         springs=springs,
         drives=_drives(file, config, n, motors),
         links=Links.of(description.inertias),
-        stations=Stations.at_base(stations),
+        stations=Stations.at_base(
+            stations, [name for name, item in config.measurements.items() if item.kind == "sockets"]
+        ),
         scatter=Scatter(np.zeros(len(SCATTER))),
         payload=payload,
         force_sensor=_force_sensor(file, description, config),

@@ -105,21 +105,31 @@ class Stations:
     Each place of a fixture with sockets is a station too, which measures where the ball is in the fixture, and so is a wire's anchor or a
     touched face. `zero` (stations,), m: distance from the station's origin at which an instrument of distances reads zero, as the radius
     of a touched sphere. `wire_scale` (stations,): relative deviation of the lengths that a wire reads from the true ones, as a drum of
-    another radius has it. `scale` (2,): relative deviation of the distances between sockets, and of the size of a camera's board, from
-    the declared ones.
+    another radius has it. `board_scale` (1,): relative deviation of the size of a camera's board from the declared one, `socket_scale`
+    (fixtures,) of the distances between the sockets of each of the `fixtures` that robot.yaml declares.
     """
 
     names: tuple[str, ...]
     pose: np.ndarray
     zero: np.ndarray
     wire_scale: np.ndarray
-    scale: np.ndarray
+    board_scale: np.ndarray
+    fixtures: tuple[str, ...]
+    socket_scale: np.ndarray
 
     @classmethod
-    def at_base(cls, names: Sequence[str]) -> Stations:
-        """Stations in the robot's base frame."""
+    def at_base(cls, names: Sequence[str], fixtures: Sequence[str] = ()) -> Stations:
+        """Stations in the robot's base frame, and `fixtures` as declared."""
         number = len(names)
-        return cls(tuple(names), np.zeros((number, 6)), np.zeros(number), np.zeros(number), np.zeros(2))
+        return cls(
+            tuple(names),
+            pose=np.zeros((number, 6)),
+            zero=np.zeros(number),
+            wire_scale=np.zeros(number),
+            board_scale=np.zeros(1),
+            fixtures=tuple(fixtures),
+            socket_scale=np.zeros(len(fixtures)),
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,11 +41,8 @@ STATION = ("x", "y", "z", "rx", "ry", "rz")
 VERTICAL = "vertical"
 """Station whose z axis is the vertical, by which inclinometers read."""
 ZEROS = ("zero_x", "zero_y", "zero_z")
-SOCKET_SCALE = "sockets.scale"
-"""Relative deviation of the distances between a fixture's sockets from the declared ones."""
 BOARD_SCALE = "board.scale"
 """Relative deviation of the size of a camera's board from the declared one."""
-SCALES = (SOCKET_SCALE, BOARD_SCALE)
 LENS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 """Intrinsic parameters of a camera."""
 SCATTER = (
@@ -124,6 +121,11 @@ def ratio_errors(model: RobotModel, joint: int) -> tuple[int, ...]:
     return (*((joint,) if own else ()), *followed)
 
 
+def socket_scale(fixture: str) -> str:
+    """Parameter that is the relative deviation of the distances between a fixture's sockets from the declared ones."""
+    return f"sockets.{fixture}.scale"
+
+
 def torque_units(model: RobotModel) -> dict[str, str]:
     """SI unit of the torque, or force, of every joint."""
     return {joint.name: "N" if joint.kind == "prismatic" else "N m" for joint in model.joints}
@@ -173,8 +175,9 @@ def parameter_locations(model: RobotModel) -> dict[str, Location]:
             table[f"station.{name}.{key}"] = Location("stations", "pose", (s, k))
         table[f"station.{name}.zero"] = Location("stations", "zero", (s,))
         table[f"station.{name}.scale"] = Location("stations", "wire_scale", (s,))
-    for k, name in enumerate(SCALES):
-        table[name] = Location("stations", "scale", (k,))
+    table[BOARD_SCALE] = Location("stations", "board_scale", (0,))
+    for k, name in enumerate(model.stations.fixtures):
+        table[socket_scale(name)] = Location("stations", "socket_scale", (k,))
     for c, name in enumerate(model.lenses.names):
         for k, key in enumerate(LENS):
             table[f"camera.{name}.{key}"] = Location("lenses", "values", (c, k))

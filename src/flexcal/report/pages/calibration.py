@@ -157,7 +157,7 @@ def calibration_verdict(study: CalibrationStudy) -> Verdict:
 
 def _held(points: MeasuredPoints) -> bool:
     """Whether every measurement is of a ball in a socket."""
-    return bool(points.poses.in_socket.all())
+    return len(points.poses) > 0 and bool(points.poses.in_socket.all())
 
 
 def _was(before: ErrorStatistics | None, words: MeasuredWords) -> str:
@@ -188,7 +188,7 @@ def calibration_checks(
     identifiable, errors = determined(results), points.statistics(CALIBRATED)
     validated = results["cross_validation"]
     left_out = None if validated is None else validated["mean_mm"] * MILLIMETRE
-    share = (identifiable.rank if validated is None else validated["parameters"]) / (3 * errors.poses)
+    share = (identifiable.rank if validated is None else validated["parameters"]) / max(3 * errors.poses, 1)
     groups, held = results["held_out"], _held(points)
     remedy = "Run it with --hold-out COLUMN" + (
         "." if held else ", or measure fresh poses and run flexcal verify, before relying on it."
