@@ -32,7 +32,7 @@ from flexcal.data.poses.distance_tables import (
 from flexcal.data.poses.image_folders import tables_of
 from flexcal.data.poses.moving_base import BASE, seen_from_base
 from flexcal.data.poses.pose_set import DEFAULT_SIGMA, PLANE, PoseSet, concatenate
-from flexcal.data.poses.socket_tables import SOCKET_COLUMNS, measures_sockets, read_sockets
+from flexcal.data.poses.socket_tables import HOLDER, SOCKET_COLUMNS, measures_sockets, read_sockets
 from flexcal.data.poses.tilt_tables import INCLINOMETER, measures_tilts, read_tilts
 from flexcal.data.tables import (
     UNITS,
@@ -55,7 +55,7 @@ _NUMBERS = (
     "quaternion", "sigma", "sigma_xyz", "sigma_angle", "tau", "payload", "force", "temperature", "t", *BASE,
 )  # fmt: skip
 _TEXTS = ("target", "station")
-_TEXT_COLUMNS = (*_TEXTS, *SOCKET_COLUMNS, *CAMERA_COLUMNS, WIRE, TOUCHED, INCLINOMETER)
+_TEXT_COLUMNS = (*_TEXTS, *SOCKET_COLUMNS, HOLDER, *CAMERA_COLUMNS, WIRE, TOUCHED, INCLINOMETER)
 """All columns of texts, of whatever kind of measurement."""
 _MISSPELT = 0.7
 """Likeness of a column's name to a known one from which it is that, misspelt."""

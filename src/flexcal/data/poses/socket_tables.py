@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel, SocketsConfig
 
 SOCKET_COLUMNS = ("fixture", "socket")
-HOLDER = "sockets"
+HOLDER = "holder"
 """Column with the name of a fixture under `measurements:`, where several have a socket of one name."""
 
 
@@ -26,10 +26,10 @@ def measures_sockets(file: TableFile) -> bool:
 
 
 def read_sockets(file: TableFile, model: RobotModel, further: Sequence[str] = ()) -> PoseSet:
-    """Read rows of `fixture`, `socket` and q1…qn; optional are `sockets`, `pose`, `target`, `payload` and `tau1`…, and
+    """Read rows of `fixture`, `socket` and q1…qn; optional are `holder`, `pose`, `target`, `payload` and `tau1`…, and
     the `further` columns, which are not used.
 
-    `fixture` is any name of the place where the fixture stood, `socket` a name under `measurements:` of robot.yaml, `sockets` that of
+    `fixture` is any name of the place where the fixture stood, `socket` a name under `measurements:` of robot.yaml, `holder` that of
     its fixture there. Raises `InputError` where robot.yaml declares no sockets, for an unknown socket and one that several fixtures have,
     for several fixtures at one place, for places whose names differ only in capital letters, and for a place that is called as a station
     of an instrument.
