@@ -15,7 +15,7 @@ import pytest
 from refusals import assert_refusal
 
 from flexcal import RobotModel, calibrate, read_poses
-from flexcal.calibration.diagnostics import PlaceAgreement
+from flexcal.calibration.diagnostics import LearningCurve, PlaceAgreement
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.cli.main import main
 from flexcal.data.poses import concatenate
@@ -163,6 +163,27 @@ def calibrated_points(robot: RobotModel, q: np.ndarray) -> np.ndarray:
     return point_kinematics(robot, q, jacobians=False).position
 
 
+def test_the_learning_curve_is_that_of_robots_fitted_to_fewer_places(seven: tuple[Path, Arm]) -> None:
+    """Linear about the fit to six places, against new fits to two and three of them."""
+    model = RobotModel.from_yaml(seven[0] / "robot.yaml")
+    poses = read_poses(seven[0] / "held.csv", model)
+    curve = LearningCurve.of(calibrate(model, poses, terms=["kinematic"]).selected)
+    assert curve is not None
+    by_places = {point.places: point.error for point in curve.points if point.poses == 14}
+    assert list(by_places) == [2, 3, 4, 5] and by_places[2] > by_places[3] > by_places[5]
+    for count in (2, 3):
+        errors = []
+        for k in (0, 2, 5):
+            chosen = [f"place{(k + 1 + 5 * i // count) % 6}" for i in range(count)]
+            robot = calibrate(model, poses.subset(np.isin(poses.station, chosen)), terms=["kinematic"]).model
+            own = poses.subset(poses.station == f"place{k}")
+            ball = calibrated_points(robot, own.q)
+            for socket in "ab":
+                held = ball[own.socket == socket]
+                errors.append(np.linalg.norm(held - held.mean(axis=0), axis=1).mean())
+        assert by_places[count] == pytest.approx(np.mean(errors), rel=0.35)
+
+
 def test_lengths_are_known_no_better_than_the_distance_of_the_sockets(
     seven: tuple[Path, Arm], tmp_path: Path
 ) -> None:
@@ -223,6 +244,10 @@ def test_the_arms_of_delft(examples: Path, tmp_path: Path, capsys: pytest.Captur
     for word in ("instruments", "measured point ", "flexcal verify", "instrument's frame", "no sigma"):
         assert word not in page and word not in said, f"nothing that a ball in sockets has: {word}"
     assert found["verdict"]["reasons"] == ["left_out", "groups_left_out"]
+    assert "How many places and poses are enough" in page
+    few, most = found["learning_curve"][0], found["learning_curve"][-1]
+    assert few["places"] == 2 and most["places"] == 5 and few["poses_per_socket"] == pytest.approx(8, abs=0.5)
+    assert most["mean_mm"] == pytest.approx(held["mean_mm"], rel=0.03) and few["mean_mm"] > most["mean_mm"]
     assert held["mean_mm"] <= 0.17 and held["distance_mm"] <= 0.045
     assert set(held["groups"]["backleft"]) == {"poses", "mean_mm", "p90_mm", "max_mm", "distance_mm"}
     assert (

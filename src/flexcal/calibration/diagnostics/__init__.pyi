@@ -3,6 +3,7 @@ from .coupled_drives import Coupling, undeclared_coupling
 from .drift_test import Drift
 from .gravity_residuals import GravityLoads, gravity_loads
 from .jumps_in_readings import ReadingJump, reading_jumps
+from .learning_curve import LearningCurve, LearningPoint
 from .nearest_socket import NearestSocket, nearest_sockets
 from .noise_test import StatedNoise, stated_noise
 from .place_agreement import FEWEST_PLACES, Disagreement, PlaceAgreement, PlaceErrors
@@ -18,6 +19,8 @@ __all__ = [
     "Drift",
     "FarZero",
     "GravityLoads",
+    "LearningCurve",
+    "LearningPoint",
     "NearestSocket",
     "PlaceAgreement",
     "PlaceErrors",

@@ -9,9 +9,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from flexcal.calibration.error_model import joint_rotation_jacobian
-from flexcal.calibration.fit import GeometricFit, manufacturing_tolerances
-from flexcal.calibration.measurement import predict_measurements
+from flexcal.calibration.diagnostics.linearised_places import LinearisedPlaces
+from flexcal.calibration.fit import GeometricFit
 from flexcal.data.poses import PoseSet
 from flexcal.units import MILLIMETRE
 
@@ -134,56 +133,18 @@ def place_errors(fit: GeometricFit) -> tuple[PlaceErrors, ...]:
     """
     from scipy.special import fdtrc
 
-    poses, model, estimate = fit.poses, fit.model, fit.estimate
-    at = predict_measurements(model, poses, flank=fit.flank, elastic=bool(model.elastic), jacobians=True)
-    held = [item.name for item in fit.undetermined]
-    names = [name for name in fit.identifiability.kept_names if name not in held]
-    names += [p.name for p in estimate.parameters if _is_random(p.name, fit)]
-    deviation = {name: _prior_std(name, fit) for name in names}
-    known = np.array([np.isfinite(std) for std in deviation.values()])
-    scale = manufacturing_tolerances(estimate.parameters.subset(names))
-    scale = np.where(known, list(deviation.values()), scale)
-    columns = at.jacobian(names) * scale
-    readings, count = at.readings, len(names)
-    whitening = fit.scatter.weights(readings, joint_rotation_jacobian(at))
-    white = whitening(columns).reshape(-1, 3, count)
-    left = whitening(fit.readings).reshape(-1, 3)
-    inside = ~np.isin(np.arange(len(poses)), estimate.outliers)
-    prior = np.eye(count)[known]
-    fitted = estimate.parameters.subset(names)
-    expected = ((fitted.prior_mean() - fitted.coordinates()) / scale)[known]
-
-    def solved(rows: np.ndarray) -> tuple[np.ndarray, float, int]:
-        measured = readings.present & rows[:, None]
-        table = np.concatenate([white[measured], prior])
-        right = np.concatenate([left[measured], expected])
-        change, _, rank, _ = np.linalg.lstsq(table, right, rcond=1e-10)
-        return change, float(np.sum((right - table @ change) ** 2)), len(right) - int(rank)
-
-    kept, result = inside[readings.row], []
-    _, whole, freedom = solved(kept)
+    poses, linear, result = fit.poses, LinearisedPlaces.of(fit), []
+    _, whole, freedom = linear.solved(linear.inside)
+    inside = ~np.isin(np.arange(len(poses)), fit.estimate.outliers)
     for fixture in poses.fixtures:
-        own = np.flatnonzero(poses.in_socket & (poses.station == fixture))
-        change, others, degrees = solved(kept & ~np.isin(readings.row, own))
-        change[[name.startswith(f"station.{fixture}.") for name in names]] = 0.0
-        ball = poses.position[own] - (fit.residuals[own] - columns[own] @ change)
+        own = linear.rows_of(fixture)
+        change, others, degrees = linear.solved(linear.inside & ~np.isin(linear.row, own))
+        ball = linear.ball(fixture, change)
         added = max(freedom - degrees, 1)
         ratio = max(whole - others, 0.0) / added * degrees / others if degrees > 0 and others > 0 else 0.0
         p = float(fdtrc(added, max(degrees, 1), ratio))
         result.append(_errors(poses.subset(own), ball, inside[own], ratio, p, several=len(poses.holders) > 1))
     return tuple(result)
-
-
-def _is_random(name: str, fit: GeometricFit) -> bool:
-    """Whether a parameter is a wave of the random effects `transmission`."""
-    return ".transmission_" in name and name not in fit.identifiability.names
-
-
-def _prior_std(name: str, fit: GeometricFit) -> float:
-    """Standard deviation of a parameter beforehand; infinite without one."""
-    if _is_random(name, fit):
-        return fit.scatter.transmission / int(name.split("_")[-2])
-    return fit.estimate.parameters[name].prior_std
 
 
 def _errors(

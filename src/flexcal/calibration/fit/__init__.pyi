@@ -21,6 +21,7 @@ from .terms import (
     loaded_compliances,
     manufacturing_tolerances,
     moving_joints,
+    plausible_size,
 )
 
 __all__ = [
@@ -42,6 +43,7 @@ __all__ = [
     "loaded_compliances",
     "manufacturing_tolerances",
     "moving_joints",
+    "plausible_size",
     "point_uncertainty",
     "probable_robot",
     "probable_robots",

@@ -13,6 +13,7 @@ from flexcal.calibration.diagnostics import (
     BearingAxes,
     Coupling,
     Drift,
+    LearningCurve,
     PlaceAgreement,
     RepeatabilityFloor,
     gravity_loads,
@@ -247,6 +248,7 @@ class Calibration(Identification):
         agreement, scale = PlaceAgreement.of(selected), scale_document(selected)
         coupling = self.coupling
         floor = RepeatabilityFloor.of(selected) if coupling is None else None
+        learning = LearningCurve.of(selected)
         bearings = bearing_remarks(self.bearings, selected)
         blamed = self.bearings is not None and self.bearings.contradicted
         misfit = None if self.stiffness is None else self.stiffness.misfit
@@ -300,6 +302,7 @@ class Calibration(Identification):
             "sample": subsample_document(self.sample, self.everywhere),
             "outliers": [outlier.document() for outlier in outliers_of(selected)],
             "places": None if agreement is None else agreement.document(),
+            "learning_curve": None if learning is None else learning.document(),
             "scale": scale,
             "bearings": bearings_block(self.bearings),
             "stage1": None if self.stiffness is None else {"misfit": misfit_document(self.stiffness.misfit)},

@@ -11,6 +11,7 @@ from .estimated_parameters import (
 )
 from .frequency_plan import amplitude_spectrum, planned_arm, poses_against_std, predicted_springs
 from .frequency_responses import bode, response_fit, response_levels, sensor_fit
+from .learning_curve import learning_curves
 from .pose_errors import ErrorSeries, calibration_errors, error_components, pose_courses, verification_errors
 from .pose_plan import joint_positions, plan_space, pose_numbers
 from .residuals import (
@@ -41,6 +42,7 @@ __all__ = [
     "error_field",
     "error_histogram",
     "joint_positions",
+    "learning_curves",
     "limit_shares",
     "links_at",
     "loaded_joints",

@@ -51,6 +51,7 @@ from flexcal.report.sections import (
     headline_facts,
     held_out_section,
     identifiability_blocks,
+    learning_section,
     noise_tables,
     orientation_tables,
     parameter_figures,
@@ -97,6 +98,8 @@ def calibration_page(study: CalibrationStudy) -> Page:
     held = _held(points)
     if considered:
         sections.append(terms_section(considered, results["term_selection_by"]))
+    if results.get("learning_curve"):
+        sections.append(learning_section(results["learning_curve"]))
     sections += [
         residuals_section(
             results["joints"],

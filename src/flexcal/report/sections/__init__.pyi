@@ -6,6 +6,7 @@ from .headline_numbers import comparison_section
 from .held_out import held_out_section
 from .identifiability import identifiability_blocks
 from .learned_residual import learned_section
+from .learning_curve import learning_section
 from .link_inertials import link_inertials_section
 from .measured_words import MeasuredWords
 from .orientations import orientation_tables
@@ -41,6 +42,7 @@ __all__ = [
     "identifiability_blocks",
     "input_files",
     "learned_section",
+    "learning_section",
     "levels_block",
     "link_inertials_section",
     "noise_tables",
