@@ -25,7 +25,7 @@ from flexcal.elasticity.response_model import stiffness_parameters
 from flexcal.frequency.periodic import FrequencyResponse
 from flexcal.frequency.periodic.response import POOLED_LINES, SMALLEST_FREEDOM
 from flexcal.model.parts import LOOP
-from flexcal.model.robot import RATIO, ArmSensor, RobotModel, unit_of
+from flexcal.model.robot import RATIO, ArmSensor, RobotModel, Stations, unit_of
 from flexcal.model.robot.config import ArmSensorConfig
 
 NUMBERS = {"nine": 9, "twelve": 12, "thirteen": 13, "fourteen": 14, "fifteen": 15}
@@ -96,6 +96,7 @@ def produced(model: RobotModel) -> dict[str, str]:
 def test_every_name_is_in_the_table_with_its_unit(root: Path, tx90l: RobotModel) -> None:
     tx40 = RobotModel.from_yaml(root / "examples" / "tx40" / "robot.yaml", estimates=False)
     seen = tx40.with_lenses({"eye": np.zeros(9)})
+    seen = replace(seen, stations=Stations.at_base((), ["cube"]))
     table, names = documented(root), {name: unit_of(name) for name in seen.values} | produced(tx90l)
     for name, unit in names.items():
         units = [known for written, known in table.items() if re.fullmatch(pattern(written), name)]
