@@ -140,12 +140,25 @@ def test_the_exported_urdf_has_what_mimic_can_say(run, tmp_path: Path) -> None:
     # what the points leave open is chosen anew for the export, the base frame among it
     rotation, shift = rigid_motion(theirs, ours)
     np.testing.assert_allclose(theirs @ rotation.T + shift, ours, rtol=0, atol=1e-8)
-    for format_name in ("mjcf", "dh", "offsets"):
+    assert run("export", "offsets", robot, "--out", tmp_path / "offsets.csv").status == 0
+    with (tmp_path / "offsets.csv").open() as stream:
+        rows = csv.DictReader(line for line in stream if not line.startswith("#"))
+        zeros = {row["joint"]: float(row["value"]) for row in rows if row["parameter"] == "offset"}
+    assert set(zeros) == set(found.motor_names)
+    drawn, shift = Palletiser.nominal(), np.array([zeros[name] for name in found.motor_names])
+    assert _apart(drawn.reflector(fresh + shift), ours) < 0.7 * _apart(drawn.reflector(fresh), ours)
+    for format_name in ("mjcf", "dh"):
         refused = run(
             "export", format_name, robot, "--out", tmp_path / f"x.{'xml' if format_name == 'mjcf' else 'csv'}"
         )
         assert refused.status == 2
         assert_refusal(refused.err, "E-ROBOT-076", "elbow")
+
+
+def _apart(points: np.ndarray, others: np.ndarray) -> float:
+    """Root mean square distance of best-fit registered points."""
+    rotation, shift = rigid_motion(points, others)
+    return float(np.sqrt(np.mean((points @ rotation.T + shift - others) ** 2)))
 
 
 def _with_elbow(path: Path, q: np.ndarray, xyz: np.ndarray, elbow: np.ndarray) -> Path:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.export.representation_error import PositionErrors, random_poses, tool_positions
-from flexcal.model.kinematics import point_kinematics
+from flexcal.model.kinematics import motor_motion, point_kinematics
 from flexcal.model.parts import rotation_vector, vector_rotation
 from flexcal.model.robot import RobotModel, propagated_covariance_root
 
@@ -57,7 +57,7 @@ def fit_offsets(
     """
     fixed = np.isin(np.arange(model.n), sorted(undetermined))
     fit = _fit(model, nominal, point, fixed, keep_frames=keep_frames)
-    made = np.array([_MADE_WITHIN[joint.kind] for joint in model.joints])
+    made = np.array([_MADE_WITHIN[joint.kind] for joint in model.motor_joints])
     weak = ~fixed & (fit.std > made) & (np.abs(fit.offsets) < 2 * fit.std)
     return _fit(model, nominal, point, fixed | weak, keep_frames=keep_frames) if weak.any() else fit
 
@@ -156,7 +156,7 @@ def _columns(
     at = point_kinematics(nominal, q + parameters[:n], point=point)
     turn = vector_rotation(parameters[n + 3 : n + 6])
     columns = np.zeros((len(q), 3, n + 9))
-    by_offset = at.geometry_jacobian[:, :, : 6 * n : 6]
+    by_offset = at.geometry_jacobian[:, :, : 6 * len(nominal.joints) : 6] @ motor_motion(nominal)
     lever = (at.orientation @ parameters[n + 6 :])[:, :, None]
     columns[:, :, :n] = turn @ (by_offset[:, :3] + np.cross(by_offset[:, 3:], lever, axis=1))
     where = offset_tool(nominal, q, parameters, point) - parameters[n : n + 3]

@@ -8,7 +8,7 @@ from io import StringIO
 
 import numpy as np
 
-from flexcal.export.chain import chain_to
+from flexcal.export.chain import motors_to
 from flexcal.export.offset_fit import OffsetFit, error_after_offsets, fit_offsets, offset_tool
 from flexcal.export.representation_error import AT_REST, GEOMETRY, ToolMap
 from flexcal.export.transforms import XYZ_RPY, from_xyz_rpy, transform, xyz_rpy
@@ -34,31 +34,31 @@ def render_offsets(
 
     Raises `FlexcalError` for a robot without points, or an unknown point.
     """
-    target, chain = chain_to(model, point, "Joint offsets")
+    target, motors = motors_to(model, point, "Joint offsets")
     fit = fit_offsets(model, nominal, target, keep_frames=keep_frames, undetermined=undetermined)
-    text = _csv(model, fit, chain, keep_frames=keep_frames)
+    text = _csv(model, fit, motors, keep_frames=keep_frames)
     placed = "as it is" if keep_frames else "with base and tool placed by best fit"
     remarks = [
         f"Without offsets, {placed}, the nominal robot is off by {fit.before.mean / MILLIMETRE:.3f} mm on average, "
         f"{fit.before.max / MILLIMETRE:.3f} mm at most."
     ]
-    open_ = [model.joint_names[i] for i in chain if not fit.determined[i]]
+    open_ = [model.motor_names[k] for k in motors if not fit.determined[k]]
     if open_:
         remarks.append(
             f"Not determined, and zero here: {', '.join(open_)}. What was measured cannot tell their zeros from another place of the "
             "base or of the measured point on the tool; leave these zeros as they are."
         )
     large = [
-        model.joint_names[i]
-        for i in chain
-        if abs(fit.offsets[i]) > _LARGE and model.joints[i].kind != "prismatic"
+        model.motor_names[k]
+        for k in motors
+        if abs(fit.offsets[k]) > _LARGE and model.motor_joints[k].kind != "prismatic"
     ]
     if large:
         remarks.append(
             f"Larger than any error of manufacture: {', '.join(large)}. Look whether URDF and controller have the same zeros before "
             "entering any."
         )
-    left = [name for i, name in enumerate(model.joint_names) if i not in chain]
+    left = [name for k, name in enumerate(model.motor_names) if k not in motors]
     if left:
         remarks.append(
             f"Without an offset here, for they do not move the point '{target}': {', '.join(left)}."
@@ -75,17 +75,16 @@ def render_offsets(
             f"tool: what to add to the point '{target}' in its frame.",
         )
     )
+    ratios = model.drives.ratio[list(model.motors)]
     document = {
-        model.joints[i].name: {
-            "offset": float(fit.offsets[i]),
-            "unit": "m" if model.joints[i].kind == "prismatic" else "rad",
-            "std": float(fit.std[i]) if fit.determined[i] and fit.std[i] > 0 else None,
-            "determined": bool(fit.determined[i]),
-            "motor_offset": float(fit.offsets[i] * model.drives.ratio[i])
-            if np.isfinite(model.drives.ratio[i])
-            else None,
+        model.motor_names[k]: {
+            "offset": float(fit.offsets[k]),
+            "unit": "m" if model.motor_joints[k].kind == "prismatic" else "rad",
+            "std": float(fit.std[k]) if fit.determined[k] and fit.std[k] > 0 else None,
+            "determined": bool(fit.determined[k]),
+            "motor_offset": float(fit.offsets[k] * ratios[k]) if np.isfinite(ratios[k]) else None,
         }
-        for i in chain
+        for k in motors
     }
     return RenderedModel(
         text,
@@ -120,7 +119,8 @@ def offsets_of(text: str, nominal: RobotModel) -> np.ndarray:
     for row in csv.DictReader(lines):
         value = float(row["value"])
         if row["parameter"] == "offset":
-            parameters[nominal.joint_index(row["joint"])] = value
+            nominal.joint_index(row["joint"])
+            parameters[nominal.motor_names.index(row["joint"])] = value
         elif row["joint"] == "tool":
             parameters[nominal.n + 6 + "xyz".index(row["parameter"])] = value
         else:
@@ -140,18 +140,18 @@ def _base_numbers(base: np.ndarray) -> dict[str, float]:
     return xyz_rpy(transform(base[:3], vector_rotation(base[3:])))
 
 
-def _csv(model: RobotModel, fit: OffsetFit, chain: tuple[int, ...], *, keep_frames: bool) -> str:
+def _csv(model: RobotModel, fit: OffsetFit, motors: tuple[int, ...], *, keep_frames: bool) -> str:
     stream = StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(COLUMNS)
-    for i in chain:
-        joint, value = model.joints[i], float(fit.offsets[i])
+    for i in motors:
+        joint, value = model.motor_joints[i], float(fit.offsets[i])
         std = repr(float(fit.std[i])) if fit.determined[i] and fit.std[i] > 0 else ""
         told = "yes" if fit.determined[i] else "no"
         if joint.kind == "prismatic":
             writer.writerow([joint.name, "offset", "m", repr(value), std, "", "", told])
             continue
-        at_motor = value * model.drives.ratio[i] / DEGREE
+        at_motor = value * model.drives.ratio[model.motors[i]] / DEGREE
         motor = f"{at_motor:.6f}" if np.isfinite(at_motor) else ""
         writer.writerow([joint.name, "offset", "rad", repr(value), std, f"{value / DEGREE:.6f}", motor, told])
     if not keep_frames:

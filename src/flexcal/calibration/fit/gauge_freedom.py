@@ -54,7 +54,7 @@ def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotMod
 
     Weighted least squares of all geometric errors, subject to unchanged positions of the points, and orientations of targets of which they
     were measured, as every calibrated station sees them, by Gauss-Newton, of the robot taken as stiff under gravity: tilting axes would
-    show such directions faintly. The posterior follows: what
+    show such directions faintly. What these then move the points, by nanometres, all parameters make up for. The posterior follows: what
     was estimated is propagated, and the free directions have the tolerances as their covariance. The second robot is the same with only
     these in its posterior: what the measured points leave open. Both are the
     robot itself where nothing was calibrated.
@@ -78,16 +78,18 @@ def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotMod
     weight = np.where(np.isfinite(std), 1 / std, 0.0)
     seen, free = _directions(stiff, poses, names, scale)
     robot = stiff
-    for _ in range(_STEPS):
-        at = predict_measurements(robot, poses, elastic=False, jacobians=True)
-        columns = at.jacobian(names).reshape(-1, len(names)) @ seen
-        step = seen @ np.linalg.lstsq(columns, at.residual.ravel(), rcond=_UNSEEN)[0]
-        values = np.array([robot.value(name) for name in names]) + step
-        step += free @ np.linalg.lstsq(weight[:, None] * free, -weight * values, rcond=None)[0]
-        changed = np.array([robot.value(name) for name in names]) + step
-        robot = robot.with_values(dict(zip(names, changed.tolist(), strict=True)))
-        if np.abs(step).max() < _SMALL:
-            break
+    for directions in (seen, np.diag(scale)):
+        for _ in range(_STEPS):
+            at = predict_measurements(robot, poses, elastic=False, jacobians=True)
+            columns = at.jacobian(names).reshape(-1, len(names)) @ directions
+            step = directions @ np.linalg.lstsq(columns, at.residual.ravel(), rcond=_UNSEEN)[0]
+            values = np.array([robot.value(name) for name in names]) + step
+            if directions is seen:
+                step += free @ np.linalg.lstsq(weight[:, None] * free, -weight * values, rcond=None)[0]
+            changed = np.array([robot.value(name) for name in names]) + step
+            robot = robot.with_values(dict(zip(names, changed.tolist(), strict=True)))
+            if np.abs(step).max() < _SMALL:
+                break
     robot = model.with_values({name: robot.value(name) for name in names})
     whole, unseen = _propagated(robot, names, free, weight)
     return replace(robot, posterior=whole), replace(robot, posterior=unseen)
