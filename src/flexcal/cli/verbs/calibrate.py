@@ -163,6 +163,8 @@ class Calibrate:
             else f"{command_line()} --hold-out COLUMN, where a column tells recordings apart, for errors outside the fit"
             if self.hold_out is None
             else f"flexcal export urdf {self.robot}{where}"
+            if len(calibration.selected.poses.pointed)
+            else f"flexcal export offsets {self.robot}{where}, for the joint zeros that these readings tell"
         )
         if calibration.bearings is not None and calibration.bearings.contradicted:
             following = (
