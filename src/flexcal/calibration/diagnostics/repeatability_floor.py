@@ -36,6 +36,11 @@ class RepeatabilityFloor:
         return cls(float(np.sqrt(3)) * scatter, scatter / lever, fit.poses.sigma_given)
 
     @property
+    def joint_degrees(self) -> float:
+        """The `angle` in degrees."""
+        return float(np.rad2deg(self.angle))
+
+    @property
     def sentence(self) -> str:
         """What it means, in a sentence."""
         whose = (
@@ -43,13 +48,13 @@ class RepeatabilityFloor:
         )
         return (
             f"{self.distance / MILLIMETRE:.1f} mm (rms) of scatter from pose to pose remain beside the geometry, as of "
-            f"{np.rad2deg(self.angle):.1f}° of play in every joint (1σ): {whose}, and no calibration goes much below that"
+            f"{self.joint_degrees:.1f}° of play in every joint (1σ): {whose}, and no calibration goes much below that"
         )
 
     def document(self) -> dict[str, Any]:
         """Entry of results.json."""
         return {
             "rms_mm": self.distance / MILLIMETRE,
-            "joint_deg": float(np.rad2deg(self.angle)),
+            "joint_deg": self.joint_degrees,
             "without_instrument": self.apart,
         }

@@ -40,6 +40,7 @@ def kinematic_identifiability(
     if not poses.located.any():
         # where fixture, wire or face stand is to take up what moves the whole robot, not a joint
         preferred += [name for name in parameters.names if name.startswith("station.")]
+    preferred += prefer
     if np.isfinite(parameters.prior_std()).any():
         # a declared prior must not stand against what the points tell of a parameter without
         preferred += [item.name for item in parameters if not np.isfinite(item.prior_std)]
@@ -47,7 +48,7 @@ def kinematic_identifiability(
         columns,
         parameters.names,
         scale=manufacturing_tolerances(parameters) if scale is None else scale,
-        prefer=[*preferred, *prefer],
+        prefer=preferred,
     )
 
 

@@ -1,4 +1,4 @@
-from .backlash_flanks import ambiguous_poses, require_both_flanks
+from .backlash_flanks import OneFlank, ambiguous_poses, require_both_flanks
 from .hand_eye import with_camera_places
 from .joint_zeros import register_with_zeros
 from .prediction import (
@@ -16,6 +16,7 @@ __all__ = [
     "OF_INSTRUMENTS",
     "RADIANS",
     "ROBOT",
+    "OneFlank",
     "PredictedMeasurements",
     "Propagation",
     "Readings",

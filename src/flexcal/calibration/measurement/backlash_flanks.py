@@ -10,6 +10,10 @@ from flexcal.model.robot import RobotModel
 from flexcal.model.statics import carried_mass, certain_flank
 
 
+class OneFlank(FlexcalError):
+    """A joint rests on the same flank of its backlash at all poses."""
+
+
 def ambiguous_poses(model: RobotModel, prediction: PredictedMeasurements) -> np.ndarray:
     """Poses (N,) at which a joint with backlash carries too little torque for its sign to be certain.
 
@@ -21,11 +25,11 @@ def ambiguous_poses(model: RobotModel, prediction: PredictedMeasurements) -> np.
 
 
 def require_both_flanks(model: RobotModel, flank: np.ndarray) -> None:
-    """Raise `FlexcalError` naming the joints whose backlash is not separable from their offset because only one flank was measured."""
+    """Raise `OneFlank` naming the joints whose backlash is not separable from their offset because only one flank was measured."""
     for i in model.backlash_joints:
         seen = np.unique(flank[:, i])
         if not {-1.0, 1.0} <= set(seen):
-            raise FlexcalError(
+            raise OneFlank(
                 "E-CAL-010",
                 f"{model.joints[i].name} rests on one flank of its backlash at all {len(flank)} poses, so backlash and joint "
                 "offset are not identifiable separately; add poses loaded in the other direction, or take the joint out of "

@@ -33,6 +33,15 @@ class TermSelection:
     by: str
     remark: str
 
+    def without(self, term: str, model: RobotModel, reason: str) -> TermSelection:
+        """Selection for a `model` without a term that was taken and cannot be fitted, for the `reason`, a clause."""
+        rows = (
+            replace(row, taken=False, reason=f"{row.reason}; but {reason}") if row.term == term else row
+            for row in self.considered
+        )
+        kept = tuple(own for own in self.terms if own != term)
+        return replace(self, terms=kept, model=model, considered=tuple(rows))
+
     def __str__(self) -> str:
         return "; ".join(
             f"{row.term}: {'taken' if row.taken else 'left'}, {row.reason}"
@@ -94,9 +103,8 @@ def select_terms(
     model: RobotModel,
     poses: PoseSet,
     fitted: GeometricFit | None = None,
-    level: str = "kinematic",
 ) -> TermSelection:
-    """Forward selection of compliance under gravity, backlash and transmission harmonics on top of the rigid fit of a `level` of geometry.
+    """Forward selection of compliance under gravity, backlash and transmission harmonics on top of the rigid fit.
 
     A term is added where it lowers the mean error on poses left out by more than one standard error of the paired difference, lowers the
     Bayesian information criterion, and does not raise the largest left-out error. Fewer than 80 different poses are left out one by one,
@@ -109,7 +117,7 @@ def select_terms(
     The random effects `transmission` are none of the terms: beside them compliance of every joint, which moves the points much alike,
     would not be found.
     """
-    base = (level, *(("backlash",) if model.backlash_joints else ()))
+    base = ("kinematic", *(("backlash",) if model.backlash_joints else ()))
     folds, distinct = folds_of(poses)
     if distinct < LEAST_POSES:
         more = LEAST_POSES - distinct

@@ -7,7 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration.fit import LEAST_POSES, LEVELS, TOLERANCE, GeometricFit, fit_geometry
+from flexcal.calibration.fit import (
+    LEAST_POSES,
+    LEVELS,
+    TOLERANCE,
+    GeometricFit,
+    fit_geometry,
+    geometric_parameters,
+    plausible_size,
+)
 from flexcal.calibration.term_selection.cross_validation import folds_of, left_out_by
 from flexcal.calibration.term_selection.leave_out_errors import LeaveOutErrors
 from flexcal.calibration.term_selection.trials import TermTrials, mean_gain
@@ -17,6 +25,8 @@ from flexcal.units import MILLIMETRE
 
 _SAME = 0.02
 """Relative difference of mean errors that does not matter."""
+_HAND_MADE = {"m": 1e-3, "rad": 1e-2}
+"""Tolerances (1σ) of lengths and axes of printed or bent links, by unit, for robots whose scatter hides them."""
 _SAID = {
     "offsets": "joint zeros alone",
     "lengths": "joint zeros and lengths of links",
@@ -49,6 +59,16 @@ class ZerosOrGeometry:
     levels: tuple[LevelFit, ...]
     answer: LevelFit
 
+    def with_tolerances(self, model: RobotModel, poses: PoseSet) -> RobotModel:
+        """Robot whose lengths and axes beyond the answer's level have the tolerances of hand-made links as a prior."""
+        own = geometric_parameters(model, poses, (self.answer.level,)).names
+        beyond = {
+            item.name: max(_HAND_MADE[item.unit], plausible_size(model, item.name))
+            for item in geometric_parameters(model, poses, ("kinematic",))
+            if item.name not in own and not np.isfinite(item.prior_std)
+        }
+        return model.with_priors(beyond)
+
     @property
     def sentence(self) -> str:
         """The answer in one sentence."""
@@ -56,12 +76,17 @@ class ZerosOrGeometry:
             f"{level.mean / MILLIMETRE:.1f} mm with {_SAID[level.level]}" for level in self.levels
         )
         own = _SAID[self.answer.level]
-        held = {
-            "offsets": "; lengths and axes stay as in the URDF, since the scatter hides what they are off, which intervals leave out",
-            "lengths": "; axes stay as in the URDF, since the scatter hides how they are tilted, which intervals leave out",
-            "kinematic": "",
-        }[self.answer.level]
-        return f"zeros or geometry: these points support {own} (mean error at left-out poses {errors}){held}"
+        said = f"zeros or geometry: these points support {own} (mean error at left-out poses {errors})"
+        if self.answer.level == "kinematic":
+            return said
+        zeros = self.answer.level == "offsets"
+        rest, length = (
+            ("lengths and axes", f"{_HAND_MADE['m'] / MILLIMETRE:g} mm and ") if zeros else ("axes", "")
+        )
+        return (
+            f"{said}; the scatter hides what {rest} are off, which are taken as those of the URDF with standard deviations of "
+            f"{length}{np.rad2deg(_HAND_MADE['rad']):.1f}° (robot.yaml may state others: `prior:`)"
+        )
 
     def document(self) -> dict[str, Any]:
         """Entry of results.json."""

@@ -148,7 +148,7 @@ class TermTrials:
     def determined(self) -> LeaveOutErrors:
         """Fit of those parameters of the base fit that its points determine."""
         held = [item.name for item in self.rigid.undetermined]
-        kept = [name for name in self.rigid.identifiability.kept_names if name not in held]
+        kept = [name for name in self._free if name not in held]
         return self._left_out([self._seen(kept), self._held], [0.0, self._noise])
 
     def mean(self, terms: tuple[str, ...]) -> float:
@@ -220,21 +220,37 @@ class TermTrials:
         return float((self._residual**2).sum()) / freedom
 
     @cached_property
+    def _known(self) -> dict[str, float]:
+        """Prior standard deviations of the geometric parameters that have one."""
+        every = self.rigid.estimate.parameters
+        return {
+            item.name: item.prior_std
+            for item in every
+            if np.isfinite(item.prior_std) and item.name.rpartition(".")[2] in (*GEOMETRY, *ORIGIN)
+        }
+
+    @cached_property
+    def _free(self) -> list[str]:
+        """Parameters that the points determine by rank, without those that have a prior."""
+        return [name for name in self.rigid.identifiability.kept_names if name not in self._known]
+
+    @cached_property
     def _held(self) -> np.ndarray:
-        """Columns (R, 3, k) of springs and inertia, in prior standard deviations."""
-        prior = self.rigid.prior
+        """Columns (R, 3, k) of springs, inertia and geometry with a prior, in its standard deviations."""
+        prior, names = self.rigid.prior, tuple(self._known)
+        known = self._seen(names) * np.array([self._known[name] for name in names])
         if not len(prior.parameters):
-            return np.zeros((*self._residual.shape, 0))
+            return known
         parameters = self.rigid.estimate.parameters.subset(prior.parameters.names)
         slope = parameters.natural_slope(parameters.coordinates())
-        return self._seen(parameters.names) * slope @ np.linalg.cholesky(prior.covariance)
+        elastic = self._seen(parameters.names) * slope @ np.linalg.cholesky(prior.covariance)
+        return np.concatenate([known, elastic], axis=2)
 
     def _block(self, term: str) -> np.ndarray:
         if term not in self._columns:
             if term in LEVELS:
-                kept = self.rigid.identifiability.kept_names
                 names = tuple(
-                    n for n in kept if n.rpartition(".")[2] in (*GEOMETRY, *ORIGIN, *STATION, "zero")
+                    n for n in self._free if n.rpartition(".")[2] in (*GEOMETRY, *ORIGIN, *STATION, "zero")
                 )
             else:
                 names = geometric_parameters(self.model, self.rigid.poses, [term]).names

@@ -11,6 +11,7 @@ import numpy as np
 from flexcal.calibration.diagnostics import BearingAxes, compare_bearings
 from flexcal.calibration.error_model import TRANSMISSION
 from flexcal.calibration.fit import CONVERGED, GeometricFit, LossName, StratifiedSample, fit_geometry
+from flexcal.calibration.measurement import OneFlank
 from flexcal.calibration.term_selection import (
     TermSelection,
     ZerosOrGeometry,
@@ -103,20 +104,28 @@ class Fits:
         good = poses.subset(np.setdiff1d(np.flatnonzero(~poses.tilted), rigid.estimate.outliers))
         alone = loss == "auto" and not poses.tilted.any()
 
-        def choose(begin: GeometricFit, level: str) -> tuple[TermSelection, GeometricFit]:
-            """Terms beyond a level of geometry, and the fit with them."""
+        def choose(robot: RobotModel, begin: GeometricFit) -> tuple[TermSelection, GeometricFit]:
+            """Terms beyond the geometry, and the fit with them."""
             progress("terms", 0.0)
-            chosen = select_terms(model, good, begin if alone else None, level)
+            chosen = select_terms(robot, good, begin if alone else None)
             progress("terms", 1.0)
-            found = _with_random_waves(chosen.terms)
-            return chosen, fit(chosen.model, found, "selected fit", start, elastic=elastic)
+            try:
+                found = _with_random_waves(chosen.terms)
+                return chosen, fit(chosen.model, found, "selected fit", start, elastic=elastic)
+            except OneFlank:
+                if robot.backlash_joints:
+                    raise
+                reason = "the fitted robot rests on one flank at all poses, so it is not identifiable beside the offset"
+                chosen = chosen.without("backlash", robot, reason)
+                found = _with_random_waves(chosen.terms)
+                return chosen, fit(robot, found, "selected fit", start, elastic=elastic)
 
-        selection, selected = choose(rigid, "kinematic")
+        selection, selected = choose(model, rigid)
         levels = zeros_or_geometry(model, good) if not elastic and asks_for_levels(selected) else None
         if levels is not None and levels.answer.level != "kinematic":
-            level = levels.answer.level
-            rigid = fit(model, (level, *base[1:]), "rigid fit", levels.answer.fit, elastic=False)
-            selection, selected = choose(rigid, level)
+            model = levels.with_tolerances(model, poses)
+            rigid = fit(model, base, "rigid fit", levels.answer.fit, elastic=False)
+            selection, selected = choose(model, rigid)
         return cls(
             selection.model,
             _with_random_waves(selection.terms),

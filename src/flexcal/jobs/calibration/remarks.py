@@ -158,7 +158,7 @@ def calibration_remarks(fit: GeometricFit, cause: Sequence[str] = ()) -> tuple[s
         )
     remarks += cause
     if not cause and not residuals_implausible(fit):
-        remarks += [*_floor(fit), *_zeros(fit)]
+        remarks += _zeros(fit)
     far = implausible_shifts(fit)
     if far:
         named = [f"{m.name} ({m.start:.4g} to {m.value:.4g} {m.unit})" for m in far[:_SHOWN]]
@@ -172,11 +172,6 @@ def calibration_remarks(fit: GeometricFit, cause: Sequence[str] = ()) -> tuple[s
             "import' and the nominal geometry in the URDF, take fewer terms under `geometry:`, or measure more poses, farther apart"
         )
     return tuple(remarks)
-
-
-def _floor(fit: GeometricFit) -> Sequence[str]:
-    floor = RepeatabilityFloor.of(fit)
-    return () if floor is None else (floor.sentence,)
 
 
 def _zeros(fit: GeometricFit) -> Sequence[str]:
@@ -354,8 +349,10 @@ def _contradicted(test: StatedNoise) -> str:
 def floor_remark(fit: GeometricFit, before: np.ndarray | None) -> tuple[str, ...]:
     """Remark where the scatter from pose to pose is what is left, and large; `before` (N, 3), m, are the errors without calibration."""
     rows = int(fit.poses.present.sum())
-    if not rows:
+    if not rows or residuals_implausible(fit):
         return ()
+    floor = RepeatabilityFloor.of(fit)
+    own = () if floor is None else (floor.sentence,)
     budget = fit.variances
     robot, model, instrument = (
         float(budget[key] or 0.0) for key in ("robot_mm", "model_mm", "instrument_mm")
@@ -367,13 +364,14 @@ def floor_remark(fit: GeometricFit, before: np.ndarray | None) -> tuple[str, ...
         or is_implausible(fit)
         or robot < _FLOOR * np.hypot(np.hypot(model, parameters), instrument)
     ):
-        return ()
+        return own
     if fit.errors.mean < _GAIN * float(np.linalg.norm(before, axis=1).mean()):
-        return ()
+        return own
+    play = "" if floor is None else f", as of {floor.joint_degrees:.1f}° of play in every joint,"
     return (
-        f"the scatter from pose to pose, {robot:.2f} mm per coordinate (1σ), is the floor: model errors of {model:.2f} mm and parameters "
-        f"known to {parameters:.2f} mm at these poses add little to it, so neither further terms nor more poses will make this robot much "
-        "more accurate. Visits to the same poses tell how much of it is the robot's repeatability (flexcal repeatability)",
+        f"the scatter from pose to pose, {robot:.2f} mm per coordinate (1σ){play or ','} is the floor: model errors of {model:.2f} mm and "
+        f"parameters known to {parameters:.2f} mm at these poses add little to it, so neither further terms nor more poses will make this "
+        "robot much more accurate. Visits to the same poses tell how much of it is the robot's repeatability (flexcal repeatability)",
     )
 
 

@@ -231,6 +231,22 @@ class RobotModel:
         """
         return replace(self, config=replace(self.config, bearings=bearings))
 
+    def with_priors(self, stds: Mapping[str, float]) -> RobotModel:
+        """Robot with priors of some geometric parameters, centred on their nominal values.
+
+        Parameters
+        ----------
+        stds : mapping of float
+            Standard deviations, m or rad, by name of the parameter.
+
+        Returns
+        -------
+        RobotModel
+            The changed robot.
+        """
+        prior = replace(self.config.prior, parameters={**self.config.prior.parameters, **stds})
+        return replace(self, config=replace(self.config, prior=prior))
+
     def with_drive_springs(self, springs: Mapping[int, tuple[float, float]]) -> RobotModel:
         """Robot with drive springs at some of its rigid joints.
 
