@@ -18,6 +18,8 @@ _NEAR = 1.2
 """Factor up to which a stated noise counts as right even where many readings tell the difference."""
 _FEWEST = 5
 """Least degrees of freedom for a judgement."""
+_OWN = 10.0
+"""Factor on noise relative to the robot's reach, by which what is left of a column may be the residuals themselves."""
 ORIENTATIONS, POINTS = "orientations", "points"
 
 
@@ -76,10 +78,11 @@ def stated_noise(fit: GeometricFit) -> tuple[StatedNoise, ...]:
     whitened = _whitened(fit)
     if whitened is None:
         return ()
-    rows, columns, names = whitened
-    scale = np.linalg.norm(columns, axis=0)
-    basis, sizes, _ = np.linalg.svd(columns[:, scale > 0] / scale[scale > 0], full_matrices=False)
-    basis = basis[:, sizes > RANK_TOLERANCE * sizes.max(initial=0.0)]
+    rows, free, held, names = whitened
+    basis = _basis(free, RANK_TOLERANCE)
+    # where nothing tells the size of the robot, what is left of a common scale of all lengths is the residuals themselves
+    own = _OWN * float(np.median(fit.poses.sigma[fit.poses.stated])) / fit.model.reach
+    basis = np.concatenate([basis, _basis(held, max(RANK_TOLERANCE, own), beside=basis)], axis=1)
     left = rows - basis @ (basis.T @ rows)
     freedom = len(rows) - basis.shape[1]
     if freedom < _FEWEST:
@@ -87,6 +90,17 @@ def stated_noise(fit: GeometricFit) -> tuple[StatedNoise, ...]:
     whole = StatedNoise("", len(rows), float(freedom), float(left @ left) / freedom)
     groups = {name: names == name for name in dict.fromkeys(names.tolist())}
     return (whole, *_of_each(groups, left, basis)) if len(groups) > 1 else (whole,)
+
+
+def _basis(columns: np.ndarray, tolerance: float, beside: np.ndarray | None = None) -> np.ndarray:
+    """Orthonormal basis (n, r) of columns (n, k) of unit norm, without what is in the span of the basis `beside` (n, m)."""
+    scale = np.linalg.norm(columns, axis=0)
+    scaled = columns[:, scale > 0] / scale[scale > 0]
+    if beside is not None:
+        for _ in range(2):
+            scaled = scaled - beside @ (beside.T @ scaled)
+    basis, sizes, _ = np.linalg.svd(scaled, full_matrices=False)
+    return basis[:, sizes > tolerance * (1.0 if beside is not None else sizes.max(initial=0.0))]
 
 
 def _of_each(groups: dict[str, np.ndarray], left: np.ndarray, basis: np.ndarray) -> Iterator[StatedNoise]:
@@ -104,14 +118,16 @@ def _of_each(groups: dict[str, np.ndarray], left: np.ndarray, basis: np.ndarray)
             yield StatedNoise(name, int(size), float(1 / spread), max(float(factor), 0.0))
 
 
-def _whitened(fit: GeometricFit) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Residuals (n,) of the coordinates whose noise is stated, columns (n, k) and names (n,) of instruments; None where there are none."""
+def _whitened(fit: GeometricFit) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
+    """Residuals (n,) of the coordinates whose noise is stated, columns (n, k) of free parameters and of held ones, and names (n,) of
+    instruments; None where there are none.
+    """
     linear, poses = fit.linear, fit.poses
     readings = linear.readings
     stated = readings.present & (readings.sigma > 0)
     if not poses.sigma_given or not stated.any():
         return None
-    columns = [linear.free, linear.tied]
+    columns = [linear.tied]
     if fit.scatter.transmission > 0:
         columns.append(linear.waves)
     if fit.undetermined:
@@ -126,5 +142,10 @@ def _whitened(fit: GeometricFit) -> tuple[np.ndarray, np.ndarray, np.ndarray] | 
     if poses.camera is not None:
         instrument = np.where(poses.seen, poses.camera, instrument)
     names = np.where(readings.points | poses.seen[readings.row], instrument[readings.row], ORIENTATIONS)
-    every = np.concatenate(columns, axis=2)
-    return whitening(linear.residual)[there], whitening(every)[there], np.repeat(names, 3)[there]
+    held = np.concatenate(columns, axis=2)
+    return (
+        whitening(linear.residual)[there],
+        whitening(linear.free)[there],
+        whitening(held)[there],
+        np.repeat(names, 3)[there],
+    )

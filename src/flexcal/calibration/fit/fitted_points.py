@@ -46,6 +46,7 @@ from flexcal.calibration.measurement import (
     require_orientations,
     stated_sigma,
     with_camera_places,
+    with_places_of,
     with_target_axes,
 )
 from flexcal.data.poses import PoseSet
@@ -118,19 +119,22 @@ class PointFit:
         model = model.with_lenses({name: lens.values for name, lens in poses.lenses.items()})
         bare = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
         start = register(model, poses, predict_measurements(bare, poses, elastic=elastic).located)
-        placed = register_with_zeros(start, poses)
-        far_zeros = placed is not None
-        start = start if placed is None else placed
-        start = with_target_axes(with_camera_places(start, poses), poses)
-        require_orientations(start, poses)
+        zeroed = register_with_zeros(start, poses)
+        far_zeros = zeroed is not None
+        placed = with_target_axes(with_camera_places(zeroed or start, poses), poses)
+        require_orientations(placed, poses)
+        start = with_places_of(start, placed, poses) if far_zeros else placed
         prior = with_instruments(prior, start, poses)
         if "backlash" in terms:
             require_both_flanks(model, predict_measurements(start, poses, elastic=elastic).rest.flank)
         held = held_lengths(start, poses)
         geometric = geometric_parameters(start, poses, terms)
         geometric = Parameters(item for item in geometric if item.name not in held)
-        # zeros that are far off are to be found as such, not as lengths of links that are turned
-        zeros = [name for name in geometric.names if name.endswith(".offset")] if far_zeros else []
+        # zeros that are far off are to be found as such, not as lengths of links that are turned; that of the last joint may as well
+        # be where the target is
+        last = {start.point(target).joint for target in poses.targets}
+        inner = [f"{joint.name}.offset" for i, joint in enumerate(start.joints) if i not in last]
+        zeros = [name for name in inner if name in geometric] if far_zeros else []
         seen = kinematic_identifiability(start, poses, geometric, prefer=zeros)
         require_enough(start, poses, geometric, seen)
         structural = random_identifiability(start, poses, geometric, seen)

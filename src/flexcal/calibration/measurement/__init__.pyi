@@ -1,6 +1,6 @@
 from .backlash_flanks import OneFlank, ambiguous_poses, require_both_flanks
 from .hand_eye import with_camera_places
-from .joint_zeros import register_with_zeros
+from .joint_zeros import register_with_zeros, with_places_of
 from .prediction import (
     PredictedMeasurements,
     predict_measurements,
@@ -34,5 +34,6 @@ __all__ = [
     "require_points",
     "stated_sigma",
     "with_camera_places",
+    "with_places_of",
     "with_target_axes",
 ]

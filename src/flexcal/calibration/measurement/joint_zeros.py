@@ -21,7 +21,7 @@ _SMALL_STEP = 1e-7
 
 
 def register_with_zeros(registered: RobotModel, poses: PoseSet) -> RobotModel | None:
-    """Robot with its stations as the best fit of stations, joint zeros and points has them; zeros and points stay as they are.
+    """Robot with stations, joint zeros and points as their best fit has them: `with_places_of` takes the places alone from it.
 
     None where all points of instruments, `registered` by best fit, are no farther from the robot than errors of manufacture explain, and
     where zeros do not explain what the registration leaves, as of data of another robot.
@@ -64,4 +64,11 @@ def register_with_zeros(registered: RobotModel, poses: PoseSet) -> RobotModel | 
         trial = best + step
     if np.sqrt(least) > max(_EXPLAINED * np.sqrt(first), _PLAY):
         return None
-    return registered.with_values(dict(zip(stations, best[: len(stations)].tolist(), strict=True)))
+    return registered.with_values(dict(zip(names, best.tolist(), strict=True)))
+
+
+def with_places_of(model: RobotModel, found: RobotModel, poses: PoseSet) -> RobotModel:
+    """Robot with the places of stations, and the axes of targets, of another that was `found` with other joint zeros."""
+    names = [f"station.{name}.{key}" for name in poses.stations for key in STATION]
+    names += [f"point.{target}.{key}" for target in poses.targets for key in STATION[3:]]
+    return model.with_values({name: found.value(name) for name in names})
