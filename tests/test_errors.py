@@ -12,12 +12,13 @@ from typing import Any
 
 import pytest
 
+from flexcal.calibration.measurement import OneFlank
 from flexcal.data.recordings.low_pass import TooFewSamples
 from flexcal.errors import FlexcalError, InputError, naming, unreadable
 from flexcal.files.structuring.faults import Failure, Fault, StructureError
 
 CODE = re.compile(r"E-([A-Z]+)-(\d{3})")
-CLASSES = {"FlexcalError", "InputError", "TooFewSamples", "Fault", "Failure"}
+CLASSES = {"FlexcalError", "InputError", "OneFlank", "TooFewSamples", "Fault", "Failure"}
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +117,7 @@ def test_a_code_that_is_gone_stays_on_the_page(page: str, script: dict[str, Any]
     assert script["render"](later, sentences) == later
 
 
-@pytest.mark.parametrize("kind", [FlexcalError, InputError, TooFewSamples])
+@pytest.mark.parametrize("kind", [FlexcalError, InputError, OneFlank, TooFewSamples])
 def test_an_error_is_its_sentence(kind: type[FlexcalError]) -> None:
     problem = kind("E-CAL-900", "the loop was open; close it.")
     assert str(problem) == problem.sentence == "the loop was open; close it." and problem.code == "E-CAL-900"

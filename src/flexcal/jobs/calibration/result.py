@@ -315,7 +315,7 @@ class Calibration(Identification):
                 *calibration_remarks(selected, self._cause),
                 *(() if blamed else bearings),
                 *place_remarks(agreement),
-                *(() if coupling is not None else floor_remark(selected, self.before.robots_own)),
+                *(() if self._cause else floor_remark(selected, self.before.robots_own)),
                 *(
                     []
                     if misfit is None
