@@ -15,9 +15,6 @@ from flexcal.units import MILLIMETRE
 
 CHANCE, MISSING = 1.35, 2.0
 """Ratio of observed to predicted errors exceeded by chance once in a hundred robots, and from which the model must lack something.
-Errors at all poses come from one draw of the parameters, which counts as about two dozen independent numbers however many poses there
-are.
-
 Errors at all poses come from one draw of the parameters, which counts as about two dozen independent numbers however many poses there are.
 """
 
