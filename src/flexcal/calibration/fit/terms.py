@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -181,8 +182,12 @@ def free_joints(model: RobotModel, kind: str, joints: Sequence[int]) -> list[int
     ]
 
 
+@lru_cache(maxsize=4)
 def loaded_compliances(model: RobotModel, poses: PoseSet) -> frozenset[str]:
-    """Names of the compliances of joints whose load, of gravity and known forces, varies by more than 1 % of that which varies most."""
+    """Names of the compliances of joints whose load, of gravity and known forces, varies by more than 1 % of that which varies most.
+
+    Kept for the last few robots and poses, of which the selection of terms asks once a term.
+    """
     masses = carried_mass(model, poses.payload, len(poses))
     loads = np.concatenate(
         [gravity_torque(model, poses.q, masses)[:, :, None], gravity_moments(model, poses.q, masses)], axis=2

@@ -14,9 +14,6 @@ from flexcal.model.kinematics import PointKinematics, relative_motion
 from flexcal.model.robot import GEOMETRY, LATERAL, ORIGIN, RATIO, SPRINGS, RobotModel
 from flexcal.model.statics import (
     carried_mass,
-    force_moments,
-    lateral_axes,
-    lateral_slopes,
     transmission_column,
     twist_by_hardening,
     twist_from_torque,
@@ -116,7 +113,7 @@ class ArmColumns:
 
     def _tilted(self, owner: str, key: str) -> np.ndarray:
         joint = self.at.model.joint_index(owner)
-        tilt = self.at.by_row(self._lateral[:, joint, LATERAL.index(key)])
+        tilt = self.at.by_row(self.at.lateral[:, joint, LATERAL.index(key)])
         return np.matmul(self._by_motion[:, :, joint, :2], tilt[:, :, None])[:, :, 0]
 
     def _twist(self, joint: int, key: str) -> np.ndarray:
@@ -126,18 +123,6 @@ class ArmColumns:
         if key == "gravity_compliance":
             return -self.at.rest.torque[:, joint]
         return transmission_column(self.at.model, self.at.poses.q, joint, key)
-
-    @cached_property
-    def _lateral(self) -> np.ndarray:
-        """Tilt about the bearing's x and y (N, n, axis, 2) of every joint by its lateral compliances, rad per rad/(N m)."""
-        model, poses = self.at.model, self.at.poses
-        masses = carried_mass(model, poses.payload, len(poses))
-        slopes = lateral_slopes(model, poses.q, masses)
-        if poses.force is not None:
-            axes = lateral_axes(model, poses.q)
-            moments = force_moments(self.at.kinematics, poses.force)[:, :, :2]
-            slopes = slopes + np.matmul(axes, moments[:, :, :, None]) * axes
-        return slopes
 
     def _load(self, name: str) -> np.ndarray:
         """Change of the load on each elastic coordinate (N, d) with a stiffness, mass or centre of mass."""

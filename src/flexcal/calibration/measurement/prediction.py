@@ -16,7 +16,14 @@ from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import PointKinematics, carrier_kinematics, relative_kinematics
 from flexcal.model.parts import left_jacobian, vector_rotation
 from flexcal.model.robot import STATION, RobotModel
-from flexcal.model.statics import Equilibrium, tool_at_rest
+from flexcal.model.statics import (
+    Equilibrium,
+    carried_mass,
+    force_moments,
+    lateral_axes,
+    lateral_slopes,
+    tool_at_rest,
+)
 from flexcal.progress import Progress, silent
 
 
@@ -143,6 +150,18 @@ class PredictedMeasurements:
             kind = next((kind for kind in KINDS if owner not in joints and kind.owns(name)), None)
             result[:, :, k] = arm.column(name) if kind is None else kind.column(self, name)
         return result
+
+    @cached_property
+    def lateral(self) -> np.ndarray:
+        """Tilt about the bearing's x and y (N, n, axis, 2) of every joint by its lateral compliances, rad per rad/(N m)."""
+        model, poses = self.model, self.poses
+        masses = carried_mass(model, poses.payload, len(poses))
+        slopes = lateral_slopes(model, poses.q, masses)
+        if poses.force is not None:
+            axes = lateral_axes(model, poses.q)
+            moments = force_moments(self.kinematics, poses.force)[:, :, :2]
+            slopes = slopes + np.matmul(axes, moments[:, :, :, None]) * axes
+        return slopes
 
     def _by_station(self, station: str) -> tuple[np.ndarray, np.ndarray]:
         """Readings (K,) from a station, and their derivatives (K, 3, 6) by the numbers of its pose."""
