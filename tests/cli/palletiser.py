@@ -174,13 +174,3 @@ def write_robot(folder: Path, *, mimic: bool, elastic: bool = True) -> Path:
         + ("" if mimic else "  - {joint: level, of: {joint_3: -1.0}}\n")
     )
     return folder / "robot.yaml"
-
-
-def write_points(path: Path, q: np.ndarray, xyz: np.ndarray) -> Path:
-    """Poses and points as CSV, without a word on noise."""
-    rows = [
-        f"{i + 1}," + ",".join(map(repr, (*a.tolist(), *p.tolist())))
-        for i, (a, p) in enumerate(zip(q, xyz, strict=True))
-    ]
-    path.write_text("\n".join(["pose,q1,q2,q3,q4,x,y,z", *rows, ""]))
-    return path

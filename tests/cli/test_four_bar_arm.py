@@ -10,7 +10,7 @@ import four_bar_arm
 import numpy as np
 import pinocchio as pin
 import pytest
-from cli_files import write_csv
+from arm_points import write_points
 from four_bar_arm import DRIVES, FourBarArm, poses, write_robot
 from palletiser import turn
 from refusals import assert_refusal
@@ -22,11 +22,6 @@ from flexcal.model.robot import GEOMETRY, RobotModel
 
 ERRORS = [*(f"loop.four_bar.b_{axis}" for axis in "xyz"), *(f"arm_joint.origin_{axis}" for axis in "xyz")]
 """Where the pin is on the arm, which carries the forearm too, and where the arm turns in the column, which carries the crank too."""
-
-
-def write_points(path: Path, q: np.ndarray, xyz: np.ndarray) -> Path:
-    rows = np.column_stack([1 + np.arange(len(q)), q, xyz])
-    return write_csv(path, ["pose", "q1", "q2", "q3", "q4", "x", "y", "z"], rows)
 
 
 def _wrapped(angle: np.ndarray) -> np.ndarray:

@@ -6,16 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cli_files import write_csv
+from arm_points import assert_intervals_cover, prediction_of, write_points
 from gantry import Gantry, poses, write_robot
 
 from flexcal import RobotModel, read_poses, tool_at_rest
 from flexcal.calibration.measurement import predict_measurements
-
-
-def write_points(path: Path, q: np.ndarray, xyz: np.ndarray) -> Path:
-    rows = np.column_stack([1 + np.arange(len(q)), q, xyz])
-    return write_csv(path, ["pose", "q1", "q2", "q3", "q4", "q5", "x", "y", "z"], rows)
 
 
 def test_derivatives_by_a_lead(tmp_path: Path) -> None:
@@ -61,7 +56,7 @@ def test_leads_are_found(run, tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_intervals_cover(run, tmp_path: Path) -> None:
     """Fresh points of 20 gantries, by default options."""
-    inside, ratios = [], []
+    predictions = []
     for seed in range(20):
         robot, true, rng = (
             write_robot(tmp_path / str(seed)),
@@ -69,13 +64,7 @@ def test_intervals_cover(run, tmp_path: Path) -> None:
             np.random.default_rng(seed),
         )
         q, fresh = poses(60, rng), poses(60, rng)
-        assert (
-            run("calibrate", robot, write_points(robot.parent / "p.csv", q, true.measured(q, rng))).status
-            == 0
-        )
+        points = write_points(robot.parent / "p.csv", q, true.measured(q, rng))
         checked = write_points(robot.parent / "fresh.csv", fresh, true.measured(fresh, rng))
-        prediction = run("verify", robot, checked, "--json").document["prediction"]
-        inside.append(prediction["inside_95_percent"])
-        ratios.append(prediction["ratio"])
-    assert 0.93 <= np.mean(inside) <= 0.97, np.mean(inside)
-    assert 0.95 < np.mean(ratios) < 1.05, np.mean(ratios)
+        predictions.append(prediction_of(run, robot, points, checked))
+    assert_intervals_cover(predictions)

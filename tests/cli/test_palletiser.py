@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from palletiser import DRIVES, Palletiser, poses, turn, write_points, write_robot
+from arm_points import assert_intervals_cover, prediction_of, write_points
+from palletiser import DRIVES, Palletiser, poses, turn, write_robot
 from refusals import assert_refusal
 
 from flexcal import read_poses, rigid_motion, tool_at_rest
@@ -214,16 +215,12 @@ def test_relations_that_cannot_be(run, tmp_path: Path, right: str, wrong: str, r
 @pytest.mark.slow
 def test_intervals_cover(run, tmp_path: Path) -> None:
     """95 % intervals of fresh points, of 20 palletisers whose springs are known to 30 % only."""
-    inside, ratios = [], []
+    predictions = []
     for seed in range(20):
         robot, true = write_robot(tmp_path / str(seed), mimic=seed % 2 == 0), Palletiser.drawn(100 + seed)
         rng = np.random.default_rng(seed)
         q, fresh = poses(70, rng), poses(60, rng)
         points = write_points(robot.parent / "points.csv", q, true.measured(q, rng))
         checked = write_points(robot.parent / "checked.csv", fresh, true.measured(fresh, rng))
-        assert run("calibrate", robot, points, *KINEMATIC).status == 0
-        prediction = run("verify", robot, checked, "--json").document["prediction"]
-        inside.append(prediction["inside_95_percent"])
-        ratios.append(prediction["ratio"])
-    assert 0.93 <= np.mean(inside) <= 0.97, np.mean(inside)
-    assert 0.95 < np.mean(ratios) < 1.05, np.mean(ratios)
+        predictions.append(prediction_of(run, robot, points, checked, *KINEMATIC))
+    assert_intervals_cover(predictions)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cli_files import write_csv
+from arm_points import assert_intervals_cover, prediction_of, write_points
 from scara import LEAD, Scara, poses, write_robot
 
 from flexcal import RobotModel, tool_at_rest
@@ -16,10 +16,9 @@ NOISE = 0.032
 """mm, mean distance by the tracker's noise."""
 
 
-def write_points(path: Path, robot: Scara, count: int, rng: np.random.Generator) -> Path:
+def measured_points(path: Path, robot: Scara, count: int, rng: np.random.Generator) -> Path:
     q = poses(count, rng)
-    rows = np.column_stack([1 + np.arange(count), q, robot.measured(q, rng)])
-    return write_csv(path, ["pose", "q1", "q2", "q3", "q4", "x", "y", "z"], rows)
+    return write_points(path, q, robot.measured(q, rng))
 
 
 def test_the_spline_lifts_the_quill(tmp_path: Path) -> None:
@@ -36,7 +35,7 @@ def test_calibrated_with_default_options(run, tmp_path: Path) -> None:
     """What cannot be told by a tool that stays upright is said as such, and not asked of further poses."""
     robot, true, rng = write_robot(tmp_path), Scara.drawn(1), np.random.default_rng(1)
     outcome = run(
-        "calibrate", robot, write_points(tmp_path / "points.csv", true, 60, rng), "--out", tmp_path / "out"
+        "calibrate", robot, measured_points(tmp_path / "points.csv", true, 60, rng), "--out", tmp_path / "out"
     )
     assert outcome.status == 0, outcome.err
     assert "turns its tool about one direction only" in outcome.out
@@ -45,7 +44,7 @@ def test_calibrated_with_default_options(run, tmp_path: Path) -> None:
     assert (
         "j3.offset: {estimate: " in text and "unit: m" in text.partition("j3.offset: ")[2].partition("std")[0]
     )
-    fresh = write_points(tmp_path / "fresh.csv", true, 40, rng)
+    fresh = measured_points(tmp_path / "fresh.csv", true, 40, rng)
     verified = run("verify", robot, fresh, "--estimates", tmp_path / "out", "--json").document
     errors = verified["verification"]
     assert errors["measured"]["mean_mm"] < 1.4 * NOISE and errors["nominal"]["mean_mm"] > 0.5, errors
@@ -61,7 +60,7 @@ def test_a_coupling_that_is_not_as_declared(run, tmp_path: Path, forgotten: bool
     relation = right[right.index("relations:") :]
     wrong = "" if forgotten else relation.replace(repr(-LEAD), repr(LEAD))
     robot.write_text(right.replace(relation, wrong))
-    points = write_points(tmp_path / "points.csv", true, 60, rng)
+    points = measured_points(tmp_path / "points.csv", true, 60, rng)
     outcome = run("calibrate", robot, points, "--terms", "kinematic")
     assert "Trusted: no" in outcome.out and "repeat no better" not in outcome.out
     said = re.search(
@@ -75,17 +74,14 @@ def test_a_coupling_that_is_not_as_declared(run, tmp_path: Path, forgotten: bool
 @pytest.mark.slow
 def test_intervals_cover(run, tmp_path: Path) -> None:
     """Fresh points of 20 SCARAs, by default options."""
-    inside, ratios = [], []
+    predictions = []
     for seed in range(20):
         robot, true, rng = (
             write_robot(tmp_path / str(seed)),
             Scara.drawn(100 + seed),
             np.random.default_rng(seed),
         )
-        assert run("calibrate", robot, write_points(robot.parent / "points.csv", true, 60, rng)).status == 0
-        fresh = write_points(robot.parent / "fresh.csv", true, 60, rng)
-        prediction = run("verify", robot, fresh, "--json").document["prediction"]
-        inside.append(prediction["inside_95_percent"])
-        ratios.append(prediction["ratio"])
-    assert 0.93 <= np.mean(inside) <= 0.97, np.mean(inside)
-    assert 0.95 < np.mean(ratios) < 1.05, np.mean(ratios)
+        points = measured_points(robot.parent / "points.csv", true, 60, rng)
+        fresh = measured_points(robot.parent / "fresh.csv", true, 60, rng)
+        predictions.append(prediction_of(run, robot, points, fresh))
+    assert_intervals_cover(predictions)

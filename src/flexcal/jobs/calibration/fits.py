@@ -104,21 +104,23 @@ class Fits:
         good = poses.subset(np.setdiff1d(np.flatnonzero(~poses.tilted), rigid.estimate.outliers))
         alone = loss == "auto" and not poses.tilted.any()
 
+        def fit_of(chosen: TermSelection) -> GeometricFit:
+            found = _with_random_waves(chosen.terms)
+            return fit(chosen.model, found, "selected fit", start, elastic=elastic)
+
         def choose(robot: RobotModel, begin: GeometricFit) -> tuple[TermSelection, GeometricFit]:
             """Terms beyond the geometry, and the fit with them."""
             progress("terms", 0.0)
             chosen = select_terms(robot, good, begin if alone else None)
             progress("terms", 1.0)
             try:
-                found = _with_random_waves(chosen.terms)
-                return chosen, fit(chosen.model, found, "selected fit", start, elastic=elastic)
+                return chosen, fit_of(chosen)
             except OneFlank:
                 if robot.backlash_joints:
                     raise
                 reason = "the fitted robot rests on one flank at all poses, so it is not identifiable beside the offset"
                 chosen = chosen.without("backlash", robot, reason)
-                found = _with_random_waves(chosen.terms)
-                return chosen, fit(robot, found, "selected fit", start, elastic=elastic)
+                return chosen, fit_of(chosen)
 
         selection, selected = choose(model, rigid)
         levels = zeros_or_geometry(model, good) if not elastic and asks_for_levels(selected) else None
