@@ -34,6 +34,7 @@ SUBJECTS = {
     "MODEL": "Robot model",
     "PLAN": "Plans",
     "POSES": "Poses",
+    "PROG": "Robot programs",
     "REPORT": "Reports",
     "ROBOT": "robot.yaml",
     "RUN": "Verbs and what they are given",

@@ -264,6 +264,13 @@ STEPS = (
                 "flexcal compensate robot.yaml targets.csv --out commands.csv",
             ),
             Verb(
+                ("filter",),
+                "filter",
+                "Filter",
+                "a robot program whose targets are corrected",
+                "flexcal filter robot.yaml program.script --out corrected.script",
+            ),
+            Verb(
                 ("predict",),
                 "predict",
                 "Predict",

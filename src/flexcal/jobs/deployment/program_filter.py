@@ -1,0 +1,364 @@
+"""Programs whose targets are replaced by those that bring the real tool there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.compensation import motor_commands
+from flexcal.compensation.failure_reasons import nominal_reasons
+from flexcal.compensation.inverse_kinematics import inverse_kinematics
+from flexcal.compensation.tool_target import ToolPoseTarget
+from flexcal.data.poses import ToolTargets
+from flexcal.errors import FlexcalError, InputError
+from flexcal.files.transaction import atomic_path
+from flexcal.jobs.inputs import CalibratedRobot, unmeasured_lengths_remark
+from flexcal.jobs.pages import Result
+from flexcal.model.kinematics import joint_limits
+from flexcal.model.parts import rotation_vector, vector_rotation
+from flexcal.model.robot import RobotModel, with_point_at_frame
+from flexcal.model.statics import points_kinematics, tool_at_rest
+from flexcal.model.urdf import Frame, read_urdf
+from flexcal.programs import Program, ProgramTarget, parse_urscript
+from flexcal.units import MILLIMETRE
+
+_FLANGE, _BASE = "tool0", "base"
+"""Frames of a Universal Robots' URDF in which the controller gives poses: the flange, and the base turned by half a turn."""
+_STEP_LENGTH, _STEP_ANGLE = 0.05, 0.15
+"""Largest distance (m) and angle (rad) between poses of a straight motion at which its configuration is followed."""
+_SUFFIXES = (".script", ".urscript")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FilteredProgram(Result):
+    """Result of `filter_program`.
+
+    Attributes
+    ----------
+    model : RobotModel
+        The calibrated robot.
+    program : Program
+        The program that was read.
+    values : ndarray
+        Numbers (N, 6) of the targets in the new program, m and rad; NaN where a target stays as it is.
+    shift : ndarray
+        Distance (N,), m, between the flange of the nominal robot at the new and at the old numbers.
+    turn : ndarray
+        Angle (N,), rad, between these two.
+    reasons : tuple of str
+        Why a target stays as it is; empty where it does not.
+    remarks : tuple of str
+        What makes the new numbers doubtful.
+    """
+
+    program: Program
+    values: np.ndarray
+    shift: np.ndarray
+    turn: np.ndarray
+    reasons: tuple[str, ...]
+    remarks: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        """The new program."""
+        changed = [k for k, reason in enumerate(self.reasons) if not reason]
+        return self.program.rewritten({k: self.values[k].tolist() for k in changed})
+
+    @property
+    def headline(self) -> str:
+        """Number of targets that were corrected, and by how much."""
+        done = np.isfinite(self.shift)
+        if not done.any():
+            return f"none of {len(self.reasons)} targets corrected"
+        shift = self.shift[done] / MILLIMETRE
+        left = len(self.program.computed) + int((~done).sum())
+        return (
+            f"{int(done.sum())} targets corrected by {shift.mean():.3f} mm on average, {shift.max():.3f} mm at most; "
+            f"{left} motions left as they are"
+        )
+
+    def summary(self) -> str:
+        """Number of corrected targets, those left with their reasons, and remarks."""
+        left = [f"line {item['line']}: {item['text']}: {item['reason']}" for item in self.left]
+        return "\n".join([self.headline, *left, *self.remarks])
+
+    @property
+    def left(self) -> list[dict[str, Any]]:
+        """Line, text and reason of every target that stays as it is."""
+        own = [
+            {"line": target.line, "text": target.name, "reason": reason}
+            for target, reason in zip(self.program.targets, self.reasons, strict=True)
+            if reason
+        ]
+        found = [
+            {"line": item.line, "text": item.text, "reason": item.reason} for item in self.program.computed
+        ]
+        return sorted([*own, *found], key=lambda item: item["line"])
+
+    def document(self) -> dict[str, Any]:
+        """JSON document: every target with its numbers before and after, and what stays as it is."""
+        corrected = [
+            {
+                "line": target.line,
+                "name": target.name,
+                "motion": target.motion,
+                "kind": "joints" if target.joints else "pose",
+                "before": list(target.values),
+                "after": self.values[k].tolist(),
+                "shift_mm": float(self.shift[k] / MILLIMETRE),
+                "turn_deg": float(np.rad2deg(self.turn[k])),
+            }
+            for k, target in enumerate(self.program.targets)
+            if not self.reasons[k]
+        ]
+        return {"targets": corrected, "left": self.left, "remarks": list(self.remarks)}
+
+
+def filter_program(
+    robot: CalibratedRobot,
+    program: Program,
+    *,
+    tool: Sequence[float] = (),
+    start: Sequence[float] = (),
+    flange: str = _FLANGE,
+    reverse: bool = False,
+) -> FilteredProgram:
+    """Replace the targets of a program by those with which the real robot's flange takes the poses that the nominal robot would take.
+
+    Joint positions become compensated commands. A pose becomes the one at which the controller, whose kinematics are taken to be those of
+    the URDF, computes the compensated command. The arm has the configuration of the joint positions beside the pose, else that in which it
+    arrives from the target before it in the text.
+
+    Parameters
+    ----------
+    robot : CalibratedRobot
+        The robot, with six joints.
+    program : Program
+        Its program.
+    tool : sequence of float
+        Tool centre point in the flange, m and rotation vector in rad (6,), for poses before which the program sets none.
+    start : sequence of float
+        Joint positions (6,), rad, whose configuration the poses have before which there are none.
+    flange : str
+        URDF frame of the flange.
+    reverse : bool
+        Whether to return from corrected targets to the nominal ones.
+
+    Returns
+    -------
+    FilteredProgram
+        `text` is the new program.
+
+    Raises
+    ------
+    FlexcalError
+        For a robot without six joints, and a frame that the URDF lacks.
+    """
+    model, nominal = (with_point_at_frame(each, flange) for each in (robot.probable, robot.with_points))
+    if model.n != 6:
+        raise FlexcalError(
+            "E-PROG-002",
+            f"{model.name} has {model.n} joints, but targets of these programs have six numbers; use the robot.yaml of the six-joint arm.",
+        )
+    for name, values in (("tool", tool), ("start", start)):
+        if len(values) not in (0, 6):
+            raise InputError("E-PROG-003", f"--{name} has {len(values)} values; give six.")
+    places = _Places(nominal, flange, tuple(tool), tuple(start))
+    q, reasons = places.joints(program.targets)
+    values, after = np.full((len(q), 6), np.nan), np.full((len(q), 6), np.nan)
+    rows = np.array([k for k, reason in enumerate(reasons) if not reason], dtype=int)
+    if len(rows):
+        masses, payload_remarks = _payloads(model, program, rows)
+        targets = ToolTargets(rows, np.full(len(rows), flange), q[rows], payload=masses)
+        after[rows], failures = (_nominal if reverse else _commands)(model, nominal, targets)
+        for row, failure in zip(rows.tolist(), failures, strict=True):
+            reasons[row] = failure
+        done = np.array([k for k in rows if not reasons[k]], dtype=int)
+        values[done] = places.values([program.targets[k] for k in done], after[done])
+    else:
+        done, payload_remarks = rows, ()
+    shift, turn = np.full(len(q), np.nan), np.full(len(q), np.nan)
+    if len(done):
+        (there, turned), (here, was) = places.poses(after[done]), places.poses(q[done])
+        shift[done] = np.linalg.norm(there - here, axis=1)
+        turn[done] = np.linalg.norm(rotation_vector(turned @ np.swapaxes(was, 1, 2)), axis=1)
+    remarks = (*unmeasured_lengths_remark(robot), *program.remarks, *payload_remarks)
+    return FilteredProgram(model, program, values, shift, turn, tuple(reasons), remarks)
+
+
+def filter_program_file(
+    robot_file: Path,
+    file: Path,
+    out: Path | None,
+    *,
+    estimates: Path | None = None,
+    tool: Sequence[float] = (),
+    start: Sequence[float] = (),
+    flange: str = _FLANGE,
+    reverse: bool = False,
+) -> FilteredProgram:
+    """`filter_program` for a file; the new program goes to `out`, byte for byte as before but for the numbers, or nowhere (None)."""
+    if file.suffix.lower() not in _SUFFIXES:
+        raise InputError(
+            "E-PROG-004",
+            f"{file} is no URScript program ({' or '.join(_SUFFIXES)}); other dialects cannot be read.",
+        )
+    robot = CalibratedRobot.from_yaml(robot_file, estimates)
+    if not file.is_file():
+        raise InputError("E-PROG-005", f"{file} does not exist; name the program's file.")
+    written = file.read_bytes()
+    try:
+        encoding, text = "utf-8", written.decode("utf-8")
+    except UnicodeDecodeError:
+        # every byte stands for a character there, and comes back as it was
+        encoding, text = "latin-1", written.decode("latin-1")
+    program = parse_urscript(text, str(file))
+    result = filter_program(robot, program, tool=tool, start=start, flange=flange, reverse=reverse)
+    if out is not None:
+        with atomic_path(out) as temporary:
+            temporary.write_bytes(result.text.encode(encoding))
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """Poses of the controller and joint positions of the `nominal` robot: `tool` and `start` where the program has none."""
+
+    nominal: RobotModel
+    flange: str
+    tool: tuple[float, ...]
+    start: tuple[float, ...]
+
+    @property
+    def base(self) -> Frame:
+        """Frame in which the controller gives poses."""
+        frames = read_urdf(self.nominal.urdf, self.nominal.config.locked).frames
+        known = frames.get(_BASE)
+        return Frame(-1, np.eye(3), np.zeros(3)) if known is None or known.joint >= 0 else known
+
+    def poses(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Positions (N, 3) and rotations (N, 3, 3) of the flange."""
+        at = points_kinematics(self.nominal, q, None, np.full(len(q), self.flange), jacobians=False)
+        return at.position, at.orientation
+
+    def joints(self, targets: Sequence[ProgramTarget]) -> tuple[np.ndarray, list[str]]:
+        """Joint positions (N, 6) of the targets as the nominal robot takes them, and why one has none."""
+        q, reasons = np.full((len(targets), 6), np.nan), [""] * len(targets)
+        last = self.start or None
+        lower, upper = joint_limits(self.nominal)
+        for k, target in enumerate(targets):
+            if target.joints:
+                q[k] = target.values
+                outside = np.flatnonzero((q[k] < lower) | (q[k] > upper))
+                if len(outside):
+                    reasons[k] = f"{self.nominal.motor_names[outside[0]]} is outside its limits"
+                    continue
+                last = target.values
+                continue
+            tool, near = target.tool or self.tool, target.near or last
+            if not tool:
+                reasons[k] = "the program sets no tool before it (set_tcp): give --tool"
+            elif near is None:
+                reasons[k] = (
+                    "no joint positions stand before it or beside it (qnear), so the arm's configuration is unknown: give --start"
+                )
+            else:
+                aim = self._aim(target.values, tool)
+                path = self._line(near, aim) if target.straight and target.near is None else aim
+                found, reached = np.array([near]), np.zeros(1, dtype=bool)
+                for step in range(len(path.target)):
+                    found, reached = inverse_kinematics(
+                        self.nominal, path.subset(slice(step, step + 1)), found
+                    )
+                    if not reached[0]:
+                        break
+                if reached[0]:
+                    q[k], last = found[0], tuple(found[0])
+                else:
+                    reasons[k] = str(nominal_reasons(self.nominal, aim, found)[0])
+        return q, reasons
+
+    def values(self, targets: Sequence[ProgramTarget], q: np.ndarray) -> np.ndarray:
+        """Numbers (N, 6) of the targets at other joint positions (N, 6)."""
+        position, rotation = self.poses(q)
+        found = q.copy()
+        base = self.base
+        for k, target in enumerate(targets):
+            if target.joints:
+                continue
+            away, turned = _split(target.tool or self.tool)
+            at = base.rotation.T @ (position[k] + rotation[k] @ away - base.translation)
+            vector = rotation_vector(base.rotation.T @ rotation[k] @ turned)
+            found[k] = [*at, *_nearest_turn(vector, np.array(target.values[3:]))]
+        return found
+
+    def _line(self, q: Sequence[float], aim: ToolPoseTarget) -> ToolPoseTarget:
+        """Poses from that at `q` to the aim, along a line, so close that inverse kinematics cannot leave the arm's configuration."""
+        assert aim.rotation is not None
+        (position,), (rotation,) = self.poses(np.array([q]))
+        away, turn = aim.position[0] - position, rotation_vector(aim.rotation[0] @ rotation.T)
+        far = np.linalg.norm(away) / _STEP_LENGTH, np.linalg.norm(turn) / _STEP_ANGLE
+        share = np.linspace(0, 1, max(2, int(np.ceil(max(far))) + 1))[1:]
+        turns = np.array([vector_rotation(part * turn) @ rotation for part in share])
+        turns[-1] = aim.rotation[0]
+        positions = position + share[:, None] * away
+        positions[-1] = aim.position[0]
+        return ToolPoseTarget(np.repeat(aim.target, len(share)), positions, turns)
+
+    def _aim(self, pose: Sequence[float], tool: Sequence[float]) -> ToolPoseTarget:
+        """Pose of the flange in the robot's root frame."""
+        base = self.base
+        (at, turned), (away, beside) = _split(pose), _split(tool)
+        rotation = base.rotation @ turned @ beside.T
+        position = base.translation + base.rotation @ at - rotation @ away
+        return ToolPoseTarget(np.array([self.flange]), position[None], rotation[None])
+
+
+def _split(pose: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+    return np.array(pose[:3]), vector_rotation(np.array(pose[3:]))
+
+
+def _nearest_turn(vector: np.ndarray, old: np.ndarray) -> np.ndarray:
+    """Rotation vector of the same rotation that is nearest to an old one: its angle may differ by whole turns."""
+    angle = float(np.linalg.norm(vector))
+    if angle < 1e-12:
+        return vector
+    axis = vector / angle
+    return min(
+        (axis * (angle + 2 * np.pi * k) for k in range(-2, 3)), key=lambda v: float(np.linalg.norm(v - old))
+    )
+
+
+def _payloads(
+    model: RobotModel, program: Program, rows: np.ndarray
+) -> tuple[np.ndarray | None, tuple[str, ...]]:
+    """Masses (N,), kg, that the arm carries at the targets; None where robot.yaml knows of no payload."""
+    said = [program.targets[k].payload for k in rows]
+    if model.payload is None:
+        if any(said):
+            return None, (
+                f"the program sets payloads of up to {max(mass or 0.0 for mass in said):g} kg, but robot.yaml declares none, so that the "
+                "deflection under them is not corrected: add `payload:`",
+            )
+        return None, ()
+    return np.array([model.payload.mass if mass is None else mass for mass in said]), ()
+
+
+def _commands(model: RobotModel, nominal: RobotModel, targets: ToolTargets) -> tuple[np.ndarray, list[str]]:
+    """Compensated commands (N, 6) and why one has none."""
+    commands = motor_commands(model, nominal, targets)
+    return commands.q, [str(reason) for reason in commands.reason]
+
+
+def _nominal(model: RobotModel, nominal: RobotModel, targets: ToolTargets) -> tuple[np.ndarray, list[str]]:
+    """Joint positions (N, 6) at which the nominal robot stands as the real one does at its commands, and why there are none."""
+    assert targets.q is not None
+    at = tool_at_rest(model, targets.q, targets.payload, targets.target).kinematics
+    aim = ToolPoseTarget(targets.target, at.position, at.orientation)
+    q, reached = inverse_kinematics(nominal, aim, targets.q)
+    reasons = nominal_reasons(nominal, aim, q)
+    return q, ["" if there else str(reason) for there, reason in zip(reached, reasons, strict=True)]
