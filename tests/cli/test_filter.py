@@ -241,6 +241,13 @@ def test_reverse_returns_the_numbers(cell: tuple[Path, Ur5]) -> None:
             0,
             "out of reach",
         ),
+        ("movej(get_inverse_kin())\n", 0, "when the program runs"),
+        ("movej([d2r(),-1,1,-1,1,1e999])\nmovej()\nset_tcp()\n", 0, "when the program runs"),
+        (
+            "set_tcp(p[0,0,0,0,0,0])\nmovej([0,-1,1,-1,1,0])\na=p[-0.4,0.1,0.3,0,3,0]\nmovel(a)\nmovel(pose_add(a, b))\n",
+            0,
+            "from a as corrected",
+        ),
         ("a=[0,-1,1,-1,1,0]\na=[0,-1,1,-1,1,1]\nmovej(a)\n", 0, "set more than once"),
         ("a=p[-0.4,0.1,0.3,0,3,0]\na[2]=0.1\nmovej(a)\n", 0, "set more than once"),
         ("def f(a):\n movej(a)\nend\na=[0,-1,1,-1,1,0]\n", 0, "set more than once"),

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 
@@ -95,15 +96,15 @@ class _Reader:
             RunTimeTarget(self.targets[first].line, self.targets[first].name, reason)
             for first, reason in self.doubtful.items()
         ]
+        corrected = {target.name for target in kept} & set(self.variables)
+        left += [_built_from(item, corrected) for item in self.computed]
         remarks = ()
         if len(set(self.tools)) > 1:
             remarks = (
                 "the program sets several tools (set_tcp); each holds for the motions after it in the text, also where threads or "
                 "functions are run in another order",
             )
-        return Program(
-            self.text, tuple(kept), tuple(sorted([*self.computed, *left], key=lambda t: t.line)), remarks
-        )
+        return Program(self.text, tuple(kept), tuple(sorted(left, key=lambda item: item.line)), remarks)
 
     def _assignments(self, nodes: Sequence[Node]) -> None:
         """Note what is assigned to every variable, wherever it is."""
@@ -155,8 +156,8 @@ class _Reader:
         near = None
         if len(argument) == 1 and isinstance(argument[0], Tree) and argument[0].data == "call":
             inner = argument[0]
-            if inner.children[0] == "get_inverse_kin":
-                first, *others = _arguments(inner.children[1:])
+            if inner.children[0] == "get_inverse_kin" and (given := _arguments(inner.children[1:])):
+                first, *others = given
                 argument = first
                 seeds = [
                     other
@@ -206,6 +207,12 @@ class _Reader:
         return " ".join(self.text[call.meta.start_pos : call.meta.end_pos].split())
 
 
+def _built_from(item: RunTimeTarget, corrected: set[str]) -> RunTimeTarget:
+    """The same target, with the corrected variables that it is computed from."""
+    names = [name for name in dict.fromkeys(re.findall(r"\w+", item.text)) if name in corrected]
+    return replace(item, reason=f"{item.reason}, from {' and '.join(names)} as corrected") if names else item
+
+
 def _is(node: Node, kind: str) -> bool:
     return isinstance(node, Token) and node.type == kind
 
@@ -253,7 +260,8 @@ def _numbers(part: Sequence[Node]) -> list[Written] | None:
         return None
     node, unit = rest[0], 1.0
     if isinstance(node, Tree) and node.data == "call" and node.children[0] == "d2r":
-        inner = _numbers(_arguments(node.children[1:])[0]) if len(node.children) > 1 else None
+        given = _arguments(node.children[1:])
+        inner = _numbers(given[0]) if len(given) == 1 else None
         if inner is None:
             return None
         value, unit = inner[0].value, math.pi / 180
@@ -261,6 +269,8 @@ def _numbers(part: Sequence[Node]) -> list[Written] | None:
     elif isinstance(node, Token) and node.type == "NUMBER":
         value, end = float(node), node.end_pos
     else:
+        return None
+    if not math.isfinite(value):
         return None
     head = part[0]
     first = head.start_pos if isinstance(head, Token) else head.meta.start_pos
