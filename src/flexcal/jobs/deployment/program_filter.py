@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -233,7 +234,7 @@ class _Places:
     tool: tuple[float, ...]
     start: tuple[float, ...]
 
-    @property
+    @cached_property
     def base(self) -> Frame:
         """Frame in which the controller gives poses."""
         frames = read_urdf(self.nominal.urdf, self.nominal.config.locked).frames
