@@ -92,4 +92,6 @@ def test_bad_checks_are_named(study: TwoStageStudy) -> None:
     blocks = {**study.estimates, "calibration": lost}
     trust = Trust(two_stage_checks(replace(study, estimates=blocks)))
     assert trust.document() == {"trusted": False, "reasons": ["residual"]}
-    assert trust.sentence == "Trusted: no — because the fit does not explain the measured points"
+    assert (
+        trust.sentence == "Trusted: no — because the robot as declared does not explain the measured points"
+    )

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from flexcal.calibration.fit import TOLERANCE, GeometricFit, fit_geometry
+from flexcal.calibration.fit.terms import plausible_size
 from flexcal.calibration.measurement import predict_measurements, predicted_positions, register
 from flexcal.data.poses import PoseSet
 from flexcal.model.kinematics import motor_motion
@@ -19,6 +20,8 @@ _EXPLAINED = 0.75
 """Share of the squared residuals that one ratio has to explain, to first order, to be tried."""
 _BETTER = 1 / 3
 """Ratio of the residuals with the coupling to those without, below which it is what is wrong."""
+_AS_GOOD = 1.5
+"""Ratio of the residuals with one ratio to those with transmission errors of all joints, up to which it is as good an explanation."""
 _ROUNDS = 3
 _LEAST = 12
 """Fewest points beyond the parameters at which a ratio is not chance."""
@@ -65,12 +68,20 @@ class Coupling:
 def undeclared_coupling(nominal: RobotModel, fit: GeometricFit) -> Coupling | None:
     """The ratio of a motor to a joint that explains most of a bad fit to points; None where the fit is good or no single one does.
 
+    A fit with implausibly large transmission errors is bad, too: over a part of a turn waves follow a joint of a wrong ratio, but no farther.
+    Of such a fit the ratio alone has to meet the points nearly as well as the waves do.
+
     The best of all pairs to first order is tried, else the best with a ratio of ±1: with it, the geometry is fitted anew, and has to meet
     the points three times as well. Orientations do not count, and views of a camera, which scatter by more than a bad fit, are not judged.
     """
     poses = fit.poses.without_orientations()
     small = _size(fit.residuals) < np.sqrt(3) * TOLERANCE["m"]
-    if small or poses.kind is not None or poses.seen.any() or not poses.located.all():
+    if (
+        (small and not _large_waves(fit))
+        or poses.kind is not None
+        or poses.seen.any()
+        or not poses.located.all()
+    ):
         return None
     first = fit_geometry(nominal, poses, terms=("kinematic",), loss="squares")
     if 3 * len(poses) < len(first.identifiability.kept_names) + _LEAST:
@@ -79,6 +90,8 @@ def undeclared_coupling(nominal: RobotModel, fit: GeometricFit) -> Coupling | No
     joint, motor = (int(k) for k in np.unravel_index(int(np.argmax(gains)), gains.shape))
     start = float(ratios[joint, motor])
     if gains[joint, motor] < _EXPLAINED:
+        if small:
+            return None
         every = _one_to_one(nominal)
         sizes = [_registered(_coupled(nominal, *tried), poses) for tried in every]
         joint, motor, start = every[int(np.argmin(sizes))]
@@ -88,7 +101,14 @@ def undeclared_coupling(nominal: RobotModel, fit: GeometricFit) -> Coupling | No
         model = _coupled(model, joint, motor, float(_explained(found)[1][joint, motor]))
         found = fit_geometry(model, poses, terms=("kinematic",), loss="squares")
     before, after = _size(first.residuals), _size(found.residuals)
-    return _told(model, joint, motor, before, after) if after < _BETTER * before else None
+    enough = after < _BETTER * before and (not small or after < _AS_GOOD * _size(fit.residuals))
+    return _told(model, joint, motor, before, after) if enough else None
+
+
+def _large_waves(fit: GeometricFit) -> bool:
+    """Whether a transmission error is larger than those of drives are."""
+    values = fit.estimate.values
+    return any(abs(values[n]) > plausible_size(fit.model, n) for n in values if ".transmission_" in n)
 
 
 def _one_to_one(model: RobotModel) -> list[tuple[int, int, float]]:

@@ -141,7 +141,7 @@ PHRASES: dict[str, dict[str, str]] = {
     },
     "residual": {
         "good": "the noise explains the residuals",
-        "bad": "the fit does not explain the measured points",
+        "bad": "the robot as declared does not explain the measured points",
         "care": "the residuals do not agree with the stated noise",
         "else": "no measurement noise is stated",
     },
