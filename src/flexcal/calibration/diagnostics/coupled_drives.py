@@ -68,7 +68,7 @@ class Coupling:
 def undeclared_coupling(nominal: RobotModel, fit: GeometricFit) -> Coupling | None:
     """The ratio of a motor to a joint that explains most of a bad fit to points; None where the fit is good or no single one does.
 
-    A fit with implausibly large transmission errors is bad, too: over a part of a turn waves follow a joint of a wrong ratio, but no farther.
+    A fit with implausibly large transmission errors is bad, too: over a part of a turn waves follow a joint of a wrong ratio.
     Of such a fit the ratio alone has to meet the points nearly as well as the waves do.
 
     The best of all pairs to first order is tried, else the best with a ratio of ±1: with it, the geometry is fitted anew, and has to meet
