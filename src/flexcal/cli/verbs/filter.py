@@ -74,9 +74,13 @@ class Filter:
             console.say(f"left as it is: line {item['line']}: {item['text']}: {item['reason']}")
         for remark in document["remarks"]:
             console.say(remark)
-        if not self.dry_run:
-            console.say(f"wrote {self.out}")
         where = estimates_option(self.estimates)
+        if self.dry_run:
+            console.finish(
+                document, f"flexcal filter {self.robot} {self.program}{where} --out {self.out} writes it"
+            )
+            return
+        console.say(f"wrote {self.out}")
         console.finish(
             document,
             f"run {self.out} slowly first; the way back: flexcal filter {self.robot} {self.out} --reverse --out ORIGINAL.script{where}",

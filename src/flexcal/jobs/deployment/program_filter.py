@@ -69,6 +69,8 @@ class FilteredProgram(Result):
     def headline(self) -> str:
         """Number of targets that were corrected, and by how much."""
         done = np.isfinite(self.shift)
+        if not len(done):
+            return "no motion of the program has a target that is written as numbers"
         if not done.any():
             return f"none of {len(self.reasons)} targets corrected"
         shift = self.shift[done] / MILLIMETRE
