@@ -514,7 +514,8 @@ class RobotModel:
             )
             raise FlexcalError(
                 "E-ROBOT-076",
-                f"{what}, and {purpose} can have only joints that move each by a motor of its own.",
+                f"{what}, and {purpose} can have only joints that move each by a motor of its own; calibrate, map, compensate, and export "
+                "urdf, sdf, json and offsets take such a robot.",
             )
 
     def moving(self, joint: int) -> tuple[int, ...]:
