@@ -73,6 +73,7 @@ def calibrated_arm(folder: Path, examples: Path) -> list[str]:
     header, rows = read_csv(folder / "random.csv")
     write_csv(folder / "targets.csv", header[:7], rows[:, :7])
     run(example("compensate"))
+    (folder / "program.script").write_text("movej([-0.4, -0.8, 2.3, -1.6, 1.0, -0.1])\n", "utf-8")
     model = RobotModel.from_yaml(folder / "robot.yaml")
     measured = read_poses(folder / "random.csv", model)
     rng = np.random.default_rng(3)
@@ -89,6 +90,7 @@ def calibrated_arm(folder: Path, examples: Path) -> list[str]:
     return [
         "identify tool",
         "identify frame",
+        "filter",
         "verify",
         "repeatability",
         "map",
@@ -187,6 +189,7 @@ PLACES = {
         "repeatability",
         "map",
         "compensate",
+        "filter",
         "predict",
         "certificate",
         "report",

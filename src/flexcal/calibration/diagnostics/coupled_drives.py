@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration.fit import TOLERANCE, GeometricFit, fit_geometry
-from flexcal.calibration.fit.terms import plausible_size
+from flexcal.calibration.fit import TOLERANCE, GeometricFit, fit_geometry, plausible_size
 from flexcal.calibration.measurement import predict_measurements, predicted_positions, register
 from flexcal.data.poses import PoseSet
 from flexcal.model.kinematics import motor_motion

@@ -8,9 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from flexcal.compensation.failure_reasons import nominal_reasons
-from flexcal.compensation.inverse_kinematics import inverse_kinematics
-from flexcal.compensation.tool_target import ToolPoseTarget
+from flexcal.compensation import ToolPoseTarget, nominal_joint_positions
 from flexcal.model.kinematics import joint_limits
 from flexcal.model.parts import rotation_vector, vector_rotation
 from flexcal.model.robot import RobotModel
@@ -69,17 +67,15 @@ class ControllerPoses:
             else:
                 aim = self._aim(target.values, tool)
                 path = self._line(near, aim) if target.straight and target.near is None else aim
-                found, reached = np.array([near]), np.zeros(1, dtype=bool)
+                found = np.array([near])
                 for step in range(len(path.target)):
-                    found, reached = inverse_kinematics(
+                    found, (reasons[k],) = nominal_joint_positions(
                         self.nominal, path.subset(slice(step, step + 1)), found
                     )
-                    if not reached[0]:
+                    if reasons[k]:
                         break
-                if reached[0]:
-                    q[k], last = found[0], tuple(found[0])
                 else:
-                    reasons[k] = str(nominal_reasons(self.nominal, aim, found)[0])
+                    q[k], last = found[0], tuple(found[0])
         return q, reasons
 
     def values(self, targets: Sequence[ProgramTarget], q: np.ndarray) -> np.ndarray:

@@ -9,10 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.compensation import motor_commands
-from flexcal.compensation.failure_reasons import nominal_reasons
-from flexcal.compensation.inverse_kinematics import inverse_kinematics
-from flexcal.compensation.tool_target import ToolPoseTarget
+from flexcal.compensation import ToolPoseTarget, motor_commands, nominal_joint_positions
 from flexcal.data.poses import ToolTargets
 from flexcal.errors import FlexcalError, InputError
 from flexcal.files.transaction import atomic_path
@@ -249,6 +246,4 @@ def _nominal(model: RobotModel, nominal: RobotModel, targets: ToolTargets) -> tu
     assert targets.q is not None
     at = tool_at_rest(model, targets.q, targets.payload, targets.target).kinematics
     aim = ToolPoseTarget(targets.target, at.position, at.orientation)
-    q, reached = inverse_kinematics(nominal, aim, targets.q)
-    reasons = nominal_reasons(nominal, aim, q)
-    return q, ["" if there else str(reason) for there, reason in zip(reached, reasons, strict=True)]
+    return nominal_joint_positions(nominal, aim, targets.q)
