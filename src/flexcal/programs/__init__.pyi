@@ -1,4 +1,24 @@
-from .program import Program, ProgramTarget, RunTimeTarget
+from .arm_at_zero import ArmAtZero
+from .configuration import Configuration
+from .dialect import Dialect
+from .dialects import DIALECTS, dialect_of
+from .notation import Notation
+from .pose import Pose
+from .program import NewNumbers, Program, ProgramFile, ProgramTarget, RunTimeTarget
 from .urscript import parse_urscript
 
-__all__ = ["Program", "ProgramTarget", "RunTimeTarget", "parse_urscript"]
+__all__ = [
+    "DIALECTS",
+    "ArmAtZero",
+    "Configuration",
+    "Dialect",
+    "NewNumbers",
+    "Notation",
+    "Pose",
+    "Program",
+    "ProgramFile",
+    "ProgramTarget",
+    "RunTimeTarget",
+    "dialect_of",
+    "parse_urscript",
+]

@@ -14,7 +14,10 @@ from lark import Lark, Token, Tree
 from lark.exceptions import UnexpectedInput
 
 from flexcal.errors import InputError
-from flexcal.programs.program import Program, ProgramTarget, RunTimeTarget, Written
+from flexcal.programs.dialect import Dialect
+from flexcal.programs.notation import Notation
+from flexcal.programs.orientation import RotationVector
+from flexcal.programs.program import Program, ProgramFile, ProgramTarget, RunTimeTarget, Written
 
 _MOTIONS = {"movej": 1, "movel": 1, "movep": 1, "movec": 2, "servoj": 1, "servoc": 1}
 """Motions, and how many of their first arguments are targets."""
@@ -51,8 +54,8 @@ def parse_urscript(text: str, source: str = "the program") -> Program:
     Examples
     --------
     >>> program = parse_urscript("set_tcp(p[0,0,0.1,0,0,0])\\nmovel(p[-0.4,0.1,0.3,0,3.14,0], v=0.2)\\nmovel(pose_add(a, b))")
-    >>> program.targets[0].values, program.targets[0].tool
-    ((-0.4, 0.1, 0.3, 0.0, 3.14, 0.0), (0.0, 0.0, 0.1, 0.0, 0.0, 0.0))
+    >>> program.targets[0].values, program.targets[0].tool.position.tolist()
+    ((-0.4, 0.1, 0.3, 0.0, 3.14, 0.0), [0.0, 0.0, 0.1])
     >>> program.computed[0].reason
     'the controller computes it when the program runs'
     """
@@ -63,7 +66,7 @@ def parse_urscript(text: str, source: str = "the program") -> Program:
             "E-PROG-001",
             f"{source}, line {error.line}: the brackets or quotes do not fit there, so the program cannot be read; correct it.",
         ) from error
-    return _Reader(text, tree).program()
+    return _Reader(text, source, tree).program()
 
 
 @cache
@@ -78,10 +81,12 @@ class _Reader:
     """Walk through a program in the order of its text, with the tool and the payload that hold there."""
 
     text: str
+    source: str
     tree: Tree
     tool: tuple[float, ...] | None = None
     payload: float | None = None
     tools: list[tuple[float, ...] | None] = field(default_factory=list)
+    used_with: dict[int, tuple[tuple[float, ...] | None, float | None]] = field(default_factory=dict)
     variables: dict[str, list[Node]] = field(default_factory=lambda: defaultdict(list))
     targets: dict[int, ProgramTarget] = field(default_factory=dict)
     doubtful: dict[int, str] = field(default_factory=dict)
@@ -104,7 +109,8 @@ class _Reader:
                 "the program sets several tools (set_tcp); each holds for the motions after it in the text, also where threads or "
                 "functions are run in another order",
             )
-        return Program(self.text, tuple(kept), tuple(sorted(left, key=lambda item: item.line)), remarks)
+        computed = tuple(sorted(left, key=lambda item: item.line))
+        return Program(URSCRIPT, (ProgramFile(self.source, self.text),), tuple(kept), computed, remarks)
 
     def _assignments(self, nodes: Sequence[Node]) -> None:
         """Note what is assigned to every variable, wherever it is."""
@@ -177,14 +183,15 @@ class _Reader:
             node.data == "list",
             tuple(numbers),
             near,
-            self.tool,
+            None if self.tool is None else URSCRIPT.notation.pose(self.tool),
+            "the program sets no tool before it (set_tcp): give --tool",
             self.payload,
             motion,
             motion in _STRAIGHT,
         )
         first = numbers[0].first
-        earlier = self.targets.setdefault(first, target)
-        if (earlier.tool, earlier.payload) != (target.tool, target.payload):
+        self.targets.setdefault(first, target)
+        if self.used_with.setdefault(first, (self.tool, self.payload)) != (self.tool, self.payload):
             self.doubtful[first] = (
                 "it is reached with different tools or payloads, each of which needs other numbers"
             )
@@ -205,6 +212,25 @@ class _Reader:
 
     def _said(self, call: Tree) -> str:
         return " ".join(self.text[call.meta.start_pos : call.meta.end_pos].split())
+
+
+def _parse(files: Sequence[ProgramFile]) -> Program:
+    if len(files) > 1:
+        raise InputError(
+            "E-PROG-006",
+            f"a URScript program is one file, and {len(files)} are given; give {files[0].name} alone, and the others after it.",
+        )
+    return parse_urscript(files[0].text, files[0].name)
+
+
+URSCRIPT = Dialect(
+    "URScript of Universal Robots",
+    (".script", ".urscript"),
+    Notation(1.0, 1.0, RotationVector(), 9),
+    _parse,
+    no_start="no joint positions stand before it or beside it (qnear)",
+)
+"""URScript: metres and radians."""
 
 
 def _built_from(item: RunTimeTarget, corrected: set[str]) -> RunTimeTarget:

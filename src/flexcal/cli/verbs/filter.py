@@ -8,7 +8,16 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-from flexcal.cli.arguments.shared_options import Estimates, Json, Numbers, Robot, require_robot
+from flexcal.cli.arguments.shared_options import (
+    Estimates,
+    Json,
+    MaybePath,
+    Numbers,
+    Paths,
+    Robot,
+    file_argument,
+    require_robot_and_files,
+)
 from flexcal.cli.arguments.suggested_commands import estimates_option
 from flexcal.cli.terminal.console import Console
 
@@ -22,20 +31,30 @@ class Filter:
     PROGRAM is URScript (Universal Robots). Targets written as numbers are corrected, in motions and in variables that are set once;
     all other text stays as it is, byte for byte. Targets that the controller computes when the program runs stay and are listed.
 
-    Poses count in the frame base of the URDF, and the controller's kinematics as those of the URDF.
+    Poses count in the frame base of the URDF, and the controller's kinematics as those of the URDF. A program of several files goes
+    into the folder --out, under the names of its files.
     """
 
     robot: Robot
-    program: Annotated[Positional[Path], arg(metavar="PROGRAM", help="the program (.script)")]
-    out: Annotated[Path, arg(metavar="FILE", aliases=["-o"])] = Path("corrected.script")
-    """File for the new program."""
+    program: Annotated[
+        Positional[Paths], file_argument("PROGRAM...", "the program (.script), and further files of it")
+    ] = ()
+    out: Annotated[
+        MaybePath,
+        arg(metavar="FILE", aliases=["-o"], help_behavior_hint="(default: corrected.script, or its suffix)"),
+    ] = None
+    """File for the new program, or the folder for one of several files."""
     estimates: Estimates = None
     tool: Annotated[Numbers, arg(metavar="X...", help_behavior_hint="(default: set_tcp of the program)")] = ()
-    """Tool centre point in the flange for poses before which the program sets none: position, m, and rotation vector, rad."""
+    """Tool centre point in the flange for poses before which the program sets none, in the program's own numbers and units."""
     start: Annotated[
         Numbers, arg(metavar="Q...", help_behavior_hint="(default: the target before, or qnear)")
     ] = ()
-    """Joint positions, rad, that have the configuration of the arm at poses before which the program has no joint positions."""
+    """Joint positions, in the program's units, that have the configuration of the arm at poses before which there are none."""
+    joint_signs: Annotated[Numbers, arg(metavar="S...", help_behavior_hint="(default: 1 1 1 1 1 1)")] = ()
+    """Signs of the joints where the URDF counts them otherwise than the controller: URDF = sign * controller + zero."""
+    joint_zeros: Annotated[Numbers, arg(metavar="Q...", help_behavior_hint="(default: 0 0 0 0 0 0)")] = ()
+    """Joint positions of the URDF at those of the controller that are zero, in the program's units."""
     flange: Annotated[str, arg(metavar="FRAME")] = "tool0"
     """URDF frame of the flange, in which tools are given."""
     reverse: Annotated[bool, arg(help_behavior_hint="")] = False
@@ -46,17 +65,21 @@ class Filter:
 
     def run(self) -> None:
         """Correct the program, and print each target and what stays as it is."""
-        from flexcal.jobs.deployment import filter_program_file
+        from flexcal.jobs.deployment import filter_program_file, with_companions
 
-        require_robot(self.robot, self.program)
+        require_robot_and_files(self.robot, self.program, "program")
+        several = len(with_companions(self.program)) > 1
+        out = self.out or Path("corrected" + ("" if several else self.program[0].suffix))
         console = Console(self.json)
         result = filter_program_file(
             self.robot,
             self.program,
-            None if self.dry_run else self.out,
+            None if self.dry_run else out,
             estimates=self.estimates,
             tool=self.tool,
             start=self.start,
+            signs=self.joint_signs,
+            zeros=self.joint_zeros,
             flange=self.flange,
             reverse=self.reverse,
         )
@@ -75,13 +98,15 @@ class Filter:
         for remark in document["remarks"]:
             console.say(remark)
         where = estimates_option(self.estimates)
+        given = " ".join(map(str, self.program))
         if self.dry_run:
-            console.finish(
-                document, f"flexcal filter {self.robot} {self.program}{where} --out {self.out} writes it"
-            )
+            console.finish(document, f"flexcal filter {self.robot} {given}{where} --out {out} writes it")
             return
-        console.say(f"wrote {self.out}")
+        console.say(f"wrote {out}")
+        new = given if not several else " ".join(str(out / file.name) for file in self.program)
+        new = " ".join(str(out / file.name) for file in self.program) if several else str(out)
+        back = "ORIGINAL" if several else f"ORIGINAL{out.suffix}"
         console.finish(
             document,
-            f"run {self.out} slowly first; the way back: flexcal filter {self.robot} {self.out} --reverse --out ORIGINAL.script{where}",
+            f"run {out} slowly first; the way back: flexcal filter {self.robot} {new} --reverse --out {back}{where}",
         )

@@ -1,6 +1,7 @@
 from .compensation import Compensation, compensate, compensate_robot
 from .export import ExportedRobot, export_robot, export_stored_robot
 from .prediction import Prediction, predict, predict_robot
+from .program_files import with_companions
 from .program_filter import FilteredProgram, filter_program, filter_program_file
 
 __all__ = [
@@ -16,4 +17,5 @@ __all__ = [
     "filter_program_file",
     "predict",
     "predict_robot",
+    "with_companions",
 ]

@@ -9,34 +9,38 @@ from functools import cached_property
 import numpy as np
 
 from flexcal.compensation import ToolPoseTarget, nominal_joint_positions
+from flexcal.jobs.deployment.arm_postures import arm_postures
+from flexcal.jobs.deployment.configured_joints import all_solutions, fitting_joints
+from flexcal.jobs.deployment.controller_base import controller_base
+from flexcal.jobs.deployment.controller_joints import ControllerJoints
 from flexcal.model.kinematics import joint_limits
 from flexcal.model.parts import rotation_vector, vector_rotation
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import points_kinematics
-from flexcal.model.urdf import Frame, read_urdf
-from flexcal.programs import ProgramTarget
+from flexcal.programs import NewNumbers, Pose, ProgramTarget
 
-_BASE = "base"
-"""Frame of a Universal Robots' URDF in which the controller gives poses: the base turned by half a turn."""
 _STEP_LENGTH, _STEP_ANGLE = 0.05, 0.15
 """Largest distance (m) and angle (rad) between poses of a straight motion at which its configuration is followed."""
 
 
 @dataclass(frozen=True, eq=False)
 class ControllerPoses:
-    """Poses of the controller and joint positions of the `nominal` robot: `tool` and `start` where the program has none."""
+    """Poses of the controller and joint positions of its nominal robot: `tool` where the program has none, `start` (6,) of the URDF."""
 
-    nominal: RobotModel
+    controller: ControllerJoints
     flange: str
-    tool: tuple[float, ...]
-    start: tuple[float, ...]
+    tool: Pose | None
+    start: np.ndarray | None
+
+    @property
+    def nominal(self) -> RobotModel:
+        """The robot as the controller knows it."""
+        return self.controller.nominal
 
     @cached_property
-    def base(self) -> Frame:
+    def base(self) -> Pose:
         """Frame in which the controller gives poses."""
-        frames = read_urdf(self.nominal.urdf, self.nominal.config.locked).frames
-        known = frames.get(_BASE)
-        return Frame(-1, np.eye(3), np.zeros(3)) if known is None or known.joint >= 0 else known
+        return controller_base(self.nominal)
 
     def poses(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Positions (N, 3) and rotations (N, 3, 3) of the flange."""
@@ -46,56 +50,99 @@ class ControllerPoses:
     def joints(self, targets: Sequence[ProgramTarget]) -> tuple[np.ndarray, list[str]]:
         """Joint positions (N, 6) of the targets as the nominal robot takes them, and why one has none."""
         q, reasons = np.full((len(targets), 6), np.nan), [""] * len(targets)
-        last = self.start or None
+        last = self.start
         lower, upper = joint_limits(self.nominal)
         for k, target in enumerate(targets):
             if target.joints:
-                q[k] = target.values
+                q[k] = self.controller.to_urdf(np.array(target.values))
                 outside = np.flatnonzero((q[k] < lower) | (q[k] > upper))
                 if len(outside):
                     reasons[k] = f"{self.nominal.motor_names[outside[0]]} is outside its limits"
-                    continue
-                last = target.values
-                continue
-            tool, near = target.tool or self.tool, target.near or last
-            if not tool:
-                reasons[k] = "the program sets no tool before it (set_tcp): give --tool"
-            elif near is None:
-                reasons[k] = (
-                    "no joint positions stand before it or beside it (qnear), so the arm's configuration is unknown: give --start"
-                )
             else:
-                aim = self._aim(target.values, tool)
-                path = self._line(near, aim) if target.straight and target.near is None else aim
-                found = np.array([near])
-                for step in range(len(path.target)):
-                    found, (reasons[k],) = nominal_joint_positions(
-                        self.nominal, path.subset(slice(step, step + 1)), found
-                    )
-                    if reasons[k]:
-                        break
-                else:
-                    q[k], last = found[0], tuple(found[0])
+                q[k], reasons[k] = self._of_pose(target, last)
+            if not reasons[k]:
+                last = q[k]
         return q, reasons
 
-    def values(self, targets: Sequence[ProgramTarget], q: np.ndarray) -> np.ndarray:
-        """Numbers (N, 6) of the targets at other joint positions (N, 6)."""
+    def new_numbers(self, targets: Sequence[ProgramTarget], q: np.ndarray) -> list[NewNumbers]:
+        """Numbers of the targets at other joint positions (N, 6), and their configuration data."""
         position, rotation = self.poses(q)
-        found = q.copy()
-        base = self.base
+        postures = arm_postures(self.controller, q) if any(target.configuration for target in targets) else q
+        dialect = self.controller.dialect
+        new = []
         for k, target in enumerate(targets):
             if target.joints:
+                new.append(NewNumbers(tuple(self.controller.from_urdf(q[k]).tolist())))
                 continue
-            away, turned = _split(target.tool or self.tool)
-            at = base.rotation.T @ (position[k] + rotation[k] @ away - base.translation)
-            vector = rotation_vector(base.rotation.T @ rotation[k] @ turned)
-            found[k] = [*at, *_nearest_turn(vector, np.array(target.values[3:]))]
-        return found
+            flange = self.base.inverse() @ Pose(position[k], rotation[k])
+            pose = target.frame.inverse() @ flange @ self._tool(target)
+            words = target.words
+            if words and dialect.configuration is not None:
+                words = dialect.configuration.updated(postures[k], words)
+            new.append(NewNumbers(dialect.notation.pose_numbers(pose, target.values), words))
+        return new
 
-    def _line(self, q: Sequence[float], aim: ToolPoseTarget) -> ToolPoseTarget:
+    def _tool(self, target: ProgramTarget) -> Pose:
+        tool = target.tool or self.tool
+        assert tool is not None
+        return tool
+
+    def _of_pose(self, target: ProgramTarget, last: np.ndarray | None) -> tuple[np.ndarray, str]:
+        """Joint positions (6,) of a target that is a pose, and why it has none."""
+        none = np.full(6, np.nan)
+        if target.tool is None and self.tool is None:
+            return none, target.missing
+        near = None if target.near is None else self.controller.to_urdf(np.array(target.near))
+        start = near if near is not None else last
+        dialect = self.controller.dialect
+        written = dialect.configuration is not None and bool(target.configuration)
+        if start is None and not written:
+            return none, f"{dialect.no_start}, so the arm's configuration is unknown: give --start"
+        aim = self._aim(target)
+        found, reason = none, ""
+        if start is not None:
+            found, reason = self._follow(start, aim, straight=target.straight and near is None)
+            if not written:
+                return found, reason
+        return self._configured(target, aim, found[None][: int(not reason and start is not None)], start)
+
+    def _follow(self, start: np.ndarray, aim: ToolPoseTarget, *, straight: bool) -> tuple[np.ndarray, str]:
+        """Joint positions (6,) at the aim in the configuration that the arm has at `start`, and why there are none."""
+        path = self._line(start, aim) if straight else aim
+        found, reason = start[None], ""
+        for step in range(len(path.target)):
+            found, (reason,) = nominal_joint_positions(
+                self.nominal, path.subset(slice(step, step + 1)), found
+            )
+            if reason:
+                break
+        return found[0], reason
+
+    def _configured(
+        self, target: ProgramTarget, aim: ToolPoseTarget, followed: np.ndarray, start: np.ndarray | None
+    ) -> tuple[np.ndarray, str]:
+        """Joint positions (6,) at the aim with the written configuration, first of those that are `followed` (N, 6)."""
+        near = np.zeros(6) if start is None else start
+        found = fitting_joints(self.controller, target.words, followed, near)
+        if found is not None:
+            return found, ""
+        solutions = all_solutions(self.controller, aim)
+        if not len(solutions):
+            reason = nominal_joint_positions(self.nominal, aim, near[None])[1][0]
+            return np.full(6, np.nan), reason or "out of reach"
+        found = fitting_joints(self.controller, target.words, solutions, near)
+        if found is not None:
+            return found, ""
+        words = ", ".join(target.words)
+        return np.full(6, np.nan), (
+            f"none of the {len(solutions)} solutions of inverse kinematics has the configuration ({words}): the URDF counts joints "
+            "otherwise than the controller (--joint-signs, --joint-zeros), or frames and tool are not those of the program"
+        )
+
+    def _line(self, q: np.ndarray, aim: ToolPoseTarget) -> ToolPoseTarget:
         """Poses from that at `q` to the aim, along a line, so close that inverse kinematics cannot leave the arm's configuration."""
         assert aim.rotation is not None
-        (position,), (rotation,) = self.poses(np.array([q]))
+        (position,), (rotation,) = self.poses(q[None])
         away, turn = aim.position[0] - position, rotation_vector(aim.rotation[0] @ rotation.T)
         far = np.linalg.norm(away) / _STEP_LENGTH, np.linalg.norm(turn) / _STEP_ANGLE
         share = np.linspace(0, 1, max(2, int(np.ceil(max(far))) + 1))[1:]
@@ -105,25 +152,8 @@ class ControllerPoses:
         positions[-1] = aim.position[0]
         return ToolPoseTarget(np.repeat(aim.target, len(share)), positions, turns)
 
-    def _aim(self, pose: Sequence[float], tool: Sequence[float]) -> ToolPoseTarget:
+    def _aim(self, target: ProgramTarget) -> ToolPoseTarget:
         """Pose of the flange in the robot's root frame."""
-        base = self.base
-        (at, turned), (away, beside) = _split(pose), _split(tool)
-        rotation = base.rotation @ turned @ beside.T
-        position = base.translation + base.rotation @ at - rotation @ away
-        return ToolPoseTarget(np.array([self.flange]), position[None], rotation[None])
-
-
-def _split(pose: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-    return np.array(pose[:3]), vector_rotation(np.array(pose[3:]))
-
-
-def _nearest_turn(vector: np.ndarray, old: np.ndarray) -> np.ndarray:
-    """Rotation vector of the same rotation that is nearest to an old one: its angle may differ by whole turns."""
-    angle = float(np.linalg.norm(vector))
-    if angle < 1e-12:
-        return vector
-    axis = vector / angle
-    return min(
-        (axis * (angle + 2 * np.pi * k) for k in range(-2, 3)), key=lambda v: float(np.linalg.norm(v - old))
-    )
+        pose = self.controller.dialect.notation.pose(target.values)
+        at = self.base @ target.frame @ pose @ self._tool(target).inverse()
+        return ToolPoseTarget(np.array([self.flange]), at.position[None], at.rotation[None])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,19 +12,19 @@ import numpy as np
 from flexcal.compensation import ToolPoseTarget, motor_commands, nominal_joint_positions
 from flexcal.data.poses import ToolTargets
 from flexcal.errors import FlexcalError, InputError
-from flexcal.files.transaction import atomic_path
+from flexcal.jobs.deployment.controller_joints import ControllerJoints
 from flexcal.jobs.deployment.controller_poses import ControllerPoses
+from flexcal.jobs.deployment.program_files import output_places, read_program, write_program
 from flexcal.jobs.inputs import CalibratedRobot, unmeasured_lengths_remark
 from flexcal.jobs.pages import Result
 from flexcal.model.parts import rotation_vector
 from flexcal.model.robot import RobotModel, with_point_at_frame
 from flexcal.model.statics import tool_at_rest
-from flexcal.programs import Program, parse_urscript
+from flexcal.programs import Dialect, NewNumbers, Pose, Program, ProgramFile
 from flexcal.units import MILLIMETRE
 
 _FLANGE = "tool0"
 """Frame of a Universal Robots' URDF in which the controller gives tools."""
-_SUFFIXES = (".script", ".urscript")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -37,8 +37,8 @@ class FilteredProgram(Result):
         The calibrated robot.
     program : Program
         The program that was read.
-    values : ndarray
-        Numbers (N, 6) of the targets in the new program, m and rad; NaN where a target stays as it is.
+    new : dict
+        Numbers in the new program by index of target, in the program's units; targets that stay as they are have none.
     shift : ndarray
         Distance (N,), m, between the flange of the nominal robot at the new and at the old numbers.
     turn : ndarray
@@ -50,17 +50,16 @@ class FilteredProgram(Result):
     """
 
     program: Program
-    values: np.ndarray
+    new: dict[int, NewNumbers]
     shift: np.ndarray
     turn: np.ndarray
     reasons: tuple[str, ...]
     remarks: tuple[str, ...]
 
     @property
-    def text(self) -> str:
-        """The new program."""
-        changed = [k for k, reason in enumerate(self.reasons) if not reason]
-        return self.program.rewritten({k: self.values[k].tolist() for k in changed})
+    def files(self) -> tuple[ProgramFile, ...]:
+        """Files of the new program."""
+        return self.program.rewritten(self.new)
 
     @property
     def headline(self) -> str:
@@ -85,31 +84,35 @@ class FilteredProgram(Result):
     @property
     def left(self) -> list[dict[str, Any]]:
         """Line, text and reason of every target that stays as it is."""
+        name = {k: file.name for k, file in enumerate(self.program.files)}
         own = [
-            {"line": target.line, "text": target.name, "reason": reason}
+            {"file": name[target.file], "line": target.line, "text": target.name, "reason": reason}
             for target, reason in zip(self.program.targets, self.reasons, strict=True)
             if reason
         ]
         found = [
-            {"line": item.line, "text": item.text, "reason": item.reason} for item in self.program.computed
+            {"file": name[item.file], "line": item.line, "text": item.text, "reason": item.reason}
+            for item in self.program.computed
         ]
-        return sorted([*own, *found], key=lambda item: item["line"])
+        return sorted([*own, *found], key=lambda item: (item["file"], item["line"]))
 
     def document(self) -> dict[str, Any]:
         """JSON document: every target with its numbers before and after, and what stays as it is."""
         corrected = [
             {
+                "file": self.program.files[target.file].name,
                 "line": target.line,
                 "name": target.name,
                 "motion": target.motion,
                 "kind": "joints" if target.joints else "pose",
                 "before": list(target.values),
-                "after": self.values[k].tolist(),
+                "after": list(self.new[k].values),
+                "configuration": list(self.new[k].words),
                 "shift_mm": float(self.shift[k] / MILLIMETRE),
                 "turn_deg": float(np.rad2deg(self.turn[k])),
             }
             for k, target in enumerate(self.program.targets)
-            if not self.reasons[k]
+            if k in self.new
         ]
         return {"targets": corrected, "left": self.left, "remarks": list(self.remarks)}
 
@@ -120,6 +123,8 @@ def filter_program(
     *,
     tool: Sequence[float] = (),
     start: Sequence[float] = (),
+    signs: Sequence[float] = (),
+    zeros: Sequence[float] = (),
     flange: str = _FLANGE,
     reverse: bool = False,
 ) -> FilteredProgram:
@@ -136,9 +141,13 @@ def filter_program(
     program : Program
         Its program.
     tool : sequence of float
-        Tool centre point in the flange, m and rotation vector in rad (6,), for poses before which the program sets none.
+        Tool centre point in the flange, for poses where the program says none, as the dialect writes a pose.
     start : sequence of float
-        Joint positions (6,), rad, whose configuration the poses have before which there are none.
+        Joint positions (6,), as the dialect writes them, whose configuration the poses have before which there are none.
+    signs : sequence of float
+        Signs (6,), ±1, and
+    zeros : sequence of float
+        Zeros (6,) of joints, in the dialect's units: q_URDF = sign · q_controller + zero. Default: 1 and 0.
     flange : str
         URDF frame of the flange.
     reverse : bool
@@ -147,7 +156,7 @@ def filter_program(
     Returns
     -------
     FilteredProgram
-        `text` is the new program.
+        `files` is the new program.
 
     Raises
     ------
@@ -160,12 +169,16 @@ def filter_program(
             "E-PROG-002",
             f"{model.name} has {model.n} joints, but targets of these programs have six numbers; use the robot.yaml of the six-joint arm.",
         )
-    for name, values in (("tool", tool), ("start", start)):
-        if len(values) not in (0, 6):
-            raise InputError("E-PROG-003", f"--{name} has {len(values)} values; give six.")
-    places = ControllerPoses(nominal, flange, tuple(tool), tuple(start))
+    joints = _controller_joints(nominal, program.dialect, signs, zeros)
+    beginning = _checked("start", start, 6, "joint positions")
+    places = ControllerPoses(
+        joints,
+        flange,
+        _tool(program.dialect, tool),
+        None if beginning is None else joints.to_urdf(beginning),
+    )
     q, reasons = places.joints(program.targets)
-    values, after = np.full((len(q), 6), np.nan), np.full((len(q), 6), np.nan)
+    after, new = np.full((len(q), 6), np.nan), {}
     rows = np.array([k for k, reason in enumerate(reasons) if not reason], dtype=int)
     if len(rows):
         masses, payload_remarks = _payloads(model, program, rows)
@@ -174,7 +187,8 @@ def filter_program(
         for row, failure in zip(rows.tolist(), failures, strict=True):
             reasons[row] = failure
         done = np.array([k for k in rows if not reasons[k]], dtype=int)
-        values[done] = places.values([program.targets[k] for k in done], after[done])
+        numbers = places.new_numbers([program.targets[k] for k in done], after[done])
+        new = dict(zip(done.tolist(), numbers, strict=True))
     else:
         done, payload_remarks = rows, ()
     shift, turn = np.full(len(q), np.nan), np.full(len(q), np.nan)
@@ -182,42 +196,78 @@ def filter_program(
         (there, turned), (here, was) = places.poses(after[done]), places.poses(q[done])
         shift[done] = np.linalg.norm(there - here, axis=1)
         turn[done] = np.linalg.norm(rotation_vector(turned @ np.swapaxes(was, 1, 2)), axis=1)
-    remarks = (*unmeasured_lengths_remark(robot), *program.remarks, *payload_remarks)
-    return FilteredProgram(model, program, values, shift, turn, tuple(reasons), remarks)
+    remarks = (
+        *unmeasured_lengths_remark(robot),
+        *_convention_remarks(joints),
+        *program.remarks,
+        *payload_remarks,
+    )
+    return FilteredProgram(model, program, new, shift, turn, tuple(reasons), remarks)
 
 
 def filter_program_file(
     robot_file: Path,
-    file: Path,
+    files: Sequence[Path],
     out: Path | None,
     *,
     estimates: Path | None = None,
     tool: Sequence[float] = (),
     start: Sequence[float] = (),
+    signs: Sequence[float] = (),
+    zeros: Sequence[float] = (),
     flange: str = _FLANGE,
     reverse: bool = False,
 ) -> FilteredProgram:
-    """`filter_program` for a file; the new program goes to `out`, byte for byte as before but for the numbers, or nowhere (None)."""
-    if file.suffix.lower() not in _SUFFIXES:
-        raise InputError(
-            "E-PROG-004",
-            f"{file} is no URScript program ({' or '.join(_SUFFIXES)}); other dialects cannot be read.",
-        )
-    robot = CalibratedRobot.from_yaml(robot_file, estimates)
-    if not file.is_file():
-        raise InputError("E-PROG-005", f"{file} does not exist; name the program's file.")
-    written = file.read_bytes()
-    try:
-        encoding, text = "utf-8", written.decode("utf-8")
-    except UnicodeDecodeError:
-        # every byte stands for a character there, and comes back as it was
-        encoding, text = "latin-1", written.decode("latin-1")
-    program = parse_urscript(text, str(file))
-    result = filter_program(robot, program, tool=tool, start=start, flange=flange, reverse=reverse)
+    """`filter_program` for files, and those that belong to them; the new program goes to `out`, or nowhere (None).
+
+    It is the old one byte for byte but for the numbers: one file to the file `out`, several into the folder `out` under their names.
+    """
+    program = read_program(files)
     if out is not None:
-        with atomic_path(out) as temporary:
-            temporary.write_bytes(result.text.encode(encoding))
+        output_places([Path(file.name) for file in program.files], out)
+    robot = CalibratedRobot.from_yaml(robot_file, estimates)
+    result = filter_program(
+        robot, program, tool=tool, start=start, signs=signs, zeros=zeros, flange=flange, reverse=reverse
+    )
+    if out is not None:
+        write_program(result.files, out)
     return result
+
+
+def _controller_joints(
+    nominal: RobotModel, dialect: Dialect, signs: Sequence[float], zeros: Sequence[float]
+) -> ControllerJoints:
+    sign, zero = _checked("joint-signs", signs, 6, "signs"), _checked("joint-zeros", zeros, 6, "angles")
+    if sign is not None and set(np.abs(sign).tolist()) != {1.0}:
+        raise InputError(
+            "E-PROG-011", f"--joint-signs has values other than 1 and -1 ({sign}); give six of these."
+        )
+    plain = ControllerJoints(nominal, dialect, np.ones(6) if sign is None else sign, np.zeros(6))
+    return plain if zero is None else replace(plain, zeros=zero * plain.unit)
+
+
+def _tool(dialect: Dialect, tool: Sequence[float]) -> Pose | None:
+    numbers = _checked("tool", tool, 3 + dialect.notation.orientation.count, f"a pose in {dialect.name}")
+    return None if numbers is None else dialect.notation.pose(numbers.tolist())
+
+
+def _checked(name: str, values: Sequence[float], count: int, meaning: str) -> np.ndarray | None:
+    if len(values) not in (0, count):
+        raise InputError("E-PROG-003", f"--{name} has {len(values)} values; give the {count} of {meaning}.")
+    return np.array(values, dtype=float) if len(values) else None
+
+
+def _convention_remarks(joints: ControllerJoints) -> tuple[str, ...]:
+    """What is taken of the signs and zeros of the joints, for dialects whose arms have them by custom."""
+    if joints.dialect.zero is None:
+        return ()
+    differing = joints.differing()
+    if not differing:
+        return ()
+    return (
+        f"joint positions and configuration data count as those of the URDF, but its arm at zero is not that of {joints.dialect.name}: "
+        f"{differing}; give --joint-signs and --joint-zeros if the controller counts otherwise",
+    )
 
 
 def _payloads(
