@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 # matrices are small here: more BLAS threads only get in each other's way
 export OPENBLAS_NUM_THREADS ?= 1
-SOURCES := pyproject.toml CMakeLists.txt $(wildcard kernels/*)
+SOURCES := pyproject.toml CMakeLists.txt $(wildcard kernels/* runtime/include/flexcal/*.hpp runtime/include/flexcal/runtime/*.hpp)
 
 .PHONY: install demo test test-all coverage sanitize check bench docs wheels clean
 

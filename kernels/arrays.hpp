@@ -5,8 +5,11 @@
 #include <nanobind/ndarray.h>
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <type_traits>
+#include <utility>
+#include <vector>
 
 namespace flexcal {
 
@@ -60,5 +63,24 @@ template <std::size_t axes>
 Contiguous<double, axes> written_reals(nb::handle object, const std::size_t (&shape)[axes], const char* name) {
     return array<double>(object, shape, name);
 }
+
+using Result = nb::ndarray<nb::numpy, double>;
+
+// An array to be returned.
+struct Buffer {
+    std::unique_ptr<double[]> data;
+    std::vector<std::size_t> shape;
+
+    explicit Buffer(std::vector<std::size_t> extents) : shape(std::move(extents)) {
+        std::size_t size = 1;
+        for (std::size_t e : shape) size *= e;
+        data = std::make_unique<double[]>(size);
+    }
+    Result release() {
+        double* p = data.release();
+        nb::capsule owner(p, [](void* q) noexcept { delete[] static_cast<double*>(q); });
+        return Result(p, shape.size(), shape.data(), owner);
+    }
+};
 
 }  // namespace flexcal

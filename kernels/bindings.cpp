@@ -10,6 +10,7 @@ NB_MODULE(KERNELS, m) {
 #endif
     bind_closed_loop(m);
     bind_geared_loop(m);
+    bind_runtime(m);
     bind_tree(m);
     bind_triangle(m);
 }

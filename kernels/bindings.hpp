@@ -4,5 +4,6 @@
 
 void bind_closed_loop(nanobind::module_& m);
 void bind_geared_loop(nanobind::module_& m);
+void bind_runtime(nanobind::module_& m);
 void bind_tree(nanobind::module_& m);
 void bind_triangle(nanobind::module_& m);

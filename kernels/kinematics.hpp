@@ -1,6 +1,6 @@
 // Where a target point of the tool is, and how that depends on every geometric error and deflection.
 #pragma once
-#include "tree.hpp"
+#include "flexcal/tree.hpp"
 
 namespace flexcal {
 

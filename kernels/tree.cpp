@@ -3,8 +3,6 @@
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/vector.h>
 
-#include <memory>
-
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "equilibrium.hpp"
@@ -15,24 +13,6 @@ namespace nb = nanobind;
 using namespace flexcal;
 
 namespace {
-
-using Result = nb::ndarray<nb::numpy, double>;
-
-struct Buffer {
-    std::unique_ptr<double[]> data;
-    std::vector<std::size_t> shape;
-
-    explicit Buffer(std::vector<std::size_t> extents) : shape(std::move(extents)) {
-        std::size_t size = 1;
-        for (std::size_t e : shape) size *= e;
-        data = std::make_unique<double[]>(size);
-    }
-    Result release() {
-        double* p = data.release();
-        nb::capsule owner(p, [](void* q) noexcept { delete[] static_cast<double*>(q); });
-        return Result(p, shape.size(), shape.data(), owner);
-    }
-};
 
 Tree make_tree(const std::vector<int>& parents, const std::vector<bool>& prismatic, nb::handle placements_, nb::handle translations_,
                nb::handle normals_, nb::handle bearings_, bool tilts_first) {

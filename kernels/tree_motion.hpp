@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "lanes.hpp"
-#include "tree.hpp"
+#include "flexcal/tree.hpp"
 
 namespace flexcal {
 

@@ -2,6 +2,24 @@ import numpy as np
 
 avx2: bool
 
+class RuntimeRobot:
+    @staticmethod
+    def read(text: str) -> RuntimeRobot: ...
+    joint_names: list[str]
+    point_names: list[str]
+    @staticmethod
+    def describe(status: int) -> str: ...
+    def forward(
+        self, q: np.ndarray, point: int, payload: np.ndarray, flank: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
+    def nominal(self, q: np.ndarray, point: int) -> tuple[np.ndarray, np.ndarray]: ...
+    def compensate(
+        self, q: np.ndarray, point: int, payload: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
+    def inverse(
+        self, position: np.ndarray, rotation: np.ndarray, near: np.ndarray, point: int, payload: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
+
 class Tree:
     @staticmethod
     def build(

@@ -5,6 +5,7 @@ from .mujoco_spec import mjcf_spec
 from .offset_fit import undetermined_offsets
 from .offset_table import render_offsets
 from .representation_error import measure_export_error
+from .runtime_file import render_runtime
 from .urdf import export_urdf
 from .written_file import ExportedFile, RenderedModel, write_rendered
 
@@ -21,6 +22,7 @@ __all__ = [
     "render",
     "render_dh",
     "render_offsets",
+    "render_runtime",
     "undetermined_offsets",
     "write_rendered",
 ]

@@ -109,6 +109,7 @@ Its frames are those of that description, whatever those of the URDF are, for ro
 which is printed.""",
         "give {out} to the description or driver as kinematics_params_file",
     ),
+    Format("runtime", "for the C++ runtime, which compensates in the control loop", "runtime.json"),
     PlainFormat(
         "json",
         "the whole calibrated model, for programs of your own",

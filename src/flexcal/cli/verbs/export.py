@@ -176,3 +176,20 @@ class ExportOffsets(Export):
         if self.keep_frames:
             return [offset_table(document)]
         return [offset_table(document), frame_table({name: document[name] for name in ("base", "tool")})]
+
+
+@dataclass(frozen=True)
+class ExportRuntime(Export):
+    """Write the calibrated robot for the C++ runtime of flexcal (runtime/), which compensates in the control loop, without Python.
+
+    The file is JSON, or, where it is called .h or .hpp, a header with the same in the constant flexcal_robot. Everything is carried:
+    geometry, deflection under gravity and payload, backlash, transmission errors.
+    """
+
+    def write(self) -> ExportedRobot:
+        from flexcal.jobs.deployment import export_stored_robot
+
+        return export_stored_robot(self.robot, self.out, "runtime", estimates=self.estimates)
+
+    def following(self, document: dict[str, Any]) -> str:
+        return f"read {self.out} with flexcal::runtime::read_model_file in your program: docs/runtime.md"

@@ -16,6 +16,7 @@ from flexcal.export import (
     render,
     render_dh,
     render_offsets,
+    render_runtime,
     undetermined_offsets,
     write_rendered,
 )
@@ -25,6 +26,7 @@ from flexcal.jobs.pages import Result
 from flexcal.model.robot import RobotModel, with_blocks
 
 _CONVENTIONS: dict[str, Convention] = {"dh": "standard", "mdh": "modified"}
+_HEADERS = (".h", ".hpp")
 _OPTIONS = {"point": ("dh", "mdh", "offsets"), "four_parameters": ("dh", "mdh"), "keep_frames": ("offsets",)}
 """Formats that take an option."""
 
@@ -93,8 +95,9 @@ def export_robot(
         `Calibration.robot`, or ``CalibratedRobot.from_yaml(path)``.
     path : str or Path
         File to write.
-    format : {"urdf", "mjcf", "sdf", "dh", "mdh", "offsets", "kinematics", "json"}
-        URDF, MJCF, SDFormat, Denavit-Hartenberg table, standard or modified, joint offsets, kinematics of Universal Robots, or everything.
+    format : {"urdf", "mjcf", "sdf", "dh", "mdh", "offsets", "kinematics", "json", "runtime"}
+        URDF, MJCF, SDFormat, Denavit-Hartenberg table, standard or modified, joint offsets, kinematics of Universal Robots, everything, or
+        what the C++ runtime reads: JSON, or a header with it where `path` ends in .h or .hpp.
     point : str, optional
         Point at the end of the chain, of tables and offsets; the first by default.
     four_parameters : bool
@@ -142,6 +145,8 @@ def export_robot(
         rendered = render_offsets(
             probable, nominal, point=point, keep_frames=keep_frames, undetermined=_undetermined(robot)
         )
+    elif format == "runtime":
+        rendered = render_runtime(probable, robot.with_points, header=Path(path).suffix in _HEADERS)
     else:
         rendered = render(format, probable, nominal)
     written = write_rendered(probable, path, rendered)

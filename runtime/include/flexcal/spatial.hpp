@@ -2,9 +2,14 @@
 #pragma once
 #include <array>
 #include <cmath>
-#include <type_traits>
 
 namespace flexcal {
+
+// S itself, from which it is not deduced.
+template <class S>
+struct Plain {
+    using type = S;
+};
 
 // S is double, or several samples side by side (lanes.hpp).
 template <class S>
@@ -18,7 +23,7 @@ inline Vector<S> operator+(const Vector<S>& a, const Vector<S>& b) { return {a.x
 template <class S>
 inline Vector<S> operator-(const Vector<S>& a, const Vector<S>& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 template <class S>
-inline Vector<S> operator*(std::type_identity_t<S> s, const Vector<S>& a) { return {s * a.x, s * a.y, s * a.z}; }
+inline Vector<S> operator*(typename Plain<S>::type s, const Vector<S>& a) { return {s * a.x, s * a.y, s * a.z}; }
 template <class S>
 inline S dot(const Vector<S>& a, const Vector<S>& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 template <class S>
