@@ -1,3 +1,4 @@
+from flexcal._kernels import RuntimeRobot as RuntimeRobot
 from flexcal._kernels import Tree as Tree
 from flexcal._kernels import closed_loop as closed_loop
 from flexcal._kernels import update as update
