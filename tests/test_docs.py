@@ -22,6 +22,7 @@ import flexcal
 from flexcal.cli.main import main
 from flexcal.dynamics.drives.gains import gain_name
 from flexcal.elasticity.response_model import stiffness_parameters
+from flexcal.export import Actuators, actuator_name
 from flexcal.frequency.periodic import FrequencyResponse
 from flexcal.frequency.periodic.response import POOLED_LINES, SMALLEST_FREEDOM
 from flexcal.model.parts import LOOP
@@ -87,9 +88,10 @@ def produced(model: RobotModel) -> dict[str, str]:
         joint_covariance=np.tile(1e-6 * np.eye(12, dtype=complex), (lines, 1, 1)),
     )
     gains = [gain_name(joint) for joint in model.joint_names]
+    servos = [actuator_name("joint_1", key) for key in Actuators.KEYS]
     forked = replace(model, joints=(*model.joints[:-1], replace(model.joints[-1], parent=3)))
     loops = [*(f"loop.four_bar.{key}" for key in LOOP), f"joint_3.{RATIO}joint_2"]
-    names = {name: unit_of(name) for name in (*model.values, *forked.values, *gains, *loops)}
+    names = {name: unit_of(name) for name in (*model.values, *forked.values, *gains, *loops, *servos)}
     return names | {item.name: item.unit for item in stiffness_parameters(model, [response], backlash=True)}
 
 

@@ -13,6 +13,7 @@ import polars as pl
 import pytest
 from cli_files import read_csv, write_csv
 from newcomer_robot import urdf_text
+from servo_arm import TRUTH, arm, command, simulate, write_log
 from two_links import HELD, PAYLOAD, swings, two_links
 
 from flexcal.calibration.measurement import predict_measurements
@@ -141,6 +142,15 @@ def recordings_of_two_payloads(folder: Path, examples: Path) -> list[str]:
     return ["identify gains"]
 
 
+def servo_moves(folder: Path, examples: Path) -> list[str]:
+    """Two links under a position controller, which a program of the tests simulates."""
+    arm(folder)
+    commands = command(16.0, 100.0, np.random.default_rng(5))
+    write_log(folder / "moves.csv", 0.01, commands, simulate(TRUTH, commands[None], 100.0, step=5e-4)[0])
+    run("flexcal identify actuators robot.yaml moves.csv --out actuators")
+    return ["identify actuators"]
+
+
 def exciting_motion(folder: Path, examples: Path) -> list[str]:
     shutil.copytree(
         examples / "tx40", folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("estimates.*")
@@ -196,6 +206,7 @@ PLACES = {
         *EXPORTS,
     },
     recordings_of_two_payloads: {"identify gains"},
+    servo_moves: {"identify actuators"},
     exciting_motion: {"identify dynamics"},
     virtual_robot: set(PROCEDURE),
 }
@@ -214,7 +225,9 @@ def test_quick_examples_run(place, tmp_path: Path, examples: Path, monkeypatch: 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "place", [recordings_of_two_payloads, exciting_motion, virtual_robot], ids=lambda place: place.__name__
+    "place",
+    [recordings_of_two_payloads, servo_moves, exciting_motion, virtual_robot],
+    ids=lambda place: place.__name__,
 )
 def test_slow_examples_run(place, tmp_path: Path, examples: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     here(place, tmp_path, examples, monkeypatch)

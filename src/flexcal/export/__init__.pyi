@@ -1,7 +1,8 @@
+from .actuators import OF_ERROR, Actuators, actuator_name, actuator_unit
 from .dh_table import Convention, render_dh
 from .formats import FORMATS, PlainFormat, render
 from .mjcf_file import export_mjcf
-from .mujoco_spec import mjcf_spec
+from .mujoco_spec import effort_limit, mjcf_spec
 from .offset_fit import undetermined_offsets
 from .offset_table import render_offsets
 from .representation_error import measure_export_error
@@ -11,10 +12,15 @@ from .written_file import ExportedFile, RenderedModel, write_rendered
 
 __all__ = [
     "FORMATS",
+    "OF_ERROR",
+    "Actuators",
     "Convention",
     "ExportedFile",
     "PlainFormat",
     "RenderedModel",
+    "actuator_name",
+    "actuator_unit",
+    "effort_limit",
     "export_mjcf",
     "export_urdf",
     "measure_export_error",

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexcal.errors import FlexcalError
+from flexcal.export.actuators import Actuators
 from flexcal.model.kinematics import bearing_placement, link_placement, point_placement
 from flexcal.model.parts import rotation_wxyz
 from flexcal.model.robot import SPRINGS, RobotModel, carried_inertias
@@ -24,6 +25,10 @@ from flexcal.mujoco_library import log_mujoco_warnings
 if TYPE_CHECKING:
     import mujoco
 
+_FRICTION_SOLREF = (0.0005, 1.0)
+_FRICTION_SOLIMP = (0.99, 0.99, 0.001, 0.5, 2.0)
+"""Softness of dry friction in MuJoCo, by which a joint that stands creeps; stiffer than MuJoCo's own, with which it creeps visibly."""
+
 
 def mjcf_spec(
     model: RobotModel,
@@ -31,13 +36,16 @@ def mjcf_spec(
     q: np.ndarray | None = None,
     free: Collection[int] | None = None,
     payload: float | None = None,
+    actuators: Actuators | None = None,
 ) -> mujoco.MjSpec:
     """Robot as an `MjSpec`, with all identified values.
 
     `q` (n,) rad or m: where the joints that are not in `free` are locked (default: all joints are free); `payload` kg at the declared
     payload's centre of mass (default: the declared mass). MuJoCo joints are named `<joint>` (motor side), `<joint>.drive` (twist
     of the arm beyond the motor), `<joint>.bearing_y`, `<joint>.bearing_x`; sites have the points' names. Backlash has no form in
-    MJCF and is left out; Coulomb friction becomes `frictionloss`, which is not a tanh. Raises `FlexcalError` where a joint is
+    MJCF and is left out; Coulomb friction becomes `frictionloss`, which is not a tanh. With `actuators` the joints have their armature
+    and friction, and the MuJoCo actuator `<joint>` takes positions (and `<joint>.velocity` velocities, where the damping follows them);
+    else it takes torques. The delay is not in it: `with_delay` adds it. Raises `FlexcalError` where a joint is
     locked without `q`, or a payload is given but none declared.
     """
     import mujoco
@@ -65,7 +73,7 @@ def mjcf_spec(
         body.ipos = inertia.com
         body.fullinertia = inertia.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
         body.explicitinertial = True
-        _add_joints(spec, body, model, i, None if i in motors else at[i])
+        _add_joints(spec, body, model, i, None if i in motors else at[i], actuators)
         bodies.append(body)
     for name in model.points:
         joint, position, rotation = point_placement(model, name)
@@ -74,7 +82,12 @@ def mjcf_spec(
 
 
 def _add_joints(
-    spec: mujoco.MjSpec, body: mujoco.MjsBody, model: RobotModel, i: int, locked: float | None
+    spec: mujoco.MjSpec,
+    body: mujoco.MjsBody,
+    model: RobotModel,
+    i: int,
+    locked: float | None,
+    actuators: Actuators | None,
 ) -> None:
     """Motor and springs of a joint, outermost first; the motor is left out where it is locked, at that angle (rad or m)."""
     import mujoco
@@ -82,7 +95,11 @@ def _add_joints(
     spring = next((e for e in model.elastic if e.index == i), None)
     for component in spring.components if spring else (2,):
         if component == 2 and locked is None:
-            _add_motor(spec, body, model, i)
+            motor = _add_motor(body, model, i)
+            if actuators is None:
+                _drive_by_torque(spec, motor, model, i)
+            else:
+                _drive_by_position(spec, motor, model, i, actuators)
         if spring:
             name = f"{spring.name}.{SPRINGS[component]}"
             axis = bearing_placement(model, spring, locked or 0.0)[:, component]
@@ -91,20 +108,59 @@ def _add_joints(
             joint.damping = _linear(joint.damping, float(spring.damping[component]))
 
 
-def _add_motor(spec: mujoco.MjSpec, body: mujoco.MjsBody, model: RobotModel, i: int) -> None:
+def _add_motor(body: mujoco.MjsBody, model: RobotModel, i: int) -> mujoco.MjsJoint:
     import mujoco
 
     joint = model.joints[i]
     kind = mujoco.mjtJoint.mjJNT_SLIDE if joint.kind == "prismatic" else mujoco.mjtJoint.mjJNT_HINGE
     motor = body.add_joint(name=joint.name, type=kind, axis=joint.axis)
+    if np.isfinite([joint.lower, joint.upper]).all():
+        motor.range = [joint.lower, joint.upper]
+    return motor
+
+
+def _drive_by_torque(spec: mujoco.MjSpec, motor: mujoco.MjsJoint, model: RobotModel, i: int) -> None:
+    import mujoco
+
     motor.armature = _known(model.drives.rotor_inertia[i])
     motor.damping = _linear(motor.damping, _known(model.drives.viscous[i]))
     motor.frictionloss = _known(model.drives.coulomb[i])
-    if np.isfinite([joint.lower, joint.upper]).all():
-        motor.range = [joint.lower, joint.upper]
-    drive = spec.add_actuator(name=joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-    if np.isfinite(joint.effort) and joint.effort > 0:
-        drive.ctrlrange = [-joint.effort, joint.effort]
+    drive = spec.add_actuator(name=motor.name, target=motor.name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    effort = effort_limit(model, i)
+    if effort is not None:
+        drive.ctrlrange = [-effort, effort]
+
+
+def _drive_by_position(
+    spec: mujoco.MjSpec, motor: mujoco.MjsJoint, model: RobotModel, i: int, actuators: Actuators
+) -> None:
+    """K (u − q) − D q̇ by an affine bias; D u̇ by a second actuator; the limit of the torque is the joint's, as it is of their sum."""
+    import mujoco
+
+    motor.armature = float(actuators.armature[i])
+    motor.damping = _linear(motor.damping, float(actuators.viscous[i]))
+    motor.frictionloss = float(actuators.coulomb[i])
+    motor.solref_friction[:] = _FRICTION_SOLREF
+    motor.solimp_friction[:] = _FRICTION_SOLIMP
+    effort = effort_limit(model, i)
+    if effort is not None:
+        motor.actfrcrange = [-effort, effort]
+    drive = spec.add_actuator(name=motor.name, target=motor.name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    drive.gaintype, drive.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
+    drive.gainprm[0] = actuators.stiffness[i]
+    drive.biasprm[:3] = [0.0, -actuators.stiffness[i], -actuators.damping[i]]
+    if actuators.follows_velocity:
+        drive = spec.add_actuator(
+            name=f"{motor.name}.velocity", target=motor.name, trntype=mujoco.mjtTrn.mjTRN_JOINT
+        )
+        drive.gaintype = mujoco.mjtGain.mjGAIN_FIXED
+        drive.gainprm[0] = actuators.damping[i]
+
+
+def effort_limit(model: RobotModel, i: int) -> float | None:
+    """Largest torque of a joint's drive, N m (N), where the URDF says one."""
+    effort = model.joints[i].effort
+    return float(effort) if np.isfinite(effort) and effort > 0 else None
 
 
 def _linear(default: float | np.ndarray, value: float) -> float | np.ndarray:

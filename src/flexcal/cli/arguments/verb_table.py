@@ -131,6 +131,14 @@ STEPS = (
                 ("results.json", "report.html"),
             ),
             Verb(
+                ("identify", "actuators"),
+                "identify_actuators",
+                "IdentifyActuators",
+                "gains, delay, friction and armature of position-controlled joints, for simulators",
+                "flexcal identify actuators robot.yaml moves.csv",
+                ("results.json", "report.html"),
+            ),
+            Verb(
                 ("identify", "dynamics"),
                 "identify_dynamics",
                 "IdentifyDynamics",

@@ -1,3 +1,4 @@
+from .command_log import CommandLog, read_command_log
 from .decimation import Decimation, DecimationStream
 from .joint_log import Recording, RecordingLabel
 from .log_files import FILL, read_recording, read_recording_blocks, write_recording
@@ -9,6 +10,7 @@ from .time_summary import TimeSummary
 __all__ = [
     "FILL",
     "LATE",
+    "CommandLog",
     "Decimation",
     "DecimationStream",
     "LowPass",
@@ -17,6 +19,7 @@ __all__ = [
     "TimeBase",
     "TimeSummary",
     "TooFewSamples",
+    "read_command_log",
     "read_recording",
     "read_recording_blocks",
     "uniform_blocks",

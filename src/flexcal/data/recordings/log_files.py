@@ -93,7 +93,7 @@ def read_recording(
     texts = timestamp_columns(signals)
     (table,) = with_seconds([file.read(texts)], texts)
     t = signals["t"].values(table)[:, 0]
-    _check_time(table, signals["t"], t, None)
+    check_time(table, signals["t"], t, None)
     values = _stacked(model, table, signals)
     (base, whole), *others = uniform_blocks([(t, values)], positions=model.n, fill=fill)
     if others:
@@ -167,7 +167,7 @@ def _stamped(
     payload: float | None = None
     for table in tables:
         t = signals["t"].values(table)[:, 0]
-        _check_time(table, signals["t"], t, before)
+        check_time(table, signals["t"], t, before)
         before = float(t.max()) if before is None else max(before, float(t.max()))
         yield t, _stacked(model, table, signals, payload)
         payload = float(signals["payload"].values(table)[0, 0]) if "payload" in signals else None
@@ -245,7 +245,7 @@ def _recording(
     )
 
 
-def _check_time(table: Table, signal: Signal, t: np.ndarray, before: float | None) -> None:
+def check_time(table: Table, signal: Signal, t: np.ndarray, before: float | None) -> None:
     """Check the time stamps `t` (N,) that follow one at `before` (None: they begin the log)."""
     if before is None and len(t) < 2:
         raise table.error("E-LOG-016", 0, None, "this is the only sample; a log needs at least two.")

@@ -21,7 +21,7 @@ from flexcal.units import DEGREE, MILLIMETRE
 if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel, SignalConfig
 
-JOINT_QUANTITIES = ("q", "dq", "ddq", "tau", "qa", "qax", "qay", "dqa", "tau_ext")
+JOINT_QUANTITIES = ("q", "dq", "ddq", "tau", "qa", "qax", "qay", "dqa", "tau_ext", "qc")
 """Quantities with one column a joint, numbered from 1."""
 VECTORS = {
     "xyz": ("x", "y", "z"),
@@ -45,7 +45,7 @@ TIMESTAMP = "timestamp"
 """Unit of time for texts with date or time of day, which count as seconds from the first."""
 UNITS: dict[str, dict[str, float]] = {
     "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, TIMESTAMP: 1.0},
-    **dict.fromkeys(("q", "qa", "qax", "qay"), _ANGLE),
+    **dict.fromkeys(("q", "qa", "qax", "qay", "qc"), _ANGLE),
     **dict.fromkeys(("dq", "dqa"), _RATE),
     "ddq": _ACCELERATION,
     **dict.fromkeys(("tau", "tau_ext"), _TORQUE),

@@ -24,7 +24,7 @@ from flexcal.files.formats.yaml_reader import YamlFile, read_yaml_file
 from flexcal.files.formats.yaml_writer import to_plain, yaml_text
 from flexcal.files.transaction import atomic_paths, current_path, recover, refuse_irregular
 
-Block = Literal["dynamics", "stiffness", "calibration", "payload"]
+Block = Literal["dynamics", "stiffness", "calibration", "payload", "actuators"]
 BLOCKS: tuple[Block, ...] = get_args(Block)
 """Blocks of the file, in the order of their application to a robot."""
 
@@ -105,6 +105,7 @@ class StoredEstimates:
     stiffness: StoredBlock | None = None
     calibration: StoredBlock | None = None
     payload: StoredBlock | None = None
+    actuators: StoredBlock | None = None
 
     def block(self, name: Block) -> StoredBlock | None:
         """One block, where it is there."""

@@ -41,6 +41,7 @@ from flexcal.report.pages import (
     ResponseStudy,
     StiffnessStudy,
     VerificationStudy,
+    actuators_page,
     calibration_page,
     dynamics_page,
     excitation_page,
@@ -72,7 +73,9 @@ def report_folder(folder: Path) -> Path:
     results, path = read_results(folder), folder / REPORT
     kind: Kind = results["kind"]
     try:
-        if kind == "inertials":
+        if kind == "actuators":
+            page = actuators_page(results)
+        elif kind == "inertials":
             page = inertials_page(InertialsStudy(results, _block(folder, "dynamics")))
         elif kind == "gains":
             page = gains_page(results)

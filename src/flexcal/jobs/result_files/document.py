@@ -23,6 +23,7 @@ _ROUNDING = 1e-9
 
 
 Kind = Literal[
+    "actuators",
     "calibration",
     "demo",
     "dynamics",

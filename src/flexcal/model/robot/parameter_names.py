@@ -64,7 +64,7 @@ _UNITS = {
     "x": "m", "y": "m", "z": "m", "zero": "m", "rx": "rad", "ry": "rad", "rz": "rad", "backlash": "rad", "gravity_compliance": "rad/(N m)",
     "gravity_compliance_1": "rad/(N m)", "gravity_compliance_2": "rad/(N m)",
     "stiffness": "N m/rad", "damping": "N m s/rad",
-    "rotor_inertia": "kg m²", "viscous": "N m s/rad", "coulomb": "N m",
+    "rotor_inertia": "kg m²", "armature": "kg m²", "viscous": "N m s/rad", "coulomb": "N m",
     "spring_stiffness": "N m/rad", "spring_torque": "N m", "cable_torque": "N m",
     **dict.fromkeys(("fx_offset", "fy_offset", "fz_offset"), "N"), **dict.fromkeys(("mx_offset", "my_offset", "mz_offset"), "N m"),
     "torque_offset": "N m", "delay": "s", "mass": "kg", "com_x": "m", "com_y": "m", "com_z": "m",

@@ -40,6 +40,8 @@ def apply_estimates(model: RobotModel, path: Path, *, without: Block | None = No
 def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path) -> RobotModel:
     """Robot with the estimates of `blocks`, read from the file `path`.
 
+    The block `actuators` is of simulators, and no part of the robot.
+
     A joint whose backlash was estimated counts as declared to have backlash, one whose drive stiffness was estimated as elastic, and a
     payload that was identified as declared in its frame; places of a fixture with sockets are stations.
     Raises `InputError` for a unit that is not the parameter's; for a name that the robot does not have: the file is then of another
@@ -52,6 +54,8 @@ def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path)
     if "payload" in blocks:
         model = _with_payload(model, blocks["payload"], path)
     for block, estimate in blocks.items():
+        if block == "actuators":
+            continue
         model = model.with_estimated_springs(estimate.values)
         if model.config.measurements:
             model = model.with_stations(

@@ -1,3 +1,4 @@
+from .actuators import actuator_checks
 from .bearing_axes import check_bearings, check_response_bearings
 from .drive_gains import gain_checks
 from .dynamics import (
@@ -47,6 +48,7 @@ __all__ = [
     "TOO_LARGE",
     "UNLIKE",
     "Trust",
+    "actuator_checks",
     "check_base",
     "check_bearings",
     "check_bodies",

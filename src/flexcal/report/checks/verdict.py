@@ -247,6 +247,25 @@ PHRASES: dict[str, dict[str, str]] = {
         "unknown": "no masses were fitted",
         "else": "the axis of masses describes the response badly, or is not determined",
     },
+    "held_out_windows": {
+        "good": "the simulation moves like the robot in windows outside the fit",
+        "care": "the simulation misses some of the tracking error in windows outside the fit",
+        "else": "the simulation does not move like the robot in windows outside the fit",
+    },
+    "carries_over": {
+        "good": "the simulation is as good outside the fit as in it",
+        "else": "the simulation is worse outside the fit than in it",
+    },
+    "simulated_noise": {
+        "good": "the model explains the measured positions",
+        "else": "the model lacks something that the positions show",
+    },
+    "actuator_parameters": {
+        "good": "the logs tell every parameter",
+        "bad": "the logs tell no parameter",
+        "else": "the logs do not tell every parameter",
+    },
+    "actuator_fit": {"good": "the fit converged", "else": "the fit did not converge"},
     "half_gains": {
         "good": "the first and the second half of the recordings give the same gains",
         "unknown": "the recordings are too short to compare their halves",

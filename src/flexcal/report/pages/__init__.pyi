@@ -1,4 +1,5 @@
 from .accuracy_map import MapStudy, map_page
+from .actuators import actuators_page
 from .calibration import CalibrationStudy, calibration_checks, calibration_page
 from .certificate import CertificateStudy, write_certificate
 from .customer import CustomerStudy, write_customer_report
@@ -34,6 +35,7 @@ __all__ = [
     "ResponseStudy",
     "StiffnessStudy",
     "VerificationStudy",
+    "actuators_page",
     "calibration_checks",
     "calibration_page",
     "comparison_page",

@@ -1,0 +1,179 @@
+"""Fit of actuators to logs: simulated positions against measured ones, window by window."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.actuators.determined import determined
+from flexcal.actuators.servo_parameters import Servo, ServoCoordinates
+from flexcal.actuators.servo_simulation import ServoSimulation, Windows
+from flexcal.actuators.smoothed_motion import SmoothedMotion
+from flexcal.actuators.start_values import start_values
+from flexcal.actuators.torque_scale import torques_without_effect
+from flexcal.actuators.tracking_errors import TrackingErrors
+from flexcal.data.recordings import CommandLog
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Estimate, Parameter, Parameters, Problem, solve
+from flexcal.export import OF_ERROR, Actuators
+from flexcal.model.robot import RobotModel
+from flexcal.progress import Progress, silent
+
+_LENGTH = 1.0
+"""Part of a window that counts, s."""
+_SETTLING = 6.0
+"""Time constants of the slowest axis after which a window counts: errors of the state that it begins in have then decayed."""
+_STEP, _DELAY_STEP = 1e-4, 1e-4
+"""Steps of the differences: relative to the first value, and in s of the delay."""
+_TOLERANCE = 1e-3
+"""Relative offset at which a fit has converged: a twentieth of a standard deviation, in a thousand samples."""
+_PASSES = 2
+"""Fits: the first weighs joints by the noise of their positions, the second by its residuals."""
+
+
+@dataclass(frozen=True, eq=False)
+class ActuatorFit:
+    """Fitted actuators of n joints.
+
+    estimate : what the logs do not tell is not identifiable in it; fitted, unseen : errors of simulated positions in the fit and in the
+    windows held out; noise : (n,) of the measured positions, rad or m; settling : s, from the beginning of a window until it counts;
+    windows : numbers of those fitted and held out.
+    """
+
+    estimate: Estimate
+    actuators: Actuators
+    fitted: TrackingErrors
+    unseen: TrackingErrors
+    noise: np.ndarray
+    settling: float
+    windows: tuple[int, int]
+
+
+def fit_actuators(
+    model: RobotModel,
+    logs: Sequence[CommandLog],
+    servo: Servo,
+    *,
+    hold_out: float = 0.25,
+    threads: int = 1,
+    progress: Progress = silent,
+) -> ActuatorFit:
+    """Least squares of simulated positions (Åström 1980: output error) over windows that begin in the measured state.
+
+    The last share `hold_out` of the windows of every log is not fitted. Covariance by the scatter of the windows' scores, joint by
+    joint, which holds where residuals are correlated within a window (Liang & Zeger 1986). Raises `FlexcalError` where the logs are too
+    short, or a joint does not move.
+    """
+    motions = [SmoothedMotion.of(log) for log in logs]
+    _require_motion(model, logs, motions)
+    first, links = start_values(model, logs, motions, follows_velocity=servo.follows_velocity)
+    start = servo.applied(first)
+    coordinates = ServoCoordinates(model, servo, links, start)
+    simulation = ServoSimulation(model, start, links, threads=threads)
+    settling = _SETTLING * simulation.slowest_time_constant(start)
+    whole = [Windows.of(log, m, settling, _LENGTH) for log, m in zip(logs, motions, strict=True)]
+    seen = [w.part(np.arange(len(w)) < np.ceil((1.0 - hold_out) * len(w))) for w in whole]
+    unseen = [w.part(np.arange(len(w)) >= np.ceil((1.0 - hold_out) * len(w))) for w in whole]
+    counts = sum(map(len, seen)), sum(map(len, unseen))
+    if counts[0] <= len(servo.keys) + 1 or not counts[1]:
+        raise FlexcalError(
+            "E-DYN-045",
+            f"the logs of {sum(log.duration for log in logs):.3g} s give {sum(counts)} windows of {_LENGTH:g} s, each after "
+            f"{settling:.2g} s of settling, which is too few for {len(servo.keys)} parameters a joint; record longer.",
+        )
+    noise = np.sqrt(np.mean([motion.noise**2 for motion in motions], axis=0))
+    scale = noise
+    fit = _Fit(simulation, coordinates, [w for w in seen if len(w)])
+    parameters = coordinates.parameters
+    estimate: Estimate | None = None
+    for number in range(_PASSES):
+        problem = fit.problem(
+            np.maximum(scale, 1e-12), parameters if estimate is None else estimate.parameters
+        )
+        estimate = solve(
+            problem,
+            covariance="sandwich",
+            max_iterations=40,
+            tolerance=_TOLERANCE,
+            progress=lambda stage, share, n=number: progress(stage, (n + share) / _PASSES),
+        )
+        scale = np.sqrt(np.mean(fit.residual(estimate.parameters.coordinates()) ** 2, axis=(0, 1)))
+    assert estimate is not None
+    found = coordinates.actuators(estimate.parameters.coordinates())
+    fitted = TrackingErrors.of(simulation, found, seen)
+    open_scale = torques_without_effect(simulation, found, seen, fitted.commanded) & ~coordinates.declared
+    estimate = coordinates.natural(estimate)
+    estimate = replace(
+        estimate,
+        identifiable=determined(model, servo, estimate, found, links, open_scale),
+        covariance_freedom=float(counts[0] - len(servo.keys)),
+        provenance={"option.damping": OF_ERROR if servo.follows_velocity else "velocity"},
+    )
+    return ActuatorFit(
+        estimate,
+        found,
+        fitted,
+        TrackingErrors.of(simulation, found, unseen),
+        noise,
+        settling,
+        counts,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    simulation: ServoSimulation
+    coordinates: ServoCoordinates
+    parts: Sequence[Windows]
+
+    def residual(self, x: np.ndarray) -> np.ndarray:
+        """Measured less simulated positions (W, S, n) of all windows."""
+        at = self.coordinates.actuators(x)
+        return np.concatenate([part.measured - self.simulation.positions(at, part) for part in self.parts])
+
+    def problem(self, scale: np.ndarray, parameters: Parameters) -> Problem:
+        """The problem with residuals over `scale` (n,); a group is a window of one joint."""
+        windows, samples, n = (
+            sum(map(len, self.parts)),
+            self.parts[0].measured.shape[1],
+            len(scale),
+        )
+        groups = np.broadcast_to(
+            (np.arange(windows)[:, None] * n + np.arange(n))[:, None, :], (windows, samples, n)
+        )
+
+        def residual(x: np.ndarray) -> np.ndarray:
+            return (self.residual(x) / scale).ravel()
+
+        def linearise(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            at = residual(x)
+            columns = []
+            for k, item in enumerate(parameters):
+                moved = x.copy()
+                step = _step(item)
+                moved[k] += step
+                columns.append((residual(moved) - at) / step)
+            return at, np.stack(columns, axis=1)
+
+        return Problem(parameters, linearise, residual, groups=groups.ravel())
+
+
+def _step(item: Parameter) -> float:
+    if item.unit == "s":
+        return _DELAY_STEP
+    return _STEP if item.scale == "log" else _STEP * max(abs(item.prior_mean or 0.0), abs(item.value))
+
+
+def _require_motion(model: RobotModel, logs: Sequence[CommandLog], motions: Sequence[SmoothedMotion]) -> None:
+    moved = np.max([np.ptp(motion.q, axis=0) for motion in motions], axis=0)
+    noise = np.max([motion.noise for motion in motions], axis=0)
+    still = np.flatnonzero(moved <= 10 * noise)
+    if still.size:
+        name, unit = model.joint_names[still[0]], "m" if model.joints[still[0]].kind == "prismatic" else "rad"
+        raise FlexcalError(
+            "E-DYN-046",
+            f"{name} moves by {moved[still[0]]:.3g} {unit} in all of {logs[0].name}"
+            f"{' and others' if len(logs) > 1 else ''}, so nothing of its actuator shows; move every joint.",
+        )
