@@ -26,7 +26,7 @@ def robot(folder: Path, axis: str = "0 0 1", extra: str = "") -> RobotModel:
 
 
 def moves(weight: float = 0.0, integral: float = 0.0, stiffness: float = STIFFNESS) -> CommandLog:
-    """One axis about a vertical (or, with a `weight` in N m, a horizontal) line, step by step; `integral` of the controller, N m/(rad s)."""
+    """One axis, step by step; `weight` N m where it is horizontal, `integral` of the controller N m/(rad s)."""
     rng = np.random.default_rng(2)
     time = np.arange(round(SECONDS * RATE)) / RATE
     frequency, phase = np.array([0.13, 0.37, 0.83, 1.7]), rng.uniform(0, 6, 4)

@@ -24,9 +24,10 @@ def determined(
     """For every parameter whether the logs tell its value.
 
     Positions tell torques relative to the known inertia and weight of the links: where these hardly act on a joint, one factor is common
-    to its gains, friction and armature (`open_scale` (n,)). Or the fit holds one of them, and those that absorb it have no value of their own; or all are
-    uncertain. Where the stiffness of a joint is open, so is everything else of it but the delay. Armature and viscous friction count as
-    known where their standard deviation is below a quarter of the inertia on the joint, with that of the `links` (n,), and of all its damping.
+    to its gains, friction and armature (`open_scale` (n,)), or the fit holds one of them, and those that absorb it have no value of their
+    own; or all are uncertain. Where the stiffness of a joint is open, so is everything else of it but the delay. Armature and viscous
+    friction count as known where their standard deviation is below a quarter of the inertia on the joint, with that of the `links` (n,),
+    and of all its damping.
     """
     open_ = {entry.name for entry in estimate.dropped}
     open_ |= {name for entry in estimate.dropped for name, share in entry.absorbed_by if abs(share) > _SHARE}

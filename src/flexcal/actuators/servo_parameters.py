@@ -77,8 +77,8 @@ class ServoCoordinates:
 
     @property
     def parameters(self) -> Parameters:
-        """The coordinates, joint by joint. A rotor inertia that robot.yaml declares is the prior of A, and without one a vague prior keeps A
-        finite.
+        """The coordinates, joint by joint. A rotor inertia that robot.yaml declares is the prior of A, which a vague one
+        keeps finite otherwise.
         """
         items = []
         totals = self._totals(self.start.armature)

@@ -28,10 +28,11 @@ def start_values(
     *,
     follows_velocity: bool,
 ) -> tuple[Actuators, np.ndarray]:
-    """Actuators, and the links' inertias (n,) on the joints (medians), by the equation error: τ(q, q̇, q̈) of the links = K (u(t − T) − q) + D v − f sgn q̇ − A q̈, joint by joint.
+    """Actuators by the equation error, and the links' inertias (n,) on the joints (medians).
 
-    v is −q̇, or the velocity error where `follows_velocity`; no coefficient is negative (Lawson & Hanson 1974), and T is the best of a grid.
-    A declared rotor inertia is the armature, and the rest in proportion, with which the motion is the same where gravity is small.
+    Joint by joint, τ(q, q̇, q̈) of the links = K (u(t − T) − q) + D v − f sgn q̇ − A q̈, with v = −q̇, or the velocity error where
+    `follows_velocity`; no coefficient is negative (Lawson & Hanson 1974), and T is the best of a grid. A declared rotor inertia is the
+    armature, and the rest in proportion, with which the motion is the same where gravity is small.
     """
     from scipy.optimize import nnls
 
