@@ -135,7 +135,8 @@ def _carry_out(verb: Verb, arguments: list[str]) -> int:
             return 0
         raise parse_error(verb, said.getvalue()) from None
     complete_interrupted_runs(parsed)
-    with outputs(verb.name, parsed.out, verb.leaves, page=verb.page, beside=verb.beside):
+    leaves = getattr(parsed, "leaves", verb.leaves)
+    with outputs(verb.name, parsed.out, leaves, page=verb.page, beside=verb.beside):
         parsed.run()
     return 0
 

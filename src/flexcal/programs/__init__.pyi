@@ -5,6 +5,7 @@ from .dialects import DIALECTS, dialect_of
 from .notation import Notation
 from .pose import Pose
 from .program import NewNumbers, Program, ProgramFile, ProgramTarget, RunTimeTarget
+from .rapid import parse_rapid
 from .urscript import parse_urscript
 
 __all__ = [
@@ -20,5 +21,6 @@ __all__ = [
     "ProgramTarget",
     "RunTimeTarget",
     "dialect_of",
+    "parse_rapid",
     "parse_urscript",
 ]

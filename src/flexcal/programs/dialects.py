@@ -6,9 +6,10 @@ from pathlib import Path
 
 from flexcal.errors import InputError
 from flexcal.programs.dialect import Dialect
+from flexcal.programs.rapid import RAPID
 from flexcal.programs.urscript import URSCRIPT
 
-DIALECTS: tuple[Dialect, ...] = (URSCRIPT,)
+DIALECTS: tuple[Dialect, ...] = (RAPID, URSCRIPT)
 """Dialects that are read."""
 
 

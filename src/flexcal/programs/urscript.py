@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 import math
-import re
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from functools import cache
-from pathlib import Path
+from dataclasses import dataclass, field
 
-from lark import Lark, Token, Tree
-from lark.exceptions import UnexpectedInput
+from lark import Token, Tree
 
 from flexcal.errors import InputError
 from flexcal.programs.dialect import Dialect
 from flexcal.programs.notation import Notation
 from flexcal.programs.orientation import RotationVector
-from flexcal.programs.program import Program, ProgramFile, ProgramTarget, RunTimeTarget, Written
+from flexcal.programs.program import Program, ProgramFile, ProgramTarget, Written
+from flexcal.programs.syntax import Node, parse_text
+from flexcal.programs.target_list import RUN_TIME, TargetList
 
 _MOTIONS = {"movej": 1, "movel": 1, "movep": 1, "movec": 2, "servoj": 1, "servoc": 1}
 """Motions, and how many of their first arguments are targets."""
 _STRAIGHT = ("movel", "movep", "movec", "servoc")
 _PAYLOADS = ("set_payload", "set_target_payload", "set_payload_mass")
 _AXES = 6
-
-Node = Tree | Token
 
 
 def parse_urscript(text: str, source: str = "the program") -> Program:
@@ -59,21 +55,7 @@ def parse_urscript(text: str, source: str = "the program") -> Program:
     >>> program.computed[0].reason
     'the controller computes it when the program runs'
     """
-    try:
-        tree = _grammar().parse(text)
-    except UnexpectedInput as error:
-        raise InputError(
-            "E-PROG-001",
-            f"{source}, line {error.line}: the brackets or quotes do not fit there, so the program cannot be read; correct it.",
-        ) from error
-    return _Reader(text, source, tree).program()
-
-
-@cache
-def _grammar() -> Lark:
-    return Lark(
-        Path(__file__).with_suffix(".lark").read_text("utf-8"), parser="lalr", propagate_positions=True
-    )
+    return _Reader(text, source, parse_text(ProgramFile(source, text), "urscript")).program()
 
 
 @dataclass
@@ -82,35 +64,24 @@ class _Reader:
 
     text: str
     source: str
-    tree: Tree
+    nodes: list[Node]
     tool: tuple[float, ...] | None = None
     payload: float | None = None
     tools: list[tuple[float, ...] | None] = field(default_factory=list)
-    used_with: dict[int, tuple[tuple[float, ...] | None, float | None]] = field(default_factory=dict)
     variables: dict[str, list[Node]] = field(default_factory=lambda: defaultdict(list))
-    targets: dict[int, ProgramTarget] = field(default_factory=dict)
-    doubtful: dict[int, str] = field(default_factory=dict)
-    computed: list[RunTimeTarget] = field(default_factory=list)
+    found: TargetList = field(default_factory=TargetList)
 
     def program(self) -> Program:
         """The program that was read."""
-        self._assignments(self.tree.children)
-        self._walk(self.tree.children)
-        kept = [target for first, target in self.targets.items() if first not in self.doubtful]
-        left = [
-            RunTimeTarget(self.targets[first].line, self.targets[first].name, reason)
-            for first, reason in self.doubtful.items()
-        ]
-        corrected = {target.name for target in kept} & set(self.variables)
-        left += [_built_from(item, corrected) for item in self.computed]
+        self._assignments(self.nodes)
+        self._walk(self.nodes)
         remarks = ()
         if len(set(self.tools)) > 1:
             remarks = (
                 "the program sets several tools (set_tcp); each holds for the motions after it in the text, also where threads or "
                 "functions are run in another order",
             )
-        computed = tuple(sorted(left, key=lambda item: item.line))
-        return Program(URSCRIPT, (ProgramFile(self.source, self.text),), tuple(kept), computed, remarks)
+        return self.found.program(URSCRIPT, (ProgramFile(self.source, self.text),), self.variables, remarks)
 
     def _assignments(self, nodes: Sequence[Node]) -> None:
         """Note what is assigned to every variable, wherever it is."""
@@ -174,7 +145,7 @@ class _Reader:
         node = self._pointed(argument)
         numbers = None if node is None else _numbers_of(node)
         if node is None or numbers is None or len(numbers) != _AXES:
-            self.computed.append(RunTimeTarget(_line(call), self._said(call), self._why(argument)))
+            self.found.leave(_line(call), self._said(call), self._why(argument))
             return
         name = str(argument[0]) if _is(argument[0], "NAME") else motion
         target = ProgramTarget(
@@ -189,12 +160,7 @@ class _Reader:
             motion,
             motion in _STRAIGHT,
         )
-        first = numbers[0].first
-        self.targets.setdefault(first, target)
-        if self.used_with.setdefault(first, (self.tool, self.payload)) != (self.tool, self.payload):
-            self.doubtful[first] = (
-                "it is reached with different tools or payloads, each of which needs other numbers"
-            )
+        self.found.add(target)
 
     def _near(self, argument: Sequence[Node]) -> tuple[float, ...] | None:
         if len(argument) > 2 and argument[0] == "qnear":
@@ -208,10 +174,10 @@ class _Reader:
                 return f"{argument[0]} is set more than once, so its numbers depend on how the program runs"
             if not known:
                 return f"{argument[0]} is not set in this program"
-        return "the controller computes it when the program runs"
+        return RUN_TIME
 
     def _said(self, call: Tree) -> str:
-        return " ".join(self.text[call.meta.start_pos : call.meta.end_pos].split())
+        return self.text[call.meta.start_pos : call.meta.end_pos]
 
 
 def _parse(files: Sequence[ProgramFile]) -> Program:
@@ -231,12 +197,6 @@ URSCRIPT = Dialect(
     no_start="no joint positions stand before it or beside it (qnear)",
 )
 """URScript: metres and radians."""
-
-
-def _built_from(item: RunTimeTarget, corrected: set[str]) -> RunTimeTarget:
-    """The same target, with the corrected variables that it is computed from."""
-    names = [name for name in dict.fromkeys(re.findall(r"\w+", item.text)) if name in corrected]
-    return replace(item, reason=f"{item.reason}, from {' and '.join(names)} as corrected") if names else item
 
 
 def _is(node: Node, kind: str) -> bool:

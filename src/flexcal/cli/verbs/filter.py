@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -39,11 +40,16 @@ class Filter:
     program: Annotated[
         Positional[Paths], file_argument("PROGRAM...", "the program (.script), and further files of it")
     ] = ()
-    out: Annotated[
+    place: Annotated[
         MaybePath,
-        arg(metavar="FILE", aliases=["-o"], help_behavior_hint="(default: corrected.script, or its suffix)"),
+        arg(
+            name="out",
+            aliases=["-o"],
+            metavar="FILE",
+            help_behavior_hint="(default: corrected, with the suffix of PROGRAM)",
+        ),
     ] = None
-    """File for the new program, or the folder for one of several files."""
+    """File for the new program; the folder for one of several files, which keep their names."""
     estimates: Estimates = None
     tool: Annotated[Numbers, arg(metavar="X...", help_behavior_hint="(default: set_tcp of the program)")] = ()
     """Tool centre point in the flange for poses before which the program sets none, in the program's own numbers and units."""
@@ -63,13 +69,25 @@ class Filter:
     """List the targets, and write nothing."""
     json: Json = False
 
-    def run(self) -> None:
-        """Correct the program, and print each target and what stays as it is."""
-        from flexcal.jobs.deployment import filter_program_file, with_companions
+    @property
+    def out(self) -> Path:
+        """File or folder of the new program."""
+        return self.place or Path("corrected" + ("" if self.leaves else self.program[0].suffix))
+
+    @property
+    def leaves(self) -> tuple[str, ...]:
+        """Patterns of the files that a program of several leaves in the folder; none for one file."""
+        from flexcal.jobs.deployment import with_companions
 
         require_robot_and_files(self.robot, self.program, "program")
-        several = len(with_companions(self.program)) > 1
-        out = self.out or Path("corrected" + ("" if several else self.program[0].suffix))
+        names = [glob.escape(file.name) for file in with_companions(self.program)]
+        return tuple(names) if len(names) > 1 else ()
+
+    def run(self) -> None:
+        """Correct the program, and print each target and what stays as it is."""
+        from flexcal.jobs.deployment import filter_program_file
+
+        out = self.out
         console = Console(self.json)
         result = filter_program_file(
             self.robot,
@@ -103,9 +121,8 @@ class Filter:
             console.finish(document, f"flexcal filter {self.robot} {given}{where} --out {out} writes it")
             return
         console.say(f"wrote {out}")
-        new = given if not several else " ".join(str(out / file.name) for file in self.program)
-        new = " ".join(str(out / file.name) for file in self.program) if several else str(out)
-        back = "ORIGINAL" if several else f"ORIGINAL{out.suffix}"
+        new = " ".join(str(out / file.name) for file in self.program) if self.leaves else str(out)
+        back = "ORIGINAL" if self.leaves else f"ORIGINAL{out.suffix}"
         console.finish(
             document,
             f"run {out} slowly first; the way back: flexcal filter {self.robot} {new} --reverse --out {back}{where}",

@@ -53,7 +53,7 @@ def with_companions(files: Sequence[Path]) -> list[Path]:
 def output_places(files: Sequence[Path], out: Path) -> list[Path]:
     """Where each file of a new program goes: one to `out`, several into the folder `out` under their names.
 
-    Raises `InputError` where `out` is no folder, or would take two files of one name, or the original ones.
+    Raises `InputError` where `out` is no folder, or would take two files of one name.
     """
     if len(files) == 1:
         return [out]
@@ -69,12 +69,6 @@ def output_places(files: Sequence[Path], out: Path) -> list[Path]:
             "E-PROG-009",
             f"two of the files have one name ({names}), and cannot go into one folder; rename one.",
         )
-    taken = {file.resolve() for file in files}
-    for place in places:
-        if place.resolve() in taken:
-            raise InputError(
-                "E-PROG-010", f"{place} is the original, and --out would replace it; give another folder."
-            )
     return places
 
 

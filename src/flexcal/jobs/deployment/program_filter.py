@@ -240,7 +240,7 @@ def _controller_joints(
     sign, zero = _checked("joint-signs", signs, 6, "signs"), _checked("joint-zeros", zeros, 6, "angles")
     if sign is not None and set(np.abs(sign).tolist()) != {1.0}:
         raise InputError(
-            "E-PROG-011", f"--joint-signs has values other than 1 and -1 ({sign}); give six of these."
+            "E-PROG-010", f"--joint-signs has values other than 1 and -1 ({sign}); give six of these."
         )
     plain = ControllerJoints(nominal, dialect, np.ones(6) if sign is None else sign, np.zeros(6))
     return plain if zero is None else replace(plain, zeros=zero * plain.unit)
