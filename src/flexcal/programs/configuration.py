@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 
@@ -18,8 +19,11 @@ class Configuration(ABC):
 
     A posture is eight quantities (8,): the six joint positions of the controller, rad; how far the wrist centre is in front of axis 1, m;
     and how far it is in front of the lower arm, the line from axis 2 to axis 3, m: positive where a positive rotation of axis 3 from the
-    stretched arm brings it, if axes 2 and 3 have one direction. Negative values lie behind.
+    stretched arm brings it, if axes 2 and 3 have one direction. Negative values lie behind. `on_lines`: whether the controller heeds the
+    data in straight motions; otherwise these keep the configuration that they start in.
     """
+
+    on_lines: ClassVar[bool] = True
 
     @abstractmethod
     def levels(self, posture: np.ndarray) -> tuple[int, ...]:

@@ -6,10 +6,11 @@ from pathlib import Path
 
 from flexcal.errors import InputError
 from flexcal.programs.dialect import Dialect
+from flexcal.programs.krl import KRL
 from flexcal.programs.rapid import RAPID
 from flexcal.programs.urscript import URSCRIPT
 
-DIALECTS: tuple[Dialect, ...] = (RAPID, URSCRIPT)
+DIALECTS: tuple[Dialect, ...] = (KRL, RAPID, URSCRIPT)
 """Dialects that are read."""
 
 

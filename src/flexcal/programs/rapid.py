@@ -24,6 +24,7 @@ from flexcal.programs.syntax import (
     is_tree,
     line_of,
     name_of,
+    names_in,
     parse_text,
     written_number,
     written_numbers,
@@ -241,13 +242,20 @@ class _Reader:
         return Statement(argument, statement.file, statement.routine).text(self.files)
 
     def _unused(self) -> None:
-        """Name the targets that are declared with numbers, but stand in no motion that is read."""
+        """Name the targets with numbers that the program uses, but in no motion that is read."""
         used = {
             (target.file, number.first) for target in self.found.targets.values() for number in target.numbers
         }
+        declares = ("const", "pers", "var")
+        plain = [
+            each.nodes
+            for each in self.statements
+            if not {name_of(node) for node in each.nodes} & set(declares)
+        ]
+        named = {name for nodes in plain for name in names_in(nodes)}
         for (_, _, name), datum in self.data.known.items():
             node = datum.value
-            if node is None or not isinstance(node, Tree) or node.data != "aggregate":
+            if node is None or name not in named or not isinstance(node, Tree) or node.data != "aggregate":
                 continue
             for joints in (True, False):
                 try:

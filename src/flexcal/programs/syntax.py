@@ -49,6 +49,15 @@ def name_of(node: Node) -> str:
     return str(node).lower() if is_token(node, "NAME") else ""
 
 
+def names_in(nodes: Sequence[Node]) -> set[str]:
+    """All names in the nodes and their brackets, in lower case."""
+    names = {name_of(node) for node in nodes} - {""}
+    for node in nodes:
+        if isinstance(node, Tree):
+            names |= names_in(node.children)
+    return names
+
+
 def line_of(node: Node) -> int:
     """Line of a node's first character."""
     line = node.line if isinstance(node, Token) else node.meta.line

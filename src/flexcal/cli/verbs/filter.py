@@ -29,8 +29,9 @@ _LISTED = 20
 class Filter:
     """Correct a robot program: its targets become those that bring the real robot where the nominal one would go.
 
-    PROGRAM is URScript (Universal Robots). Targets written as numbers are corrected, in motions and in variables that are set once;
-    all other text stays as it is, byte for byte. Targets that the controller computes when the program runs stay and are listed.
+    PROGRAM is URScript (Universal Robots), RAPID (ABB) or KRL (KUKA), by its suffix. Targets written as numbers are corrected, in
+    motions and in variables that are set once; all other text stays as it is, byte for byte. Targets that the controller computes when
+    the program runs stay and are listed.
 
     Poses count in the frame base of the URDF, and the controller's kinematics as those of the URDF. A program of several files goes
     into the folder --out, under the names of its files.
@@ -38,7 +39,8 @@ class Filter:
 
     robot: Robot
     program: Annotated[
-        Positional[Paths], file_argument("PROGRAM...", "the program (.script), and further files of it")
+        Positional[Paths],
+        file_argument("PROGRAM...", "the program (.script, .mod, .src), and further files of it"),
     ] = ()
     place: Annotated[
         MaybePath,
@@ -51,10 +53,11 @@ class Filter:
     ] = None
     """File for the new program; the folder for one of several files, which keep their names."""
     estimates: Estimates = None
-    tool: Annotated[Numbers, arg(metavar="X...", help_behavior_hint="(default: set_tcp of the program)")] = ()
+    tool: Annotated[Numbers, arg(metavar="X...", help_behavior_hint="(default: that of the program)")] = ()
     """Tool centre point in the flange for poses before which the program sets none, in the program's own numbers and units."""
     start: Annotated[
-        Numbers, arg(metavar="Q...", help_behavior_hint="(default: the target before, or qnear)")
+        Numbers,
+        arg(metavar="Q...", help_behavior_hint="(default: the target before, or what the program says)"),
     ] = ()
     """Joint positions, in the program's units, that have the configuration of the arm at poses before which there are none."""
     joint_signs: Annotated[Numbers, arg(metavar="S...", help_behavior_hint="(default: 1 1 1 1 1 1)")] = ()

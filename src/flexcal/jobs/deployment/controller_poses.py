@@ -64,10 +64,15 @@ class ControllerPoses:
                 last = q[k]
         return q, reasons
 
-    def new_numbers(self, targets: Sequence[ProgramTarget], q: np.ndarray) -> list[NewNumbers]:
-        """Numbers of the targets at other joint positions (N, 6), and their configuration data."""
+    def new_numbers(
+        self, targets: Sequence[ProgramTarget], old_q: np.ndarray, q: np.ndarray
+    ) -> list[NewNumbers]:
+        """Numbers of the targets at other joint positions (N, 6) than `old_q`, and configuration data, which stay where they were wrong."""
         position, rotation = self.poses(q)
-        postures = arm_postures(self.controller, q) if any(target.configuration for target in targets) else q
+        configured = any(target.configuration for target in targets)
+        postures, old_postures = (
+            (arm_postures(self.controller, each) for each in (q, old_q)) if configured else (q, old_q)
+        )
         dialect = self.controller.dialect
         new = []
         for k, target in enumerate(targets):
@@ -76,9 +81,9 @@ class ControllerPoses:
                 continue
             flange = self.base.inverse() @ Pose(position[k], rotation[k])
             pose = target.frame.inverse() @ flange @ self._tool(target)
-            words = target.words
-            if words and dialect.configuration is not None:
-                words = dialect.configuration.updated(postures[k], words)
+            words, configuration = target.words, dialect.configuration
+            if words and configuration is not None and configuration.fits(old_postures[k], words):
+                words = configuration.updated(postures[k], words)
             new.append(NewNumbers(dialect.notation.pose_numbers(pose, target.values), words))
         return new
 
@@ -123,6 +128,7 @@ class ControllerPoses:
     ) -> tuple[np.ndarray, str]:
         """Joint positions (6,) at the aim with the written configuration, first of those that are `followed` (N, 6)."""
         near = np.zeros(6) if start is None else start
+        dialect = self.controller.dialect
         found = fitting_joints(self.controller, target.words, followed, near)
         if found is not None:
             return found, ""
@@ -133,6 +139,9 @@ class ControllerPoses:
         found = fitting_joints(self.controller, target.words, solutions, near)
         if found is not None:
             return found, ""
+        assert dialect.configuration is not None
+        if target.straight and len(followed) and not dialect.configuration.on_lines:
+            return followed[0], ""
         words = ", ".join(target.words)
         return np.full(6, np.nan), (
             f"none of the {len(solutions)} solutions of inverse kinematics has the configuration ({words}): the URDF counts joints "

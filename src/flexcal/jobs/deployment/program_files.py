@@ -42,11 +42,12 @@ def with_companions(files: Sequence[Path]) -> list[Path]:
         others = [
             other
             for other in sorted(file.parent.iterdir())
-            if other.stem.casefold() == file.stem.casefold() and other.suffix.lower() in beside
+            if other.stem.casefold() == file.stem.casefold()
+            and other.suffix.lower() in beside
+            and other != file
         ]
-        every += [
-            each for each in (file, *others) if each.resolve() not in {known.resolve() for known in every}
-        ]
+        known = {each.resolve() for each in every}
+        every += [each for each in (file, *others) if each.resolve() not in known]
     return every
 
 

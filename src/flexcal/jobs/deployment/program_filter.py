@@ -187,7 +187,7 @@ def filter_program(
         for row, failure in zip(rows.tolist(), failures, strict=True):
             reasons[row] = failure
         done = np.array([k for k in rows if not reasons[k]], dtype=int)
-        numbers = places.new_numbers([program.targets[k] for k in done], after[done])
+        numbers = places.new_numbers([program.targets[k] for k in done], q[done], after[done])
         new = dict(zip(done.tolist(), numbers, strict=True))
     else:
         done, payload_remarks = rows, ()
