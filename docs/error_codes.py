@@ -37,6 +37,7 @@ SUBJECTS = {
     "PROG": "Robot programs",
     "REPORT": "Reports",
     "ROBOT": "robot.yaml",
+    "ROS": "Descriptions of ROS",
     "RUN": "Verbs and what they are given",
     "STIFF": "Stiffness",
     "TABLE": "Tables",

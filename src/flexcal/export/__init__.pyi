@@ -2,6 +2,7 @@ from .actuators import OF_ERROR, Actuators, actuator_name, actuator_unit
 from .dh_table import Convention, render_dh
 from .formats import FORMATS, PlainFormat, render
 from .mjcf_file import export_mjcf
+from .moveit_limits import shifted_limits
 from .mujoco_spec import effort_limit, mjcf_spec
 from .offset_fit import undetermined_offsets
 from .offset_table import render_offsets
@@ -9,6 +10,8 @@ from .representation_error import measure_export_error
 from .runtime_file import render_runtime
 from .urdf import export_urdf
 from .written_file import ExportedFile, RenderedModel, write_rendered
+from .xacro_expansion import XacroSource
+from .xacro_robot import XacroExport, Zeros, render_xacro
 
 __all__ = [
     "FORMATS",
@@ -18,6 +21,9 @@ __all__ = [
     "ExportedFile",
     "PlainFormat",
     "RenderedModel",
+    "XacroExport",
+    "XacroSource",
+    "Zeros",
     "actuator_name",
     "actuator_unit",
     "effort_limit",
@@ -29,6 +35,8 @@ __all__ = [
     "render_dh",
     "render_offsets",
     "render_runtime",
+    "render_xacro",
+    "shifted_limits",
     "undetermined_offsets",
     "write_rendered",
 ]

@@ -74,26 +74,28 @@ def render_urdf(model: RobotModel) -> RenderedModel:
 
 def urdf_tool(model: RobotModel, text: str) -> ToolMap:
     """Position of the first point of `model` in Pinocchio, from the URDF `text`."""
+    return lambda q: link_placements(model, text, model.point().name, q)[0]
+
+
+def link_placements(model: RobotModel, text: str, link: str, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (N, 3), m, and rotations (N, 3, 3) of a link at the motors' `q` (N, n) in Pinocchio, from the URDF `text`."""
     import pinocchio as pin
 
     from flexcal.model.urdf import locked_joints
 
-    def positions(q: np.ndarray) -> np.ndarray:
-        read = pin.buildModelFromXML(text)
-        read = pin.buildReducedModel(read, *locked_joints(read, model.config.locked))
-        data, frame = read.createData(), read.getFrameId(model.point().name, pin.FrameType.BODY)
-        joints = [read.joints[read.getJointId(name)] for name in model.joint_names]
-        result = np.zeros((len(q), 3))
-        for k, own in enumerate(joint_values(model, q)):
-            configuration = pin.neutral(read)
-            for joint, value in zip(joints, own, strict=True):
-                turn = (value,) if joint.nq == 1 else (np.cos(value), np.sin(value))
-                configuration[joint.idx_q : joint.idx_q + joint.nq] = turn
-            pin.framesForwardKinematics(read, data, configuration)
-            result[k] = data.oMf[frame].translation
-        return result
-
-    return positions
+    read = pin.buildModelFromXML(text)
+    read = pin.buildReducedModel(read, *locked_joints(read, model.config.locked))
+    data, frame = read.createData(), read.getFrameId(link, pin.FrameType.BODY)
+    joints = [read.joints[read.getJointId(name)] for name in model.joint_names]
+    positions, rotations = np.zeros((len(q), 3)), np.zeros((len(q), 3, 3))
+    for k, own in enumerate(joint_values(model, q)):
+        configuration = pin.neutral(read)
+        for joint, value in zip(joints, own, strict=True):
+            turn = (value,) if joint.nq == 1 else (np.cos(value), np.sin(value))
+            configuration[joint.idx_q : joint.idx_q + joint.nq] = turn
+        pin.framesForwardKinematics(read, data, configuration)
+        positions[k], rotations[k] = data.oMf[frame].translation, data.oMf[frame].rotation
+    return positions, rotations
 
 
 def _remarks(model: RobotModel, bodiless: tuple[str, ...]) -> tuple[str, ...]:

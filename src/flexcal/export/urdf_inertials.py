@@ -11,7 +11,8 @@ from flexcal.model.parts import Inertia, is_physically_consistent
 from flexcal.model.robot import RobotModel
 from flexcal.model.urdf import read_urdf
 
-_MOMENTS = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
+MOMENTS = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
+"""Rows and columns of the attributes of <inertia>."""
 
 
 def write_inertials(model: RobotModel, root: ET.Element) -> tuple[str, ...]:
@@ -22,7 +23,7 @@ def write_inertials(model: RobotModel, root: ET.Element) -> tuple[str, ...]:
     nominal = read_urdf(model.urdf, model.config.locked).inertias
     left = bodiless_links(model, nominal)
     for joint, ours, theirs in zip(model.joints, model.inertias, nominal, strict=True):
-        if _same(ours, theirs) or joint.link in left:
+        if is_same(ours, theirs) or joint.link in left:
             continue
         carrier, *others = _rigid_body(root, joint.link, model.config.locked)
         for link in (carrier, *others):
@@ -37,7 +38,7 @@ def bodiless_links(model: RobotModel, nominal: Sequence[Inertia]) -> tuple[str, 
     return tuple(
         joint.link
         for joint, ours, theirs in zip(model.joints, model.inertias, nominal, strict=True)
-        if not _same(ours, theirs) and not is_physically_consistent(model.values, joint.link)
+        if not is_same(ours, theirs) and not is_physically_consistent(model.values, joint.link)
     )
 
 
@@ -50,7 +51,8 @@ def bodiless_remark(links: tuple[str, ...]) -> tuple[str, ...]:
     )
 
 
-def _same(one: Inertia, other: Inertia) -> bool:
+def is_same(one: Inertia, other: Inertia) -> bool:
+    """Whether two inertias have the same numbers."""
     return (
         one.mass == other.mass
         and np.array_equal(one.com, other.com)
@@ -78,5 +80,5 @@ def _add_inertial(link: ET.Element, inertia: Inertia) -> None:
     inertial = ET.SubElement(link, "inertial")
     ET.SubElement(inertial, "origin", xyz=" ".join(repr(float(v)) for v in inertia.com), rpy="0 0 0")
     ET.SubElement(inertial, "mass", value=repr(float(inertia.mass)))
-    moments = {key: repr(float(inertia.inertia[place])) for key, place in _MOMENTS.items()}
+    moments = {key: repr(float(inertia.inertia[place])) for key, place in MOMENTS.items()}
     ET.SubElement(inertial, "inertia", moments)

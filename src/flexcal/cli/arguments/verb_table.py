@@ -42,15 +42,25 @@ class Step:
     verbs: tuple[Verb, ...]
 
 
-EXPORTS = tuple(
+EXPORTS = (
+    *(
+        Verb(
+            ("export", format.name),
+            "export",
+            f"Export{format.name.capitalize()}",
+            format.summary,
+            f"flexcal export {format.name} robot.yaml --out {format.example}",
+        )
+        for format in FORMATS
+    ),
     Verb(
-        ("export", format.name),
-        "export",
-        f"Export{format.name.capitalize()}",
-        format.summary,
-        f"flexcal export {format.name} robot.yaml --out {format.example}",
-    )
-    for format in FORMATS
+        ("export", "xacro"),
+        "export_xacro",
+        "ExportXacro",
+        "the xacro files or the URDF of the robot with calibrated numbers, every other byte as before",
+        "flexcal export xacro robot.yaml --out description",
+        leaves=("**",),
+    ),
 )
 
 STEPS = (

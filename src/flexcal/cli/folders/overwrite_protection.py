@@ -24,6 +24,8 @@ from flexcal.files.transaction import (
     stages_in,
 )
 
+_ALL = "**"
+"""Pattern of all files of a folder and of those in it, but hidden ones."""
 _REPORT = "report"
 """The verb that makes the pages of the others anew."""
 
@@ -37,7 +39,8 @@ def outputs(
     page: bool = False,
     beside: Sequence[str] = (),
 ) -> Iterator[None]:
-    """Around `verb`, which writes the file `out`, or into the folder `out` the files `names` (glob patterns); None writes nothing there.
+    """Around `verb`, which writes the file `out`, or into the folder `out` the files `names` (glob patterns; `**`: all, those in its
+    folders too); None writes nothing there.
 
     With `page`, it also writes an HTML file of the same name beside `out`, and files whose names end, after its stem, as `beside` says.
 
@@ -100,7 +103,7 @@ class _Place:
         digests: dict[Path, str] = {}
         for path in self._present():
             refuse_irregular(path)
-            digest, writer = known.get(path.name, ("", ""))
+            digest, writer = known.get(self._name(path), ("", ""))
             if digest != _digest_on_disk(path):
                 raise InputError(
                     "E-CLI-013",
@@ -121,25 +124,38 @@ class _Place:
         home = Path(os.path.realpath(self.folder))
         written = {place: file for place, file in run.files.items() if self._is_mine(place, home)}
         for path in self.own_files():
-            if home / path.name not in written:
+            if home / self._name(path) not in written:
                 run.remove(path)
         if written:
-            digests = {place.name: _digest_on_disk(file) for place, file in written.items()}
+            digests = {
+                place.relative_to(home).as_posix(): _digest_on_disk(file) for place, file in written.items()
+            }
             ledger = run.temporary(self.folder / LEDGER)
             ledger.write_bytes(Ledger.read(self.folder).with_files(self.verb, digests).content())
             run.put(self.folder / LEDGER, ledger)
 
     def _present(self) -> list[Path]:
+        if _ALL in self.patterns:
+            found = sorted(path for path in self.folder.rglob("*") if not path.is_dir())
+            return [path for path in found if self._is_named(self._name(path))]
         try:
             names = sorted(os.listdir(self.folder))
         except OSError:  # there is none, or what is wrong with it is seen when it is written to
             return []
         return [self.folder / name for name in names if self._is_named(name)]
 
+    def _name(self, path: Path) -> str:
+        """Name in the folder, with the folders in it before."""
+        return path.relative_to(self.folder).as_posix()
+
     def _is_mine(self, place: Path, home: Path) -> bool:
+        if _ALL in self.patterns:
+            return place.is_relative_to(home) and self._is_named(place.relative_to(home).as_posix())
         return place.parent == home and self._is_named(place.name)
 
     def _is_named(self, name: str) -> bool:
+        if _ALL in self.patterns:
+            return not any(part.startswith(".") for part in name.split("/"))
         return any(fnmatchcase(name, pattern) for pattern in self.patterns)
 
     def _overlap(self, others: Sequence[str]) -> bool:

@@ -3,16 +3,19 @@ from .export import ExportedRobot, export_robot, export_stored_robot
 from .prediction import Prediction, predict, predict_robot
 from .program_files import with_companions
 from .program_filter import FilteredProgram, filter_program, filter_program_file
+from .xacro_export import ExportedXacro, export_xacro
 
 __all__ = [
     "Compensation",
     "ExportedRobot",
+    "ExportedXacro",
     "FilteredProgram",
     "Prediction",
     "compensate",
     "compensate_robot",
     "export_robot",
     "export_stored_robot",
+    "export_xacro",
     "filter_program",
     "filter_program_file",
     "predict",

@@ -168,29 +168,39 @@ def export_stored_robot(
 
     Raises `FlexcalError` as reading and `export_robot` do, and where `out` is one of the robot's own files.
     """
-    nominal = RobotModel.from_yaml(robot_file, estimates=False)
-    path = stored_estimates(nominal, estimates)
+    robot = identified_robot(robot_file, estimates)
+    nominal, path = robot.nominal, robot.stored
     for own, what in ((nominal.urdf, "nominal URDF"), (robot_file, "robot.yaml"), (path, "estimates file")):
-        if out.exists() and own.exists() and out.samefile(own):
+        if own is not None and out.exists() and own.exists() and out.samefile(own):
             raise InputError(
                 "E-RUN-021",
                 f"{out} is the {what} of {robot_file}, which is never changed; give another --out.",
             )
-    if estimates is not None and not path.exists():
-        raise InputError(
-            "E-RUN-022", f"{path} does not exist; run 'flexcal calibrate' first, or leave --estimates out."
-        )
-    stored = path.exists()
-    blocks = read_estimates(path) if stored else {}
-    model = with_blocks(nominal, blocks, path) if stored else nominal
     return export_robot(
-        CalibratedRobot(nominal, model, blocks, path if stored else None),
+        robot,
         out,
         format,
         point=point,
         four_parameters=four_parameters,
         keep_frames=keep_frames,
     )
+
+
+def identified_robot(robot_file: Path, estimates: Path | None) -> CalibratedRobot:
+    """The robot of a robot.yaml as far as it was identified; `estimates` is a file or folder in place of that beside it.
+
+    Raises `FlexcalError` as reading does, and where the named estimates do not exist.
+    """
+    nominal = RobotModel.from_yaml(robot_file, estimates=False)
+    path = stored_estimates(nominal, estimates)
+    if path.exists():
+        blocks = read_estimates(path)
+        return CalibratedRobot(nominal, with_blocks(nominal, blocks, path), blocks, path)
+    if estimates is not None:
+        raise InputError(
+            "E-RUN-022", f"{path} does not exist; run 'flexcal calibrate' first, or leave --estimates out."
+        )
+    return CalibratedRobot(nominal, nominal, {}, None)
 
 
 def _check_options(format: str, options: dict[str, object]) -> None:

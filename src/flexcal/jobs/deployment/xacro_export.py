@@ -1,0 +1,163 @@
+"""Export of the calibrated robot into the xacro files or the URDF that describe it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from flexcal.calibration.fit import probable_robots
+from flexcal.errors import InputError, unreadable
+from flexcal.export import XacroExport, XacroSource, Zeros, render_xacro, shifted_limits
+from flexcal.files.transaction import atomic_path
+from flexcal.jobs.deployment.export import identified_robot
+from flexcal.jobs.inputs import unmeasured_lengths_remark
+from flexcal.jobs.pages import Result
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ExportedXacro(Result):
+    """Result of `export_xacro`.
+
+    `files` has the content of all files by their paths below the folder to write, `main` first, and `changes` what each changed one got.
+    """
+
+    export: XacroExport
+    files: Mapping[Path, bytes]
+    main: Path
+    changes: Mapping[Path, tuple[str, ...]]
+    remarks: tuple[str, ...]
+    calibrated: bool
+
+    @property
+    def headline(self) -> str:
+        """Number of files with other numbers."""
+        return f"{len(self.changes)} of {len(self.files)} files have other numbers"
+
+    def summary(self) -> str:
+        """What each file got, the loss in millimetres, and remarks."""
+        lines = [f"{path}: {'; '.join(said)}" for path, said in self.changes.items()]
+        return "\n".join([self.headline, *lines, *self.export.loss.sentences, *self.remarks])
+
+    def document(self) -> dict[str, Any]:
+        """The JSON document."""
+        loss = self.export.loss
+        return {
+            "main": self.main,
+            "files": [{"file": path, "changes": list(self.changes.get(path, ()))} for path in self.files],
+            "calibrated": self.calibrated,
+            "lost": [
+                {"term": term.name} | (term.error.in_millimetres() if term.error else {})
+                for term in loss.terms
+            ],
+            "tool_error": loss.error.in_millimetres() | {"poses": loss.poses, "within": loss.within}
+            if loss.error
+            else None,
+            "points": {
+                name: {"link": link, "xyz": list(xyz), "rpy": list(rpy)}
+                for name, (link, xyz, rpy) in self.export.points.items()
+            },
+            "remarks": list(self.remarks),
+        }
+
+
+def export_xacro(
+    robot_file: Path,
+    out: Path,
+    *,
+    xacro: Path | None = None,
+    arguments: Mapping[str, str] | None = None,
+    packages: Mapping[str, Path] | None = None,
+    zeros: Zeros = "origins",
+    joint_limits: Path | None = None,
+    estimates: Path | None = None,
+) -> ExportedXacro:
+    """Write the files of a robot's description with calibrated numbers into the folder `out`, every other byte as it was.
+
+    Parameters
+    ----------
+    robot_file : Path
+        robot.yaml.
+    out : Path
+        Folder for all files of the description, changed or not, as they lie to each other.
+    xacro : Path, optional
+        Main xacro file, or a URDF; the URDF of robot.yaml by default.
+    arguments, packages : mapping, optional
+        Values of xacro's arguments, and folders of ROS packages.
+    zeros : {"origins", "ros2_control"}
+        Where the offsets of the joints go.
+    joint_limits : Path, optional
+        MoveIt's joint_limits.yaml, whose positions move with the offsets in ros2_control.
+    estimates : Path, optional
+        estimates.yaml or its folder, in place of that beside robot.yaml.
+
+    Returns
+    -------
+    ExportedXacro
+        What each file got, and the error of the whole.
+
+    Raises
+    ------
+    InputError
+        For files that cannot be read or expanded, that describe another robot, and for limits without offsets.
+    FlexcalError
+        Where a number cannot be replaced so that nothing else changes.
+    """
+    if joint_limits is not None and zeros == "origins":
+        raise InputError(
+            "E-ROS-016",
+            f"{joint_limits} stays valid while the zeros are in the origins; give --zeros ros2_control, or leave --joint-limits out.",
+        )
+    robot = identified_robot(robot_file, estimates)
+    measured = robot.targets
+    model = probable_robots(robot.model, measured)[0] if measured else robot.model
+    source = XacroSource(xacro or robot.nominal.urdf, arguments or {}, packages or {})
+    export = render_xacro(model, robot.nominal, source, zeros)
+    folder, files, changes, main = _below_one_folder(export)
+    remarks = [*export.remarks, *unmeasured_lengths_remark(robot)]
+    if joint_limits is not None:
+        offsets = dict(zip(model.joint_names, model.joint_offsets.tolist(), strict=True))
+        try:
+            content = joint_limits.read_bytes()
+        except OSError as problem:
+            raise unreadable(joint_limits, problem) from problem
+        own = Path(os.path.abspath(joint_limits))
+        place = own.relative_to(folder) if own.is_relative_to(folder) else Path(own.name)
+        files[place], said, left = shifted_limits(joint_limits, content, offsets)
+        changes[place] = said
+        if left:
+            remarks.append(
+                f"{joint_limits.name} has no positions of {', '.join(left)}: MoveIt takes those of the URDF, which have moved."
+            )
+    for path, content in files.items():
+        with atomic_path(out / path) as temporary:
+            temporary.write_bytes(content)
+    return ExportedXacro(model, export, files, main, changes, tuple(remarks), "calibration" in robot.blocks)
+
+
+def _below_one_folder(
+    export: XacroExport,
+) -> tuple[Path, dict[Path, bytes], dict[Path, tuple[str, ...]], Path]:
+    """The folder that has all files, the files by their paths below it, what changed in them, and the main one.
+
+    Unchanged files of other ROS packages are left out: the description finds them where they are.
+    """
+    description = export.description
+    contents, changes = description.contents, description.changes
+    main = next(iter(contents))
+    others = [folder for folder in description.expansion.packages if not main.is_relative_to(folder)]
+    own = [
+        path
+        for path in contents
+        if path in changes or not any(path.is_relative_to(other) for other in others)
+    ]
+    folder = Path(os.path.commonpath([path.parent for path in own]))
+    files = {path.relative_to(folder): contents[path] for path in own}
+    return (
+        folder,
+        files,
+        {path.relative_to(folder): said for path, said in changes.items()},
+        main.relative_to(folder),
+    )
