@@ -190,14 +190,23 @@ def link_poses(urdf: str, q: dict[str, float]) -> dict[str, np.ndarray]:
     """Poses (4, 4) of all links of a URDF in its root, joints at `q`."""
     root = ET.fromstring(urdf)
     joints = root.findall("joint")
-    children = {joint.find("child").get("link") for joint in joints}
-    poses = {link.get("name"): np.eye(4) for link in root.findall("link") if link.get("name") not in children}
+    ends = {joint.attrib["name"]: _ends(joint) for joint in joints}
+    children = {child for _, child in ends.values()}
+    names = [link.attrib["name"] for link in root.findall("link")]
+    poses = {name: np.eye(4) for name in names if name not in children}
     while len(poses) <= len(joints):
         for joint in joints:
-            parent, child = (joint.find(tag).get("link") for tag in ("parent", "child"))
+            parent, child = ends[joint.attrib["name"]]
             if parent in poses and child not in poses:
-                poses[child] = poses[parent] @ _placed(joint) @ _moved(joint, q.get(joint.get("name"), 0.0))
+                moved = _moved(joint, q.get(joint.attrib["name"], 0.0))
+                poses[child] = poses[parent] @ _placed(joint) @ moved
     return poses
+
+
+def _ends(joint: ET.Element) -> tuple[str, str]:
+    parent, child = joint.find("parent"), joint.find("child")
+    assert parent is not None and child is not None
+    return parent.attrib["link"], child.attrib["link"]
 
 
 def _placed(joint: ET.Element) -> np.ndarray:
@@ -208,12 +217,12 @@ def _placed(joint: ET.Element) -> np.ndarray:
 
 
 def _moved(joint: ET.Element, q: float) -> np.ndarray:
-    if joint.get("type") == "fixed":
+    if joint.attrib["type"] == "fixed":
         return np.eye(4)
     axis = joint.find("axis")
-    direction = np.array((axis.get("xyz") if axis is not None else "1 0 0").split(), dtype=float)
+    direction = np.array((axis.attrib["xyz"] if axis is not None else "1 0 0").split(), dtype=float)
     direction /= np.linalg.norm(direction)
-    return _translation(q * direction) if joint.get("type") == "prismatic" else _turn(direction, q)
+    return _translation(q * direction) if joint.attrib["type"] == "prismatic" else _turn(direction, q)
 
 
 def _translation(xyz: np.ndarray) -> np.ndarray:
