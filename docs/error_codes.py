@@ -39,6 +39,7 @@ SUBJECTS = {
     "ROBOT": "robot.yaml",
     "ROS": "Descriptions of ROS",
     "RUN": "Verbs and what they are given",
+    "SERVE": "Server",
     "STIFF": "Stiffness",
     "TABLE": "Tables",
     "TOOL": "Tool and work object",

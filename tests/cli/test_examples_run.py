@@ -213,9 +213,9 @@ PLACES = {
 
 
 def test_every_verb_has_a_place() -> None:
-    """`demo` is run by tests/test_readme.py."""
+    """`demo` is run by tests/test_readme.py, and `serve`, which goes on, by test_serve.py."""
     named = {name for names in PLACES.values() for name in names}
-    assert named | {"demo"} == {verb.name for verb in VERBS}
+    assert named | {"demo", "serve"} == {verb.name for verb in VERBS}
 
 
 @pytest.mark.parametrize("place", [own_robot, foreign_file, calibrated_arm], ids=lambda place: place.__name__)

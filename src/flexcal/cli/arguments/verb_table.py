@@ -289,6 +289,13 @@ STEPS = (
                 "flexcal filter robot.yaml program.script --out corrected.script",
             ),
             Verb(
+                ("serve",),
+                "serve",
+                "Serve",
+                "commands and poses for other programs on this machine, line by line",
+                "flexcal serve robot.yaml --unix robot.sock",
+            ),
+            Verb(
                 ("predict",),
                 "predict",
                 "Predict",

@@ -1,0 +1,5 @@
+"""Answers about a calibrated robot to programs on the same machine, line by line."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,161 @@
+"""Answers about a calibrated robot to lines of JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.errors import FlexcalError
+from flexcal.export import render_runtime
+from flexcal.jobs.inputs import CalibratedRobot
+from flexcal.kernels import RuntimeRobot
+from flexcal.model.parts import rotation_wxyz, wxyz_rotation
+
+_DONE = "done"
+
+
+class _UnclearError(Exception):
+    """A request that cannot be answered, with the sentence that says why."""
+
+
+class Answers:
+    """Answers of one robot: a JSON object in a line for every line, and never an exception."""
+
+    def __init__(self, robot: CalibratedRobot) -> None:
+        self._robot = RuntimeRobot.read(render_runtime(robot.probable, robot.with_points).text)
+        self._joints, self._points = self._robot.joint_names, self._robot.point_names
+        self._name = robot.nominal.name
+        self._free = np.zeros((0, len(self._joints)))
+        self._verbs: dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
+            "compensate": self._compensate,
+            "inverse": self._inverse,
+            "forward": self._forward,
+            "nominal": self._nominal,
+            "describe": self._describe,
+        }
+
+    @classmethod
+    def from_yaml(cls, robot_file: Path, estimates: Path | None = None) -> Answers:
+        """Answers of the robot of a robot.yaml; raises `FlexcalError` as reading does, and for a robot whose joints follow others."""
+        return cls(CalibratedRobot.from_yaml(robot_file, estimates))
+
+    def of(self, line: bytes) -> bytes:
+        """Answer to a line, with its `id` where it has one, and a line feed at its end."""
+        number: object = None
+        try:
+            asked = _parsed(line)
+            number = asked.get("id")
+            verb = asked.get("do", "compensate")
+            if not isinstance(verb, str) or verb not in self._verbs:
+                raise _UnclearError(f"'do' must be one of {', '.join(self._verbs)}")
+            answer = self._verbs[verb](asked)
+        except _UnclearError as problem:
+            answer = {"status": str(problem)}
+        except FlexcalError as problem:
+            answer = {"status": str(problem)}
+        answer = answer if number is None else {"id": number, **answer}
+        return json.dumps(answer, allow_nan=False).encode() + b"\n"
+
+    def _compensate(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+        found = self._robot.compensate(self._positions(asked, "q"), self._point(asked), _payload(asked))
+        return self._commanded(*found)
+
+    def _inverse(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+        position, rotation = _pose(asked)
+        near = self._positions(asked, "near")
+        found = self._robot.inverse(position, rotation, near, self._point(asked), _payload(asked))
+        return self._commanded(*found)
+
+    def _commanded(self, command: np.ndarray, status: np.ndarray, joint: np.ndarray) -> dict[str, Any]:
+        if status[0] == 0:
+            return {"status": _DONE, "command": command[0].tolist()}
+        said = RuntimeRobot.describe(int(status[0]))
+        return {"status": said, **({} if joint[0] < 0 else {"joint": self._joints[int(joint[0])]})}
+
+    def _forward(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+        found = self._robot.forward(
+            self._positions(asked, "q"), self._point(asked), _payload(asked), self._free
+        )
+        position, rotation, status = found
+        if status[0] != 0:
+            return {"status": RuntimeRobot.describe(int(status[0]))}
+        return _placed(position[0], rotation[0])
+
+    def _nominal(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+        q = self._positions(asked, "q")
+        if not np.isfinite(q).all():
+            raise _UnclearError("'q' must be finite")
+        position, rotation = self._robot.nominal(q, self._point(asked))
+        return _placed(position[0], rotation[0])
+
+    def _describe(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+        return {"status": _DONE, "robot": self._name, "joints": self._joints, "points": self._points}
+
+    def _positions(self, asked: Mapping[str, Any], key: str) -> np.ndarray:
+        return _numbers(asked, key, len(self._joints))[None]
+
+    def _point(self, asked: Mapping[str, Any]) -> int:
+        name = asked.get("point", self._points[0])
+        if name not in self._points:
+            raise _UnclearError(f"'point' must be one of {', '.join(self._points)}")
+        return self._points.index(name)
+
+
+def _parsed(line: bytes) -> dict[str, Any]:
+    try:
+        asked = json.loads(line)
+    except (ValueError, RecursionError):
+        raise _UnclearError("the line is no JSON document") from None
+    if not isinstance(asked, dict):
+        raise _UnclearError('the line is no JSON object, such as {"q": [0, 0, 0, 0, 0, 0]}')
+    return asked
+
+
+def _numbers(asked: Mapping[str, Any], key: str, count: int) -> np.ndarray:
+    values = asked.get(key)
+    if (
+        not isinstance(values, list)
+        or len(values) != count
+        or not all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
+    ):
+        raise _UnclearError(f"'{key}' must be a list of {count} numbers")
+    return np.array([_real(value) for value in values])
+
+
+def _real(value: float) -> float:
+    """A number as a float, infinite where it is too large for one."""
+    try:
+        return float(value)
+    except OverflowError:
+        return np.inf
+
+
+def _payload(asked: Mapping[str, Any]) -> np.ndarray:
+    """Mass (1,), kg; NaN stands for the declared one."""
+    mass = asked.get("payload")
+    if mass is None:
+        return np.array([np.nan])
+    if not isinstance(mass, int | float) or isinstance(mass, bool) or not np.isfinite(_real(mass)):
+        raise _UnclearError("'payload' must be a mass in kg")
+    return np.array([_real(mass)])
+
+
+def _pose(asked: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Position (1, 3), m, and rotation (1, 3, 3)."""
+    position, turn = _numbers(asked, "position", 3), _numbers(asked, "quaternion_wxyz", 4)
+    size = np.linalg.norm(turn)
+    if not abs(size - 1) < 1e-3:
+        raise _UnclearError("'quaternion_wxyz' must be a unit quaternion")
+    return position[None], wxyz_rotation(turn / size)[None]
+
+
+def _placed(position: np.ndarray, rotation: np.ndarray) -> dict[str, Any]:
+    return {
+        "status": _DONE,
+        "position": position.tolist(),
+        "quaternion_wxyz": rotation_wxyz(rotation).tolist(),
+    }

@@ -1,0 +1,276 @@
+"""The server with friendly and hostile clients: garbage, long lines, kills, a thousand at once, and those without the token."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from refusals import refused
+
+from flexcal import CalibratedRobot, compensate
+from flexcal.cli.main import main
+from flexcal.data.poses import ToolTargets
+from flexcal.jobs.serving import Answers, serve_tcp, serve_unix
+
+Q = [0.3, -1.2, 1.5, 0.1, 1.6, 0.2]
+
+
+@pytest.fixture(scope="module")
+def robot_file(examples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A UR5 with estimates beside it."""
+    folder = tmp_path_factory.mktemp("served")
+    for name in ("robot.yaml", "ur5.urdf", "grid.csv"):
+        (folder / name).write_bytes((examples / "ur5_tracker" / name).read_bytes())
+    rows = (folder / "grid.csv").read_text().splitlines(keepends=True)
+    (folder / "grid.csv").write_text("".join([rows[0], *rows[1::20]]))
+    assert (
+        main(
+            [
+                "calibrate",
+                str(folder / "robot.yaml"),
+                str(folder / "grid.csv"),
+                "--out",
+                str(folder),
+                "--json",
+            ]
+        )
+        == 0
+    )
+    return folder / "robot.yaml"
+
+
+@contextmanager
+def serving(*arguments: str | Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """The server as a process of its own, and where it listens."""
+    command = [sys.executable, "-m", "flexcal.cli.main", "serve", *map(str, arguments)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as server:
+        assert server.stderr is not None
+        try:
+            said = server.stderr.readline()
+            assert said.startswith("listening on "), said + server.stderr.read()
+            yield server, said.removeprefix("listening on ").strip()
+        finally:
+            server.terminate()
+            server.wait(10)
+
+
+class Client:
+    """A connection that writes lines and reads answers."""
+
+    def __init__(self, address: str) -> None:
+        host, _, port = address.rpartition(":")
+        self.socket = (
+            socket.create_connection((host, int(port)), 10) if host else socket.socket(socket.AF_UNIX)
+        )
+        if not host:
+            self.socket.settimeout(10)
+            self.socket.connect(address)
+        self.file = self.socket.makefile("rb")
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.file.close()
+        self.socket.close()
+
+    def send(self, raw: bytes) -> None:
+        self.socket.sendall(raw)
+
+    def answer(self) -> dict[str, object] | None:
+        """The next answer; None where the connection is closed."""
+        try:
+            line = self.file.readline()
+        except ConnectionResetError:
+            return None
+        return json.loads(line) if line else None
+
+    def ask(self, **request: object) -> dict[str, object]:
+        self.send(json.dumps(request).encode() + b"\n")
+        found = self.answer()
+        assert found is not None
+        return found
+
+
+def test_answers_are_those_of_the_library(robot_file: Path, tmp_path: Path) -> None:
+    robot = CalibratedRobot.from_yaml(robot_file)
+    targets = ToolTargets(np.array([1]), np.array(["smr"]), np.array([Q]))
+    expected = compensate(robot, targets).commands.q[0]
+    with serving(robot_file, "--unix", tmp_path / "s", "--json") as (server, address):
+        assert (tmp_path / "s").stat().st_mode & 0o077 == 0
+        with Client(address) as client:
+            done = client.ask(id="a", q=Q)
+            assert done["id"] == "a" and done["status"] == "done"
+            np.testing.assert_allclose(done["command"], expected, rtol=0, atol=1e-8)
+            wanted = client.ask(do="nominal", q=Q)
+            there = client.ask(do="forward", q=done["command"], point="smr")
+            np.testing.assert_allclose(there["position"], wanted["position"], rtol=0, atol=1e-11)
+            back = client.ask(
+                do="inverse", near=Q, **{key: wanted[key] for key in ("position", "quaternion_wxyz")}
+            )
+            np.testing.assert_allclose(back["command"], done["command"], rtol=0, atol=1e-9)
+            assert client.ask(do="describe")["points"] == ["smr"]
+            past = client.ask(q=[9.0] * 6)
+            assert past["status"] == "a joint would be past its limit" and past["joint"] == "elbow_joint"
+        server.send_signal(signal.SIGTERM)
+        said, _ = server.communicate(timeout=10)
+        assert server.returncode == 0
+        assert json.loads(said)["answers"] == 6
+    assert not (tmp_path / "s").exists()
+
+
+NONSENSE = [
+    b"\n",
+    b"\x00\xff\xfe garbage\n",
+    b"null\n",
+    b"[1, 2, 3]\n",
+    b"[" * 60000 + b"\n",
+    b'{"q": [1, 2]}\n',
+    b'{"q": [true, 0, 0, 0, 0, 0]}\n',
+    b'{"q": [NaN, 0, 0, 0, 0, 0]}\n',
+    b'{"q": [1e999, 0, 0, 0, 0, 0]}\n',
+    b'{"q": [1' + b"0" * 400 + b", 0, 0, 0, 0, 0]}\n",
+    b'{"q": [0, 0, 0, 0, 0, 0], "point": ["smr"]}\n',
+    b'{"q": [0, 0, 0, 0, 0, 0], "payload": "heavy"}\n',
+    b'{"q": [0, -1, 1, 0, 1, 0], "payload": 3}\n',
+    b'{"do": "drop"}\n',
+    b'{"do": {"a": 1}}\n',
+    b'{"do": "inverse", "near": [0, -1, 1, 0, 1, 0], "position": [0, 0, 0], "quaternion_wxyz": [0, 0, 0, 0]}\n',
+    b'{"do": "nominal", "q": [Infinity, 0, 0, 0, 0, 0]}\n',
+    b"GET / HTTP/1.1\r\n",
+]
+
+
+@pytest.mark.parametrize("line", NONSENSE, ids=lambda line: line[:20].decode(errors="replace").strip())
+def test_nonsense_is_answered_in_a_sentence(robot_file: Path, line: bytes) -> None:
+    answers = Answers.from_yaml(robot_file)
+    found = json.loads(answers.of(line))
+    assert len(str(found["status"])) > 10 and found["status"] != "done" and "command" not in found
+    assert json.loads(answers.of(json.dumps({"q": Q}).encode()))["status"] == "done"
+
+
+def test_no_client_disturbs_the_others(robot_file: Path, tmp_path: Path) -> None:
+    """Long lines, half lines, clients that never read, that are killed, and a thousand at once."""
+    with serving(robot_file, "--unix", tmp_path / "s") as (server, address), Client(address) as steady:
+        with Client(address) as client:
+            client.send(b'{"q": [' + b"0, " * 60000)
+            found = client.answer()
+            assert found is not None and "longer than 65536 bytes" in str(found["status"])
+            assert client.answer() is None
+        assert steady.ask(q=Q)["status"] == "done"
+        deaf = Client(address)
+        deaf.socket.settimeout(2)
+        with pytest.raises(TimeoutError):
+            while True:  # answers that nobody reads: the server stops reading from here
+                deaf.send(b'{"do": "describe"}\n' * 1000)
+        assert steady.ask(q=Q)["status"] == "done"
+        child = (
+            "import socket, sys, time; s = socket.socket(socket.AF_UNIX); s.connect(sys.argv[1]); "
+            "s.sendall(b'{\"q\": [0,'); print('up', flush=True); time.sleep(60)"
+        )
+        with subprocess.Popen(
+            [sys.executable, "-c", child, address], stdout=subprocess.PIPE, text=True
+        ) as other:
+            assert other.stdout is not None and other.stdout.readline() == "up\n"
+            other.kill()
+        assert steady.ask(q=Q)["status"] == "done"
+        with ExitStack() as stack:
+            crowd = [stack.enter_context(Client(address)) for _ in range(400)]
+            script = (
+                "import json, resource, socket, sys\n_, most = resource.getrlimit(resource.RLIMIT_NOFILE)\n"
+                "resource.setrlimit(resource.RLIMIT_NOFILE, (900, most))\n"
+                "crowd = []\nfor _ in range(600):\n    s = socket.socket(socket.AF_UNIX); s.settimeout(20)\n"
+                "    s.connect(sys.argv[1]); crowd.append(s)\n"
+                f"line = json.dumps({{'q': {Q}}}).encode() + b'\\n'\nfor s in crowd: s.sendall(line)\n"
+                "print(sum(b'done' in s.makefile('rb').readline() for s in crowd))"
+            )
+            found = subprocess.run(
+                [sys.executable, "-c", script, address], capture_output=True, text=True, check=True
+            )
+            assert found.stdout.strip() == "600", found.stderr
+            for client in crowd:
+                client.send(json.dumps({"q": Q}).encode() + b"\n")
+            assert all((client.answer() or {}).get("status") == "done" for client in crowd)
+        deaf.__exit__()
+        assert steady.ask(q=Q)["status"] == "done" and server.poll() is None
+
+
+def test_a_port_asks_for_the_token(robot_file: Path, tmp_path: Path) -> None:
+    file = tmp_path / "token"
+    with serving(robot_file, "--port", "0", "--token", file) as (_, address):
+        assert re.fullmatch(r"127\.0\.0\.1:\d+", address) and file.stat().st_mode & 0o077 == 0
+        token = file.read_text().strip()
+        assert len(token) > 30
+        for first in (
+            b'{"q": [0, 0, 0, 0, 0, 0]}\n',
+            b'{"token": "x"}\n',
+            b'{"token": 1}\n',
+            b"POST / HTTP/1.1\r\n",
+            b'"\n',
+        ):
+            with Client(address) as stranger:
+                stranger.send(first)
+                found = stranger.answer()
+                assert found is not None and "token" in str(found["status"])
+                assert stranger.answer() is None
+        with Client(address) as client:
+            assert client.ask(token=token)["status"] == "done"
+            assert client.ask(q=Q)["status"] == "done"
+    again = file.read_text().strip()
+    with serving(robot_file, "--port", "0", "--token", file):
+        assert file.read_text().strip() == again == token
+
+
+def test_a_socket_of_a_killed_server_is_taken_over(robot_file: Path, tmp_path: Path) -> None:
+    path = tmp_path / "s"
+    with serving(robot_file, "--unix", path) as (server, address):
+        answers = Answers.from_yaml(robot_file)
+        with refused("E-SERVE-005", str(path)):
+            serve_unix(answers, path, print)
+        os.kill(server.pid, signal.SIGKILL)
+        server.wait(10)
+        assert path.exists()
+    begun = time.monotonic()
+    with serving(robot_file, "--unix", path) as (_, address), Client(address) as client:
+        assert client.ask(q=Q)["status"] == "done"
+    assert time.monotonic() - begun < 30
+
+
+def test_places_that_cannot_be_listened_on_are_refused(
+    robot_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answers = Answers.from_yaml(robot_file)
+    with refused("E-SERVE-001"):
+        serve_unix(answers, tmp_path / "nowhere" / "s", print)
+    with refused("E-SERVE-003"):
+        serve_unix(answers, tmp_path / ("s" * 120), print)
+    (tmp_path / "file").write_text("mine")
+    with refused("E-SERVE-004", str(tmp_path / "file")):
+        serve_unix(answers, tmp_path / "file", print)
+    assert (tmp_path / "file").read_text() == "mine"
+    (tmp_path / "file").chmod(0o644)
+    with refused("E-SERVE-006"):
+        serve_tcp(answers, 0, tmp_path / "file", print)
+    (tmp_path / "file").chmod(0o600)
+    (tmp_path / "file").write_text("\n")
+    with refused("E-SERVE-007"):
+        serve_tcp(answers, 0, tmp_path / "file", print)
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        with refused("E-SERVE-002"):
+            serve_tcp(answers, taken.getsockname()[1], tmp_path / "token", print)
+    for options in ([], ["--unix", "s", "--port", "1"]):
+        assert main(["serve", str(robot_file), *options]) == 2
+        assert "E-CLI-044" in capsys.readouterr().err
