@@ -230,6 +230,21 @@ def test_reverse_returns_the_numbers(cell: tuple[Path, Ur5]) -> None:
     assert np.abs(back - first).max() < 1e-6 < np.abs(there - first).max()
 
 
+def test_lines_are_divided(cell: tuple[Path, Ur5]) -> None:
+    folder, _ = cell
+    assert filtered(folder, "palletise.script", "undivided.script") == 0
+    assert filtered(folder, "palletise.script", "divided.script", "--subdivide", "0.02") == 0
+    whole, divided = ((folder / f"{name}divided.script").read_bytes() for name in ("un", ""))
+    lines = whole.splitlines()
+    new = [line for line in divided.splitlines() if line not in lines]
+    assert new and [line for line in divided.splitlines() if line not in new] == lines
+    number = rb"-?\d+\.\d+"
+    for line in new:
+        assert re.fullmatch(
+            rb"    movel\(p\[" + b", ".join([number] * 6) + rb"\], a=1.2, v=0.25, r=0.01\)", line
+        ), line
+
+
 @pytest.mark.parametrize(
     ("text", "code", "said"),
     [

@@ -221,6 +221,24 @@ def test_reverse_returns_the_numbers(cell: tuple[Path, Arm]) -> None:
         assert np.abs(back - first).max() < 1e-5 < np.abs(there - first).max()
 
 
+def test_lines_are_divided(cell: tuple[Path, Arm], capsys: pytest.CaptureFixture[str]) -> None:
+    folder, _ = cell
+    capsys.readouterr()
+    assert filtered(folder, ".", "divided", "--subdivide", "0.002") == 0
+    assert filtered(folder, ".", "undivided") == 0
+    assert "points inserted in 2 motions" in " ".join(capsys.readouterr().out.split())
+    (source, data), (divided, same) = texts(folder / "undivided"), texts(folder / "divided")
+    assert data == same and "\r\n" in divided
+    new = [line for line in divided.splitlines() if line not in source.splitlines()]
+    assert new and [line for line in divided.splitlines() if line not in new] == source.splitlines()
+    first = next(line for line in source.splitlines() if line.startswith("SLIN"))
+    for line in new:
+        number = r"-?\d+\.?\d*"
+        shape = rf"(S?LIN) \{{X {number},Y {number},Z {number},A {number},B {number},C {number},S \d+,T \d+,E1 0.0,E2 0.0\}} .*"
+        assert re.fullmatch(shape, line), line
+        assert not line.startswith("SLIN") or line.endswith(first[first.index(" WITH") :])
+
+
 _HEAD = "DEF m()\n$TOOL={X 0,Y 0,Z 100,A 0,B 0,C 0}\n$BASE=NULLFRAME\n"
 _UP = "{X 500,Y 0,Z 500,A 0,B 90,C 0,S 2,T 2}"
 

@@ -5,7 +5,7 @@ from .dialects import DIALECTS, dialect_of
 from .krl import parse_krl
 from .notation import Notation
 from .pose import Pose
-from .program import NewNumbers, Program, ProgramFile, ProgramTarget, RunTimeTarget
+from .program import Move, NewNumbers, Program, ProgramFile, ProgramTarget, RunTimeTarget
 from .rapid import parse_rapid
 from .urscript import parse_urscript
 
@@ -14,6 +14,7 @@ __all__ = [
     "ArmAtZero",
     "Configuration",
     "Dialect",
+    "Move",
     "NewNumbers",
     "Notation",
     "Pose",

@@ -10,7 +10,7 @@ from flexcal.programs.dialect import Dialect
 from flexcal.programs.krl_configuration import StatusAndTurn
 from flexcal.programs.krl_data import KrlData, Line, components, is_list, lines_of, numbers_of, variable_name
 from flexcal.programs.krl_frames import KRL_NOTATION, POSE, KrlFrames, Setting
-from flexcal.programs.program import Program, ProgramFile, ProgramTarget, Word
+from flexcal.programs.program import Divisible, Program, ProgramFile, ProgramTarget, Span, Word
 from flexcal.programs.syntax import (
     Node,
     between_commas,
@@ -94,12 +94,16 @@ class _Reader:
         bases = _distinct([each.base for each in held if each.base is not None])
         for line, frames in zip(self.lines, held, strict=True):
             name = name_of(line.nodes[0])
+            if not names_in(line.nodes).isdisjoint(("def", "deffct")):
+                self.found.interrupt()
             if name in _RELATIVE:
+                self.found.begin(1, straight=False)
                 self.found.leave(
                     line.number, line.text(self.files), "it is relative to where the robot stands", line.file
                 )
             elif name in _MOTIONS and len(line.nodes) > 1 and line.nodes[1] != "=":
                 self._motion(line, name, frames, tools, bases)
+        self.found.interrupt()
         self._unused()
         remarks = []
         if self.moved_axes:
@@ -121,11 +125,22 @@ class _Reader:
                 value = [node for node in part[2:] if not name_of(node).startswith("c_")]
                 frames = frames.set(name_of(part[0]), value, line.file)
         arguments = between_commas(line.nodes[1:end])
+        divisible = self._divisible(line, arguments[0]) if motion in ("lin", "slin") else None
+        self.found.begin(_MOTIONS[motion], straight=motion not in ("ptp", "sptp"), divisible=divisible)
         for argument in arguments[: _MOTIONS[motion]]:
             expression = [node for node in argument if not name_of(node).startswith("c_")]
             reason = self._target(line, motion, expression, frames, tools, bases)
             if reason:
                 self.found.leave(line.number, line.text(self.files), reason, line.file)
+
+    def _divisible(self, line: Line, argument: list[Node]) -> Divisible | None:
+        target = [node for node in argument if not name_of(node).startswith("c_")]
+        if not target:
+            return None
+        return Divisible(
+            Span(start_of(line.nodes[0]), end_of(line.nodes[-1]), line.file),
+            Span(start_of(target[0]), end_of(target[-1]), line.file),
+        )
 
     def _target(
         self,
@@ -154,7 +169,8 @@ class _Reader:
                     base.wrong if base is not None else "its routine sets no base ($BASE, FDAT_ACT) before it"
                 )
         name = variable_name(expression) or motion.upper()
-        if any(self._turned(*value, axis) for axis in _EXTERNAL) and name not in self.moved_axes:
+        moves = any(self._turned(*value, axis) for axis in _EXTERNAL)
+        if moves and name not in self.moved_axes:
             self.moved_axes.append(name)
         missing = "its routine sets no tool ($TOOL, FDAT_ACT) before it" if tool is None else tool.wrong
         target = ProgramTarget(
@@ -168,6 +184,7 @@ class _Reader:
             None if tool is None else tool.mass,
             motion.upper(),
             motion not in ("ptp", "sptp"),
+            literal=None if moves else Span(start_of(value[0]), end_of(value[0]), value[1]),
         )
         if joints is None and base is not None and base.known is not None:
             target = replace(target, frame=base.known, configuration=self._words(*value))

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from flexcal.programs.pose import Pose
 
 if TYPE_CHECKING:
     from flexcal.programs.dialect import Dialect
+
+
+_NONE: Mapping[int, Sequence[NewNumbers]] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,19 @@ class Word:
     first: int
     end: int
     file: int = 0
+
+
+@dataclass(frozen=True)
+class Span:
+    """A part of the text of a program: its first character, the one after its last, and the index of its file."""
+
+    first: int
+    end: int
+    file: int = 0
+
+    def of(self, files: Sequence[ProgramFile]) -> str:
+        """Its text."""
+        return files[self.file].text[self.first : self.end]
 
 
 @dataclass(frozen=True)
@@ -70,6 +87,8 @@ class ProgramTarget:
         Frame in which poses are given (work object, base, user frame), in that of the controller.
     configuration : tuple of Word
         Configuration data that go with the pose; empty where the program gives none.
+    literal : Span or None
+        The whole target as it is written, for points on the way to it.
     """
 
     name: str
@@ -84,6 +103,7 @@ class ProgramTarget:
     straight: bool
     frame: Pose = field(default_factory=Pose.identity)
     configuration: tuple[Word, ...] = ()
+    literal: Span | None = None
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -110,6 +130,27 @@ class NewNumbers:
 
 
 @dataclass(frozen=True)
+class Divisible:
+    """The whole statement of a straight motion and in it the target, so that motions to points on the way can be written before it."""
+
+    whole: Span
+    target: Span
+
+
+@dataclass(frozen=True)
+class Move:
+    """Motion of the tool from a target to another, by their indices: along a line, or along an arc through a third one.
+
+    `divisible` is None where no points on the way can be written: on arcs, and in statements that do more than move.
+    """
+
+    start: int
+    via: int | None
+    end: int
+    divisible: Divisible | None
+
+
+@dataclass(frozen=True)
 class RunTimeTarget:
     """Target that is no plain number in the program: line and text of its motion, why it stays as it is, and the index of its file."""
 
@@ -128,9 +169,16 @@ class Program:
     targets: tuple[ProgramTarget, ...]
     computed: tuple[RunTimeTarget, ...]
     remarks: tuple[str, ...]
+    moves: tuple[Move, ...] = ()
+    """Straight motions and arcs whose targets, and the one before, are written as numbers."""
 
-    def rewritten(self, new: Mapping[int, NewNumbers]) -> tuple[ProgramFile, ...]:
-        """Files with other numbers of the targets of these indices; all other characters, and numbers that hardly change, are kept."""
+    def rewritten(
+        self, new: Mapping[int, NewNumbers], between: Mapping[int, Sequence[NewNumbers]] = _NONE
+    ) -> tuple[ProgramFile, ...]:
+        """Files with other numbers of the targets of these indices; all other characters, and numbers that hardly change, are kept.
+
+        `between` has targets on the way to be inserted, by the index of the move.
+        """
         edits: list[list[tuple[int, int, str]]] = [[] for _ in self.files]
         notation = self.dialect.notation
         for index, numbers in new.items():
@@ -142,10 +190,46 @@ class Program:
             for word, text in zip(target.configuration, numbers.words, strict=True):
                 if text != word.text:
                     edits[word.file].append((word.first, word.end, text))
+        for index, points in between.items():
+            statement = self.moves[index].divisible
+            assert statement is not None
+            copies = [self._copy(self.moves[index], statement, point) for point in points]
+            edits[statement.whole.file].append(
+                (statement.whole.first, statement.whole.first, "".join(copies))
+            )
         return tuple(
             replace(file, text=_edited(file.text, sorted(own)))
             for file, own in zip(self.files, edits, strict=True)
         )
+
+    def can_insert(self, move: Move) -> bool:
+        """Whether motions to points on the way can be written before the move: its statement begins a line."""
+        if move.divisible is None or self.targets[move.end].literal is None:
+            return False
+        return not self._indent(move.divisible).strip()
+
+    def _indent(self, statement: Divisible) -> str:
+        text = self.files[statement.whole.file].text
+        return text[text.rfind("\n", 0, statement.whole.first) + 1 : statement.whole.first]
+
+    def _copy(self, move: Move, statement: Divisible, point: NewNumbers) -> str:
+        """The statement with a point in place of its target, and the indent of the next line."""
+        target, whole = self.targets[move.end], statement.whole
+        literal = target.literal
+        assert literal is not None
+        edits = [
+            (number.first, number.end, self.dialect.notation.text(value, ""))
+            for number, value in zip(target.numbers, point.values, strict=True)
+        ]
+        edits += [
+            (word.first, word.end, text) for word, text in zip(target.configuration, point.words, strict=True)
+        ]
+        inside = [(first - literal.first, end - literal.first, text) for first, end, text in sorted(edits)]
+        written = _edited(literal.of(self.files), inside)
+        text = whole.of(self.files)
+        before, after = statement.target.first - whole.first, statement.target.end - whole.first
+        line_end = "\r\n" if "\r\n" in self.files[whole.file].text else "\n"
+        return text[:before] + written + text[after:] + line_end + self._indent(statement)
 
 
 def _edited(text: str, edits: list[tuple[int, int, str]]) -> str:

@@ -12,20 +12,22 @@ from flexcal.programs.dialect import Dialect
 from flexcal.programs.notation import Notation
 from flexcal.programs.orientation import Quaternion
 from flexcal.programs.pose import Pose
-from flexcal.programs.program import Program, ProgramFile, ProgramTarget, Written
+from flexcal.programs.program import Program, ProgramFile, ProgramTarget, Span, Written
 from flexcal.programs.rapid_configuration import QuadrantConfiguration
 from flexcal.programs.rapid_data import RapidData, Statement, statements_of
 from flexcal.programs.rapid_frames import RapidFrames, Unreadable
-from flexcal.programs.rapid_motion import KINDS, Arguments, MotionKind, motion_in
+from flexcal.programs.rapid_motion import KINDS, Arguments, MotionKind, divisible, motion_in
 from flexcal.programs.syntax import (
     Node,
     as_word,
     between_commas,
+    end_of,
     is_tree,
     line_of,
     name_of,
     names_in,
     parse_text,
+    start_of,
     written_number,
     written_numbers,
 )
@@ -101,8 +103,11 @@ class _Reader:
         """The program that was read."""
         for statement in self.statements:
             self._switch(statement)
+            if not names_in(statement.nodes).isdisjoint(("proc", "func", "trap")):
+                self.found.interrupt()
             if (k := motion_in(statement.nodes)) is not None:
                 self._motion(statement, k)
+        self.found.interrupt()
         self._unused()
         remarks = []
         if len(self.loads) > 1:
@@ -139,10 +144,16 @@ class _Reader:
         text = statement.text(self.files, k)
         count = max(*kind.targets, kind.tool) + 1
         if len(given.required) <= count - (kind.tool >= 0):
+            self.found.begin(1, straight=False)
             self.found.leave(
                 line_of(statement.nodes[k]), text, "its arguments cannot be read", statement.file
             )
             return
+        self.found.begin(
+            len(kind.targets),
+            straight=kind.straight,
+            divisible=divisible(statement.nodes, k, given, self.files[statement.file].text, statement.file),
+        )
         for index in kind.targets:
             try:
                 for target in self._targets(statement, name, kind, given, given.required[index]):
@@ -171,7 +182,8 @@ class _Reader:
         targets = []
         for node in aggregates:
             numbers, words, external = self._numbers(node, file, joints=kind.joints)
-            if any(abs(axis.value) < _NO_AXIS for axis in external) and name not in self.moved_axes:
+            moves = any(abs(axis.value) < _NO_AXIS for axis in external)
+            if moves and name not in self.moved_axes:
                 self.moved_axes.append(name)
             targets.append(
                 ProgramTarget(
@@ -187,6 +199,7 @@ class _Reader:
                     kind.straight,
                     frame,
                     tuple(as_word(each, self.files[file].text) for each in words if self.configured[switch]),
+                    None if moves else Span(start_of(node), end_of(node), file),
                 )
             )
         return targets

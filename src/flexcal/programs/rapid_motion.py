@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from flexcal.programs.syntax import Node, between_commas, is_token, name_of
+from flexcal.programs.program import Divisible, Span
+from flexcal.programs.syntax import Node, between_commas, end_of, is_token, name_of, start_of
 
 
 @dataclass(frozen=True)
@@ -80,3 +81,14 @@ def motion_in(nodes: Sequence[Node]) -> int | None:
         if name_of(node) in KINDS and not is_token(nodes[k + 1], "ASSIGN") and nodes[k + 1] != ".":
             return k
     return None
+
+
+def divisible(nodes: Sequence[Node], k: int, given: Arguments, text: str, file: int) -> Divisible | None:
+    """A `MoveL` whose name has index `k` in its statement; None for other instructions, which may do more than move."""
+    end = text.find(";", end_of(nodes[-1]))
+    if name_of(nodes[k]) != "movel" or end < 0:
+        return None
+    target = given.required[0]
+    return Divisible(
+        Span(start_of(nodes[k]), end + 1, file), Span(start_of(target[0]), end_of(target[-1]), file)
+    )

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from flexcal.programs.dialect import Dialect
 from flexcal.programs.pose import Pose
-from flexcal.programs.program import Program, ProgramFile, ProgramTarget, RunTimeTarget
+from flexcal.programs.program import Divisible, Move, Program, ProgramFile, ProgramTarget, RunTimeTarget
 
 RUN_TIME = "the controller computes it when the program runs"
 """Why a target is not corrected whose numbers are not in the program."""
@@ -21,10 +21,21 @@ class TargetList:
     targets: dict[tuple[int, int], ProgramTarget] = field(default_factory=dict)
     doubtful: dict[tuple[int, int], str] = field(default_factory=dict)
     computed: list[RunTimeTarget] = field(default_factory=list)
+    motions: list[_Motion] = field(default_factory=list)
+
+    def begin(self, count: int, *, straight: bool, divisible: Divisible | None = None) -> None:
+        """Begin a motion to `count` targets, which are added or left next; `divisible` as in `Move`."""
+        self.motions.append(_Motion(count, straight, divisible))
+
+    def interrupt(self) -> None:
+        """Note that what follows does not start where the last motion ended."""
+        self.motions.append(_Motion(1, False, None))
 
     def add(self, target: ProgramTarget) -> None:
         """Note a motion to a target whose numbers are written."""
         place = (target.file, target.numbers[0].first)
+        if self.motions:
+            self.motions[-1].goals.append(place)
         earlier = self.targets.setdefault(place, target)
         if _differ(earlier.tool, target.tool) or earlier.payload != target.payload:
             self.doubtful[place] = (
@@ -35,6 +46,8 @@ class TargetList:
 
     def leave(self, line: int, text: str, reason: str, file: int = 0) -> None:
         """Note a motion to a target that stays as it is."""
+        if self.motions:
+            self.motions[-1].goals.append(None)
         item = RunTimeTarget(line, " ".join(text.split()), reason, file)
         if item not in self.computed:
             self.computed.append(item)
@@ -58,8 +71,37 @@ class TargetList:
             for place, reason in self.doubtful.items()
         ]
         left += [_built_from(item, corrected) for item in self.computed]
+        index = {
+            place: k for k, place in enumerate(place for place in self.targets if place not in self.doubtful)
+        }
         ordered = sorted(left, key=lambda item: (item.file, item.line))
-        return Program(dialect, tuple(files), tuple(kept), tuple(ordered), tuple(remarks))
+        return Program(dialect, tuple(files), tuple(kept), tuple(ordered), tuple(remarks), self._moves(index))
+
+    def _moves(self, index: Mapping[tuple[int, int], int]) -> tuple[Move, ...]:
+        """Straight motions and arcs between targets of known indices."""
+        moves: list[Move] = []
+        last: int | None = None
+        for motion in self.motions:
+            goals = [None if place is None else index.get(place) for place in motion.goals]
+            known = [goal for goal in goals if goal is not None]
+            if len(known) != motion.count or len(goals) != motion.count:
+                last = None
+                continue
+            if last is not None and motion.straight:
+                via = known[0] if motion.count > 1 else None
+                moves.append(Move(last, via, known[-1], motion.divisible))
+            last = known[-1]
+        return tuple(moves)
+
+
+@dataclass
+class _Motion:
+    """A motion to `count` targets: their places, or None for one that stays as it is."""
+
+    count: int
+    straight: bool
+    divisible: Divisible | None
+    goals: list[tuple[int, int] | None] = field(default_factory=list)
 
 
 def _differ(one: Pose | None, other: Pose | None) -> bool:

@@ -13,13 +13,14 @@ from flexcal.errors import InputError
 from flexcal.programs.dialect import Dialect
 from flexcal.programs.notation import Notation
 from flexcal.programs.orientation import RotationVector
-from flexcal.programs.program import Program, ProgramFile, ProgramTarget, Written
-from flexcal.programs.syntax import Node, parse_text
+from flexcal.programs.program import Divisible, Program, ProgramFile, ProgramTarget, Span, Written
+from flexcal.programs.syntax import Node, end_of, parse_text, start_of
 from flexcal.programs.target_list import RUN_TIME, TargetList
 
 _MOTIONS = {"movej": 1, "movel": 1, "movep": 1, "movec": 2, "servoj": 1, "servoc": 1}
 """Motions, and how many of their first arguments are targets."""
 _STRAIGHT = ("movel", "movep", "movec", "servoc")
+_DIVIDED = ("movel", "movep")
 _PAYLOADS = ("set_payload", "set_target_payload", "set_payload_mass")
 _AXES = 6
 
@@ -104,10 +105,17 @@ class _Reader:
     def _walk(self, nodes: Sequence[Node]) -> None:
         for node in nodes:
             if not isinstance(node, Tree):
+                if node in ("def", "thread"):
+                    self.found.interrupt()
                 continue
             if node.data == "call":
                 name, arguments = str(node.children[0]), _arguments(node.children[1:])
                 if name in _MOTIONS:
+                    self.found.begin(
+                        _MOTIONS[name],
+                        straight=name in _STRAIGHT,
+                        divisible=_divisible(node, arguments) if name in _DIVIDED else None,
+                    )
                     for argument in arguments[: _MOTIONS[name]]:
                         self._target(name, node, argument)
                 elif name == "set_tcp":
@@ -159,6 +167,7 @@ class _Reader:
             self.payload,
             motion,
             motion in _STRAIGHT,
+            literal=Span(start_of(node), end_of(node)),
         )
         self.found.add(target)
 
@@ -197,6 +206,15 @@ URSCRIPT = Dialect(
     no_start="no joint positions stand before it or beside it (qnear)",
 )
 """URScript: metres and radians."""
+
+
+def _divisible(call: Tree, arguments: Sequence[Sequence[Node]]) -> Divisible | None:
+    """A call whose first argument is a pose or a name."""
+    if not arguments or len(arguments[0]) != 1:
+        return None
+    return Divisible(
+        Span(start_of(call), end_of(call)), Span(start_of(arguments[0][0]), end_of(arguments[0][0]))
+    )
 
 
 def _is(node: Node, kind: str) -> bool:

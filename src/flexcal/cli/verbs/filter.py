@@ -12,6 +12,7 @@ from tyro.conf import Positional, arg
 from flexcal.cli.arguments.shared_options import (
     Estimates,
     Json,
+    MaybeNumber,
     MaybePath,
     Numbers,
     Paths,
@@ -68,6 +69,11 @@ class Filter:
     """URDF frame of the flange, in which tools are given."""
     reverse: Annotated[bool, arg(help_behavior_hint="")] = False
     """Return from a corrected program to the original one."""
+    subdivide: Annotated[
+        MaybeNumber,
+        arg(metavar="MM", help_behavior_hint="(default: no points are inserted)"),
+    ] = None
+    """Insert points into straight motions whose correction misses the needed one by more than this between their ends."""
     dry_run: Annotated[bool, arg(help_behavior_hint="")] = False
     """List the targets, and write nothing."""
     json: Json = False
@@ -89,6 +95,7 @@ class Filter:
     def run(self) -> None:
         """Correct the program, and print each target and what stays as it is."""
         from flexcal.jobs.deployment import filter_program_file
+        from flexcal.units import MILLIMETRE
 
         out = self.out
         console = Console(self.json)
@@ -103,6 +110,7 @@ class Filter:
             zeros=self.joint_zeros,
             flange=self.flange,
             reverse=self.reverse,
+            subdivide=None if self.subdivide is None else self.subdivide * MILLIMETRE,
         )
         document = result.document()
         rows = document["targets"]

@@ -14,6 +14,7 @@ from flexcal.data.poses import ToolTargets
 from flexcal.errors import FlexcalError, InputError
 from flexcal.jobs.deployment.controller_joints import ControllerJoints
 from flexcal.jobs.deployment.controller_poses import ControllerPoses
+from flexcal.jobs.deployment.path_corrections import PathCorrections, deviations_of_targets, path_remarks
 from flexcal.jobs.deployment.program_files import output_places, read_program, write_program
 from flexcal.jobs.inputs import CalibratedRobot, unmeasured_lengths_remark
 from flexcal.jobs.pages import Result
@@ -39,6 +40,11 @@ class FilteredProgram(Result):
         The program that was read.
     new : dict
         Numbers in the new program by index of target, in the program's units; targets that stay as they are have none.
+    between : dict
+        Numbers of points that are inserted on the way to targets, by the index of the move in `program.moves`.
+    missed : ndarray
+        Largest distance (N,), m, on the line or arc to a target between the needed correction and the interpolation of the corrected ends,
+        before points are inserted; NaN where there is none, or it is not known.
     shift : ndarray
         Distance (N,), m, between the flange of the nominal robot at the new and at the old numbers.
     turn : ndarray
@@ -51,6 +57,8 @@ class FilteredProgram(Result):
 
     program: Program
     new: dict[int, NewNumbers]
+    between: dict[int, list[NewNumbers]]
+    missed: np.ndarray
     shift: np.ndarray
     turn: np.ndarray
     reasons: tuple[str, ...]
@@ -59,7 +67,7 @@ class FilteredProgram(Result):
     @property
     def files(self) -> tuple[ProgramFile, ...]:
         """Files of the new program."""
-        return self.program.rewritten(self.new)
+        return self.program.rewritten(self.new, self.between)
 
     @property
     def headline(self) -> str:
@@ -110,6 +118,10 @@ class FilteredProgram(Result):
                 "configuration": list(self.new[k].words),
                 "shift_mm": float(self.shift[k] / MILLIMETRE),
                 "turn_deg": float(np.rad2deg(self.turn[k])),
+                "between_mm": float(self.missed[k] / MILLIMETRE) if np.isfinite(self.missed[k]) else None,
+                "inserted": sum(
+                    len(points) for m, points in self.between.items() if self.program.moves[m].end == k
+                ),
             }
             for k, target in enumerate(self.program.targets)
             if k in self.new
@@ -127,6 +139,7 @@ def filter_program(
     zeros: Sequence[float] = (),
     flange: str = _FLANGE,
     reverse: bool = False,
+    subdivide: float | None = None,
 ) -> FilteredProgram:
     """Replace the targets of a program by those with which the real robot's flange takes the poses that the nominal robot would take.
 
@@ -152,6 +165,8 @@ def filter_program(
         URDF frame of the flange.
     reverse : bool
         Whether to return from corrected targets to the nominal ones.
+    subdivide : float, optional
+        Distance, m, by which a line may miss the needed correction between its ends; points are inserted where it misses it by more.
 
     Returns
     -------
@@ -162,7 +177,14 @@ def filter_program(
     ------
     FlexcalError
         For a robot without six joints, and a frame that the URDF lacks.
+    InputError
+        For `subdivide` that is not positive, or given with `reverse`.
     """
+    if subdivide is not None and (reverse or not subdivide > 0):
+        raise InputError(
+            "E-PROG-011",
+            f"--subdivide {subdivide / MILLIMETRE:g} needs a positive number of millimetres, and no --reverse; correct the command.",
+        )
     model, nominal = (with_point_at_frame(each, flange) for each in (robot.probable, robot.with_points))
     if model.n != 6:
         raise FlexcalError(
@@ -190,7 +212,10 @@ def filter_program(
         numbers = places.new_numbers([program.targets[k] for k in done], q[done], after[done])
         new = dict(zip(done.tolist(), numbers, strict=True))
     else:
-        done, payload_remarks = rows, ()
+        done, masses, payload_remarks = rows, None, ()
+    paths = PathCorrections(model, places, program, q, after, _by_target(masses, rows, len(q)))
+    deviations = np.full(len(program.moves), np.nan) if reverse else paths.deviations()
+    between = {} if subdivide is None else paths.divisions(deviations, subdivide)
     shift, turn = np.full(len(q), np.nan), np.full(len(q), np.nan)
     if len(done):
         (there, turned), (here, was) = places.poses(after[done]), places.poses(q[done])
@@ -201,8 +226,10 @@ def filter_program(
         *_convention_remarks(joints),
         *program.remarks,
         *payload_remarks,
+        *path_remarks(program, deviations, subdivide, between),
     )
-    return FilteredProgram(model, program, new, shift, turn, tuple(reasons), remarks)
+    missed = deviations_of_targets(program.moves, deviations, len(q))
+    return FilteredProgram(model, program, new, between, missed, shift, turn, tuple(reasons), remarks)
 
 
 def filter_program_file(
@@ -217,6 +244,7 @@ def filter_program_file(
     zeros: Sequence[float] = (),
     flange: str = _FLANGE,
     reverse: bool = False,
+    subdivide: float | None = None,
 ) -> FilteredProgram:
     """`filter_program` for files, and those that belong to them; the new program goes to `out`, or nowhere (None).
 
@@ -227,7 +255,15 @@ def filter_program_file(
         output_places([Path(file.name) for file in program.files], out)
     robot = CalibratedRobot.from_yaml(robot_file, estimates)
     result = filter_program(
-        robot, program, tool=tool, start=start, signs=signs, zeros=zeros, flange=flange, reverse=reverse
+        robot,
+        program,
+        tool=tool,
+        start=start,
+        signs=signs,
+        zeros=zeros,
+        flange=flange,
+        reverse=reverse,
+        subdivide=subdivide,
     )
     if out is not None:
         write_program(result.files, out)
@@ -268,6 +304,15 @@ def _convention_remarks(joints: ControllerJoints) -> tuple[str, ...]:
         f"joint positions and configuration data count as those of the URDF, but its arm at zero is not that of {joints.dialect.name}: "
         f"{differing}; give --joint-signs and --joint-zeros if the controller counts otherwise",
     )
+
+
+def _by_target(masses: np.ndarray | None, rows: np.ndarray, count: int) -> np.ndarray | None:
+    """Masses (count,) of the targets; None where robot.yaml knows of no payload."""
+    if masses is None:
+        return None
+    every = np.full(count, np.nan)
+    every[rows] = masses
+    return every
 
 
 def _payloads(
