@@ -148,7 +148,7 @@ def servo_moves(folder: Path, examples: Path) -> list[str]:
     commands = command(16.0, 100.0, np.random.default_rng(5))
     write_log(folder / "moves.csv", 0.01, commands, simulate(TRUTH, commands[None], 100.0, step=5e-4)[0])
     run("flexcal identify actuators robot.yaml moves.csv --out actuators")
-    return ["identify actuators"]
+    return ["identify actuators", "export isaac"]
 
 
 def exciting_motion(folder: Path, examples: Path) -> list[str]:
@@ -186,7 +186,7 @@ def virtual_robot(folder: Path, examples: Path) -> list[str]:
     return []
 
 
-EXPORTS = tuple(verb.name for verb in VERBS if verb.words[0] == "export")
+EXPORTS = tuple(verb.name for verb in VERBS if verb.words[0] == "export" and verb.words[1] != "isaac")
 PROCEDURE = ("design trajectory", "identify inertials", "identify payload", "design frequency", "measure")
 PROCEDURE += ("identify response", "identify stiffness", "design poses", "calibrate", "verify")
 PLACES = {
@@ -206,7 +206,7 @@ PLACES = {
         *EXPORTS,
     },
     recordings_of_two_payloads: {"identify gains"},
-    servo_moves: {"identify actuators"},
+    servo_moves: {"identify actuators", "export isaac"},
     exciting_motion: {"identify dynamics"},
     virtual_robot: set(PROCEDURE),
 }

@@ -1,7 +1,8 @@
 from .actuators import OF_ERROR, Actuators, actuator_name, actuator_unit
 from .dh_table import Convention, render_dh
 from .formats import FORMATS, PlainFormat, render
-from .mjcf_file import export_mjcf
+from .isaac import TIME_STEP, render_isaac
+from .mjcf_file import export_mjcf, render_mjcf
 from .moveit_limits import shifted_limits
 from .mujoco_spec import effort_limit, mjcf_spec
 from .offset_fit import undetermined_offsets
@@ -16,6 +17,7 @@ from .xacro_robot import XacroExport, Zeros, render_xacro
 __all__ = [
     "FORMATS",
     "OF_ERROR",
+    "TIME_STEP",
     "Actuators",
     "Convention",
     "ExportedFile",
@@ -33,6 +35,8 @@ __all__ = [
     "mjcf_spec",
     "render",
     "render_dh",
+    "render_isaac",
+    "render_mjcf",
     "render_offsets",
     "render_runtime",
     "render_xacro",

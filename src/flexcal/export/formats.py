@@ -81,8 +81,9 @@ and friction stay in estimates.yaml.""",
         _mjcf,
         """Write the calibrated robot as MJCF for MuJoCo, with its springs, dampers and rotors as joints and its payload in the last link.
 
-It deflects under gravity as the calibrated robot does. MJCF cannot represent backlash, gravity compliance and transmission error;
-the resulting error is printed in millimetres.""",
+It deflects under gravity as the calibrated robot does, and has its backlash. After 'identify actuators' it takes commanded positions, with
+gains, delay, friction and armature as identified; else torques. MJCF cannot represent gravity compliance and transmission error; the
+resulting error is printed in millimetres.""",
         "load {out} in MuJoCo, or look at it with 'python -m mujoco.viewer --mjcf={out}'",
     ),
     PlainFormat(
@@ -109,6 +110,7 @@ Its frames are those of that description, whatever those of the URDF are, for ro
 which is printed.""",
         "give {out} to the description or driver as kinematics_params_file",
     ),
+    Format("isaac", "identified actuators, for Isaac Lab and PACE", "actuators.json"),
     Format("runtime", "for the C++ runtime, which compensates in the control loop", "runtime.json"),
     PlainFormat(
         "json",

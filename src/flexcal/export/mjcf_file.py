@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.export.mujoco_spec import mjcf_spec
+from flexcal.export.actuators import Actuators
+from flexcal.export.mujoco_spec import GAP, has_gap, mjcf_spec
 from flexcal.export.representation_error import (
     BACKLASH,
     GRAVITY_COMPLIANCE,
@@ -63,16 +64,19 @@ def export_mjcf(model: RobotModel, path: str | Path) -> ExportedFile:
     return write_rendered(model, path, render_mjcf(model))
 
 
-def render_mjcf(model: RobotModel) -> RenderedModel:
+def render_mjcf(model: RobotModel, actuators: Actuators | None = None) -> RenderedModel:
     """The robot as MJCF: the joints of `mjcf_spec`, all free, with the declared payload; numbers to their last digit.
+
+    With `actuators` it is driven by positions, as the real one, with gains, delay, friction and armature as identified.
 
     Raises `FlexcalError` where MuJoCo cannot build the robot, as with links that have no mass.
     """
     import mujoco
 
-    spec = mjcf_spec(model)
+    spec = mjcf_spec(model, actuators=actuators, backlash=True)
     spec.option.timestep = _TIME_STEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICIT
+    delayed = actuators is None or _delay(spec, model, actuators)
     try:
         compiled = spec.compile()
     except ValueError as problem:
@@ -88,14 +92,32 @@ def render_mjcf(model: RobotModel) -> RenderedModel:
         remarks.append(
             f"The payload of {payload.mass:.3g} kg is part of the link {model.joints[payload.joint].link}."
         )
-    if model.drives.coulomb[np.isfinite(model.drives.coulomb)].any():
+    if not delayed:
+        remarks.append(
+            "The delays of the commands are missing: this version of MuJoCo has none; delay the commands, or install a newer one."
+        )
+    if actuators is None and model.drives.coulomb[np.isfinite(model.drives.coulomb)].any():
         remarks.append("Coulomb friction of the drives is MuJoCo's frictionloss, which holds an arm at rest.")
     springs = [
         f"{joint.name}.{SPRINGS[component]}" for joint in model.elastic for component in joint.components
     ]
     about = (
-        "Joints: NAME is the motor's, referred to the joint; the actuator of that name is its torque, N m.",
+        "Joints: NAME is the motor's, referred to the joint; the actuator of that name "
+        + (
+            "is its torque, N m."
+            if actuators is None
+            else "takes its commanded position, rad or m"
+            + (", and NAME.velocity its commanded velocity." if actuators.follows_velocity else ".")
+        ),
     )
+    if actuators is not None and delayed and actuators.delay.any():
+        about += (
+            "The commands before the first step count as 0 where mj_initCtrlHistory does not say otherwise.",
+        )
+    gaps = [joint.name for i, joint in enumerate(model.joints) if has_gap(model, i, actuators)]
+    if gaps:
+        about += (f"Gaps: {', '.join(name + GAP for name in gaps)}; the arm moves freely within.",)
+    lacking = () if np.count_nonzero(model.drives.backlash) == len(gaps) else (BACKLASH,)
     if springs:
         about += (
             f"Springs: {', '.join(springs)}; q of a drive spring is what the arm turns beyond its motor.",
@@ -103,7 +125,7 @@ def render_mjcf(model: RobotModel) -> RenderedModel:
     return RenderedModel(
         text,
         mjcf_tool(model, text),
-        (BACKLASH, GRAVITY_COMPLIANCE, HARDENING, LATERAL_COMPLIANCE, TRANSMISSION),
+        (*lacking, GRAVITY_COMPLIANCE, HARDENING, LATERAL_COMPLIANCE, TRANSMISSION),
         "<!--",
         about=about,
         remarks=tuple(remarks),
@@ -119,9 +141,10 @@ def mjcf_tool(model: RobotModel, text: str) -> ToolMap:
         read = mujoco.MjModel.from_xml_string(text)
         data = mujoco.MjData(read)
         motors = [read.joint(name).qposadr[0] for name in model.joint_names]
-        springs = [
-            read.jnt_dofadr[i] for i in range(read.njnt) if read.joint(i).name not in model.joint_names
-        ]
+        others = [i for i in range(read.njnt) if read.joint(i).name not in model.joint_names]
+        gaps = [i for i in others if read.joint(i).name.endswith(GAP)]
+        free = [read.jnt_dofadr[i] for i in gaps]
+        springs = [read.jnt_dofadr[i] for i in others if i not in gaps]
         stiffness = np.array([_linear(read.jnt_stiffness[read.dof_jntid[i]]) for i in springs])
         result = np.zeros((len(q), 3))
         for k, motor_positions in enumerate(q):
@@ -129,17 +152,33 @@ def mjcf_tool(model: RobotModel, text: str) -> ToolMap:
             data.qpos[motors] = motor_positions
             for _ in range(_PASSES):
                 mujoco.mj_forward(read, data)
-                if not springs:
+                side = np.where(data.qfrc_bias[free] < 0, 1, 0)
+                moved = read.jnt_range[gaps, side] != data.qpos[free]
+                data.qpos[free] = read.jnt_range[gaps, side]
+                if not springs and not moved.any():
                     break
                 step = (data.qfrc_passive - data.qfrc_bias)[springs] / stiffness
                 data.qpos[springs] += step
-                if np.abs(step).max() < _AT_REST:
+                if not moved.any() and np.abs(step).max(initial=0.0) < _AT_REST:
                     break
             mujoco.mj_kinematics(read, data)
             result[k] = data.site(model.point().name).xpos
         return result
 
     return positions
+
+
+def _delay(spec: mujoco.MjSpec, model: RobotModel, actuators: Actuators) -> bool:
+    """Delay the commands, interpolated, as they were identified; False where MuJoCo cannot."""
+    for i, joint in enumerate(model.joint_names):
+        for name in (joint, f"{joint}.velocity") if actuators.follows_velocity else (joint,):
+            drive = spec.actuator(name)
+            if not hasattr(drive, "delay"):
+                return False
+            delay = float(actuators.delay[i])
+            if delay > 0:
+                drive.delay, drive.nsample, drive.interp = delay, int(np.ceil(delay / _TIME_STEP)) + 2, 1
+    return True
 
 
 def _with_all_digits(xml: str, compiled: mujoco.MjModel) -> str:
@@ -175,6 +214,11 @@ def _with_all_digits(xml: str, compiled: mujoco.MjModel) -> str:
             site = compiled.site(own.get("name"))
             own.set("pos", _digits(site.pos))
             own.set("quat", _digits(site.quat))
+    for element in root.iter("general"):
+        drive = compiled.actuator(element.get("name"))
+        for key, values in (("gainprm", drive.gainprm), ("biasprm", drive.biasprm)):
+            if element.get(key) is not None:
+                element.set(key, _digits(values[: len(element.get(key, "").split())]))
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 

@@ -25,9 +25,14 @@ from flexcal.mujoco_library import log_mujoco_warnings
 if TYPE_CHECKING:
     import mujoco
 
-_FRICTION_SOLREF = (0.0005, 1.0)
-_FRICTION_SOLIMP = (0.99, 0.99, 0.001, 0.5, 2.0)
-"""Softness of dry friction in MuJoCo, by which a joint that stands creeps; stiffer than MuJoCo's own, with which it creeps visibly."""
+GAP = ".backlash"
+"""Ending of the name of a joint that is the gap of a drive."""
+_GAP_INERTIA = 0.01
+"""Inertia between a gap and a spring, over that of the rotor."""
+_SOLREF, _GAP_SOLREF = (0.0005, 1.0), (0.001, 1.0)
+_SOLIMP = (0.99, 0.99, 0.001, 0.5, 2.0)
+"""Softness of dry friction and of the ends of a gap, much less than MuJoCo's own, with which a joint creeps visibly; MuJoCo takes two time
+steps for the first number at least, and from an end of four the arm does not bounce."""
 
 
 def mjcf_spec(
@@ -37,16 +42,20 @@ def mjcf_spec(
     free: Collection[int] | None = None,
     payload: float | None = None,
     actuators: Actuators | None = None,
+    backlash: bool = False,
 ) -> mujoco.MjSpec:
     """Robot as an `MjSpec`, with all identified values.
 
     `q` (n,) rad or m: where the joints that are not in `free` are locked (default: all joints are free); `payload` kg at the declared
     payload's centre of mass (default: the declared mass). MuJoCo joints are named `<joint>` (motor side), `<joint>.drive` (twist
-    of the arm beyond the motor), `<joint>.bearing_y`, `<joint>.bearing_x`; sites have the points' names. Backlash has no form in
-    MJCF and is left out; Coulomb friction becomes `frictionloss`, which is not a tanh. With `actuators` the joints have their armature
-    and friction, and the MuJoCo actuator `<joint>` takes positions (and `<joint>.velocity` velocities, where the damping follows them);
-    else it takes torques. The delay is not in it: `with_delay` adds it. Raises `FlexcalError` where a joint is
-    locked without `q`, or a payload is given but none declared.
+    of the arm beyond the motor), `<joint>.bearing_y`, `<joint>.bearing_x`; sites have the points' names. Coulomb friction becomes
+    `frictionloss`, which is not a tanh.
+
+    With `backlash` the gap of a drive is a joint `<joint>.backlash` that moves freely within it, of drives with a known rotor, which has
+    to move by itself. With `actuators` the joints have their armature and friction, and the MuJoCo actuator `<joint>` takes positions
+    (and `<joint>.velocity` velocities, where the damping follows them), not torques; their delay is not in it.
+
+    Raises `FlexcalError` where a joint is locked without `q`, or a payload is given but none declared.
     """
     import mujoco
 
@@ -73,7 +82,7 @@ def mjcf_spec(
         body.ipos = inertia.com
         body.fullinertia = inertia.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
         body.explicitinertial = True
-        _add_joints(spec, body, model, i, None if i in motors else at[i], actuators)
+        _add_joints(spec, body, model, i, None if i in motors else at[i], actuators, backlash)
         bodies.append(body)
     for name in model.points:
         joint, position, rotation = point_placement(model, name)
@@ -88,8 +97,9 @@ def _add_joints(
     i: int,
     locked: float | None,
     actuators: Actuators | None,
+    backlash: bool,
 ) -> None:
-    """Motor and springs of a joint, outermost first; the motor is left out where it is locked, at that angle (rad or m)."""
+    """Motor, gap and springs of a joint, outermost first; the motor is left out where it is locked, at that angle (rad or m)."""
     import mujoco
 
     spring = next((e for e in model.elastic if e.index == i), None)
@@ -100,6 +110,8 @@ def _add_joints(
                 _drive_by_torque(spec, motor, model, i)
             else:
                 _drive_by_position(spec, motor, model, i, actuators)
+            if backlash and has_gap(model, i, actuators):
+                _add_gap(body, motor, model, i, _GAP_INERTIA * motor.armature if spring else 0.0)
         if spring:
             name = f"{spring.name}.{SPRINGS[component]}"
             axis = bearing_placement(model, spring, locked or 0.0)[:, component]
@@ -117,6 +129,21 @@ def _add_motor(body: mujoco.MjsBody, model: RobotModel, i: int) -> mujoco.MjsJoi
     if np.isfinite([joint.lower, joint.upper]).all():
         motor.range = [joint.lower, joint.upper]
     return motor
+
+
+def has_gap(model: RobotModel, i: int, actuators: Actuators | None) -> bool:
+    """Whether a joint has a backlash, and a rotor that can move within it."""
+    rotor = model.drives.rotor_inertia[i] if actuators is None else actuators.armature[i]
+    return bool(model.drives.backlash[i] > 0 and _known(rotor) > 0)
+
+
+def _add_gap(body: mujoco.MjsBody, motor: mujoco.MjsJoint, model: RobotModel, i: int, inertia: float) -> None:
+    """The gap, with the inertia of what moves between it and a spring, without which MuJoCo cannot tell the two apart."""
+    half = float(model.drives.backlash[i])
+    gap = body.add_joint(name=f"{motor.name}{GAP}", type=motor.type, axis=motor.axis)
+    gap.range = [-half, half]
+    gap.armature = inertia
+    gap.solref_limit[:], gap.solimp_limit[:] = _GAP_SOLREF, _SOLIMP
 
 
 def _drive_by_torque(spec: mujoco.MjSpec, motor: mujoco.MjsJoint, model: RobotModel, i: int) -> None:
@@ -140,8 +167,7 @@ def _drive_by_position(
     motor.armature = float(actuators.armature[i])
     motor.damping = _linear(motor.damping, float(actuators.viscous[i]))
     motor.frictionloss = float(actuators.coulomb[i])
-    motor.solref_friction[:] = _FRICTION_SOLREF
-    motor.solimp_friction[:] = _FRICTION_SOLIMP
+    motor.solref_friction[:], motor.solimp_friction[:] = _SOLREF, _SOLIMP
     effort = effort_limit(model, i)
     if effort is not None:
         motor.actfrcrange = [-effort, effort]

@@ -27,6 +27,8 @@ _CALIBRATED = (GRAVITY_COMPLIANCE, LATERAL_COMPLIANCE, TRANSMISSION)
 SAMPLES = 2000
 _AGREED = 1e-9
 """Agreement, mm, below which nothing is reported."""
+_SAME = 1e-4
+"""Agreement, mm, above which a file that can carry everything differs at some poses: those on the other side of a gap."""
 _TRIES = 4
 _LEAST_REACHED = 50
 _STROKE = 1.0
@@ -73,7 +75,8 @@ class UnrepresentedTerm:
 class ExportErrors:
     """Export errors: term by term, and the whole `error` between the robot at rest and the file as written, over poses `within` a space.
 
-    `error` is None for a robot without points, which has no tool to be off; `payload` is what the robot carries, kg.
+    `error` is None for a robot without points, which has no tool to be off; `payload` is what the robot carries, kg. A file without
+    `geometry` has no tool at all.
     """
 
     terms: tuple[UnrepresentedTerm, ...]
@@ -81,13 +84,24 @@ class ExportErrors:
     poses: int
     within: str
     payload: float
+    geometry: bool = True
 
     @property
     def sentences(self) -> tuple[str, ...]:
         """Errors in sentences."""
+        if not self.geometry:
+            return (
+                "The file has actuators only: links and joints are those of the robot that is loaded beside it.",
+            )
         if not self.terms:
             if self.error is None:
                 return ("Nothing is lost.",)
+            if self.error.max / MILLIMETRE > _SAME:
+                return (
+                    f"Nothing is lost, but where gravity hardly presses a drive to one side of its gap: there the tool is off by "
+                    f"{self.error.max / MILLIMETRE:.3f} mm at most, and by {max(self.error.p95 / MILLIMETRE, _AGREED):.0e} mm in 95 % of "
+                    f"{self.poses} random poses of the {self.within}.",
+                )
             return (
                 f"Nothing is lost: the file agrees with the calibrated robot to {max(self.error.max / MILLIMETRE, _AGREED):.0e} mm "
                 f"over {self.poses} random poses of the {self.within}.",

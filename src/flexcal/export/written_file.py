@@ -18,12 +18,13 @@ from flexcal.model.robot import RobotModel
 class RenderedModel:
     """Rendered robot: `text`, and `tool`, the target's position when that text is read back.
 
-    `unrepresented` are the terms that the format has no place for; `absorb` as `measure_export_error` takes it; `about` says in sentences
-    what stands in the file, for its header; `remarks` what a reader of it must know besides; `table` is what to show of it.
+    `tool` is None for a file without geometry. `unrepresented` are the terms that the format has no place for; `absorb` as
+    `measure_export_error` takes it; `about` says in sentences what stands in the file, for its header; `remarks` what a reader of it must
+    know besides; `table` is what to show of it.
     """
 
     text: str
-    tool: ToolMap
+    tool: ToolMap | None
     unrepresented: tuple[str, ...]
     comments: Literal["<!--", "#"] | None
     about: tuple[str, ...] = ()
@@ -55,9 +56,12 @@ def write_rendered(model: RobotModel, path: str | Path, rendered: RenderedModel)
     """Measure the representation error of `rendered` against `model`, and write it with that in its header; raises `InputError` if not
     possible.
     """
-    loss = measure_export_error(
-        model, rendered.tool, rendered.unrepresented, point=rendered.point, absorb=rendered.absorb
-    )
+    if rendered.tool is None:
+        loss = ExportErrors((), None, 0, "joint range", model.payload_mass, geometry=False)
+    else:
+        loss = measure_export_error(
+            model, rendered.tool, rendered.unrepresented, point=rendered.point, absorb=rendered.absorb
+        )
     lines = [f"{model.name}, written by flexcal.", *rendered.about, *loss.sentences, *rendered.remarks]
     write_text(path, _with_header(rendered.text, lines, rendered.comments))
     return ExportedFile(Path(path), loss, rendered.remarks, rendered.table)

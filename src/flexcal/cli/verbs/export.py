@@ -11,6 +11,7 @@ from tyro.conf import arg
 
 from flexcal.cli.arguments.shared_options import Estimates, Json, MaybeText, Robot, require_robot
 from flexcal.cli.terminal.console import Console
+from flexcal.errors import InputError
 from flexcal.export import FORMATS, PlainFormat
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ class Export(ABC):
     out: Annotated[Path, arg(metavar="FILE", help="the file to write")]
     estimates: Estimates = None
     json: Json = False
+    geometric: ClassVar[bool] = True
 
     @abstractmethod
     def write(self) -> ExportedRobot:
@@ -59,7 +61,7 @@ class Export(ABC):
         for sentence in (*exported.export.loss.sentences, *exported.export.remarks):
             console.say(sentence)
         following = self.following(document)
-        if not exported.calibrated:
+        if self.geometric and not exported.calibrated:
             console.say("there is no calibration: the joint placements are nominal")
             following = f"flexcal calibrate {self.robot} POSES…, and export again"
         console.finish(document, following)
@@ -135,6 +137,36 @@ class ExportMdh(ExportDh):
     """
 
     format: ClassVar[str] = "mdh"
+
+
+@dataclass(frozen=True)
+class ExportIsaac(Export):
+    """Write the actuators that 'identify actuators' found as JSON, in the words of Isaac Lab and PACE.
+
+    Keyword arguments of DelayedPDActuatorCfg (stiffness, damping, armature, friction, dynamic_friction, viscous_friction, effort_limit,
+    delays in time steps), and PACE's vector of parameters.
+    """
+
+    geometric: ClassVar[bool] = False
+    time_step: float = 0.005
+    """Time step of the simulation, s, in which delays are counted."""
+
+    def write(self) -> ExportedRobot:
+        from flexcal.jobs.deployment import export_stored_robot
+
+        if not 1e-5 <= self.time_step <= 0.1:
+            raise InputError(
+                "E-CLI-045",
+                f"--time-step is in s, between 0.00001 and 0.1, not {self.time_step:g}; give that of the simulation.",
+            )
+        return export_stored_robot(
+            self.robot, self.out, "isaac", time_step=self.time_step, estimates=self.estimates
+        )
+
+    def following(self, document: dict[str, Any]) -> str:
+        return (
+            f"give each group of {self.out} to DelayedPDActuatorCfg(**group) of Isaac Lab: docs/simulators.md"
+        )
 
 
 @dataclass(frozen=True)

@@ -15,19 +15,26 @@ from flexcal.export import (
     RenderedModel,
     render,
     render_dh,
+    render_mjcf,
     render_offsets,
     render_runtime,
     undetermined_offsets,
     write_rendered,
 )
 from flexcal.files.formats import read_estimates
+from flexcal.jobs.deployment.actuator_export import actuator_remarks, identified_actuators, rendered_actuators
 from flexcal.jobs.inputs import CalibratedRobot, stored_estimates, unmeasured_lengths_remark
 from flexcal.jobs.pages import Result
 from flexcal.model.robot import RobotModel, with_blocks
 
 _CONVENTIONS: dict[str, Convention] = {"dh": "standard", "mdh": "modified"}
 _HEADERS = (".h", ".hpp")
-_OPTIONS = {"point": ("dh", "mdh", "offsets"), "four_parameters": ("dh", "mdh"), "keep_frames": ("offsets",)}
+_OPTIONS = {
+    "point": ("dh", "mdh", "offsets"),
+    "four_parameters": ("dh", "mdh"),
+    "keep_frames": ("offsets",),
+    "time_step": ("isaac",),
+}
 """Formats that take an option."""
 
 
@@ -86,6 +93,7 @@ def export_robot(
     point: str | None = None,
     four_parameters: bool = False,
     keep_frames: bool = False,
+    time_step: float | None = None,
 ) -> ExportedRobot:
     """Write a calibrated robot in a file format of other programs, and measure the error due to the terms that the format lacks.
 
@@ -95,15 +103,18 @@ def export_robot(
         `Calibration.robot`, or ``CalibratedRobot.from_yaml(path)``.
     path : str or Path
         File to write.
-    format : {"urdf", "mjcf", "sdf", "dh", "mdh", "offsets", "kinematics", "json", "runtime"}
+    format : {"urdf", "mjcf", "sdf", "dh", "mdh", "offsets", "kinematics", "json", "runtime", "isaac"}
         URDF, MJCF, SDFormat, Denavit-Hartenberg table, standard or modified, joint offsets, kinematics of Universal Robots, everything, or
-        what the C++ runtime reads: JSON, or a header with it where `path` ends in .h or .hpp.
+        what the C++ runtime reads: JSON, or a header with it where `path` ends in .h or .hpp. MJCF has the
+        actuators where they were identified; "isaac" has nothing else.
     point : str, optional
         Point at the end of the chain, of tables and offsets; the first by default.
     four_parameters : bool
         Whether a table is without the Hayati parameter beta of nominally parallel axes.
     keep_frames : bool
         Whether base and tool stay nominal where offsets are fitted.
+    time_step : float, optional
+        Time step, s, in which "isaac" counts delays; 5 ms by default.
 
     Returns
     -------
@@ -128,7 +139,15 @@ def export_robot(
     >>> exported.lost
     ()
     """
-    _check_options(format, {"point": point, "four_parameters": four_parameters, "keep_frames": keep_frames})
+    _check_options(
+        format,
+        {
+            "point": point,
+            "four_parameters": four_parameters,
+            "keep_frames": keep_frames,
+            "time_step": time_step,
+        },
+    )
     nominal, measured = robot.nominal, robot.targets
     probable, unseen = probable_robots(robot.model, measured) if measured else (robot.model, None)
     rendered: RenderedModel
@@ -147,10 +166,15 @@ def export_robot(
         )
     elif format == "runtime":
         rendered = render_runtime(probable, robot.with_points, header=Path(path).suffix in _HEADERS)
+    elif format == "mjcf":
+        rendered = render_mjcf(probable, identified_actuators(robot))
+    elif format == "isaac":
+        rendered = rendered_actuators(robot, time_step)
     else:
         rendered = render(format, probable, nominal)
     written = write_rendered(probable, path, rendered)
-    written = replace(written, remarks=(*written.remarks, *unmeasured_lengths_remark(robot)))
+    remarks = (*unmeasured_lengths_remark(robot), *actuator_remarks(robot, format))
+    written = replace(written, remarks=(*written.remarks, *remarks))
     return ExportedRobot(probable, written, "calibration" in robot.blocks)
 
 
@@ -162,6 +186,7 @@ def export_stored_robot(
     point: str | None = None,
     four_parameters: bool = False,
     keep_frames: bool = False,
+    time_step: float | None = None,
     estimates: Path | None = None,
 ) -> ExportedRobot:
     """`export_robot` of the robot of a robot.yaml, as far as it was identified; `estimates` is a file or folder in place of that beside it.
@@ -183,6 +208,7 @@ def export_stored_robot(
         point=point,
         four_parameters=four_parameters,
         keep_frames=keep_frames,
+        time_step=time_step,
     )
 
 
