@@ -3,7 +3,7 @@ from .calibration.kinds import rigid_motion
 from .calibration.verification import prediction_errors
 from .data.plans import MultisinePlan, PosePlan, TrajectoryPlan, read_plan
 from .data.poses import PoseSet, ToolTargets, read_poses, read_targets
-from .data.recordings import Recording, read_recording
+from .data.recordings import CommandLog, Recording, read_command_log, read_recording
 from .design.poses import random_poses
 from .design.scene import MeasuringSetup
 from .dynamics.estimators import (
@@ -36,6 +36,7 @@ from .jobs.accuracy import (
     repeatability,
     verify,
 )
+from .jobs.actuators import ActuatorIdentification, identify_actuators
 from .jobs.calibration import Calibration, calibrate
 from .jobs.deployment import Compensation, Prediction, compensate, export_robot, predict
 from .jobs.dynamics import DynamicsIdentification, identify_dynamics
@@ -77,11 +78,13 @@ __all__ = [
     "TLS",
     "WLS",
     "AccuracyMap",
+    "ActuatorIdentification",
     "AxisResponse",
     "CalibratedRobot",
     "Calibration",
     "CellConfig",
     "Certificate",
+    "CommandLog",
     "Compensation",
     "DesignedFrequency",
     "DesignedNextPoses",
@@ -131,6 +134,7 @@ __all__ = [
     "frequency_response",
     "frequency_responses",
     "gravity_torque",
+    "identify_actuators",
     "identify_dynamics",
     "identify_gains",
     "identify_inertials",
@@ -139,6 +143,7 @@ __all__ = [
     "predict",
     "prediction_errors",
     "random_poses",
+    "read_command_log",
     "read_learned_residual",
     "read_plan",
     "read_poses",

@@ -21,7 +21,21 @@ _OTHERS = ("tau", "dq", "ddq", "qa", "tau_ext", "temperature")
 
 @dataclass(frozen=True, eq=False)
 class CommandLog:
-    """Commanded and measured joint positions (N, n), rad or m, at `start` + k · `time_step`, s; `name` is what messages call it."""
+    """Log of commanded and measured joint positions: N samples of n joints at t = start + k · time_step.
+
+    Parameters
+    ----------
+    time_step : float
+        Time between samples, s.
+    command : ndarray
+        Commanded positions (N, n), rad (m where prismatic).
+    q : ndarray
+        Measured positions (N, n).
+    start : float
+        Time of the first sample, s.
+    name : str
+        What messages call it.
+    """
 
     time_step: float
     command: np.ndarray
@@ -39,9 +53,32 @@ class CommandLog:
 
 
 def read_command_log(path: str | Path, model: RobotModel) -> CommandLog:
-    """Read `t`, `q1` … `qn` and the commands `qc1` … `qcn` of a log, or what `signals:` of robot.yaml names in their stead.
+    """Read a log of commanded and measured joint positions; where its time stamps jitter, values are interpolated.
 
-    Raises `InputError` as `read_recording` does; a gap of the time stamps ends in an error too.
+    Parameters
+    ----------
+    path : str or Path
+        CSV or Parquet with `t`, `q1` … `qn` and the commands `qc1` … `qcn`, or what `signals:` of robot.yaml names in their stead.
+    model : RobotModel
+        Robot whose joints the log has.
+
+    Returns
+    -------
+    CommandLog
+        Positions in SI units.
+
+    Raises
+    ------
+    InputError
+        As `read_recording` does.
+
+    Examples
+    --------
+    >>> from flexcal import RobotModel, read_command_log
+    >>> model = RobotModel.from_yaml("examples/servo_arm/robot.yaml", estimates=False)
+    >>> log = read_command_log("examples/servo_arm/moves.csv", model)
+    >>> log.q.shape, log.time_step
+    ((2000, 2), 0.008)
     """
     file = open_table(path)
     signals = assign(file, model, ("t", "q", "qc"), _OTHERS)

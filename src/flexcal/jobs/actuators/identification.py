@@ -54,6 +54,15 @@ def identify_actuators(
     FlexcalError
         Where the logs are too short or a joint does not move, the robot's motors are coupled or drive loops, or `known_gains` is asked
         for without any in robot.yaml.
+
+    Examples
+    --------
+    >>> from flexcal import RobotModel, identify_actuators, read_command_log
+    >>> model = RobotModel.from_yaml("examples/servo_arm/robot.yaml", estimates=False)
+    >>> found = identify_actuators(model, [read_command_log("examples/servo_arm/moves.csv", model)])
+    >>> low, high = found.estimate.interval("elbow.actuator.stiffness")
+    >>> bool(low < 300 < high)
+    True
     """
     model.require_motors("the identification of actuators")
     servo = _servo(model, damping, known_gains)
