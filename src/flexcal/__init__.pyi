@@ -38,7 +38,16 @@ from .jobs.accuracy import (
 )
 from .jobs.actuators import ActuatorIdentification, identify_actuators
 from .jobs.calibration import Calibration, calibrate
-from .jobs.deployment import Compensation, Prediction, compensate, export_robot, predict
+from .jobs.deployment import (
+    Compensation,
+    FilteredProgram,
+    Prediction,
+    compensate,
+    export_robot,
+    filter_program,
+    predict,
+    read_program,
+)
 from .jobs.dynamics import DynamicsIdentification, identify_dynamics
 from .jobs.experiments import (
     DesignedFrequency,
@@ -63,6 +72,7 @@ from .jobs.response import AxisResponse, frequency_response
 from .jobs.stiffness import StiffnessIdentification, identify_stiffness
 from .model.robot import RobotModel
 from .model.statics import gravity_torque, tool_at_rest
+from .programs import Program
 from .virtual_cell import CellConfig, VirtualCell, draw_truth
 
 __version__: str
@@ -94,6 +104,7 @@ __all__ = [
     "EnergyModel",
     "Estimate",
     "Estimator",
+    "FilteredProgram",
     "FlexcalError",
     "FrequencyRequest",
     "FrequencyResponse",
@@ -108,6 +119,7 @@ __all__ = [
     "PoseSet",
     "PowerModel",
     "Prediction",
+    "Program",
     "Recording",
     "Repeatability",
     "RobotModel",
@@ -129,6 +141,7 @@ __all__ = [
     "exciting_plan",
     "export_robot",
     "export_urdf",
+    "filter_program",
     "fit_geometry",
     "frequency_plan",
     "frequency_response",
@@ -147,6 +160,7 @@ __all__ = [
     "read_learned_residual",
     "read_plan",
     "read_poses",
+    "read_program",
     "read_recording",
     "read_targets",
     "read_yaml",

@@ -2,6 +2,7 @@ from .arm_at_zero import ArmAtZero
 from .configuration import Configuration
 from .dialect import Dialect
 from .dialects import DIALECTS, dialect_of
+from .fanuc import parse_fanuc
 from .krl import parse_krl
 from .notation import Notation
 from .pose import Pose
@@ -23,6 +24,7 @@ __all__ = [
     "ProgramTarget",
     "RunTimeTarget",
     "dialect_of",
+    "parse_fanuc",
     "parse_krl",
     "parse_rapid",
     "parse_urscript",

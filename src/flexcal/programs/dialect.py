@@ -27,6 +27,8 @@ class Dialect:
         Function from the files of a program to its targets. Raises `InputError` where a file cannot be read.
     beside : tuple of str
         Suffixes of files of the same name, beside a file of the program, that belong to it.
+    tables : tuple of str
+        Those of `suffixes` whose files are only read: frames and tools of the controller.
     configuration : Configuration or None
         Its configuration data.
     zero : ArmAtZero or None
@@ -42,6 +44,7 @@ class Dialect:
     notation: Notation
     parse: Callable[[Sequence[ProgramFile]], Program]
     beside: tuple[str, ...] = ()
+    tables: tuple[str, ...] = ()
     configuration: Configuration | None = None
     zero: ArmAtZero | None = None
     level_forearm: bool = False

@@ -6,11 +6,12 @@ from pathlib import Path
 
 from flexcal.errors import InputError
 from flexcal.programs.dialect import Dialect
+from flexcal.programs.fanuc import FANUC
 from flexcal.programs.krl import KRL
 from flexcal.programs.rapid import RAPID
 from flexcal.programs.urscript import URSCRIPT
 
-DIALECTS: tuple[Dialect, ...] = (KRL, RAPID, URSCRIPT)
+DIALECTS: tuple[Dialect, ...] = (FANUC, KRL, RAPID, URSCRIPT)
 """Dialects that are read."""
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from flexcal.programs.orientation import Orientation
 from flexcal.programs.pose import Pose
+from flexcal.units import DEGREE, MILLIMETRE
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,11 @@ class Notation:
     orientation: Orientation
     decimals: int
     fixed: bool = False
+
+    @property
+    def units(self) -> str:
+        """Units of lengths and angles."""
+        return f"{'mm' if self.length == MILLIMETRE else 'm'} and {'°' if self.angle == DEGREE else 'rad'}"
 
     def pose(self, numbers: Sequence[float]) -> Pose:
         """Pose that the numbers mean."""

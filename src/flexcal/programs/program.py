@@ -162,7 +162,23 @@ class RunTimeTarget:
 
 @dataclass(frozen=True)
 class Program:
-    """Files of a program, its `targets` in the order of their use, those `computed` at run time, and what is doubtful of them."""
+    """A robot program that was read, as `read_program` returns it.
+
+    Attributes
+    ----------
+    dialect : Dialect
+        How it is written.
+    files : tuple of ProgramFile
+        Its files: name and text.
+    targets : tuple of ProgramTarget
+        Targets that are written as numbers, in the order of their use.
+    computed : tuple of RunTimeTarget
+        Motions whose targets the controller computes when the program runs.
+    remarks : tuple of str
+        What is doubtful of the targets.
+    moves : tuple of Move
+        Straight motions and arcs whose targets, and the one before, are written as numbers.
+    """
 
     dialect: Dialect
     files: tuple[ProgramFile, ...]
@@ -170,14 +186,23 @@ class Program:
     computed: tuple[RunTimeTarget, ...]
     remarks: tuple[str, ...]
     moves: tuple[Move, ...] = ()
-    """Straight motions and arcs whose targets, and the one before, are written as numbers."""
 
     def rewritten(
         self, new: Mapping[int, NewNumbers], between: Mapping[int, Sequence[NewNumbers]] = _NONE
     ) -> tuple[ProgramFile, ...]:
-        """Files with other numbers of the targets of these indices; all other characters, and numbers that hardly change, are kept.
+        """Files with other numbers; all other characters, and numbers that hardly change, are kept.
 
-        `between` has targets on the way to be inserted, by the index of the move.
+        Parameters
+        ----------
+        new : mapping of NewNumbers
+            Numbers of targets by their indices.
+        between : mapping of sequence of NewNumbers
+            Targets on the way to be inserted, by the index of the move.
+
+        Returns
+        -------
+        tuple of ProgramFile
+            The files.
         """
         edits: list[list[tuple[int, int, str]]] = [[] for _ in self.files]
         notation = self.dialect.notation
@@ -203,7 +228,18 @@ class Program:
         )
 
     def can_insert(self, move: Move) -> bool:
-        """Whether motions to points on the way can be written before the move: its statement begins a line."""
+        """Whether motions to points on the way can be written before the move: its statement begins a line.
+
+        Parameters
+        ----------
+        move : Move
+            One of `moves`.
+
+        Returns
+        -------
+        bool
+            Whether they can.
+        """
         if move.divisible is None or self.targets[move.end].literal is None:
             return False
         return not self._indent(move.divisible).strip()

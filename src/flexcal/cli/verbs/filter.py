@@ -9,6 +9,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
+from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import (
     Estimates,
     Json,
@@ -30,9 +31,9 @@ _LISTED = 20
 class Filter:
     """Correct a robot program: its targets become those that bring the real robot where the nominal one would go.
 
-    PROGRAM is URScript (Universal Robots), RAPID (ABB) or KRL (KUKA), by its suffix. Targets written as numbers are corrected, in
-    motions and in variables that are set once; all other text stays as it is, byte for byte. Targets that the controller computes when
-    the program runs stay and are listed.
+    PROGRAM is URScript (Universal Robots), RAPID (ABB), KRL (KUKA) or TP (Fanuc), by its suffix. Targets written as numbers are
+    corrected, in motions and in variables that are set once; all other text stays as it is, byte for byte. Targets that the controller
+    computes when the program runs stay and are listed.
 
     Poses count in the frame base of the URDF, and the controller's kinematics as those of the URDF. A program of several files goes
     into the folder --out, under the names of its files.
@@ -41,7 +42,7 @@ class Filter:
     robot: Robot
     program: Annotated[
         Positional[Paths],
-        file_argument("PROGRAM...", "the program (.script, .mod, .src), and further files of it"),
+        file_argument("PROGRAM...", "the program (.script, .mod, .src, .ls), and further files of it"),
     ] = ()
     place: Annotated[
         MaybePath,
@@ -74,23 +75,30 @@ class Filter:
         arg(metavar="MM", help_behavior_hint="(default: no points are inserted)"),
     ] = None
     """Insert points into straight motions whose correction misses the needed one by more than this between their ends."""
+    report: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="(default: none)")] = None
+    """Page (.html) with every target and the path in space."""
     dry_run: Annotated[bool, arg(help_behavior_hint="")] = False
-    """List the targets, and write nothing."""
+    """List all targets, nominal and corrected, and write no program."""
     json: Json = False
 
     @property
     def out(self) -> Path:
         """File or folder of the new program."""
-        return self.place or Path("corrected" + ("" if self.leaves else self.program[0].suffix))
+        return self.place or Path("corrected" + ("" if self.leaves else self._sources[0].suffix))
 
     @property
     def leaves(self) -> tuple[str, ...]:
         """Patterns of the files that a program of several leaves in the folder; none for one file."""
-        from flexcal.jobs.deployment import with_companions
+        names = [glob.escape(file.name) for file in self._sources]
+        return tuple(names) if len(names) > 1 else ()
+
+    @property
+    def _sources(self) -> list[Path]:
+        """Files that the new program has too."""
+        from flexcal.jobs.deployment import written_files
 
         require_robot_and_files(self.robot, self.program, "program")
-        names = [glob.escape(file.name) for file in with_companions(self.program)]
-        return tuple(names) if len(names) > 1 else ()
+        return written_files(self.program)
 
     def run(self) -> None:
         """Correct the program, and print each target and what stays as it is."""
@@ -111,30 +119,41 @@ class Filter:
             flange=self.flange,
             reverse=self.reverse,
             subdivide=None if self.subdivide is None else self.subdivide * MILLIMETRE,
+            page=self.report,
+            command=command_line(),
         )
         document = result.document()
         rows = document["targets"]
         console.say(result.headline)
-        for item in rows[:_LISTED]:
-            numbers = ", ".join(f"{value:.6f}" for value in item["after"])
+        listed = rows if self.dry_run else rows[:_LISTED]
+        for item in listed:
             console.say(
-                f"line {item['line']}: {item['name']}: [{numbers}], moved by {item['shift_mm']:.3f} mm and {item['turn_deg']:.3f}°"
+                f"line {item['line']}: {item['motion']} {item['name']}: [{_numbers(item['before'])}] → [{_numbers(item['after'])}], "
+                f"moved by {item['shift_mm']:.3f} mm and {item['turn_deg']:.3f}°"
             )
-        if len(rows) > _LISTED:
-            console.say(f"{len(rows) - _LISTED} more under targets in --json")
+        if len(rows) > len(listed):
+            console.say(f"{len(rows) - len(listed)} more with --dry-run, and under targets in --json")
         for item in document["left"]:
             console.say(f"left as it is: line {item['line']}: {item['text']}: {item['reason']}")
         for remark in document["remarks"]:
             console.say(remark)
+        if self.report is not None:
+            console.say(f"wrote {self.report}")
         where = estimates_option(self.estimates)
         given = " ".join(map(str, self.program))
         if self.dry_run:
             console.finish(document, f"flexcal filter {self.robot} {given}{where} --out {out} writes it")
             return
         console.say(f"wrote {out}")
-        new = " ".join(str(out / file.name) for file in self.program) if self.leaves else str(out)
+        tables = [file for file in self.program if file not in self._sources]
+        files = [out / file.name for file in self._sources] if self.leaves else [out]
+        new = " ".join(map(str, [*files, *tables]))
         back = "ORIGINAL" if self.leaves else f"ORIGINAL{out.suffix}"
         console.finish(
             document,
             f"run {out} slowly first; the way back: flexcal filter {self.robot} {new} --reverse --out {back}{where}",
         )
+
+
+def _numbers(values: list[float]) -> str:
+    return ", ".join(f"{value:.6f}".rstrip("0").rstrip(".") for value in values)

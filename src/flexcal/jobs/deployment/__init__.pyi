@@ -1,8 +1,9 @@
 from .compensation import Compensation, compensate, compensate_robot
 from .export import ExportedRobot, export_robot, export_stored_robot
+from .filtered_program import FilteredProgram
 from .prediction import Prediction, predict, predict_robot
-from .program_files import with_companions
-from .program_filter import FilteredProgram, filter_program, filter_program_file
+from .program_files import read_program, written_files
+from .program_filter import filter_program, filter_program_file
 from .xacro_export import ExportedXacro, export_xacro
 
 __all__ = [
@@ -20,5 +21,6 @@ __all__ = [
     "filter_program_file",
     "predict",
     "predict_robot",
-    "with_companions",
+    "read_program",
+    "written_files",
 ]

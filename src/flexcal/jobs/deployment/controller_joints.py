@@ -54,6 +54,15 @@ class ControllerJoints:
         """Joint positions (..., 6) of the controller, rad or m, of those of the URDF."""
         return (q - self.zeros) @ np.linalg.inv(self._matrix).T
 
+    def base_error(self) -> float:
+        """Height (m) of axis 2 above the origin of the controller's base frame, where that should lie at its height; else 0."""
+        if self.dialect.zero is None or not self.dialect.zero.base_at_axis_2:
+            return 0.0
+        base = controller_base(self.nominal)
+        _, origin = link_frames(self.nominal, self.to_urdf(np.zeros(6))[None])
+        axis_2 = self.nominal.joints.index(self.nominal.motor_joints[1])
+        return float((base.rotation.T @ (origin[0, axis_2] - base.position))[2])
+
     def differing(self) -> str:
         """What of the arm does not stand at the controller's zero as that of the maker does; empty where all does, or nothing is known."""
         zero = self.dialect.zero

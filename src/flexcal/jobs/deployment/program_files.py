@@ -13,11 +13,36 @@ _ENCODINGS = ("utf-8", "latin-1")
 """Every byte stands for a character in the second, and comes back as it was."""
 
 
-def read_program(files: Sequence[Path]) -> Program:
-    """Program in files of one dialect, and in those that belong to them by their names, as PART.dat to PART.src.
+def read_program(*paths: str | Path) -> Program:
+    """Read a robot program.
 
-    Raises `InputError` for a file that does not exist or cannot be read, for an unknown suffix, and for files of two dialects.
+    Parameters
+    ----------
+    paths : str or Path
+        Its files, of one dialect. Files that belong to them by their names, as PART.dat to PART.src, are read too.
+
+    Returns
+    -------
+    Program
+        `targets` that are written as numbers, and those `computed` when the program runs.
+
+    Raises
+    ------
+    InputError
+        For a file that does not exist or cannot be read, for an unknown suffix, and for files of two dialects.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from flexcal import read_program
+    >>> file = Path(tempfile.mkdtemp()) / "a.script"
+    >>> _ = file.write_text("movej([-0.4, -1.2, 1.9, -2.2, -1.5, 0.2])\\nmovel(pose_add(a, b))")
+    >>> program = read_program(file)
+    >>> program.targets[0].values, program.computed[0].text
+    ((-0.4, -1.2, 1.9, -2.2, -1.5, 0.2), 'movel(pose_add(a, b))')
     """
+    files = [Path(path) for path in paths]
     dialects = [dialect_of(file) for file in files]
     for file, dialect in zip(files, dialects, strict=True):
         if dialect is not dialects[0]:
@@ -51,6 +76,20 @@ def with_companions(files: Sequence[Path]) -> list[Path]:
     return every
 
 
+def written_files(files: Sequence[Path]) -> list[Path]:
+    """Those of the files, and of those that belong to them, that the new program has; tables of frames are only read.
+
+    Raises `InputError` as `with_companions`, and where none is left.
+    """
+    every = with_companions(files)
+    kept = [file for file in every if file.suffix.lower() not in dialect_of(file).tables]
+    if not kept:
+        raise InputError(
+            "E-PROG-015", f"{every[0]} holds frames and tools, no program; name the program's file before it."
+        )
+    return kept
+
+
 def output_places(files: Sequence[Path], out: Path) -> list[Path]:
     """Where each file of a new program goes: one to `out`, several into the folder `out` under their names.
 
@@ -73,9 +112,10 @@ def output_places(files: Sequence[Path], out: Path) -> list[Path]:
     return places
 
 
-def write_program(files: Sequence[ProgramFile], out: Path) -> list[Path]:
+def write_program(program: Sequence[ProgramFile], out: Path) -> list[Path]:
     """Write the files of a program, all or none, and return where; raises `InputError` as `output_places`."""
-    sources = [Path(file.name) for file in files]
+    sources = written_files([Path(file.name) for file in program])
+    files = [file for file in program if Path(file.name) in sources]
     places = output_places(sources, out)
     contents = [
         file.text.encode(_encoding(source.read_bytes())) for file, source in zip(files, sources, strict=True)

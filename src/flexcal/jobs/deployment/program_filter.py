@@ -3,130 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from flexcal.compensation import ToolPoseTarget, motor_commands, nominal_joint_positions
 from flexcal.data.poses import ToolTargets
 from flexcal.errors import FlexcalError, InputError
+from flexcal.files.formats import provenance
 from flexcal.jobs.deployment.controller_joints import ControllerJoints
 from flexcal.jobs.deployment.controller_poses import ControllerPoses
+from flexcal.jobs.deployment.filtered_program import FilteredProgram, ToolPoses
 from flexcal.jobs.deployment.path_corrections import PathCorrections, deviations_of_targets, path_remarks
-from flexcal.jobs.deployment.program_files import output_places, read_program, write_program
+from flexcal.jobs.deployment.program_files import output_places, read_program, written_files
 from flexcal.jobs.inputs import CalibratedRobot, unmeasured_lengths_remark
-from flexcal.jobs.pages import Result
-from flexcal.model.parts import rotation_vector
+from flexcal.jobs.result_files import RunRecord
 from flexcal.model.robot import RobotModel, with_point_at_frame
 from flexcal.model.statics import tool_at_rest
-from flexcal.programs import Dialect, NewNumbers, Pose, Program, ProgramFile
+from flexcal.programs import Dialect, Pose, Program
 from flexcal.units import MILLIMETRE
 
+_BASE_ERROR = 1e-3
+"""Distance (m) from which on a base frame is another one."""
 _FLANGE = "tool0"
 """Frame of a Universal Robots' URDF in which the controller gives tools."""
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class FilteredProgram(Result):
-    """Result of `filter_program`.
-
-    Attributes
-    ----------
-    model : RobotModel
-        The calibrated robot.
-    program : Program
-        The program that was read.
-    new : dict
-        Numbers in the new program by index of target, in the program's units; targets that stay as they are have none.
-    between : dict
-        Numbers of points that are inserted on the way to targets, by the index of the move in `program.moves`.
-    missed : ndarray
-        Largest distance (N,), m, on the line or arc to a target between the needed correction and the interpolation of the corrected ends,
-        before points are inserted; NaN where there is none, or it is not known.
-    shift : ndarray
-        Distance (N,), m, between the flange of the nominal robot at the new and at the old numbers.
-    turn : ndarray
-        Angle (N,), rad, between these two.
-    reasons : tuple of str
-        Why a target stays as it is; empty where it does not.
-    remarks : tuple of str
-        What makes the new numbers doubtful.
-    """
-
-    program: Program
-    new: dict[int, NewNumbers]
-    between: dict[int, list[NewNumbers]]
-    missed: np.ndarray
-    shift: np.ndarray
-    turn: np.ndarray
-    reasons: tuple[str, ...]
-    remarks: tuple[str, ...]
-
-    @property
-    def files(self) -> tuple[ProgramFile, ...]:
-        """Files of the new program."""
-        return self.program.rewritten(self.new, self.between)
-
-    @property
-    def headline(self) -> str:
-        """Number of targets that were corrected, and by how much."""
-        done = np.isfinite(self.shift)
-        if not len(done):
-            return "no motion of the program has a target that is written as numbers"
-        if not done.any():
-            return f"none of {len(self.reasons)} targets corrected"
-        shift = self.shift[done] / MILLIMETRE
-        left = len(self.program.computed) + int((~done).sum())
-        return (
-            f"{int(done.sum())} targets corrected by {shift.mean():.3f} mm on average, {shift.max():.3f} mm at most; "
-            f"{left} motions left as they are"
-        )
-
-    def summary(self) -> str:
-        """Number of corrected targets, those left with their reasons, and remarks."""
-        left = [f"line {item['line']}: {item['text']}: {item['reason']}" for item in self.left]
-        return "\n".join([self.headline, *left, *self.remarks])
-
-    @property
-    def left(self) -> list[dict[str, Any]]:
-        """Line, text and reason of every target that stays as it is."""
-        name = {k: file.name for k, file in enumerate(self.program.files)}
-        own = [
-            {"file": name[target.file], "line": target.line, "text": target.name, "reason": reason}
-            for target, reason in zip(self.program.targets, self.reasons, strict=True)
-            if reason
-        ]
-        found = [
-            {"file": name[item.file], "line": item.line, "text": item.text, "reason": item.reason}
-            for item in self.program.computed
-        ]
-        return sorted([*own, *found], key=lambda item: (item["file"], item["line"]))
-
-    def document(self) -> dict[str, Any]:
-        """JSON document: every target with its numbers before and after, and what stays as it is."""
-        corrected = [
-            {
-                "file": self.program.files[target.file].name,
-                "line": target.line,
-                "name": target.name,
-                "motion": target.motion,
-                "kind": "joints" if target.joints else "pose",
-                "before": list(target.values),
-                "after": list(self.new[k].values),
-                "configuration": list(self.new[k].words),
-                "shift_mm": float(self.shift[k] / MILLIMETRE),
-                "turn_deg": float(np.rad2deg(self.turn[k])),
-                "between_mm": float(self.missed[k] / MILLIMETRE) if np.isfinite(self.missed[k]) else None,
-                "inserted": sum(
-                    len(points) for m, points in self.between.items() if self.program.moves[m].end == k
-                ),
-            }
-            for k, target in enumerate(self.program.targets)
-            if k in self.new
-        ]
-        return {"targets": corrected, "left": self.left, "remarks": list(self.remarks)}
 
 
 def filter_program(
@@ -171,7 +72,7 @@ def filter_program(
     Returns
     -------
     FilteredProgram
-        `files` is the new program.
+        `files` is the new program, `write(path)` writes it, `report(path)` a page; `summary()` names what stays as it is.
 
     Raises
     ------
@@ -179,6 +80,22 @@ def filter_program(
         For a robot without six joints, and a frame that the URDF lacks.
     InputError
         For `subdivide` that is not positive, or given with `reverse`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from flexcal import RobotModel, calibrate, filter_program, read_poses, read_program
+    >>> model = RobotModel.from_yaml("examples/ur5_tracker/robot.yaml", estimates=False)
+    >>> poses = read_poses("examples/ur5_tracker/grid.csv", model).subset(slice(None, None, 13))
+    >>> robot = calibrate(model, poses, terms=["kinematic"]).robot
+    >>> folder = Path(tempfile.mkdtemp())
+    >>> _ = (folder / "a.script").write_text("movej([-0.4, -1.2, 1.9, -2.2, -1.5, 0.2], a=1.4)")
+    >>> filtered = filter_program(robot, read_program(folder / "a.script"))
+    >>> filtered.files[0].text.startswith("movej([-0.")
+    True
+    >>> [place.name for place in filtered.write(folder / "b.script")]
+    ['b.script']
     """
     if subdivide is not None and (reverse or not subdivide > 0):
         raise InputError(
@@ -200,27 +117,25 @@ def filter_program(
         None if beginning is None else joints.to_urdf(beginning),
     )
     q, reasons = places.joints(program.targets)
-    after, new = np.full((len(q), 6), np.nan), {}
+    commands, new = np.full((len(q), 6), np.nan), {}
     rows = np.array([k for k, reason in enumerate(reasons) if not reason], dtype=int)
     if len(rows):
         masses, payload_remarks = _payloads(model, program, rows)
         targets = ToolTargets(rows, np.full(len(rows), flange), q[rows], payload=masses)
-        after[rows], failures = (_nominal if reverse else _commands)(model, nominal, targets)
+        commands[rows], failures = (_nominal if reverse else _commands)(model, nominal, targets)
         for row, failure in zip(rows.tolist(), failures, strict=True):
             reasons[row] = failure
         done = np.array([k for k in rows if not reasons[k]], dtype=int)
-        numbers = places.new_numbers([program.targets[k] for k in done], q[done], after[done])
+        commands[[k for k in rows if reasons[k]]] = np.nan
+        numbers = places.new_numbers([program.targets[k] for k in done], q[done], commands[done])
         new = dict(zip(done.tolist(), numbers, strict=True))
     else:
         done, masses, payload_remarks = rows, None, ()
-    paths = PathCorrections(model, places, program, q, after, _by_target(masses, rows, len(q)))
+    paths = PathCorrections(model, places, program, q, commands, _by_target(masses, rows, len(q)))
     deviations = np.full(len(program.moves), np.nan) if reverse else paths.deviations()
     between = {} if subdivide is None else paths.divisions(deviations, subdivide)
-    shift, turn = np.full(len(q), np.nan), np.full(len(q), np.nan)
-    if len(done):
-        (there, turned), (here, was) = places.poses(after[done]), places.poses(q[done])
-        shift[done] = np.linalg.norm(there - here, axis=1)
-        turn[done] = np.linalg.norm(rotation_vector(turned @ np.swapaxes(was, 1, 2)), axis=1)
+    missed = deviations_of_targets(program.moves, deviations, len(q))
+    before, corrected = (ToolPoses.of(places, program.targets, each) for each in (q, commands))
     remarks = (
         *unmeasured_lengths_remark(robot),
         *_convention_remarks(joints),
@@ -228,8 +143,9 @@ def filter_program(
         *payload_remarks,
         *path_remarks(program, deviations, subdivide, between),
     )
-    missed = deviations_of_targets(program.moves, deviations, len(q))
-    return FilteredProgram(model, program, new, between, missed, shift, turn, tuple(reasons), remarks)
+    return FilteredProgram(
+        model, program, new, between, missed, commands, before, corrected, tuple(reasons), remarks, reverse
+    )
 
 
 def filter_program_file(
@@ -245,14 +161,19 @@ def filter_program_file(
     flange: str = _FLANGE,
     reverse: bool = False,
     subdivide: float | None = None,
+    page: Path | None = None,
+    command: str = "",
 ) -> FilteredProgram:
-    """`filter_program` for files, and those that belong to them; the new program goes to `out`, or nowhere (None).
+    """`filter_program` for files, and those that belong to them; the new program goes to `out`, or nowhere (None), a page to `page`.
 
     It is the old one byte for byte but for the numbers: one file to the file `out`, several into the folder `out` under their names.
     """
-    program = read_program(files)
+    program = read_program(*files)
+    sources = [Path(file.name) for file in program.files]
     if out is not None:
-        output_places([Path(file.name) for file in program.files], out)
+        output_places(written_files(sources), out)
+    if page is not None and page.suffix.lower() != ".html":
+        raise InputError("E-PROG-012", f"{page} must end in .html; give another --report.")
     robot = CalibratedRobot.from_yaml(robot_file, estimates)
     result = filter_program(
         robot,
@@ -265,8 +186,12 @@ def filter_program_file(
         reverse=reverse,
         subdivide=subdivide,
     )
+    origin = provenance([robot_file, robot.nominal.urdf, *sources], None, robot.stored, tuple(robot.blocks))
+    result = replace(result, record=RunRecord(origin, command))
+    if page is not None:
+        result.report(page)
     if out is not None:
-        write_program(result.files, out)
+        result.write(out)
     return result
 
 
@@ -294,16 +219,21 @@ def _checked(name: str, values: Sequence[float], count: int, meaning: str) -> np
 
 
 def _convention_remarks(joints: ControllerJoints) -> tuple[str, ...]:
-    """What is taken of the signs and zeros of the joints, for dialects whose arms have them by custom."""
+    """What is taken of the signs and zeros of the joints and of the base frame, for dialects whose arms have them by custom."""
     if joints.dialect.zero is None:
         return ()
-    differing = joints.differing()
-    if not differing:
-        return ()
-    return (
-        f"joint positions and configuration data count as those of the URDF, but its arm at zero is not that of {joints.dialect.name}: "
-        f"{differing}; give --joint-signs and --joint-zeros if the controller counts otherwise",
-    )
+    remarks, name = [], joints.dialect.name
+    if differing := joints.differing():
+        remarks.append(
+            f"joint positions and configuration data count as those of the URDF, but its arm at zero is not that of {name}: "
+            f"{differing}; give --joint-signs and --joint-zeros if the controller counts otherwise"
+        )
+    if abs(height := joints.base_error()) > _BASE_ERROR:
+        remarks.append(
+            f"poses count in the frame base of the URDF, else in its root, and axis 2 lies {height / MILLIMETRE:.1f} mm above it, but the "
+            f"base frame of {name} lies at the height of axis 2; add a fixed frame 'base' there to the URDF"
+        )
+    return tuple(remarks)
 
 
 def _by_target(masses: np.ndarray | None, rows: np.ndarray, count: int) -> np.ndarray | None:

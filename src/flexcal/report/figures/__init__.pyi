@@ -24,6 +24,7 @@ from .residuals import (
 )
 from .robot_arm import arm_poses, links_at
 from .tilts import tilt_joints, tilt_order
+from .tool_path import program_path
 from .torques import torque_spectra, torque_traces
 from .trajectory_plan import limit_shares, prior_gains, swept_paths
 
@@ -55,6 +56,7 @@ __all__ = [
     "predicted_quantiles",
     "predicted_springs",
     "prior_gains",
+    "program_path",
     "residual_joints",
     "residual_torque",
     "residual_trend",

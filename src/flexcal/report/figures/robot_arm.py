@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -45,23 +45,28 @@ def arm_poses(arms: ArmPoses, labels: Mapping[str, str], factors: Mapping[str, f
     for number, (model, label) in enumerate(labels.items()):
         vectors, factor = arms.errors[model], factors[model]
         colour = ELASTIC if model == CALIBRATED else RIGID
-        chosen = {"meta": {"arrows": label, "exaggeration": factor}, "visible": number == 0}
-        drawn = factor * vectors
-        ends = tips + drawn
-        figure.add_trace(polyline(np.stack([tips, ends], axis=1), "error", colour, 5.0).update(chosen))
         sizes = np.linalg.norm(vectors, axis=1) / MILLIMETRE
-        figure.add_trace(
-            go.Cone(
-                x=as_float32(ends[:, 0]), y=as_float32(ends[:, 1]), z=as_float32(ends[:, 2]),
-                u=as_float32(drawn[:, 0]), v=as_float32(drawn[:, 1]), w=as_float32(drawn[:, 2]),
-                anchor="tip", sizemode="raw", sizeref=_HEAD, showscale=False, colorscale=[[0, colour], [1, colour]],
-                lighting={"ambient": 0.9, "diffuse": 0.3},
-                text=[f"pose {k}: {size:.3f} mm" for k, size in zip(arms.pose, sizes, strict=True)],
-                hovertemplate="%{text}<extra></extra>", **chosen,
+        texts = [f"pose {k}: {size:.3f} mm" for k, size in zip(arms.pose, sizes, strict=True)]
+        for trace in arrows(tips, factor * vectors, "error", colour, texts):
+            figure.add_trace(
+                trace.update({"meta": {"arrows": label, "exaggeration": factor}, "visible": number == 0})
             )
-        )  # fmt: skip
     figure.update_layout(scene=space_axes(), margin={"l": 0, "r": 0, "t": 40, "b": 0})
     return figure
+
+
+def arrows(
+    tips: np.ndarray, vectors: np.ndarray, name: str, colour: str, texts: Sequence[str]
+) -> tuple[go.Scatter3d, go.Cone]:
+    """Arrows `vectors` (N, 3) from `tips` (N, 3), m, as lines and heads with a text each."""
+    ends = tips + vectors
+    heads = go.Cone(
+        x=as_float32(ends[:, 0]), y=as_float32(ends[:, 1]), z=as_float32(ends[:, 2]),
+        u=as_float32(vectors[:, 0]), v=as_float32(vectors[:, 1]), w=as_float32(vectors[:, 2]),
+        anchor="tip", sizemode="raw", sizeref=_HEAD, showscale=False, colorscale=[[0, colour], [1, colour]],
+        lighting={"ambient": 0.9, "diffuse": 0.3}, text=list(texts), hovertemplate="%{text}<extra></extra>",
+    )  # fmt: skip
+    return polyline(np.stack([tips, ends], axis=1), name, colour, 5.0), heads
 
 
 def space_axes() -> dict[str, Any]:

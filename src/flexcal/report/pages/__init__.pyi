@@ -12,6 +12,7 @@ from .inclinations import InclinationStudy, inclination_checks, inclination_page
 from .inertials import InertialsStudy, inertials_checks, inertials_page
 from .payload import PayloadStudy, payload_page
 from .pose_design import PoseStudy, pose_page
+from .program import ProgramStudy, program_page
 from .repeatability import RepeatabilityStudy, repeatability_page
 from .run_comparison import comparison_page
 from .stiffness import StiffnessStudy, stiffness_checks, stiffness_page
@@ -31,6 +32,7 @@ __all__ = [
     "MapStudy",
     "PayloadStudy",
     "PoseStudy",
+    "ProgramStudy",
     "RepeatabilityStudy",
     "ResponseStudy",
     "StiffnessStudy",
@@ -51,6 +53,7 @@ __all__ = [
     "map_page",
     "payload_page",
     "pose_page",
+    "program_page",
     "repeatability_page",
     "response_page",
     "stiffness_checks",

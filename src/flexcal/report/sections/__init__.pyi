@@ -1,7 +1,7 @@
 from .base_parameters import base_parameters_section
 from .first_screen import error_range, headline_facts
 from .friction import friction_section
-from .geometry import arm_figure, error_figures, geometry_section
+from .geometry import ARROW_FACTORS, arm_figure, error_figures, exaggeration, geometry_section
 from .headline_numbers import comparison_section
 from .held_out import held_out_section
 from .identifiability import identifiability_blocks
@@ -25,6 +25,7 @@ from .uncertainty_budget import budget_table, noise_tables
 from .verification import verification_section
 
 __all__ = [
+    "ARROW_FACTORS",
     "MeasuredWords",
     "arm_figure",
     "base_parameters_section",
@@ -34,6 +35,7 @@ __all__ = [
     "coverage",
     "error_figures",
     "error_range",
+    "exaggeration",
     "friction_section",
     "geometry_section",
     "hardening_sentence",

@@ -20,7 +20,8 @@ _ARROW_LENGTH = 0.25
 _OVER_SPACING = 2.5
 """The same over the distance between neighbouring points, where they are many."""
 
-_FACTORS = tuple(float(m * 10**k) for k in range(5) for m in (1, 2, 5))
+ARROW_FACTORS = tuple(float(m * 10**k) for k in range(5) for m in (1, 2, 5))
+"""Factors by which arrows can be exaggerated."""
 _ARROWS = {CALIBRATED: "after calibration", NOMINAL: "before, the robot's own"}
 
 
@@ -65,7 +66,7 @@ def arm_figure(arms: ArmPoses, poses: PoseSet) -> FigureBlock:
         f"zoom. Arrows point {words.arrow}, exaggerated as chosen above; the longest is {largest}.",
         f"Three-dimensional drawing of the arm {drawn} with exaggerated error arrows; the longest is {largest}.",
         (Selector("Error arrows", "arrows", tuple(labels.values())),),
-        Slider("Exaggeration", "arrows", _FACTORS, {labels[model]: factors[model] for model in labels}),
+        Slider("Exaggeration", "arrows", ARROW_FACTORS, {labels[model]: factors[model] for model in labels}),
     )
 
 
@@ -116,7 +117,7 @@ def component_figure(poses: PoseSet, residuals: np.ndarray) -> FigureBlock:
 def exaggeration(errors: np.ndarray, length: float) -> float:
     """The factor of the slider by which the largest of `errors` (N, 3) m becomes about `length` (m) long."""
     wanted = length / max(float(np.linalg.norm(errors, axis=1).max(initial=0.0)), 1e-9)
-    return max((factor for factor in _FACTORS if factor <= wanted * 1.001), default=_FACTORS[0])
+    return max((factor for factor in ARROW_FACTORS if factor <= wanted * 1.001), default=ARROW_FACTORS[0])
 
 
 def _spacing(points: np.ndarray) -> float:
