@@ -13,6 +13,7 @@ import numpy as np
 
 from flexcal.compensation import motor_commands
 from flexcal.data.poses import ToolTargets
+from flexcal.dynamics.torque_model import TorqueModel
 from flexcal.export import render_runtime
 from flexcal.model.kinematics import joint_ranges
 from flexcal.model.robot import GEOMETRY, RobotModel
@@ -33,7 +34,7 @@ def run() -> Iterator[tuple[str, float, str]]:
             nominal = RobotModel.from_yaml(ROOT / "examples" / robot / "robot.yaml", estimates=False)
             real = _disturbed(nominal)
             file = Path(folder) / f"{robot}.json"
-            file.write_text(render_runtime(real, nominal).text)
+            file.write_text(render_runtime(real, nominal, TorqueModel.of(real).document()).text)
             said = subprocess.run(
                 [program, file, str(CALLS)], check=True, capture_output=True, text=True
             ).stdout.splitlines()

@@ -21,6 +21,7 @@ from .dynamics.estimators import (
     PowerModel,
 )
 from .dynamics.residual import read_learned_residual
+from .dynamics.torque_model import TorqueModel
 from .errors import FlexcalError, InputError
 from .estimation import Estimate
 from .export import export_urdf
@@ -47,6 +48,7 @@ from .jobs.deployment import (
     filter_program,
     predict,
     read_program,
+    read_torque_model,
 )
 from .jobs.dynamics import DynamicsIdentification, identify_dynamics
 from .jobs.experiments import (
@@ -125,6 +127,7 @@ __all__ = [
     "RobotModel",
     "StiffnessIdentification",
     "ToolTargets",
+    "TorqueModel",
     "TrajectoryPlan",
     "TrajectoryRequest",
     "Verification",
@@ -163,6 +166,7 @@ __all__ = [
     "read_program",
     "read_recording",
     "read_targets",
+    "read_torque_model",
     "read_yaml",
     "repeatability",
     "rigid_motion",

@@ -16,6 +16,9 @@ class RuntimeRobot:
     def compensate(
         self, q: np.ndarray, point: int, payload: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
+    def torque(
+        self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, payload: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
     def inverse(
         self, position: np.ndarray, rotation: np.ndarray, near: np.ndarray, point: int, payload: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from flexcal import CalibratedRobot, compensate
+from flexcal import CalibratedRobot, compensate, read_torque_model
 from flexcal.cli.main import main
 from flexcal.data.poses import ToolTargets
 from flexcal.jobs.serving import Answers, serve_tcp, serve_unix
@@ -274,3 +274,11 @@ def test_places_that_cannot_be_listened_on_are_refused(
     for options in ([], ["--unix", "s", "--port", "1"]):
         assert main(["serve", str(robot_file), *options]) == 2
         assert "E-CLI-044" in capsys.readouterr().err
+
+
+def test_torques_are_those_of_the_library(robot_file: Path) -> None:
+    q, dq, ddq = Q, [0.1] * 6, [-0.5] * 6
+    answers = Answers.from_yaml(robot_file)
+    found = json.loads(answers.of(json.dumps({"do": "torque", "q": q, "dq": dq, "ddq": ddq}).encode()))
+    expected = read_torque_model(robot_file).torque(*(np.array([values]) for values in (q, dq, ddq)))
+    np.testing.assert_allclose(found["torque"], expected[0], rtol=0, atol=1e-9)

@@ -11,6 +11,7 @@ import pytest
 
 from flexcal.compensation import desired_pose, motor_commands
 from flexcal.data.poses import ToolTargets
+from flexcal.dynamics.torque_model import TorqueModel
 from flexcal.export import render_runtime
 from flexcal.kernels import RuntimeRobot
 from flexcal.model.kinematics import joint_ranges
@@ -98,7 +99,7 @@ def robots(
 
 
 def runtime(real: RobotModel, nominal: RobotModel) -> RuntimeRobot:
-    return RuntimeRobot.read(render_runtime(real, nominal).text)
+    return RuntimeRobot.read(render_runtime(real, nominal, TorqueModel.of(real).document()).text)
 
 
 def drawn(nominal: RobotModel, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -227,7 +228,7 @@ def test_a_payload_that_is_not_declared_is_refused(ur5: RobotModel) -> None:
 def test_broken_files_are_refused_in_a_sentence(tx90l: RobotModel, seed: int) -> None:
     """Members and numbers taken out, replaced or cut: a sentence, or a robot that answers, never a crash."""
     rng = np.random.default_rng(seed)
-    text = render_runtime(tx90l, tx90l).text
+    text = render_runtime(tx90l, tx90l, TorqueModel.of(tx90l).document()).text
     q = np.array([[0.3, 0.5, 1.2, 0.4, 0.9, -0.5]])
     for _ in range(50):
         first = int(rng.integers(len(text)))
@@ -249,7 +250,7 @@ def test_broken_files_are_refused_in_a_sentence(tx90l: RobotModel, seed: int) ->
 
 
 def test_other_documents_are_refused(tx90l: RobotModel) -> None:
-    document = json.loads(render_runtime(tx90l, tx90l).text)
+    document = json.loads(render_runtime(tx90l, tx90l, TorqueModel.of(tx90l).document()).text)
     for change, said in (
         ({"format": "flexcal robot"}, "no robot of 'flexcal export runtime'"),
         ({"version": 2}, "another version than 1"),

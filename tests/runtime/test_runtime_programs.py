@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flexcal.dynamics.torque_model import TorqueModel
 from flexcal.export import render_runtime
 from flexcal.kernels import RuntimeRobot
 from flexcal.model.robot import RobotModel
@@ -99,7 +100,8 @@ def run(*command: str | Path, **options: object) -> str:
 def texts(tx90l: RobotModel) -> tuple[str, str]:
     """The elastic robot for the runtime, as JSON and as a header."""
     real = tx90l.with_values({"joint_2.offset": 1e-3, "joint_3.length_x": 4e-4, "joint_2.backlash": 5e-5})
-    return render_runtime(real, tx90l).text, render_runtime(real, tx90l, header=True).text
+    drives = TorqueModel.of(real).document()
+    return render_runtime(real, tx90l, drives).text, render_runtime(real, tx90l, drives, header=True).text
 
 
 @pytest.fixture(scope="module")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -19,9 +20,12 @@ VERSION = 1
 _POSE = 6
 
 
-def render_runtime(model: RobotModel, nominal: RobotModel, *, header: bool = False) -> RenderedModel:
+def render_runtime(
+    model: RobotModel, nominal: RobotModel, drives: Mapping[str, Any], *, header: bool = False
+) -> RenderedModel:
     """The `model` that the robot really is, and the `nominal` one that says where its tool is to be, as the runtime reads them.
 
+    `drives` is the document of its `TorqueModel`.
     With `header` the text is a C and C++ header with the document as the constant `flexcal_robot`.
     Raises `FlexcalError` for a robot without points, and one whose joints follow others.
     """
@@ -36,7 +40,8 @@ def render_runtime(model: RobotModel, nominal: RobotModel, *, header: bool = Fal
         "reach": model.reach,
         "gravity": model.gravity.tolist(),
         "tilts_first": model.bearings == "before",
-        "joints": [_joint(model, nominal, i) for i in range(len(model.joints))],
+        "joints": [_joint(model, nominal, i) | drives["joints"][i] for i in range(len(model.joints))],
+        "couplings": drives["couplings"],
         "points": [_point(model, nominal, name) for name in model.points],
         "payload": None
         if payload is None
@@ -45,6 +50,7 @@ def render_runtime(model: RobotModel, nominal: RobotModel, *, header: bool = Fal
             "com": payload.com_in_link.tolist(),
             "mass": payload.mass,
             "scale": payload.mass / payload.nominal_mass if payload.nominal_mass else 1.0,
+            "inertia": drives["payload_inertia"],
         },
     }
     text = json.dumps(document, indent=1, allow_nan=False) + "\n"

@@ -54,6 +54,22 @@ struct PayloadData {
     Vector3 com{0, 0, 0};  // m, in the joint's link
     double mass = 0;       // kg, as declared
     double scale = 1;      // true mass per mass said
+    double inertia[6] = {0, 0, 0, 0, 0, 0};  // of 1 kg about the link frame's origin, kg m²
+};
+
+// What a joint's motor gives beside what moves the links; N m, or N of a prismatic joint, referred to the joint.
+struct DriveData {
+    double inertia[6];  // of the link about its frame's origin: xx, xy, xz, yy, yz, zz, kg m²
+    double rotor_inertia, viscous, coulomb, torque_offset;
+    double coulomb_asymmetry, sublinear_viscous, presliding, stribeck, load_coulomb, load_stribeck;  // of the motor's axis
+    double stribeck_velocity, load_stribeck_velocity;
+    double spring_stiffness, spring_torque;
+};
+
+// Motors that also turn another joint: motor m turns at q_m + ratio q_j.
+struct CouplingData {
+    int motor, joint;
+    double ratio, rotor_inertia, viscous, coulomb;
 };
 
 // Where every number of one robot stands. Threads share it; each has a Solver of its own.
@@ -68,6 +84,8 @@ struct Model {
     std::vector<ElasticAxis> axes;  // from base to tool
     std::vector<double> stiffness;  // of the axes, N m/rad
     std::vector<double> mass, first_moment;  // (n,) kg, (n, 3) kg m
+    std::vector<DriveData> drives;
+    std::vector<CouplingData> couplings;
     std::vector<PointData> points;
     PayloadData payload;
 
@@ -188,6 +206,16 @@ class ModelReader {
             model.points.emplace_back();
             if (!point(each, model.size(), model.points.back())) return in("point", model.points.size() - 1);
         }
+        const auto* couplings = list(document, "couplings");
+        if (!couplings) return false;
+        for (const Json& each : *couplings) {
+            CouplingData data{};
+            if (!index(each, "motor", 0, model.size(), data.motor) || !index(each, "joint", 0, model.size(), data.joint) ||
+                !number(each, "ratio", data.ratio) || !number(each, "rotor_inertia", data.rotor_inertia) ||
+                !number(each, "viscous", data.viscous) || !number(each, "coulomb", data.coulomb))
+                return false;
+            model.couplings.push_back(data);
+        }
         const Json* held = document.member("payload");
         return !held || held->kind == Json::Kind::null || payload(*held, model.size(), model.payload);
     }
@@ -226,7 +254,8 @@ class ModelReader {
         const Vector3 across[2] = {place.normal_1, place.normal_2};
         Vector3* components[2] = {&data.lateral_1, &data.lateral_2};
         for (int k = 0; k < 2; ++k) *components[k] = {dot(across[k], place.bearing.x), dot(across[k], place.bearing.y), 0};
-        return springs(from, i, model) && transmission(from, i, count, model);
+        model.drives.emplace_back();
+        return springs(from, i, model) && transmission(from, i, count, model) && drive(from, model.drives.back());
     }
 
     bool springs(const Json& from, int i, Model& model) {
@@ -262,6 +291,21 @@ class ModelReader {
         return true;
     }
 
+    bool drive(const Json& from, DriveData& data) {
+        const std::pair<const char*, double*> all[] = {
+            {"rotor_inertia", &data.rotor_inertia}, {"viscous", &data.viscous}, {"coulomb", &data.coulomb},
+            {"torque_offset", &data.torque_offset}, {"coulomb_asymmetry", &data.coulomb_asymmetry},
+            {"sublinear_viscous", &data.sublinear_viscous}, {"presliding", &data.presliding}, {"stribeck", &data.stribeck},
+            {"load_coulomb", &data.load_coulomb}, {"load_stribeck", &data.load_stribeck}, {"stribeck_velocity", &data.stribeck_velocity},
+            {"load_stribeck_velocity", &data.load_stribeck_velocity}, {"spring_stiffness", &data.spring_stiffness},
+            {"spring_torque", &data.spring_torque},
+        };
+        for (const auto& [name, value] : all)
+            if (!number(from, name, *value)) return false;
+        if (!(data.stribeck_velocity > 0) || !(data.load_stribeck_velocity > 0)) return fail("a Stribeck velocity is not positive");
+        return numbers(from, "inertia", 6, data.inertia);
+    }
+
     bool point(const Json& from, int count, PointData& data) {
         return text(from, "name", data.name) && index(from, "joint", 0, count, data.joint) && index(from, "rows", 3, 7, data.rows) &&
                vector(from, "position", data.real.position) && turn(from, "rotation", data.real.rotation) &&
@@ -270,7 +314,7 @@ class ModelReader {
 
     bool payload(const Json& from, int count, PayloadData& data) {
         return index(from, "joint", 0, count, data.joint) && vector(from, "com", data.com) && number(from, "mass", data.mass) &&
-               number(from, "scale", data.scale);
+               number(from, "scale", data.scale) && numbers(from, "inertia", 6, data.inertia);
     }
 
     std::string error_;

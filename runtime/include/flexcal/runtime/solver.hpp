@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "flexcal/runtime/arm_at_rest.hpp"
+#include "flexcal/runtime/inverse_dynamics.hpp"
 
 namespace flexcal::runtime {
 
@@ -17,7 +18,7 @@ struct Pose {
 class Solver {
   public:
     explicit Solver(const Model& model)
-        : model_(model), n_(model.size()), arm_(model), prepared_(model.tree.prepare(model.geometry.data())),
+        : model_(model), n_(model.size()), arm_(model), dynamics_(model), prepared_(model.tree.prepare(model.geometry.data())),
           nominal_prepared_(model.nominal_tree.prepare(model.nominal_geometry.data())), frames_(n_), still_(3 * n_, 0.0),
           jacobian_(rows_ * n_), square_(rows_ * rows_), right_(rows_), q_(n_), origin_(n_), flank_(n_), held_(n_) {
         for (const PointData& point : model.points) paths_.push_back(model.tree.path(point.joint));
@@ -54,8 +55,15 @@ class Solver {
         return Status::ok;
     }
 
+    // Torques (n,) of the motors, N m, that move the robot so: links, payload, rotors and friction. The robot is rigid and warm.
+    [[nodiscard]] Status torque(const double* q, const double* dq, const double* ddq, double* result) {
+        if (!finite(q) || !finite(dq) || !finite(ddq)) return Status::bad_input;
+        dynamics_.torque(q, dq, ddq, payload_, result);
+        return Status::ok;
+    }
+
     // Torque (n,) of every motor against gravity where the last call left the arm, N m. Of a joint with backlash near 0, the side is doubtful.
-    const double* torque() const { return arm_.torque(); }
+    const double* rest_torque() const { return arm_.torque(); }
 
     // The joint that the last status is about; -1 where it is about none.
     int joint() const { return joint_; }
@@ -264,6 +272,7 @@ class Solver {
     const Model& model_;
     const int n_;
     ArmAtRest arm_;
+    InverseDynamics dynamics_;
     const std::vector<Prepared> prepared_, nominal_prepared_;
     std::vector<std::vector<int>> paths_;
     std::vector<Frames> frames_;

@@ -19,8 +19,8 @@ class Serve:
     """Answer programs on this machine about a calibrated robot: commands and poses, line by line, in any language.
 
     A line is a JSON object such as {"q": [0, -0.5, 1.6, 0, 0.6, 0]}, and its answer one with "status", "done" or why not, and "command".
-    "do" may be compensate, inverse, forward, nominal or describe. On a Unix socket that is yours alone, or a TCP port of this machine,
-    whose clients begin with the token. Ctrl-C stops it.
+    "do" may be compensate, inverse, forward, nominal, torque or describe. It listens on a Unix socket that is yours alone,
+    or on a TCP port of this machine, whose clients begin with the token. Ctrl-C stops it.
     """
 
     out: ClassVar[None] = None

@@ -4,6 +4,7 @@ from .filtered_program import FilteredProgram
 from .prediction import Prediction, predict, predict_robot
 from .program_files import read_program, written_files
 from .program_filter import filter_program, filter_program_file
+from .torque_model import read_torque_model
 from .xacro_export import ExportedXacro, export_xacro
 
 __all__ = [
@@ -22,5 +23,6 @@ __all__ = [
     "predict",
     "predict_robot",
     "read_program",
+    "read_torque_model",
     "written_files",
 ]

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from flexcal.calibration.fit import probable_robots
+from flexcal.dynamics.torque_model import TorqueModel
 from flexcal.errors import FlexcalError, InputError
 from flexcal.export import (
     FORMATS,
@@ -28,6 +29,7 @@ from flexcal.jobs.pages import Result
 from flexcal.model.robot import RobotModel, with_blocks
 
 _CONVENTIONS: dict[str, Convention] = {"dh": "standard", "mdh": "modified"}
+_NOMINAL_TORQUES = "No dynamics were identified: the torques of the runtime are those of the URDF's links and robot.yaml's friction."
 _HEADERS = (".h", ".hpp")
 _OPTIONS = {
     "point": ("dh", "mdh", "offsets"),
@@ -165,7 +167,11 @@ def export_robot(
             probable, nominal, point=point, keep_frames=keep_frames, undetermined=_undetermined(robot)
         )
     elif format == "runtime":
-        rendered = render_runtime(probable, robot.with_points, header=Path(path).suffix in _HEADERS)
+        drives = TorqueModel.of_blocks(probable, robot.blocks)
+        rendered = render_runtime(
+            probable, robot.with_points, drives.document(), header=Path(path).suffix in _HEADERS
+        )
+        rendered = replace(rendered, remarks=() if drives.identified else (_NOMINAL_TORQUES,))
     elif format == "mjcf":
         rendered = render_mjcf(probable, identified_actuators(robot))
     elif format == "isaac":

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from flexcal.dynamics.estimators import ESTIMATORS, EstimatorName
+from flexcal.dynamics.torque_model import velocity_options
 from flexcal.files.formats import provenance, read_estimates
 from flexcal.jobs.dynamics.identification import identify_dynamics
 from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
@@ -60,6 +61,7 @@ def identify_robot_dynamics(
         "hold_out": hold_out,
         "friction": ", ".join(identified.friction.labels),
         "flexible": flexible,
+        **velocity_options(identified.friction.terms),
     }
     used = source if blocks else None
     origin = provenance([robot_file, bare.urdf, *logs], options, used, tuple(blocks))

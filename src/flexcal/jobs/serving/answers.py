@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from flexcal.dynamics.torque_model import TorqueModel
 from flexcal.errors import FlexcalError
 from flexcal.export import render_runtime
 from flexcal.jobs.inputs import CalibratedRobot
@@ -26,7 +27,8 @@ class Answers:
     """Answers of one robot: a JSON object in a line for every line, and never an exception."""
 
     def __init__(self, robot: CalibratedRobot) -> None:
-        self._robot = RuntimeRobot.read(render_runtime(robot.probable, robot.with_points).text)
+        drives = TorqueModel.of_blocks(robot.probable, robot.blocks).document()
+        self._robot = RuntimeRobot.read(render_runtime(robot.probable, robot.with_points, drives).text)
         self._joints, self._points = self._robot.joint_names, self._robot.point_names
         self._name = robot.nominal.name
         self._free = np.zeros((0, len(self._joints)))
@@ -35,6 +37,7 @@ class Answers:
             "inverse": self._inverse,
             "forward": self._forward,
             "nominal": self._nominal,
+            "torque": self._torque,
             "describe": self._describe,
         }
 
@@ -91,6 +94,13 @@ class Answers:
             raise _UnclearError("'q' must be finite")
         position, rotation = self._robot.nominal(q, self._point(asked))
         return _placed(position[0], rotation[0])
+
+    def _torque(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+        q, dq, ddq = (self._positions(asked, key) for key in ("q", "dq", "ddq"))
+        torque, status, _ = self._robot.torque(q, dq, ddq, _payload(asked))
+        if status[0] != 0:
+            return {"status": RuntimeRobot.describe(int(status[0]))}
+        return {"status": _DONE, "torque": torque[0].tolist()}
 
     def _describe(self, asked: Mapping[str, Any]) -> dict[str, Any]:
         return {"status": _DONE, "robot": self._name, "joints": self._joints, "points": self._points}
