@@ -263,6 +263,13 @@ _UP = "{X 500,Y 0,Z 500,A 0,B 90,C 0,S 2,T 2}"
         (f"{_HEAD}PTP {_UP}\n", 0, "1 targets corrected"),
         (f"{_HEAD}PTP {_UP[:-9]},S 'B010',T 'B000010'}}\n", 0, "1 targets corrected"),
         (f"{_HEAD}PTP {_UP[:-9]},S 3,T 2}}\n", 0, "has the configuration (3, 2)"),
+        (f"{_HEAD}PTP {_UP.replace('Y 0', 'Y 5')}\n", 0, "1 targets corrected"),
+        (f"{_HEAD}PTP {_UP.replace('Y 0', 'Y 50')}\n", 0, "has the configuration (2, 2)"),
+        (
+            f"$ROBROOT={{X 0,Y 500,Z 0,A 0,B 0,C 0}}\n{_HEAD}PTP {_UP.replace('Y 0', 'Y 500')}\n",
+            0,
+            "1 targets corrected",
+        ),
         (f"{_HEAD}PTP {_UP[:-9]}}}\n", 0, "--start"),
         (f"{_HEAD}LIN {{X 10}}\n", 0, "only some of its numbers are written"),
         (f"{_HEAD}P1={_UP}\nP1.Z=600\nPTP P1\n", 0, "set more than once"),

@@ -208,6 +208,24 @@ _HOME = f"MoveAbsJ [[0,0,0,0,30,0],{_NONE}],v100,fine,tool0;\n"
         ("PROC a(robtarget p1)\nMoveL p1,v100,fine,tool0;\nENDPROC\n", 0, "or a parameter"),
         (_POINT + "MyMove p1,v100;\n", 0, "no motion with plain arguments goes to it"),
         (_POINT + "MoveJ p1,v100,fine,tool0;\n", 0, "1 targets corrected"),
+        (_POINT.replace("[0,0,0,0]", "[-1,0,0,0]") + "MoveJ p1,v100,fine,tool0;\n", 0, "1 targets corrected"),
+        (
+            _POINT.replace("[0,0,0,0]", "[2,0,0,0]") + "MoveJ p1,v100,fine,tool0;\n",
+            0,
+            "configuration (2, 0, 0, 0)",
+        ),
+        (
+            f"{_POINT}{_POINT.replace('p1', 'p2').replace('400,', '410,')}CONST robtarget a{{2,1}}:=[[p1],[p2]];\n"
+            "MoveL a{i,1},v100,fine,tool0;\n",
+            0,
+            "2 targets corrected",
+        ),
+        (
+            _POINT + "CONST robtarget a{2}:=[p1,p9];\nMoveL a{i},v100,fine,tool0;\n",
+            0,
+            "not all elements of a are written",
+        ),
+        (_POINT + "CONST robtarget a{1}:=[p1];\nMoveL a{2},v100,fine,tool0;\n", 0, "or it has no such one"),
         (_FLIPPED + "MoveJ p2,v100,fine,tool0;\n", 0, "has the configuration (0, 0, 0, 5)"),
         (_POINT + "ConfJ\\Off;\nMoveJ p1,v100,fine,tool0;\n", 0, "--start"),
         (_POINT + _HOME + "ConfJ \\Off;\nMoveJ p1,v100,fine,tool0;\n", 0, "2 targets corrected"),

@@ -41,6 +41,13 @@ class Configuration(ABC):
         """Whether a posture has the written configuration; next to a step both sides do."""
         return self._within(posture, words, _NEAR)
 
+    def distance(self, posture: np.ndarray, words: Sequence[str]) -> float:
+        """How far a posture is from the written configuration: 0 where it has it, infinite where the controller does not take it for that.
+
+        Of several solutions the controller takes the nearest one.
+        """
+        return 0.0 if self.fits(posture, words) else np.inf
+
     def updated(self, posture: np.ndarray, words: Sequence[str]) -> tuple[str, ...]:
         """Words of a posture; the old ones where they hold."""
         if self._within(posture, words, _SAME):

@@ -10,6 +10,7 @@ from flexcal.programs.dialect import Dialect
 from flexcal.programs.krl_configuration import StatusAndTurn
 from flexcal.programs.krl_data import KrlData, Line, components, is_list, lines_of, numbers_of, variable_name
 from flexcal.programs.krl_frames import KRL_NOTATION, POSE, KrlFrames, Setting
+from flexcal.programs.pose import Pose
 from flexcal.programs.program import Divisible, Program, ProgramFile, ProgramTarget, Span, Word
 from flexcal.programs.syntax import (
     Node,
@@ -30,7 +31,7 @@ _MOTIONS = {"ptp": 1, "lin": 1, "circ": 2, "sptp": 1, "slin": 1, "scirc": 2, "sp
 """Motions, and how many of their first arguments are targets."""
 _RELATIVE = tuple(f"{name}_rel" for name in _MOTIONS)
 _AXES = ("a1", "a2", "a3", "a4", "a5", "a6")
-_FRAMES = ("$tool", "$base")
+_FRAMES = ("$tool", "$base", "$robroot")
 _EXTERNAL = ("e1", "e2", "e3", "e4", "e5", "e6")
 
 
@@ -187,9 +188,16 @@ class _Reader:
             literal=None if moves else Span(start_of(value[0]), end_of(value[0]), value[1]),
         )
         if joints is None and base is not None and base.known is not None:
-            target = replace(target, frame=base.known, configuration=self._words(*value))
+            frame = self._robot_root(line.file).inverse() @ base.known
+            target = replace(target, frame=frame, configuration=self._words(*value))
         self.found.add(target)
         return ""
+
+    def _robot_root(self, file: int) -> Pose:
+        """The robot's root in the world frame, which is its own where no file says another."""
+        root = self.data.find("$robroot", file)
+        numbers = None if root is None or root.value is None else numbers_of(root.value, root.file, POSE)
+        return Pose.identity() if numbers is None else KRL_NOTATION.pose([each.value for each in numbers])
 
     def _turned(self, node: Node, file: int, axis: str) -> bool:
         number = written_number(components(node, file).get(axis, []), file)

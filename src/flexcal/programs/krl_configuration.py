@@ -14,7 +14,7 @@ class StatusAndTurn(Configuration):
     """Bits of S: wrist centre behind axis 1 (1), in front of the stretched arm (2), axis 5 negative (4); of T: axis i negative (2^(i-1)).
 
     As KUKA's operating instructions have them. Further bits of S, as 16 for an absolutely accurate robot, stay. A straight motion
-    keeps the configuration that it starts in, whatever S and T say.
+    keeps the configuration that it starts in, whatever S and T say, and within 2° of zero the controller ignores the turn of an axis.
     """
 
     on_lines: ClassVar[bool] = False
@@ -35,6 +35,16 @@ class StatusAndTurn(Configuration):
             return None
         return (*(status >> bit & 1 for bit in range(3)), *(turn >> bit & 1 for bit in range(6)))
 
+    def distance(self, posture: np.ndarray, words: Sequence[str]) -> float:
+        """As `Configuration.distance`: the largest angle, rad, of an axis whose turn is ignored."""
+        written = self.read(words)
+        if self.fits(posture, words) or written is None:
+            return 0.0
+        signs = 1 - 2 * np.array(written[3:])
+        wrong = np.maximum(-signs * posture[:6], 0.0)
+        same_status = self.levels(posture)[:3] == written[:3]
+        return float(wrong.max()) if same_status and wrong.max() < _IGNORED else np.inf
+
     def words(self, levels: Sequence[int], old: Sequence[str]) -> tuple[str, ...]:
         """As `Configuration.words`."""
         new = []
@@ -45,6 +55,10 @@ class StatusAndTurn(Configuration):
             text = f"'B{value:0{len(word) - 3}b}'" if binary else str(value)
             new.append(word if value == before else text)
         return tuple(new)
+
+
+_IGNORED = np.deg2rad(2.0)
+"""Joint position, rad, below which the turn of an axis does not count."""
 
 
 def _value(word: str) -> int | None:

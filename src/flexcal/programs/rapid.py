@@ -28,7 +28,6 @@ from flexcal.programs.syntax import (
     names_in,
     parse_text,
     start_of,
-    written_number,
     written_numbers,
 )
 from flexcal.programs.target_list import RUN_TIME, TargetList
@@ -167,7 +166,7 @@ class _Reader:
         """Targets that an argument is, several where it is an element of an array whose index is computed."""
         if len(argument) == 1 and argument[0] == "*":
             raise Unreadable("its position is not in the text (*)")
-        aggregates, file = self._aggregates(statement, argument)
+        aggregates = self._aggregates(statement, argument)
         tool = given.required[kind.tool]
         pose, missing = None, ""
         payload = self.frames.payload(tool, given.optional.get("tload"), self.load, statement)
@@ -180,9 +179,9 @@ class _Reader:
         name = self._text_of(argument, statement) if name_of(argument[0]) else motion
         switch = "confl" if kind.straight else "confj"
         targets = []
-        for node in aggregates:
+        for node, file in aggregates:
             numbers, words, external = self._numbers(node, file, joints=kind.joints)
-            moves = any(abs(axis.value) < _NO_AXIS for axis in external)
+            moves = any(0 < abs(axis.value) < _NO_AXIS for axis in external)
             if moves and name not in self.moved_axes:
                 self.moved_axes.append(name)
             targets.append(
@@ -204,26 +203,20 @@ class _Reader:
             )
         return targets
 
-    def _aggregates(self, statement: Statement, argument: list[Node]) -> tuple[list[Tree], int]:
-        """Brackets of a target, or of all elements of an array of targets where the index is no number; and the index of their file."""
-        indexed = len(argument) == 2 and is_tree(argument[1], "index")
-        value = self.data.value(argument[:1] if indexed else argument, statement.file, statement.routine)
+    def _aggregates(self, statement: Statement, argument: list[Node]) -> list[tuple[Tree, int]]:
+        """Brackets of a target, or of all elements of an array of targets whose index is computed, with the indices of their files."""
+        file, routine = statement.file, statement.routine
+        if len(argument) == 2 and isinstance(argument[1], Tree) and argument[1].data == "index":
+            value = self.data.value(argument[:1], file, routine)
+            found = [] if value is None else self.data.elements(value, argument[1])
+            if value is not None and not found:
+                raise Unreadable(f"not all elements of {argument[0]} are written, or it has no such one")
+        else:
+            value = self.data.value(argument, file, routine)
+            found = [] if value is None else [value]
         if value is None:
             raise Unreadable(self._why(statement, argument))
-        node, file = value
-        assert isinstance(node, Tree)
-        if not indexed:
-            return [node], file
-        inner = argument[1]
-        assert isinstance(inner, Tree)
-        elements = [part[0] for part in between_commas(node.children) if len(part) == 1]
-        targets = [each for each in elements if isinstance(each, Tree)]
-        index = written_number(inner.children, statement.file)
-        if index is None:
-            return targets, file
-        if not 1 <= index.value <= len(targets):
-            raise Unreadable("the array has no such element")
-        return [targets[int(index.value) - 1]], file
+        return [(node, place) for node, place in found if isinstance(node, Tree)]
 
     def _numbers(
         self, node: Tree, file: int, *, joints: bool

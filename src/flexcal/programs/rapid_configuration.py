@@ -14,7 +14,8 @@ class QuadrantConfiguration(Configuration):
     """Quarter turns of axes 1, 4 and 6, counted from zero to -1 at small negative angles, and cfx from 0 to 7.
 
     cfx adds 4 where the wrist centre is behind axis 1, 2 where it is behind the lower arm, and 1 where axis 5 is negative
-    (ABB: RAPID Instructions, Functions and Data types, confdata).
+    (ABB: RAPID Instructions, Functions and Data types, confdata). Of the solutions with this cfx the controller takes the one whose axes
+    are nearest to the quarter turns; programs often have a neighbouring one.
     """
 
     def levels(self, posture: np.ndarray) -> tuple[int, ...]:
@@ -29,6 +30,16 @@ class QuadrantConfiguration(Configuration):
             return None
         cf1, cf4, cf6, cfx = (int(value) for value in values)
         return cf1, cf4, cf6, cfx >> 2 & 1, cfx >> 1 & 1, cfx & 1
+
+    def distance(self, posture: np.ndarray, words: Sequence[str]) -> float:
+        """As `Configuration.distance`: the largest angle, rad, of axes 1, 4 and 6 from their quarter turns, a quarter turn at most."""
+        written = self.read(words)
+        if self.fits(posture, words) or written is None:
+            return 0.0
+        same = posture.copy()
+        same[[0, 3, 5]] = (np.array(written[:3]) + 0.5) * (np.pi / 2)
+        away = float(np.abs(posture[[0, 3, 5]] - same[[0, 3, 5]]).max()) - np.pi / 4
+        return away if self.fits(same, words) and away <= np.pi / 2 else np.inf
 
     def words(self, levels: Sequence[int], old: Sequence[str]) -> tuple[str, ...]:
         """As `Configuration.words`."""

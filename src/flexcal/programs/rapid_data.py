@@ -17,6 +17,7 @@ from flexcal.programs.syntax import (
     line_of,
     name_of,
     start_of,
+    written_number,
 )
 
 _DECLARES = ("const", "pers", "var")
@@ -103,6 +104,27 @@ class RapidData:
             routine = routine if datum.file == file else ""
             nodes, file = [datum.value], datum.file
         return None
+
+    def elements(self, array: tuple[Node, int], index: Tree) -> list[tuple[Node, int]]:
+        """Elements {i} or {i, j} of an array with the indices of their files: all along a dimension whose index is no number.
+
+        Elements may be names of data. Empty where one of them is not written, or the array has no such one.
+        """
+        found = [array]
+        for part in between_commas(index.children):
+            number, deeper = written_number(part, 0), []
+            for node, file in found:
+                if not isinstance(node, Tree):
+                    return []
+                parts = between_commas(node.children)
+                if number is not None:
+                    parts = parts[int(number.value) - 1 : int(number.value)] if number.value >= 1 else []
+                values = [self.value(each, file, "") for each in parts]
+                if not values or None in values:
+                    return []
+                deeper += [value for value in values if value is not None]
+            found = deeper
+        return found
 
     def _declare(self, statement: Statement) -> None:
         nodes = statement.nodes

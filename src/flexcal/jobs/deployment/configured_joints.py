@@ -14,11 +14,14 @@ from flexcal.model.kinematics import joint_limits, low_discrepancy_configuration
 _STARTS = 96
 """Starts of inverse kinematics over the joint ranges: a six-joint arm has up to 8, in general 16 solutions."""
 
+_EQUAL = 1e-6
+"""Difference (rad) between distances from a written configuration that is only rounding."""
+
 
 def fitting_joints(
     joints: ControllerJoints, words: tuple[str, ...], solutions: np.ndarray, near: np.ndarray
 ) -> np.ndarray | None:
-    """That of the solutions (N, 6), whole turns added to their joints, which has the written configuration; None where none has it.
+    """That of the solutions (N, 6), whole turns added to their joints, nearest to the written configuration; None where none is near it.
 
     Of several it is the nearest to `near` (6,).
     """
@@ -27,9 +30,11 @@ def fitting_joints(
     turned = whole_turns(joints, solutions)
     if not len(turned):
         return None
-    fits = [configuration.fits(posture, words) for posture in arm_postures(joints, turned)]
-    kept = turned[np.array(fits)]
-    return kept[np.argmin(np.abs(kept - near).max(axis=1))] if len(kept) else None
+    distances = np.array([configuration.distance(posture, words) for posture in arm_postures(joints, turned)])
+    if not np.isfinite(distances).any():
+        return None
+    kept = turned[distances <= distances.min() + _EQUAL]
+    return kept[np.argmin(np.abs(kept - near).max(axis=1))]
 
 
 def all_solutions(joints: ControllerJoints, aim: ToolPoseTarget) -> np.ndarray:

@@ -139,6 +139,7 @@ def filter_program(
     remarks = (
         *unmeasured_lengths_remark(robot),
         *_convention_remarks(joints),
+        *_tool_remarks(program, places.tool),
         *program.remarks,
         *payload_remarks,
         *path_remarks(program, deviations, subdivide, between),
@@ -234,6 +235,16 @@ def _convention_remarks(joints: ControllerJoints) -> tuple[str, ...]:
             f"base frame of {name} lies at the height of axis 2; add a fixed frame 'base' there to the URDF"
         )
     return tuple(remarks)
+
+
+def _tool_remarks(program: Program, tool: Pose | None) -> tuple[str, ...]:
+    """That one given tool stands for several which the program does not say."""
+    missing = dict.fromkeys(
+        target.missing for target in program.targets if target.tool is None and not target.joints
+    )
+    if tool is None or len(missing) < 2:
+        return ()
+    return (f"--tool stands for {len(missing)} tools that the program does not say ({'; '.join(missing)})",)
 
 
 def _by_target(masses: np.ndarray | None, rows: np.ndarray, count: int) -> np.ndarray | None:
