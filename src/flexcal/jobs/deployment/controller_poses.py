@@ -144,8 +144,8 @@ class ControllerPoses:
             return followed[0], ""
         words = ", ".join(target.words)
         return np.full(6, np.nan), (
-            f"none of the {len(solutions)} solutions of inverse kinematics has the configuration ({words}): the URDF counts joints "
-            "otherwise than the controller (--joint-signs, --joint-zeros), or frames and tool are not those of the program"
+            f"none of the {len(solutions)} solutions of inverse kinematics has the configuration ({words}): check the target, the "
+            "tool and the frames, and whether the URDF counts joints as the controller does (--joint-signs, --joint-zeros)"
         )
 
     def _line(self, q: np.ndarray, aim: ToolPoseTarget) -> ToolPoseTarget:
