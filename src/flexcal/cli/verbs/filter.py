@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import glob
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from tyro.conf import Positional, arg
 
@@ -100,6 +101,11 @@ class Filter:
         require_robot_and_files(self.robot, self.program, "program")
         return written_files(self.program)
 
+    def _place_of(self, item: dict[str, Any]) -> str:
+        """Line of a target, with its file where the program has several."""
+        line = f"line {item['line']}"
+        return f"{Path(item['file']).name}, {line}" if self.leaves else line
+
     def run(self) -> None:
         """Correct the program, and print each target and what stays as it is."""
         from flexcal.jobs.deployment import filter_program_file
@@ -128,26 +134,26 @@ class Filter:
         listed = rows if self.dry_run else rows[:_LISTED]
         for item in listed:
             console.say(
-                f"line {item['line']}: {item['motion']} {item['name']}: [{_numbers(item['before'])}] → [{_numbers(item['after'])}], "
+                f"{self._place_of(item)}: {item['motion']} {item['name']}: [{_numbers(item['before'])}] → [{_numbers(item['after'])}], "
                 f"moved by {item['shift_mm']:.3f} mm and {item['turn_deg']:.3f}°"
             )
         if len(rows) > len(listed):
             console.say(f"{len(rows) - len(listed)} more with --dry-run, and under targets in --json")
         for item in document["left"]:
-            console.say(f"left as it is: line {item['line']}: {item['text']}: {item['reason']}")
+            console.say(f"left as it is: {self._place_of(item)}: {item['text']}: {item['reason']}")
         for remark in document["remarks"]:
             console.say(remark)
         if self.report is not None:
             console.say(f"wrote {self.report}")
         where = estimates_option(self.estimates)
-        given = " ".join(map(str, self.program))
+        given = shlex.join(map(str, self.program))
         if self.dry_run:
             console.finish(document, f"flexcal filter {self.robot} {given}{where} --out {out} writes it")
             return
         console.say(f"wrote {out}")
         tables = [file for file in self.program if file not in self._sources]
         files = [out / file.name for file in self._sources] if self.leaves else [out]
-        new = " ".join(map(str, [*files, *tables]))
+        new = shlex.join(map(str, [*files, *tables]))
         back = "ORIGINAL" if self.leaves else f"ORIGINAL{out.suffix}"
         console.finish(
             document,
