@@ -128,14 +128,14 @@ nb::tuple inverse(const Robot& robot, nb::handle position_, nb::handle rotation_
     });
 }
 
-nb::tuple torque(const Robot& robot, nb::handle q_, nb::handle dq_, nb::handle ddq_, nb::handle payload_) {
+nb::tuple torque(const Robot& robot, nb::handle q_, nb::handle dq_, nb::handle ddq_, nb::handle payload_, bool elastic) {
     const std::size_t n = robot.model->joints.size();
     const auto q = reals(q_, {any, n}, "q");
     const std::size_t samples = q.shape(0);
     const auto dq = reals(dq_, {samples, n}, "dq"), ddq = reals(ddq_, {samples, n}, "ddq");
     const auto payload = reals(payload_, {samples}, "payload");
     return commands(robot, samples, payload, [&](Solver& solver, std::size_t s, double* result) {
-        return solver.torque(q.data() + n * s, dq.data() + n * s, ddq.data() + n * s, result);
+        return solver.torque(q.data() + n * s, dq.data() + n * s, ddq.data() + n * s, result, elastic);
     });
 }
 
@@ -166,6 +166,6 @@ void bind_runtime(nb::module_& m) {
              "it is about (samples,), -1 for none.")
         .def("inverse", &inverse, nb::arg("position"), nb::arg("rotation"), nb::arg("near"), nb::arg("point"), nb::arg("payload"),
              "The same for poses, from motor positions near (samples, n).")
-        .def("torque", &torque, nb::arg("q"), nb::arg("dq"), nb::arg("ddq"), nb::arg("payload"),
+        .def("torque", &torque, nb::arg("q"), nb::arg("dq"), nb::arg("ddq"), nb::arg("payload"), nb::arg("elastic") = false,
              "Torques (samples, n) of the motors for a motion, status and joint as of compensate.");
 }

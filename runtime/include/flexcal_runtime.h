@@ -49,8 +49,9 @@ int flexcal_nominal(flexcal_solver* solver, const double* q, int point, double* 
 int flexcal_compensate(flexcal_solver* solver, const double* q, int point, double* command);
 /* Commands (n) for a pose, from motor positions near (n). Written only where the status is FLEXCAL_OK. */
 int flexcal_inverse(flexcal_solver* solver, const double* position, const double* rotation, const double* near, int point, double* command);
-/* Torques (n) of the motors, N m, that move the rigid, warm robot so: links, payload, rotors and friction. */
-int flexcal_torque(flexcal_solver* solver, const double* q, const double* dq, const double* ddq, double* torque);
+/* Torques (n) of the motors, N m, that move the warm robot so: links, payload, rotors and friction. If elastic is not 0, links stand where
+   the drives' springs let them, for motions slow beside their resonances. */
+int flexcal_torque(flexcal_solver* solver, const double* q, const double* dq, const double* ddq, int elastic, double* torque);
 /* The joint that the last status is about, -1 for none. */
 int flexcal_joint(const flexcal_solver* solver);
 

@@ -95,8 +95,8 @@ int flexcal_inverse(flexcal_solver* solver, const double* position, const double
     return static_cast<int>(solver->solver.inverse(pose, near, point, command));
 }
 
-int flexcal_torque(flexcal_solver* solver, const double* q, const double* dq, const double* ddq, double* torque) {
-    return static_cast<int>(solver->solver.torque(q, dq, ddq, torque));
+int flexcal_torque(flexcal_solver* solver, const double* q, const double* dq, const double* ddq, int elastic, double* torque) {
+    return static_cast<int>(solver->solver.torque(q, dq, ddq, torque, elastic != 0));
 }
 
 int flexcal_joint(const flexcal_solver* solver) { return solver->solver.joint(); }

@@ -17,7 +17,7 @@ class RuntimeRobot:
         self, q: np.ndarray, point: int, payload: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
     def torque(
-        self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, payload: np.ndarray
+        self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, payload: np.ndarray, elastic: bool = False
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
     def inverse(
         self, position: np.ndarray, rotation: np.ndarray, near: np.ndarray, point: int, payload: np.ndarray

@@ -16,6 +16,7 @@ from flexcal.dynamics.signals import Motion
 from flexcal.export import render_runtime
 from flexcal.jobs.dynamics import identify_robot_dynamics
 from flexcal.kernels import RuntimeRobot
+from flexcal.model.statics import static_equilibrium
 
 RNG_SEED = 8
 
@@ -128,6 +129,26 @@ def test_friction_is_that_of_the_identification(identified: TorqueModel) -> None
     np.testing.assert_allclose(identified.torque(q, dq, ddq), expected, rtol=0, atol=1e-9)
     found = in_cpp(identified, q, dq, ddq, np.full(len(q), np.nan))
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
+
+
+def test_elastic_drives_hold_what_they_hold_at_rest(tx90l: RobotModel) -> None:
+    """Of drives with springs and a gap, but no bearings: the torque at rest by Newton's method on the potential."""
+    stiffness = tx90l.springs.stiffness * [np.nan, np.nan, 1.0]
+    drives = replace(tx90l.drives, torque_offset=np.zeros(6), coulomb=np.zeros(6))
+    soft = replace(tx90l, springs=replace(tx90l.springs, stiffness=stiffness), drives=drives)
+    soft = soft.with_values(
+        {f"joint_{k}.drive.stiffness": 4e4 for k in (1, 2, 3)} | {"joint_2.backlash": 1e-4}
+    )
+    q, _, _ = motion(6)
+    still = np.zeros_like(q)
+    rest = static_equilibrium(soft, q)
+    model = TorqueModel.of(soft)
+    found = model.torque(q, still, still, elastic=True)
+    assert np.abs(model.torque(q, still, still) - rest.torque)[:, :3].max() > 0.1
+    np.testing.assert_allclose(found[:, :3], rest.torque[:, :3], rtol=0, atol=1e-6)
+    text = render_runtime(soft, soft, model.document()).text
+    torque, _, _ = RuntimeRobot.read(text).torque(q, still, still, np.full(len(q), np.nan), True)
+    np.testing.assert_allclose(torque, found, rtol=0, atol=1e-9)
 
 
 def test_stribeck_friction_without_its_velocities_is_refused(identified: TorqueModel) -> None:

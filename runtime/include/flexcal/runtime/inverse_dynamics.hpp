@@ -13,10 +13,31 @@ class InverseDynamics {
   public:
     explicit InverseDynamics(const Model& model)
         : model_(model), n_(model.size()), prepared_(model.tree.prepare(model.geometry.data())), frames_(n_), links_(n_), force_(n_), moment_(n_),
-          speed_(n_), load_(n_) {}
+          speed_(n_), load_(n_), moved_(n_) {}
 
-    // q, dq, ddq, result: (n,); payload: true kg.
-    void torque(const double* q, const double* dq, const double* ddq, double payload, double* result) {
+    // q, dq, ddq, result: (n,); payload: true kg; elastic: whether the drives' springs give way to what the motion asks of them.
+    void torque(const double* q, const double* dq, const double* ddq, double payload, bool elastic, double* result) {
+        links(q, dq, ddq, payload, result);
+        for (int pass = 0; elastic && pass < passes; ++pass) {
+            for (int i = 0; i < n_; ++i) {
+                const JointData& joint = model_.joints[i];
+                const double twist = joint.drive_stiffness > 0 ? hardened_twist(result[i] / joint.drive_stiffness, joint.hardening) : 0.0;
+                moved_[i] = q[i] - twist - sign(result[i]) * joint.backlash;
+            }
+            links(moved_.data(), dq, ddq, payload, result);
+        }
+        drives(q, dq, ddq, result);
+    }
+
+  private:
+    static constexpr int passes = 6;
+
+    struct Link {
+        Vector3 w, dw, a;  // angular velocity and acceleration, acceleration of the origin less gravity, in the base
+    };
+
+    // Torques that move links and payload.
+    void links(const double* q, const double* dq, const double* ddq, double payload, double* result) {
         for (int i = 0; i < n_; ++i) move(i, q[i], dq[i], ddq[i], payload);
         for (int i = n_ - 1; i >= 0; --i) {
             const bool slides = model_.tree.joints[i].prismatic;
@@ -26,6 +47,10 @@ class InverseDynamics {
             force_[parent] = force_[parent] + force_[i];
             moment_[parent] = moment_[parent] + moment_[i] + cross(frames_[i].origin - frames_[parent].origin, force_[i]);
         }
+    }
+
+    // Adds what rotors, friction, couplings, springs and cables take to the links' torques.
+    void drives(const double* q, const double* dq, const double* ddq, double* result) {
         for (int i = 0; i < n_; ++i) load_[i] = std::abs(result[i]), speed_[i] = dq[i];
         for (const CouplingData& c : model_.couplings) speed_[c.motor] += c.ratio * dq[c.joint];
         for (int i = 0; i < n_; ++i) {
@@ -39,11 +64,6 @@ class InverseDynamics {
             result[c.joint] += c.ratio * (c.rotor_inertia * ddq[c.motor] + c.viscous * dq[c.motor] + c.coulomb * side + on_axis(c.motor));
         }
     }
-
-  private:
-    struct Link {
-        Vector3 w, dw, a;  // angular velocity and acceleration, acceleration of the origin less gravity, in the base
-    };
 
     // Friction of a motor's own axis, which a joint coupled to it feels too.
     double on_axis(int i) const {
@@ -97,7 +117,7 @@ class InverseDynamics {
     std::vector<Frames> frames_;
     std::vector<Link> links_;
     std::vector<Vector3> force_, moment_;
-    std::vector<double> speed_, load_;
+    std::vector<double> speed_, load_, moved_;
 };
 
 }  // namespace flexcal::runtime

@@ -55,10 +55,11 @@ class Solver {
         return Status::ok;
     }
 
-    // Torques (n,) of the motors, N m, that move the robot so: links, payload, rotors and friction. The robot is rigid and warm.
-    [[nodiscard]] Status torque(const double* q, const double* dq, const double* ddq, double* result) {
+    // Torques (n,) of the motors, N m, that move the warm robot so: links, payload, rotors and friction. If elastic, links stand where the
+    // drives' springs let them, for motions slow beside their resonances.
+    [[nodiscard]] Status torque(const double* q, const double* dq, const double* ddq, double* result, bool elastic = false) {
         if (!finite(q) || !finite(dq) || !finite(ddq)) return Status::bad_input;
-        dynamics_.torque(q, dq, ddq, payload_, result);
+        dynamics_.torque(q, dq, ddq, payload_, elastic, result);
         return Status::ok;
     }
 

@@ -14,16 +14,19 @@ from flexcal.estimation import Estimate
 from flexcal.files.formats import Block
 from flexcal.model.parts import LINK_PARAMETERS
 from flexcal.model.robot import FRICTION_PARAMETERS, RobotModel
-from flexcal.model.statics import carried_mass
+from flexcal.model.statics import carried_mass, twist_from_torque
 from flexcal.model.torques import inertial_parameters, torque_regressor
+
+_PASSES = 6
+"""Each brings the load of twisted drives nearer by their stiffness over that of gravity, a hundred or more."""
 
 
 @dataclass(frozen=True, eq=False)
 class TorqueModel:
     """Torques of the motors for a motion: links, payload, rotors, friction, couplings, springs and cables (Eq. 2.20).
 
-    The robot is rigid, and warm: friction that fades as it warms up is left out, and friction that builds up over a presliding travel is at
-    its full value. At rest Coulomb friction is zero.
+    The robot is warm, and rigid unless asked for: friction that fades as it warms up is left out, and friction that builds up over a
+    presliding travel is at its full value. At rest Coulomb friction is zero.
 
     Attributes
     ----------
@@ -98,16 +101,25 @@ class TorqueModel:
         return cls.of(model, blocks["dynamics"].provenance if "dynamics" in blocks else None)
 
     def torque(
-        self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, payload: np.ndarray | None = None
+        self,
+        q: np.ndarray,
+        dq: np.ndarray,
+        ddq: np.ndarray,
+        payload: np.ndarray | None = None,
+        *,
+        elastic: bool = False,
     ) -> np.ndarray:
         """Torques of the motors.
 
         Parameters
         ----------
         q, dq, ddq : ndarray
-            Motion (N, n) of the joints, rad, m and s.
+            Motion (N, n) of the motors, referred to the joints, rad, m and s.
         payload : ndarray, optional
             Payload (N,), kg; by default as declared.
+        elastic : bool
+            Whether the links stand where the drive springs let them, twisted by what the motion asks of them; the twist itself does not
+            move, so that the motion has to be slow beside the drives' resonances. Bearings are rigid.
 
         Returns
         -------
@@ -120,6 +132,16 @@ class TorqueModel:
             Where the shapes differ, and for a payload without a declaration.
         """
         q, dq, ddq = (np.atleast_2d(np.asarray(values, dtype=float)) for values in (q, dq, ddq))
+        load = self._links(q, dq, ddq, payload)
+        if elastic and self.model.elastic:
+            for _ in range(_PASSES):
+                load = self._links(q - self._twist(load), dq, ddq, payload)
+        return load + self._drives(q, dq, ddq, np.abs(load))
+
+    def _links(
+        self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, payload: np.ndarray | None
+    ) -> np.ndarray:
+        """Torques (N, n) that move links and payload."""
         regressor = torque_regressor(self.model, q, dq, ddq)
         load = regressor @ inertial_parameters(self.model)
         held = self.model.payload
@@ -131,7 +153,17 @@ class TorqueModel:
             load = load + carried_mass(self.model, payload, len(q))[:, None] * own
         elif payload is not None:
             carried_mass(self.model, payload, len(q))
-        return load + self._drives(q, dq, ddq, np.abs(load))
+        return load
+
+    def _twist(self, load: np.ndarray) -> np.ndarray:
+        """Twist (N, n), rad, of the drives under a load (N, n), N m, backlash included."""
+        springs = self.model.springs
+        joints = [joint.index for joint in self.model.elastic]
+        twist = np.sign(load) * self.model.drives.backlash
+        twist[:, joints] += twist_from_torque(
+            load[:, joints], springs.stiffness[joints, 2], springs.hardening[joints]
+        )
+        return twist
 
     def _drives(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, load: np.ndarray) -> np.ndarray:
         """Torques (N, n) of rotors, friction, couplings, springs and cables under the links' `load` (N, n)."""
