@@ -27,4 +27,4 @@ def test_a_peer_that_cannot_be_installed_is_skipped_with_the_reason(
 
 def test_an_unknown_name_is_said(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["geometric"]) == 2
-    assert "there are accuracy_map, compensation, dynamics, estimators" in capsys.readouterr().err
+    assert "there are accuracy_map, actuators, compensation, dynamics, estimators" in capsys.readouterr().err

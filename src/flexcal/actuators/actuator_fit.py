@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.actuators.determined import determined
+from flexcal.actuators.output_error import OutputError
 from flexcal.actuators.servo_parameters import Servo, ServoCoordinates
 from flexcal.actuators.servo_simulation import ServoSimulation, Windows
 from flexcal.actuators.smoothed_motion import SmoothedMotion
@@ -16,7 +17,7 @@ from flexcal.actuators.torque_scale import torques_without_effect
 from flexcal.actuators.tracking_errors import TrackingErrors
 from flexcal.data.recordings import CommandLog
 from flexcal.errors import FlexcalError
-from flexcal.estimation import Estimate, Parameter, Parameters, Problem, solve
+from flexcal.estimation import Estimate, solve
 from flexcal.export import OF_ERROR, Actuators
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
@@ -25,12 +26,11 @@ _LENGTH = 1.0
 """Part of a window that counts, s."""
 _SETTLING = 6.0
 """Time constants of the slowest axis after which a window counts: errors of the state that it begins in have then decayed."""
-_STEP, _DELAY_STEP = 1e-4, 1e-4
-"""Steps of the differences: relative to the first value, and in s of the delay."""
-_TOLERANCE = 1e-3
-"""Relative offset at which a fit has converged: a twentieth of a standard deviation, in a thousand samples."""
-_PASSES = 2
-"""Fits: the first weighs joints by the noise of their positions, the second by its residuals."""
+_ROUGH = 0.05
+"""Relative offset at which the first fit has converged."""
+_SHARE = 0.2
+"""Standard deviations that a parameter may be from the optimum in the mean; dry friction makes the cost too uneven to find it closer."""
+_MOST_STEPS = 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,9 +62,10 @@ def fit_actuators(
 ) -> ActuatorFit:
     """Least squares of simulated positions (Åström 1980: output error) over windows that begin in the measured state.
 
-    The last share `hold_out` of the windows of every log is not fitted. Covariance by the scatter of the windows' scores, joint by
-    joint, which holds where residuals are correlated within a window (Liang & Zeger 1986). Raises `FlexcalError` where the logs are too
-    short, or a joint does not move.
+    A first fit with derivatives that are taken once leads near to the optimum, a second one to it. Every joint counts in units of its
+    residual before. The last share `hold_out` of the windows of every log is not fitted. Covariance by the scatter of the windows'
+    scores, joint by joint, which holds where residuals are correlated within a window (Liang & Zeger 1986). Raises `FlexcalError` where
+    the logs are too short, or a joint does not move.
     """
     motions = [SmoothedMotion.of(log) for log in logs]
     _require_motion(model, logs, motions)
@@ -84,23 +85,19 @@ def fit_actuators(
             f"{settling:.2g} s of settling, which is too few for {len(servo.keys)} parameters a joint; record longer.",
         )
     noise = np.sqrt(np.mean([motion.noise**2 for motion in motions], axis=0))
-    scale = noise
-    fit = _Fit(simulation, coordinates, [w for w in seen if len(w)])
+    error = OutputError(simulation, coordinates, [w for w in seen if len(w)])
     parameters = coordinates.parameters
-    estimate: Estimate | None = None
-    for number in range(_PASSES):
-        problem = fit.problem(
-            np.maximum(scale, 1e-12), parameters if estimate is None else estimate.parameters
-        )
+    for rough in (True, False):
+        residual = error.residual(parameters.coordinates())
+        problem = error.problem(_rms(residual), parameters, rough=rough)
         estimate = solve(
             problem,
-            covariance="sandwich",
-            max_iterations=40,
-            tolerance=_TOLERANCE,
-            progress=lambda stage, share, n=number: progress(stage, (n + share) / _PASSES),
+            covariance="posterior" if rough else "sandwich",
+            max_iterations=_MOST_STEPS,
+            tolerance=_ROUGH if rough else _SHARE * np.sqrt(len(parameters) / residual.size),
+            progress=lambda stage, share, late=not rough: progress(stage, 0.5 * (late + share)),
         )
-        scale = np.sqrt(np.mean(fit.residual(estimate.parameters.coordinates()) ** 2, axis=(0, 1)))
-    assert estimate is not None
+        parameters = estimate.parameters
     found = coordinates.actuators(estimate.parameters.coordinates())
     fitted = TrackingErrors.of(simulation, found, seen)
     open_scale = torques_without_effect(simulation, found, seen, fitted.commanded) & ~coordinates.declared
@@ -122,48 +119,9 @@ def fit_actuators(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    simulation: ServoSimulation
-    coordinates: ServoCoordinates
-    parts: Sequence[Windows]
-
-    def residual(self, x: np.ndarray) -> np.ndarray:
-        """Measured less simulated positions (W, S, n) of all windows."""
-        at = self.coordinates.actuators(x)
-        return np.concatenate([part.measured - self.simulation.positions(at, part) for part in self.parts])
-
-    def problem(self, scale: np.ndarray, parameters: Parameters) -> Problem:
-        """The problem with residuals over `scale` (n,); a group is a window of one joint."""
-        windows, samples, n = (
-            sum(map(len, self.parts)),
-            self.parts[0].measured.shape[1],
-            len(scale),
-        )
-        groups = np.broadcast_to(
-            (np.arange(windows)[:, None] * n + np.arange(n))[:, None, :], (windows, samples, n)
-        )
-
-        def residual(x: np.ndarray) -> np.ndarray:
-            return (self.residual(x) / scale).ravel()
-
-        def linearise(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            at = residual(x)
-            columns = []
-            for k, item in enumerate(parameters):
-                moved = x.copy()
-                step = _step(item)
-                moved[k] += step
-                columns.append((residual(moved) - at) / step)
-            return at, np.stack(columns, axis=1)
-
-        return Problem(parameters, linearise, residual, groups=groups.ravel())
-
-
-def _step(item: Parameter) -> float:
-    if item.unit == "s":
-        return _DELAY_STEP
-    return _STEP if item.scale == "log" else _STEP * max(abs(item.prior_mean or 0.0), abs(item.value))
+def _rms(residual: np.ndarray) -> np.ndarray:
+    """Root mean square (n,) of residuals (W, S, n), never zero."""
+    return np.maximum(np.sqrt(np.mean(residual**2, axis=(0, 1))), 1e-12)
 
 
 def _require_motion(model: RobotModel, logs: Sequence[CommandLog], motions: Sequence[SmoothedMotion]) -> None:

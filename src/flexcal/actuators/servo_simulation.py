@@ -92,10 +92,10 @@ class ServoSimulation:
         root = np.sqrt((half**2 - actuators.stiffness / inertia).astype(complex))
         return np.stack([-half + root, -half - root], axis=1)
 
-    def positions(self, actuators: Actuators, windows: Windows) -> np.ndarray:
-        """Simulated positions (W, S, n) at the samples of the windows that count."""
+    def positions(self, actuators: Actuators, windows: Windows, *, coarse: bool = False) -> np.ndarray:
+        """Simulated positions (W, S, n) at the samples of the windows that count; `coarse`: with time steps twice as long."""
         log = windows.log
-        substeps = int(np.ceil(log.time_step / self._step - 1e-9))
+        substeps = int(np.ceil(log.time_step / (2 * self._step if coarse else self._step) - 1e-9))
         compiled = self._with(actuators, log.time_step / substeps)
         samples = windows.settled + windows.measured.shape[1]
         states = np.zeros((len(windows), 1 + compiled.nq + compiled.nv))

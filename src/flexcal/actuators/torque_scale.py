@@ -27,7 +27,7 @@ def torques_without_effect(
     """
     inertia = simulation.links + found.armature
     parts = [part for part in parts if len(part)]
-    before = [simulation.positions(found, part) for part in parts]
+    before = [simulation.positions(found, part, coarse=True) for part in parts]
     answers = []
     for i in range(len(tracking)):
         scaled = {key: getattr(found, key).copy() for key in Actuators.KEYS}
@@ -36,7 +36,7 @@ def torques_without_effect(
         scaled["armature"][i] += _FACTOR * inertia[i]
         changed = replace(found, **scaled)
         squares = [
-            np.mean((simulation.positions(changed, part) - b)[:, :, i] ** 2)
+            np.mean((simulation.positions(changed, part, coarse=True) - b)[:, :, i] ** 2)
             for part, b in zip(parts, before, strict=True)
         ]
         answers.append(bool(np.sqrt(np.mean(squares)) < _LEAST * _FACTOR * tracking[i]))
