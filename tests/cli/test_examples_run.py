@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import json
 import shlex
 import shutil
 from dataclasses import replace
@@ -86,6 +87,9 @@ def calibrated_arm(folder: Path, examples: Path) -> list[str]:
         write_poses(folder / f"{name}.csv", replace(visits, position=seen))
     shutil.copy("compensated.csv", "visits.csv")
     write_touches(folder, model)
+    entry = {"drive_mode": 0, "homing_offset": 0, "range_min": 500, "range_max": 3600}
+    motors = {name: {"id": k, **entry} for k, name in enumerate(model.joint_names, 1)}
+    (folder / "motors.json").write_text(json.dumps(motors, indent=4), "utf-8")
     run("flexcal verify robot.yaml others.csv --out checked")
     run("flexcal repeatability robot.yaml visits.csv --out repeated")
     return [

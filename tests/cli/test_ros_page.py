@@ -12,7 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from cheap_arm import CheapArm
 from cli_files import read_csv, write_csv
+from lerobot_files import calibration_file, record
 from refusals import assert_refusal
 from ur5_description import JOINTS, write_description
 from xacro_robots import link_poses
@@ -21,6 +23,8 @@ from flexcal.cli.main import main
 from flexcal.jobs.inputs import CalibratedRobot
 from flexcal.model.kinematics import point_kinematics, point_placement
 from flexcal.model.robot import RobotModel
+
+pytest.importorskip("xacro")
 
 
 def commands(page: Path) -> list[str]:
@@ -48,6 +52,11 @@ def robot_folder(tmp_path: Path, examples: Path, monkeypatch: pytest.MonkeyPatch
     header, rows = read_csv(examples / "ur5_tracker" / "grid.csv")
     write_csv(tmp_path / "poses.csv", header, rows[::9])
     write_description(examples / "ur5_tracker" / "ur5.urdf", tmp_path)
+    arm = CheapArm(13)
+    arm.write(tmp_path / "arm")
+    calibration_file(tmp_path / "motors.json")
+    for name, count, seed in (("recorded", 50, 1), ("others", 40, 2)):
+        record(arm, tmp_path / f"{name}.csv", count, seed)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -62,6 +71,15 @@ def test_every_command_of_the_page_runs(
     text = " ".join(said["description"].split())
     assert "kinematics.upper_arm.roll, for rpy of shoulder_lift_joint" in text
     assert "wrote 2 files to description, 1 of them changed" in text and "Nothing is lost" in text
+    verdict = " ".join(said["corrected.json"].split())
+    page = (root / "docs" / "ros.md").read_text(encoding="utf-8")
+    on_page = re.search(r"^zeros or geometry: .*$", page, re.MULTILINE)
+    number = r"\d+(?:\.\d+)?"
+    assert on_page is not None and re.sub(number, "#", on_page[0]) in re.sub(number, "#", verdict)
+    numbers = [
+        re.findall(number, text[text.index("zeros or geometry") :])[:5] for text in (on_page[0], verdict)
+    ]
+    np.testing.assert_allclose(*np.array(numbers, dtype=float), rtol=0.02)
     model = CalibratedRobot.from_yaml("robot.yaml", "calibration").probable
     assert_tool_as_calibrated(model, Path("calibrated.urdf").read_text(), np.zeros(6))
     run("xacro with_offsets/urdf/ur5.urdf.xacro > offsets.urdf")

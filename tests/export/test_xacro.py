@@ -30,6 +30,8 @@ from flexcal.export.xacro_robot import XacroExport
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.robot import RobotModel
 
+pytest.importorskip("xacro")
+
 NUMBER = re.compile(rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?")
 ONE = {"robots/one.xacro": ONE_ARM, "parts/arm.xacro": ARM_MACRO % THIRD_BY_MACRO}
 TWO = {

@@ -15,6 +15,8 @@ from flexcal.export import XacroSource, render_xacro, shifted_limits
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.robot import RobotModel
 
+pytest.importorskip("xacro")
+
 JOINTS = ("pan", "lift", "slide")
 
 

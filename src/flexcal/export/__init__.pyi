@@ -3,6 +3,15 @@ from .dh_table import Convention, render_dh
 from .formats import FORMATS, PlainFormat, render
 from .isaac import TIME_STEP, render_isaac
 from .mjcf_file import export_mjcf, render_mjcf
+from .motor_calibration import (
+    TICKS,
+    JointMotor,
+    MotorCalibration,
+    Readings,
+    corrected_file,
+    joint_motors,
+    read_motor_calibrations,
+)
 from .moveit_limits import shifted_limits
 from .mujoco_spec import effort_limit, mjcf_spec
 from .offset_fit import undetermined_offsets
@@ -17,22 +26,29 @@ from .xacro_robot import XacroExport, Zeros, render_xacro
 __all__ = [
     "FORMATS",
     "OF_ERROR",
+    "TICKS",
     "TIME_STEP",
     "Actuators",
     "Convention",
     "ExportedFile",
+    "JointMotor",
+    "MotorCalibration",
     "PlainFormat",
+    "Readings",
     "RenderedModel",
     "XacroExport",
     "XacroSource",
     "Zeros",
     "actuator_name",
     "actuator_unit",
+    "corrected_file",
     "effort_limit",
     "export_mjcf",
     "export_urdf",
+    "joint_motors",
     "measure_export_error",
     "mjcf_spec",
+    "read_motor_calibrations",
     "render",
     "render_dh",
     "render_isaac",

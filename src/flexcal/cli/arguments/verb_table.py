@@ -61,6 +61,13 @@ EXPORTS = (
         "flexcal export xacro robot.yaml --out description",
         leaves=("**",),
     ),
+    Verb(
+        ("export", "lerobot"),
+        "export_lerobot",
+        "ExportLerobot",
+        "LeRobot's calibration of motors with the joint zeros, and whether zeros are enough or geometry is needed",
+        "flexcal export lerobot robot.yaml --calibration motors.json --out corrected.json",
+    ),
 )
 
 STEPS = (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, arg
 
@@ -66,6 +66,14 @@ class Import:
         arg(metavar="NAME", help_behavior_hint="(default: the only one)"),
     ] = None
     """Topic of the measured points in a ROS recording."""
+    lerobot: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="")] = None
+    """LeRobot's calibration (JSON) of the motors that the columns are of."""
+    motors: Annotated[
+        Texts, arg(metavar="JOINT=MOTOR...", help_behavior_hint="(default: of the same name)")
+    ] = ()
+    """Motors of joints with other names, or other signs and zeros: shoulder_lift=-lift+90 (degrees)."""
+    readings: Literal["ticks", "degrees", "percent"] = "ticks"
+    """What was recorded of the motors: ticks, or LeRobot's degrees or percent of the range (-100 to 100)."""
     unchecked: bool = False
     """Write although the points do not fit the nominal robot."""
     write_signals: bool = False
@@ -78,9 +86,11 @@ class Import:
         """Import, and show how the columns were read."""
         from flexcal.cli.tables.imported_columns import first_rows_table
         from flexcal.importing.columns import reasons_unused
-        from flexcal.jobs.setup import import_file
+        from flexcal.jobs.setup import MotorReadings, import_file
 
         require_robot(self.robot, self.file)
+        if self.motors and self.lerobot is None:
+            raise InputError("E-ROS-032", "--motors goes with --lerobot FILE; give both, or --map.")
         console = Console(self.json)
         imported = import_file(
             self.robot,
@@ -92,6 +102,7 @@ class Import:
             topic=self.topic,
             orientation=self.orientation,
             unchecked=self.unchecked,
+            motors=None if self.lerobot is None else MotorReadings(self.lerobot, self.motors, self.readings),
         )
         console.show(first_rows_table(imported))
         for left in reasons_unused(imported.left_out):

@@ -1,4 +1,5 @@
 from .certificate import Certificate, certify, certify_robot
+from .motor_zeros import MotorZeros, ZerosVerdict, export_motor_zeros
 from .repeated_visits import Repeatability, repeatability, robot_repeatability
 from .verification import Verification, verify, verify_robot
 from .volume_map import AccuracyMap, accuracy_map, map_accuracy
@@ -6,11 +7,14 @@ from .volume_map import AccuracyMap, accuracy_map, map_accuracy
 __all__ = [
     "AccuracyMap",
     "Certificate",
+    "MotorZeros",
     "Repeatability",
     "Verification",
+    "ZerosVerdict",
     "accuracy_map",
     "certify",
     "certify_robot",
+    "export_motor_zeros",
     "map_accuracy",
     "repeatability",
     "robot_repeatability",

@@ -1,5 +1,5 @@
 from .compensation import Compensation, compensate, compensate_robot
-from .export import ExportedRobot, export_robot, export_stored_robot
+from .export import ExportedRobot, export_robot, export_stored_robot, identified_robot, undetermined_zeros
 from .filtered_program import FilteredProgram
 from .prediction import Prediction, predict, predict_robot
 from .program_files import read_program, written_files
@@ -20,9 +20,11 @@ __all__ = [
     "export_xacro",
     "filter_program",
     "filter_program_file",
+    "identified_robot",
     "predict",
     "predict_robot",
     "read_program",
     "read_torque_model",
+    "undetermined_zeros",
     "written_files",
 ]

@@ -164,7 +164,7 @@ def export_robot(
         )
     elif format == "offsets":
         rendered = render_offsets(
-            probable, nominal, point=point, keep_frames=keep_frames, undetermined=_undetermined(robot)
+            probable, nominal, point=point, keep_frames=keep_frames, undetermined=undetermined_zeros(robot)
         )
     elif format == "runtime":
         drives = TorqueModel.of_blocks(probable, robot.blocks)
@@ -247,7 +247,7 @@ def _check_options(format: str, options: dict[str, object]) -> None:
             )
 
 
-def _undetermined(robot: CalibratedRobot) -> tuple[int, ...]:
+def undetermined_zeros(robot: CalibratedRobot) -> tuple[int, ...]:
     """Joints whose zeros the measured points do not tell; before an instrument with a frame of its own the base is anywhere."""
     if not robot.measured:
         return ()

@@ -35,6 +35,7 @@ from flexcal.importing.columns import (
 from flexcal.importing.orientations import NominalPoses
 from flexcal.importing.readers import read_foreign
 from flexcal.importing.tables import ForeignTable
+from flexcal.jobs.setup.motor_readings import MotorReadings
 from flexcal.jobs.setup.orientation_import import (
     ImportedOrientations,
     OrientationColumns,
@@ -145,10 +146,12 @@ def import_file(
     topic: str | None = None,
     orientation: str | None = None,
     unchecked: bool = False,
+    motors: MotorReadings | None = None,
 ) -> ImportedFile:
     """Recognise the columns of `file`, with `mapped` overriding the guess, and write them in flexcal's format to `out`.
 
     `sigma` (m) is the instrument's 1σ a coordinate where the file does not say it, and `orientation` the convention of its orientations.
+    `motors` says how columns of motors become joint positions; what is `mapped` comes before.
     Nothing is written without `out`, nor, unless `unchecked`, where the nominal robot cannot go with the points or the orientations. Raises
     `InputError` where the file cannot be read, joint positions are not recognised, the convention of orientations is not certain, or a
     value is missing or cannot be, and for a `sigma` that is not positive or has no place.
@@ -156,6 +159,8 @@ def import_file(
     model = RobotModel.from_yaml(robot_file, estimates=False)
     foreign = read_foreign(file, model.motor_names, sheet=sheet, topic=topic)
     guess = guess_columns(foreign, model)
+    if motors is not None:
+        mapped = (*motors.mapped(file, list(foreign.numbers), model.motor_names), *mapped)
     if mapped:
         guess = apply_map(mapped, guess, foreign, model)
     kind, guess = _kind(foreign, guess, model)
