@@ -11,6 +11,7 @@ import pytest
 from six_axis_arm import KR6, Arm, frame, registered, turn
 
 from flexcal.cli.main import main
+from flexcal.programs.krl_configuration import StatusAndTurn
 
 
 def posed(x: float, y: float, z: float, a: float, b: float, c: float) -> np.ndarray:
@@ -342,3 +343,13 @@ def test_a_urdf_that_counts_generically(tmp_path: Path, capsys: pytest.CaptureFi
             goal, there = KR6.flange_at(np.array(item["before"])), arm.flange_at(q)
             assert np.abs((there - goal)[:3, 3]).max() < 4e-4
             assert np.abs(q - item["before"]).max() < 0.5
+
+
+def test_other_bits_of_the_status_stay() -> None:
+    posture = np.array([0.1, -1.0, 1.5, 0.2, -0.5, 0.3, 0.5, 0.2])
+    rule = StatusAndTurn()
+    assert rule.words(rule.levels(posture), ("16", "0")) == ("22", "18")
+    assert rule.words(rule.levels(posture), ("'B10000'", "'B000000'")) == ("'B10110'", "'B010010'")
+    assert rule.distance(posture, ("6", "18")) == 0 and rule.distance(posture, ("6", "19")) == np.inf
+    posture[0] = -0.01
+    assert 0 < rule.distance(posture, ("6", "18")) < 0.02 and rule.distance(posture, ("2", "18")) == np.inf

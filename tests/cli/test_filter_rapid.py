@@ -160,7 +160,9 @@ def test_the_corrected_program_brings_the_true_tool_there(
     assert len(told) == 3
     assert sum("from p1 as corrected" in reason for reason in told.values()) == 1
     assert sum("pCamera is not declared" in reason for reason in told.values()) == 1
-    assert len(found["remarks"]) == 2 and "1.5 kg" in found["remarks"][0]
+    assert len(found["remarks"]) == 3
+    for said, remark in zip(("axis 3", "1.5 kg", "between their points"), found["remarks"], strict=True):
+        assert said in remark
 
 
 def test_reverse_returns_the_numbers(cell: tuple[Path, Arm]) -> None:

@@ -119,6 +119,11 @@ class _Reader:
                 f"external axes of {self.moved_axes[0]}{' and others' if len(self.moved_axes) > 1 else ''} stay as they are, and are taken "
                 "to carry neither robot nor work object"
             )
+        if any(target.joints for target in self.found.targets.values()):
+            remarks.append(
+                "axis 3 of joint targets is taken to count from the lower arm; arms with a parallel rod (as IRB 2400 and 4400) count it "
+                "otherwise, and their joint targets must not be corrected"
+            )
         names = {name for _, _, name in self.data.known}
         return self.found.program(RAPID, self.files, names, remarks)
 

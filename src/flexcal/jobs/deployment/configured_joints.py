@@ -55,7 +55,8 @@ def whole_turns(joints: ControllerJoints, solutions: np.ndarray) -> np.ndarray:
     for q in solutions:
         ranges = []
         for value, turn, low, high in zip(q, turns, lower, upper, strict=True):
-            other = [value + k * turn for k in (-2, -1, 1, 2)] if turn else []
+            most = 2 if np.isfinite(high - low) else 1
+            other = [value + k * turn for k in range(-most, most + 1) if k] if turn else []
             ranges.append([value, *(each for each in other if low <= each <= high)])
         several += list(itertools.product(*ranges))
     return np.array(several).reshape(-1, 6)

@@ -100,14 +100,16 @@ class ControllerPoses:
         near = None if target.near is None else self.controller.to_urdf(np.array(target.near))
         start = near if near is not None else last
         dialect = self.controller.dialect
-        written = dialect.configuration is not None and bool(target.configuration)
-        if start is None and not written:
+        configuration = dialect.configuration if target.configuration else None
+        if start is None and configuration is None:
             return none, f"{dialect.no_start}, so the arm's configuration is unknown: give --start"
         aim = self._aim(target)
         found, reason = none, ""
         if start is not None:
-            found, reason = self._follow(start, aim, straight=target.straight and near is None)
-            if not written:
+            # written configuration data that bind say more than the path
+            followed = configuration is None or not configuration.on_lines
+            found, reason = self._follow(start, aim, straight=target.straight and near is None and followed)
+            if configuration is None:
                 return found, reason
         return self._configured(target, aim, found[None][: int(not reason and start is not None)], start)
 
