@@ -133,6 +133,8 @@ def test_the_corrected_program_brings_the_true_tool_there(
     tables = {0: np.eye(4), 2: pose(TOOL)}, {0: np.eye(4), 1: pose(FRAME)}
     wanted, now = (moved(text, NOMINAL, *tables, HOME) for text in (before, after))
     assert len(wanted) == 15 and len(found["targets"]) == 13
+    missed = {item["name"]: item["between_mm"] for item in found["targets"] if item["between_mm"] is not None}
+    assert missed.keys() == {"P[3]", "P[6]", "P[7]", "P[10]", "P[11]"}
     goals = np.array([(NOMINAL.flange(q) @ pose(TOOL))[:3, 3] for q in wanted])
     was, there = (np.array([(arm.flange(q) @ pose(TOOL))[:3, 3] for q in each]) for each in (wanted, now))
     capsys.readouterr()

@@ -10,8 +10,14 @@ import subprocess
 from importlib.resources import files
 from pathlib import Path
 
+import numpy as np
 import pytest
 from outline import Outline
+from program_results import program_results
+
+from flexcal.model.robot import RobotModel
+from flexcal.report.layout.rendering import page_html
+from flexcal.report.pages import ProgramStudy, program_page
 
 CHROMIUM = next((p for p in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if p), None)
 pytestmark = pytest.mark.skipif(
@@ -113,6 +119,15 @@ def test_figures_are_drawn_and_fit_and_nobody_is_shut_out(
 def test_a_long_name_of_a_recording_fits_a_telephone(payload_folder: Path, tmp_path: Path) -> None:
     page = (payload_folder / "report.html").read_text("utf-8")
     seen(page.replace("loaded.csv", f"{'loaded_' * 9}.csv"), tmp_path, 390, "light")
+
+
+def test_the_page_of_a_program_fits_a_telephone_with_names_that_look_like_markup(
+    tx90l: RobotModel, tmp_path: Path
+) -> None:
+    study = ProgramStudy(tx90l, program_results(), np.zeros(6))
+    more = "document.body.dataset.tables = frame.contentDocument.querySelectorAll('table').length;"
+    found = seen(page_html(program_page(study)), tmp_path, 390, "light", more)
+    assert found["tables"] == "2"
 
 
 WITHOUT_WEBGL = """<!DOCTYPE html><html><body><iframe src="report.html" style="width:500px;height:900px;border:0"></iframe>

@@ -2,68 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+from program_results import HOSTILE, program_results, target
 
 from flexcal.model.robot import RobotModel
 from flexcal.report.layout.rendering import page_html
 from flexcal.report.pages import ProgramStudy, program_page
 
-HOSTILE = "<script>alert('P')</script><b>&amp;"
-
-
-def _target(order: int, at: list[float], shift: list[float], name: str = "P[1]") -> dict[str, Any]:
-    return {
-        "order": order,
-        "file": "weld.ls",
-        "line": 10 + order,
-        "name": name,
-        "motion": "L",
-        "kind": "pose",
-        "before": [1.0, 2.0, 3.0, 0.0, 90.0, 0.0],
-        "after": [1.25, 2.0, 3.0000004, 0.0, 90.001, -0.0000001],
-        "nominal_xyz_m": at,
-        "corrected_xyz_m": (np.array(at) + shift).tolist(),
-        "shift_mm": float(np.linalg.norm(shift)) * 1e3,
-        "turn_deg": 0.031,
-    }
-
-
-def results(left: bool = True) -> dict[str, Any]:
-    """What `flexcal filter --json` says of three targets, the second of which stays, and of one that is computed."""
-    stays = [
-        {"order": 1, "file": "weld.ls", "line": 11, "text": HOSTILE, "reason": f"{HOSTILE} is out of reach"},
-        {"order": None, "file": "weld.ls", "line": 30, "text": "L PR[1]", "reason": "a register"},
-    ]
-    return {
-        "program": ["weld.ls"],
-        "units": "mm and °",
-        "reversed": False,
-        "targets": [
-            _target(0, [0.5, 0.0, 0.3], [3e-4, 0.0, 4e-4]),
-            _target(2, [0.5, 0.1, 0.3], [0.0, 0.0, -1e-4], HOSTILE),
-        ],
-        "left": stays if left else [],
-        "remarks": [HOSTILE] if left else [],
-        "provenance": {"input.weld.ls": "0123"},
-        "command": "flexcal filter robot.yaml weld.ls --report page.html",
-    }
-
 
 def test_first_screen(tx90l: RobotModel) -> None:
-    page = program_page(ProgramStudy(tx90l, results(), np.zeros(6)))
+    page = program_page(ProgramStudy(tx90l, program_results(), np.zeros(6)))
     assert page.verdict.headline == "2 of 4 targets corrected" and page.verdict.status == "care"
     assert [fact.value for fact in page.verdict.facts] == ["2", "0.500", "0.031"]
     assert "line 10" in page.verdict.facts[1].detail
-    whole = program_page(ProgramStudy(tx90l, results(left=False), np.zeros(6)))
+    whole = program_page(ProgramStudy(tx90l, program_results(left=False), np.zeros(6)))
     assert whole.verdict.status == "good" and [section.id for section in whole.sections][1] == "targets"
-    none = program_page(ProgramStudy(tx90l, results() | {"targets": []}, None))
+    none = program_page(ProgramStudy(tx90l, program_results() | {"targets": []}, None))
     assert none.verdict.status == "bad" and not none.figures
 
 
 def test_path_and_arrows(tx90l: RobotModel) -> None:
-    (block,) = program_page(ProgramStudy(tx90l, results(), np.zeros(6))).figures
+    (block,) = program_page(ProgramStudy(tx90l, program_results(), np.zeros(6))).figures
     traces = {trace.name: trace for trace in block.figure.data if trace.name}
     written = np.stack([traces["as written"][axis] for axis in "xyz"], axis=1)
     np.testing.assert_allclose(written[[0, 2]], [[0.5, 0, 0.3], [0.5, 0.1, 0.3]], atol=1e-6)
@@ -75,18 +34,18 @@ def test_path_and_arrows(tx90l: RobotModel) -> None:
 
 
 def test_every_target_is_in_the_table_with_its_reason(tx90l: RobotModel) -> None:
-    page = program_page(ProgramStudy(tx90l, results(), np.zeros(6)))
+    page = program_page(ProgramStudy(tx90l, program_results(), np.zeros(6)))
     (table,) = [block for section in page.sections if section.id == "targets" for block in section.blocks]
     assert [row[0] for row in table.rows] == ["10", "11", "12", "30"]
     assert table.rows[0][3:7] == ("1, 2, 3, 0, 90, 0", "1.25, 2, 3, 0, 90.001, 0", "0.500", "0.031")
     assert table.rows[1][7] == f"{HOSTILE} is out of reach"
-    many = results() | {"targets": [_target(k, [0.1, 0, 0], [1e-6 * k, 0, 0]) for k in range(1500)]}
+    many = program_results() | {"targets": [target(k, [0.1, 0, 0], [1e-6 * k, 0, 0]) for k in range(1500)]}
     page = program_page(ProgramStudy(tx90l, many, np.zeros(6)))
     (table,) = [block for section in page.sections if section.id == "targets" for block in section.blocks]
     assert len(table.rows) == 1000 and sum(row[7] != "" for row in table.rows) == 2
 
 
 def test_names_are_never_markup(tx90l: RobotModel) -> None:
-    html = page_html(program_page(ProgramStudy(tx90l, results(), np.zeros(6))))
+    html = page_html(program_page(ProgramStudy(tx90l, program_results(), np.zeros(6))))
     assert "<script>alert" not in html and "<b>&amp;" not in html.replace("&lt;b&gt;&amp;amp;", "")
     assert html.count("&lt;script&gt;alert(&#39;P&#39;)&lt;/script&gt;") >= 4

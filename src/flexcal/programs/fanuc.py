@@ -25,6 +25,7 @@ from flexcal.programs.notation import Notation
 from flexcal.programs.orientation import RollPitchYaw
 from flexcal.programs.pose import Pose
 from flexcal.programs.program import Program, ProgramFile, ProgramTarget, RunTimeTarget
+from flexcal.programs.target_list import TargetList
 from flexcal.units import DEGREE
 
 _SHIFTS = {
@@ -34,6 +35,8 @@ _SHIFTS = {
     "INC": "an increment",
 }
 """Words of a motion that move its target, and what they add."""
+_ELSEWHERE = ("LBL", "CALL", "RUN")
+"""Instructions after which the robot may come from elsewhere than from the position before them in the text."""
 _FRAMES = {"UF": ("UFRAME_NUM", "UFRAME", "user frame"), "UT": ("UTOOL_NUM", "UTOOL", "tool")}
 """Instructions that choose the active frame, and that set its numbers, and its name."""
 
@@ -60,7 +63,7 @@ def parse_fanuc(files: Sequence[ProgramFile]) -> Program:
     >>> program.computed[0].text, program.computed[0].reason
     ('L PR[7] 9mm/sec', 'its position stands in a register of the controller')
     """
-    tables = fanuc_tables(files)
+    tables, found = fanuc_tables(files), TargetList()
     readers = []
     for index, file in enumerate(files):
         if Path(file.name).suffix.lower() in _TABLES:
@@ -72,12 +75,13 @@ def parse_fanuc(files: Sequence[ProgramFile]) -> Program:
                 "E-PROG-013",
                 f"{file.name}, line {error.line}: this is not as a Fanuc controller writes a TP program, so it cannot be read; correct it.",
             ) from error
-        readers.append(_Reader(index, file, tree, tables))
+        readers.append(_Reader(index, file, tree, tables, found))
         readers[-1].read()
     unknown = {ut for reader in readers for ut in reader.unknown_tools()}
-    if len(unknown) > 1:
-        for reader in readers:
+    for reader in readers:
+        if len(unknown) > 1:
             reader.leave_unknown_tools(unknown)
+        reader.note_taken()
     payloads = {payload for reader in readers for payload in reader.payloads}
     remarks = [remark for reader in readers for remark in reader.remarks]
     if payloads:
@@ -85,13 +89,7 @@ def parse_fanuc(files: Sequence[ProgramFile]) -> Program:
             f"the program chooses payload schedules ({', '.join(sorted(payloads))}), whose masses it does not say: the mass of robot.yaml "
             "counts everywhere"
         )
-    return Program(
-        FANUC,
-        tuple(files),
-        tuple(target for reader in readers for target in reader.targets.values()),
-        tuple(item for reader in readers for item in sorted(reader.computed, key=lambda item: item.line)),
-        tuple(remarks),
-    )
+    return found.program(FANUC, files, (), remarks)
 
 
 @cache
@@ -109,12 +107,12 @@ class _Reader:
     source: ProgramFile
     tree: Tree
     tables: FanucTables
+    found: TargetList
     active: dict[str, int | None] = field(default_factory=lambda: {"UF": None, "UT": None})
     set_by_program: set[tuple[str, int | None]] = field(default_factory=set)
     payloads: set[str] = field(default_factory=set)
-    targets: dict[int, ProgramTarget] = field(default_factory=dict)
-    frames_used: dict[int, tuple[int | None, int | None]] = field(default_factory=dict)
-    computed: list[RunTimeTarget] = field(default_factory=list)
+    tools: dict[tuple[int, int], int | None] = field(default_factory=dict)
+    places: dict[int, tuple[int, int]] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
     taken: list[tuple[Tree, int, str]] = field(default_factory=list)
 
@@ -139,26 +137,30 @@ class _Reader:
             for number in (point_number(token) for token in words if token.type == "POINT"):
                 self.taken.append((statement, number, f"it takes P[{number}]"))
             self._instruction(words)
-        for statement, number, reason in self.taken:
-            moves_too = any(token.type == "MOTION" for token in _words(statement))
-            if number in self.targets or moves_too:
-                self._compute(statement, reason + (", as corrected" if number in self.targets else ""))
 
     def unknown_tools(self) -> set[int | None]:
         """Numbers of the tools of poses that no table has."""
-        return {self.frames_used[n][1] for n, target in self.targets.items() if _lacks_tool(target)}
+        return {ut for place, ut in self.tools.items() if _lacks_tool(self.found.targets[place])}
 
     def leave_unknown_tools(self, unknown: set[int | None]) -> None:
         """Leave the poses of tools that are not known, where one --tool cannot stand for all."""
         several = ", ".join(map(str, sorted(ut for ut in unknown if ut is not None)))
-        for number, target in list(self.targets.items()):
-            if _lacks_tool(target):
-                del self.targets[number]
-                reason = (
-                    f"its tool {self.frames_used[number][1]} is not in the program, nor are its others ({several}): give the controller's "
-                    "SYSFRAME.VA after the program"
+        for place, ut in self.tools.items():
+            if _lacks_tool(self.found.targets[place]):
+                self.found.doubtful[place] = (
+                    f"its tool {ut} is not in the program, nor are its others ({several}): give the controller's SYSFRAME.VA after the "
+                    "program"
                 )
-                self.computed.append(RunTimeTarget(target.line, target.name, reason, self.file))
+
+    def note_taken(self) -> None:
+        """Note the motions and instructions that take corrected positions without going there as they are."""
+        for statement, number, reason in self.taken:
+            place = self.places.get(number)
+            corrected = place is not None and place not in self.found.doubtful
+            if corrected or any(token.type == "MOTION" for token in _words(statement)):
+                self.found.computed.append(
+                    self._left(statement, reason + (", as corrected" if corrected else ""))
+                )
 
     def _statements(self) -> list[Tree]:
         return [node for node in self.tree.children if isinstance(node, Tree) and node.data == "statement"]
@@ -177,6 +179,8 @@ class _Reader:
         if not words:
             return
         name = words[0].upper()
+        if name in _ELSEWHERE:
+            self.found.interrupt()
         for key, (choice, _, _) in _FRAMES.items():
             if name == choice:
                 last = words[-1]
@@ -189,20 +193,21 @@ class _Reader:
         words = _words(statement)
         letter = next(str(token).strip().upper() for token in words if token.type == "MOTION")
         shift = next((_SHIFTS[token.upper()] for token in words if token.upper() in _SHIFTS), "")
-        register = next((token for token in words if token.type in ("REGISTER", "POINT")), None)
-        if register is not None and register.type == "REGISTER":
-            what = "position" if register.upper().startswith("PR") else "position's number"
-            self._compute(statement, f"its {what} stands in a register of the controller")
-            return
-        for token in (token for token in words if token.type == "POINT"):
-            number = point_number(token)
-            position = positions.get(number)
-            if shift:
+        goals = [token for token in words if token.type in ("POINT", "REGISTER")][: 2 if letter == "C" else 1]
+        self.found.begin(len(goals), straight=letter in "LC")
+        for token in goals:
+            number = None if token.type == "REGISTER" else point_number(token)
+            position = None if number is None else positions.get(number)
+            if number is None:
+                what = "position" if token.upper().startswith("PR") else "position's number"
+                self._leave(statement, f"its {what} stands in a register of the controller")
+            elif shift:
+                self.found.interrupt()
                 self.taken.append((statement, number, f"the controller adds {shift} to P[{number}]"))
             elif position is None:
-                self._compute(statement, f"P[{number}] is not in the program's positions")
+                self._leave(statement, f"P[{number}] is not in the program's positions")
             elif position.trouble:
-                self._compute(statement, position.trouble)
+                self._leave(statement, position.trouble)
             else:
                 self._target(statement, letter, position)
 
@@ -214,31 +219,25 @@ class _Reader:
             if position.joints:
                 continue
             if known[key] is None:
-                self._compute(
+                self._leave(
                     statement, f"P[{position.number}] counts in the active frame, and no {choice} before it says which"
                 )  # fmt: skip
                 return
             if self.set_by_program & {(key, known[key]), (key, None)}:
-                self._compute(statement, f"the program itself sets {table}[{known[key]}]")
+                self._leave(statement, f"the program itself sets {table}[{known[key]}]")
                 return
         frame = Pose.identity() if position.joints else self.tables.pose("UF", known["UF"])
         if frame is None:
-            self._compute(
+            self._leave(
                 statement,
                 f"P[{position.number}] counts in user frame {known['UF']}, which is not in the program: give the controller's "
                 "SYSFRAME.VA after the program",
             )
             return
-        used = (known["UF"], known["UT"])
-        if self.frames_used.setdefault(position.number, used) != used:
-            self.targets.pop(position.number, None)
-            self._compute(
-                statement,
-                f"P[{position.number}] is reached in several frames, each of which needs other numbers",
-            )
-            return
-        self.targets.setdefault(
-            position.number,
+        place = (self.file, position.numbers[0].first)
+        self.places[position.number] = place
+        self.tools.setdefault(place, known["UT"])
+        self.found.add(
             ProgramTarget(
                 position.name,
                 position.line,
@@ -252,13 +251,17 @@ class _Reader:
                 letter != "J",
                 frame,
                 position.configuration,
-            ),
+            )
         )
 
-    def _compute(self, statement: Tree, reason: str) -> None:
+    def _leave(self, statement: Tree, reason: str) -> None:
+        item = self._left(statement, reason)
+        self.found.leave(item.line, item.text, item.reason, item.file)
+
+    def _left(self, statement: Tree, reason: str) -> RunTimeTarget:
         first = next(token for token in _words(statement) if token.type != "LABEL")
         said = " ".join(self.source.text[first.start_pos : statement.meta.end_pos].rstrip(";").split())
-        self.computed.append(RunTimeTarget(int(first.line or 0), said, reason, self.file))
+        return RunTimeTarget(int(first.line or 0), said, reason, self.file)
 
 
 def _lacks_tool(target: ProgramTarget) -> bool:

@@ -41,5 +41,13 @@ def program_path(
     )  # fmt: skip
     for trace in arrows(at, factor * shift, "shift", RIGID, texts):
         figure.add_trace(trace.update({"meta": {"arrows": label, "exaggeration": factor}}))
-    figure.update_layout(scene=space_axes(), margin={"l": 0, "r": 0, "t": 40, "b": 0})
+    scene = space_axes()
+    drawn = np.concatenate(
+        [at, at + factor * shift, np.stack([np.asarray(links[axis]) for axis in "xyz"], axis=1)]
+    )
+    low, high = drawn.min(axis=0), drawn.max(axis=0)
+    half = 0.55 * float((high - low).max())
+    for axis, middle in zip("xyz", ((low + high) / 2).tolist(), strict=True):
+        scene[f"{axis}axis"] |= {"range": [middle - half, middle + half]}
+    figure.update_layout(scene=scene, margin={"l": 0, "r": 0, "t": 40, "b": 0})
     return figure

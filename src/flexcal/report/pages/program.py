@@ -96,7 +96,8 @@ def program_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
     elif left:
         first = Check(
             question,
-            f"{len(left)} of {len(targets) + len(left)} stay as they are; the robot still goes there with its uncalibrated error.",
+            f"{len(left)} of {len(targets) + len(left)} stay as they are; unless the controller computes them from corrected ones, "
+            "the robot goes there with its uncalibrated error.",
             "care",
         )
     else:
