@@ -98,6 +98,13 @@ def test_gravity_tells_them_too(tmp_path: Path) -> None:
     assert low < ARMATURE < high
 
 
+def test_gravity_compensation_is_not_trusted(tmp_path: Path) -> None:
+    """The motion is right to 2 %, the stiffness many times too large."""
+    found = identify_actuators(robot(tmp_path, "0 1 0"), [moves(weight=0.0)])
+    assert value(found, "stiffness") > 5 * STIFFNESS
+    assert found.trust.trusted is None and "simulated_noise" in found.trust.reasons
+
+
 @pytest.mark.slow
 def test_integral_action_is_not_trusted(tmp_path: Path) -> None:
     """Much of it: the sag that gives the torques away is no longer there."""

@@ -258,7 +258,7 @@ PHRASES: dict[str, dict[str, str]] = {
     },
     "simulated_noise": {
         "good": "the model explains the measured positions",
-        "else": "the model lacks something that the positions show",
+        "else": "the controller has something that the model lacks, so that parameters may be far from the robot's own",
     },
     "actuator_parameters": {
         "good": "the logs tell every parameter",
