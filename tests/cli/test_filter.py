@@ -287,3 +287,16 @@ def test_what_stays_is_said(
     assert filtered(folder, "odd.script", "odd_new.script") == code
     told = " ".join("".join(capsys.readouterr()).split())
     assert said in told
+
+
+def test_nothing_is_said_to_be_corrected_that_stays(
+    cell: tuple[Path, Ur5], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A target is computed from one that is out of reach."""
+    folder, _ = cell
+    text = "set_tcp(p[0,0,0,0,0,0])\nmovej([0,-1,1,-1,1,0])\na=p[-4, 0.1, 0.3, 0, 3, 0]\nmovel(a)\nmovel(pose_add(a, b))\n"
+    (folder / "far.script").write_text(text, "utf-8")
+    capsys.readouterr()
+    assert filtered(folder, "far.script", "far_new.script") == 0
+    told = capsys.readouterr().out
+    assert "out of reach" in told and "when the program runs" in told and "as corrected" not in told

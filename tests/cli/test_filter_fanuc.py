@@ -157,7 +157,7 @@ def test_what_stays_is_named(cell: tuple[Path, LrMate], capsys: pytest.CaptureFi
     assert left == {
         "J PR[3:safe] 100% FINE": "its position stands in a register of the controller",
         "L P[2] 100mm/sec FINE Offset,PR[7]": "the controller adds an offset to P[2], as corrected",
-        "L P[1] 100mm/sec FINE Tool_Offset,PR[8:up]": "the controller adds an offset of the tool to P[1], as corrected",
+        "L P[1] 100mm/sec FINE Tool_Offset,PR[8:up]": "the controller adds an offset of the tool to P[1:home], as corrected",
         "PR[9]=P[3]": "it takes P[3], as corrected",
         "L P[R[4:next]] 100mm/sec FINE": "its position's number stands in a register of the controller",
     }

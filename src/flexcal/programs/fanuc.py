@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 
@@ -135,7 +135,7 @@ class _Reader:
                     self._motion(statement, positions)
                 continue
             for number in (point_number(token) for token in words if token.type == "POINT"):
-                self.taken.append((statement, number, f"it takes P[{number}]"))
+                self.taken.append((statement, number, "it takes"))
             self._instruction(words)
 
     def unknown_tools(self) -> set[int | None]:
@@ -154,13 +154,13 @@ class _Reader:
 
     def note_taken(self) -> None:
         """Note the motions and instructions that take corrected positions without going there as they are."""
-        for statement, number, reason in self.taken:
+        for statement, number, what in self.taken:
             place = self.places.get(number)
             corrected = place is not None and place not in self.found.doubtful
             if corrected or any(token.type == "MOTION" for token in _words(statement)):
-                self.found.computed.append(
-                    self._left(statement, reason + (", as corrected" if corrected else ""))
-                )
+                name = self.found.targets[place].name if place is not None and corrected else f"P[{number}]"
+                item = self._left(statement, f"{what} {name}")
+                self.found.computed.append(replace(item, sources=(name,) if corrected else ()))
 
     def _statements(self) -> list[Tree]:
         return [node for node in self.tree.children if isinstance(node, Tree) and node.data == "statement"]
@@ -203,7 +203,7 @@ class _Reader:
                 self._leave(statement, f"its {what} stands in a register of the controller")
             elif shift:
                 self.found.interrupt()
-                self.taken.append((statement, number, f"the controller adds {shift} to P[{number}]"))
+                self.taken.append((statement, number, f"the controller adds {shift} to"))
             elif position is None:
                 self._leave(statement, f"P[{number}] is not in the program's positions")
             elif position.trouble:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -106,6 +106,11 @@ class ProgramTarget:
     literal: Span | None = None
 
     @property
+    def variable(self) -> str:
+        """Its name without the place of its numbers in an array."""
+        return self.name.split("{")[0]
+
+    @property
     def values(self) -> tuple[float, ...]:
         """Values of the numbers."""
         return tuple(number.value for number in self.numbers)
@@ -152,12 +157,25 @@ class Move:
 
 @dataclass(frozen=True)
 class RunTimeTarget:
-    """Target that is no plain number in the program: line and text of its motion, why it stays as it is, and the index of its file."""
+    """Target that is no plain number in the program: line and text of its motion, why it stays as it is, and the index of its file.
+
+    `sources` are the names of targets in the program that it is computed from.
+    """
 
     line: int
     text: str
     reason: str
     file: int = 0
+    sources: tuple[str, ...] = ()
+
+    def reason_beside(self, corrected: Collection[str]) -> str:
+        """Why it stays as it is, and which of its sources are among the names (lower case) of `corrected` targets."""
+        names = [name for name in self.sources if name.lower() in corrected]
+        if not names:
+            return self.reason
+        if self.reason.endswith(f" {names[-1]}"):
+            return f"{self.reason}, as corrected"
+        return f"{self.reason}, from {' and '.join(names)} as corrected"
 
 
 @dataclass(frozen=True)

@@ -70,8 +70,8 @@ def parse_rapid(files: Sequence[ProgramFile]) -> Program:
     >>> program = parse_rapid([ProgramFile("m.mod", text)])
     >>> program.targets[0].values, program.targets[0].words
     ((600.0, 0.0, 400.0, 0.0, 0.0, 1.0, 0.0), ('0', '0', '0', '0'))
-    >>> program.computed[0].reason
-    'the controller computes it when the program runs, from p1 as corrected'
+    >>> program.computed[0].reason, program.computed[0].sources
+    ('the controller computes it when the program runs', ('p1',))
     """
     statements = [
         statement for k, file in enumerate(files) for statement in statements_of(parse_text(file, "rapid"), k)

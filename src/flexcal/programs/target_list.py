@@ -61,16 +61,15 @@ class TargetList:
     ) -> Program:
         """The program; of a target that is computed from corrected ones of the `variables` the reason names these."""
         kept = [target for place, target in self.targets.items() if place not in self.doubtful]
-        corrected = {target.name.split("{")[0].lower() for target in kept} & {
-            name.lower() for name in variables
-        }
+        known = {name.lower() for name in variables}
+        sources = {target.variable.lower() for target in kept} & known
         left = [
             RunTimeTarget(
                 self.targets[place].line, self.targets[place].name, reason, self.targets[place].file
             )
             for place, reason in self.doubtful.items()
         ]
-        left += [_built_from(item, corrected) for item in self.computed]
+        left += [_built_from(item, sources) for item in self.computed]
         index = {
             place: k for k, place in enumerate(place for place in self.targets if place not in self.doubtful)
         }
@@ -110,7 +109,7 @@ def _differ(one: Pose | None, other: Pose | None) -> bool:
     return not one.equals(other)
 
 
-def _built_from(item: RunTimeTarget, corrected: set[str]) -> RunTimeTarget:
-    """The same target, with the corrected variables that it is computed from."""
-    names = [name for name in dict.fromkeys(re.findall(r"\w+", item.text)) if name.lower() in corrected]
-    return replace(item, reason=f"{item.reason}, from {' and '.join(names)} as corrected") if names else item
+def _built_from(item: RunTimeTarget, variables: Collection[str]) -> RunTimeTarget:
+    """The same target, with those of the variables (lower case) that it is computed from, as it writes them."""
+    words = dict.fromkeys(re.findall(r"\w+", item.text))
+    return replace(item, sources=(*item.sources, *(word for word in words if word.lower() in variables)))

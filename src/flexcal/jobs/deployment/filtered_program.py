@@ -163,13 +163,14 @@ class FilteredProgram(PlottedResult):
             for k, target in enumerate(self.program.targets)
             if self.reasons[k]
         ]
+        corrected = {self.program.targets[k].variable.lower() for k in self.new}
         found = [
             {
                 "order": None,
                 "file": name[item.file],
                 "line": item.line,
                 "text": item.text,
-                "reason": item.reason,
+                "reason": item.reason_beside(corrected),
             }
             for item in self.program.computed
         ]
