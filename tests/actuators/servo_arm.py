@@ -33,7 +33,9 @@ NAMES = ("shoulder", "elbow")
 
 @dataclass(frozen=True)
 class Servo:
-    """True actuators, arrays (…, 2): τ = K (u − q) + D (r u̇ − q̇) − d q̇ − f sgn q̇, r being 0 or 1; delay in s."""
+    """True actuators, arrays (…, 2): τ = K (u − q) + D (r u̇ − q̇) − d q̇ − f sgn q̇, r being 0 or 1; delay in s; with `balanced` they add what
+    holds the links.
+    """
 
     stiffness: np.ndarray
     damping: np.ndarray
@@ -42,9 +44,10 @@ class Servo:
     armature: np.ndarray
     delay: np.ndarray
     rate: float = 0.0
+    balanced: bool = False
 
     def values(self) -> dict[str, np.ndarray]:
-        return {k: v for k, v in vars(self).items() if k != "rate"}
+        return {k: v for k, v in vars(self).items() if k not in ("rate", "balanced")}
 
 
 TRUTH = Servo(
@@ -105,8 +108,9 @@ def simulate(servo: Servo, commands: np.ndarray, rate: float, step: float = STEP
         force[:, 1] -= cross * sin2 * v[:, 0] ** 2
         # about +y, with x along the link at zero, a positive turn lowers it: gravity drives q upwards
         outer = MASS[1] * COM[1] * GRAVITY * np.cos(q.sum(axis=1))
-        force[:, 0] += (MASS[0] * COM[0] + MASS[1] * LENGTH) * GRAVITY * np.cos(q[:, 0]) + outer
-        force[:, 1] += outer
+        if not servo.balanced:
+            force[:, 0] += (MASS[0] * COM[0] + MASS[1] * LENGTH) * GRAVITY * np.cos(q[:, 0]) + outer
+            force[:, 1] += outer
         drag = shaped["damping"] + shaped["viscous"]
         a11 = m11 + shaped["armature"][:, 0] + 0.5 * step * drag[:, 0]
         a22 = m22 + shaped["armature"][:, 1] + 0.5 * step * drag[:, 1]

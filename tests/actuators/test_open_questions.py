@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
+from servo_arm import NAMES, TRUTH, arm, command, simulate
 
 from flexcal.data.recordings import CommandLog
+from flexcal.export import render_mjcf
 from flexcal.jobs.actuators import ActuatorIdentification, identify_actuators
 from flexcal.model.robot import RobotModel
 
@@ -98,11 +102,41 @@ def test_gravity_tells_them_too(tmp_path: Path) -> None:
     assert low < ARMATURE < high
 
 
-def test_gravity_compensation_is_not_trusted(tmp_path: Path) -> None:
-    """The motion is right to 2 %, the stiffness many times too large."""
+def test_gravity_compensation_is_found(tmp_path: Path) -> None:
+    """Taken to feel gravity, the stiffness would be many times too large; without it nothing tells the torques of a single axis."""
     found = identify_actuators(robot(tmp_path, "0 1 0"), [moves(weight=0.0)])
-    assert value(found, "stiffness") > 5 * STIFFNESS
-    assert found.trust.trusted is None and "simulated_noise" in found.trust.reasons
+    assert found.servo.compensates_gravity and "compensates gravity" in found.summary()
+    assert told(found) == {"delay"}
+    moved = (value(found, "armature") + INERTIA) / (ARMATURE + INERTIA)
+    assert value(found, "stiffness") / moved == pytest.approx(STIFFNESS, rel=0.02)
+    assert found.fit.unseen.simulated / found.fit.unseen.commanded < 0.02
+
+
+@pytest.mark.slow
+def test_the_torques_of_two_balanced_links_are_told(tmp_path: Path) -> None:
+    """By the inertia of the second on the first, which changes; the simulator's file then stays up by itself."""
+    commands = np.stack([command(40.0, 250.0, np.random.default_rng(seed)) for seed in (1,)])
+    servo = replace(TRUTH, balanced=True)
+    q = simulate(servo, commands, 250.0)[0]
+    model = arm(tmp_path)
+    measured = q + 1e-5 * np.random.default_rng(3).standard_normal(q.shape)
+    found = identify_actuators(model, [CommandLog(1 / 250.0, commands[0], measured, name="log")])
+    assert found.servo.compensates_gravity
+    for i, joint in enumerate(NAMES):
+        for key in ("stiffness", "coulomb"):
+            assert found.estimate.values[f"{joint}.actuator.{key}"] == pytest.approx(
+                getattr(TRUTH, key)[i], rel=0.05
+            )
+    compiled = mujoco.MjModel.from_xml_string(render_mjcf(model, found.actuators).text)
+    data = mujoco.MjData(compiled)
+    data.qpos[:] = data.ctrl[:] = [0.3, 0.4]
+    for k in range(compiled.nu):
+        mujoco.mj_initCtrlHistory(
+            compiled, data, k, None, np.full(compiled.actuator_history[k, 0], data.ctrl[k])
+        )
+    for _ in range(4000):
+        mujoco.mj_step(compiled, data)
+    np.testing.assert_allclose(data.qpos, [0.3, 0.4], atol=1e-4)
 
 
 @pytest.mark.slow

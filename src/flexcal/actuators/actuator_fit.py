@@ -18,7 +18,7 @@ from flexcal.actuators.tracking_errors import TrackingErrors
 from flexcal.data.recordings import CommandLog
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate, solve
-from flexcal.export import OF_ERROR, Actuators
+from flexcal.export import COMPENSATED, OF_ERROR, Actuators
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 
@@ -69,7 +69,13 @@ def fit_actuators(
     """
     motions = [SmoothedMotion.of(log) for log in logs]
     _require_motion(model, logs, motions)
-    first, links = start_values(model, logs, motions, follows_velocity=servo.follows_velocity)
+    first, links = start_values(
+        model,
+        logs,
+        motions,
+        follows_velocity=servo.follows_velocity,
+        compensates_gravity=servo.compensates_gravity,
+    )
     start = servo.applied(first)
     coordinates = ServoCoordinates(model, servo, links, start)
     simulation = ServoSimulation(model, start, links, threads=threads)
@@ -106,7 +112,10 @@ def fit_actuators(
         estimate,
         identifiable=determined(model, servo, estimate, found, links, open_scale),
         covariance_freedom=float(counts[0] - len(servo.keys)),
-        provenance={"option.damping": OF_ERROR if servo.follows_velocity else "velocity"},
+        provenance={
+            "option.damping": OF_ERROR if servo.follows_velocity else "velocity",
+            "option.gravity": COMPENSATED if servo.compensates_gravity else "felt",
+        },
     )
     return ActuatorFit(
         estimate,

@@ -25,12 +25,14 @@ class Servo:
     """What is known of the controllers.
 
     follows_velocity : whether the damping acts on the difference from the commanded velocity, not on the velocity;
+    compensates_gravity : whether they add the torques that hold the links;
     stiffness, damping : known gains (n,), N m/rad and N m s/rad (N/m, N s/m); absent where they are to be found.
     """
 
     follows_velocity: bool = False
     stiffness: tuple[float, ...] | None = None
     damping: tuple[float, ...] | None = None
+    compensates_gravity: bool = False
 
     @property
     def known(self) -> bool:

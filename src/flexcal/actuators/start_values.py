@@ -27,6 +27,7 @@ def start_values(
     motions: Sequence[SmoothedMotion],
     *,
     follows_velocity: bool,
+    compensates_gravity: bool,
 ) -> tuple[Actuators, np.ndarray]:
     """Actuators by the equation error, and the links' inertias (n,) on the joints (medians).
 
@@ -40,7 +41,7 @@ def start_values(
     q, dq, ddq = (
         np.concatenate([getattr(motion, name)[::stride] for motion in motions]) for name in ("q", "dq", "ddq")
     )
-    torque, inertia = _link_torques(model, q, dq, ddq)
+    torque, inertia = _link_torques(model, q, dq, ddq, gravity=not compensates_gravity)
     found = {key: np.zeros(model.n) for key in Actuators.KEYS}
     for i in range(model.n):
         own = np.median(inertia[:, i])
@@ -73,7 +74,8 @@ def start_values(
             for key in ("stiffness", "damping", "coulomb"):
                 found[key][i] *= factor
             found["armature"][i] = declared
-    return Actuators(**found, follows_velocity=follows_velocity), np.median(inertia, axis=0)
+    actuators = Actuators(**found, follows_velocity=follows_velocity, compensates_gravity=compensates_gravity)
+    return actuators, np.median(inertia, axis=0)
 
 
 def _complete(found: dict[str, np.ndarray], i: int, inertia: float, torque: float) -> None:
@@ -95,14 +97,16 @@ def _delayed(log: CommandLog, motion: SmoothedMotion, i: int, delay: float) -> t
 
 
 def _link_torques(
-    model: RobotModel, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray
+    model: RobotModel, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, *, gravity: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Torques (N, n) that move the links alone, and the diagonal (N, n) of their mass matrix."""
+    """Torques (N, n) that move the links alone, against gravity or not, and the diagonal (N, n) of their mass matrix."""
     import mujoco
 
     spec = mjcf_spec(model.without_springs())
     compiled = spec.compile()
     compiled.dof_armature[:] = 0.0
+    if not gravity:
+        compiled.opt.gravity[:] = 0.0
     data = mujoco.MjData(compiled)
     joints = [compiled.joint(name) for name in model.joint_names]
     positions = [joint.qposadr[0] for joint in joints]

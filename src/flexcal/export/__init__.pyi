@@ -1,4 +1,4 @@
-from .actuators import OF_ERROR, Actuators, actuator_name, actuator_unit
+from .actuators import COMPENSATED, OF_ERROR, Actuators, actuator_name, actuator_unit
 from .dh_table import Convention, render_dh
 from .formats import FORMATS, PlainFormat, render
 from .isaac import TIME_STEP, render_isaac
@@ -24,6 +24,7 @@ from .xacro_expansion import XacroSource
 from .xacro_robot import XacroExport, Zeros, render_xacro
 
 __all__ = [
+    "COMPENSATED",
     "FORMATS",
     "OF_ERROR",
     "TICKS",

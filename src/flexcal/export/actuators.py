@@ -12,6 +12,8 @@ from flexcal.model.robot import RobotModel
 
 OF_ERROR = "velocity error"
 """Provenance `option.damping` of actuators whose damping acts on the difference from the commanded velocity."""
+COMPENSATED = "compensated"
+"""Provenance `option.gravity` of actuators whose controller adds the torques that hold the links."""
 _UNITS = {
     "stiffness": ("N m/rad", "N/m"),
     "damping": ("N m s/rad", "N s/m"),
@@ -28,7 +30,8 @@ class Actuators:
 
     With the command u, the torque on a joint is K (u(t − T) − q) − D q̇ − d q̇ − f sgn q̇, and the rotor adds A to the inertia:
     `stiffness` K, `damping` D, `viscous` d, `coulomb` f, `armature` A, `delay` T (s). Where the damping acts on the velocity error
-    (`follows_velocity`), D (u̇(t − T) − q̇) stands in place of −D q̇; else D and d have one effect, and d is zero unless D is known.
+    (`follows_velocity`), D (u̇(t − T) − q̇) stands in place of −D q̇; else D and d have one effect, and d is zero unless D is known. Where
+    the controller `compensates_gravity`, it adds the torques that hold the links.
     """
 
     stiffness: np.ndarray
@@ -38,6 +41,7 @@ class Actuators:
     armature: np.ndarray
     delay: np.ndarray
     follows_velocity: bool = False
+    compensates_gravity: bool = False
 
     KEYS: ClassVar[tuple[str, ...]] = tuple(_UNITS)
 
@@ -49,7 +53,12 @@ class Actuators:
             key: np.array([values.get(actuator_name(joint, key), 0.0) for joint in model.joint_names])
             for key in cls.KEYS
         }
-        return cls(**numbers, follows_velocity=estimate.provenance.get("option.damping") == OF_ERROR)
+        said = estimate.provenance
+        return cls(
+            **numbers,
+            follows_velocity=said.get("option.damping") == OF_ERROR,
+            compensates_gravity=said.get("option.gravity") == COMPENSATED,
+        )
 
 
 def actuator_name(joint: str, key: str) -> str:

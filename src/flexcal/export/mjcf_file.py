@@ -96,6 +96,11 @@ def render_mjcf(model: RobotModel, actuators: Actuators | None = None) -> Render
         remarks.append(
             "The delays of the commands are missing: this version of MuJoCo has none; delay the commands, or install a newer one."
         )
+    if actuators is not None and actuators.compensates_gravity and model.elastic:
+        remarks.append(
+            "The controller compensates gravity, which MuJoCo's gravcomp cannot do for a robot with springs: it would hold the arm behind "
+            "them too; apply the torques (qfrc_applied) yourself."
+        )
     if actuators is None and model.drives.coulomb[np.isfinite(model.drives.coulomb)].any():
         remarks.append("Coulomb friction of the drives is MuJoCo's frictionloss, which holds an arm at rest.")
     springs = [

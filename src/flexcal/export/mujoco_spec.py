@@ -53,7 +53,8 @@ def mjcf_spec(
 
     With `backlash` the gap of a drive is a joint `<joint>.backlash` that moves freely within it, of drives with a known rotor, which has
     to move by itself. With `actuators` the joints have their armature and friction, and the MuJoCo actuator `<joint>` takes positions
-    (and `<joint>.velocity` velocities, where the damping follows them), not torques; their delay is not in it.
+    (and `<joint>.velocity` velocities, where the damping follows them), not torques; their delay is not in it. Bodies of rigid
+    robots have `gravcomp` where the controller compensates gravity; behind springs it would hold the arm too.
 
     Raises `FlexcalError` where a joint is locked without `q`, or a payload is given but none declared.
     """
@@ -82,6 +83,8 @@ def mjcf_spec(
         body.ipos = inertia.com
         body.fullinertia = inertia.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
         body.explicitinertial = True
+        if actuators is not None and actuators.compensates_gravity and not model.elastic:
+            body.gravcomp = 1.0
         _add_joints(spec, body, model, i, None if i in motors else at[i], actuators, backlash)
         bodies.append(body)
     for name in model.points:

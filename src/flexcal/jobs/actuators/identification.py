@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 from flexcal.actuators import Servo, fit_actuators
@@ -13,6 +14,10 @@ from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 
 Damping = Literal["velocity", "error"]
+_EXPLAINED, _EXACT = 1.5, 0.003
+"""Residuals over noise and over the tracking error, above both of which a controller that compensates gravity is tried, too."""
+_BETTER = 0.7
+"""Ratio of what the simulations miss below which it is taken."""
 
 
 def identify_actuators(
@@ -26,6 +31,8 @@ def identify_actuators(
     progress: Progress = silent,
 ) -> ActuatorIdentification:
     """Fit gains, delay, friction and armature of position-controlled joints to commanded and measured positions alone.
+
+    Where a controller that feels gravity imitates the robot badly, one that compensates it is tried, too, and taken if it does better.
 
     Parameters
     ----------
@@ -67,6 +74,11 @@ def identify_actuators(
     model.require_motors("the identification of actuators")
     servo = _servo(model, damping, known_gains)
     fit = fit_actuators(model, logs, servo, hold_out=hold_out, threads=jobs, progress=progress)
+    if ((fit.fitted.simulated > _EXPLAINED * fit.noise) & (fit.fitted.share > _EXACT)).any():
+        balanced = replace(servo, compensates_gravity=True)
+        other = fit_actuators(model, logs, balanced, hold_out=hold_out, threads=jobs, progress=progress)
+        if other.fitted.share.max() < _BETTER * fit.fitted.share.max():
+            servo, fit = balanced, other
     return ActuatorIdentification(
         model=model,
         estimate=fit.estimate,

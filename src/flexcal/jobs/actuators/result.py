@@ -118,6 +118,10 @@ class ActuatorIdentification(Identification):
             said.append(
                 "The damping is that of controller and viscous friction together: they have one effect."
             )
+        if self.servo.compensates_gravity:
+            said.append(
+                "The controller compensates gravity: without that the simulation is worse. The links' inertias alone tell torques then."
+            )
         if self.model.payload is not None and self.model.payload.mass > 0:
             said.append(f"The payload of {self.model.payload.mass:.3g} kg is taken as held in all logs.")
         said.append(
@@ -150,6 +154,7 @@ class ActuatorIdentification(Identification):
         return {
             "robot": self.model.name,
             "damping": "error" if self.servo.follows_velocity else "velocity",
+            "gravity": "compensated" if self.servo.compensates_gravity else "felt",
             "known_gains": self.servo.known,
             "parameters": parameters,
             "fit": {

@@ -25,6 +25,10 @@ def actuator_remarks(robot: CalibratedRobot, format: str) -> tuple[str, ...]:
         remarks.append(
             f"The logs do not tell {', '.join(open_)}: these have values of the fit, with which the motion is right and torques are not."
         )
+    if format == "isaac" and Actuators.of(robot.nominal, estimate).compensates_gravity:
+        remarks.append(
+            "The controller compensates gravity, which is no number of an actuator: set disable_gravity of the robot's links."
+        )
     if format == "mjcf" and robot.model.elastic:
         remarks.append("The actuators were identified on rigid links, and here they move elastic ones.")
     return tuple(remarks)

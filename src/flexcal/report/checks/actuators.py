@@ -48,8 +48,8 @@ def _check_held_out(errors: Mapping[str, Any]) -> Check:
     if missed[joint] > _CARE:
         return Check(
             question,
-            f"No. {answer} Controller or friction are others than assumed: try --damping error; integral action, gravity compensation and "
-            "feed-forward torques are not in the model.",
+            f"No. {answer} Controller or friction are others than assumed: try --damping error; integral action and feed-forward "
+            "torques are not in the model.",
             "bad",
         )
     return Check(question, answer, "good" if missed[joint] <= _GOOD else "care")
@@ -79,8 +79,8 @@ def _check_noise(errors: Mapping[str, Any]) -> Check:
     if ratios[joint] > _EXPLAINED and share > _EXACT:
         return Check(
             question,
-            f"No. {answer} The controller has something that the model lacks, as gravity compensation, integral action or feed-forward of "
-            "the velocity (then try --damping error): the parameters imitate it, and may be far from the robot's own, outside their "
+            f"No. {answer} The controller has something that the model lacks, as integral action or feed-forward of the velocity "
+            " (then try --damping error): the parameters imitate it, and may be far from the robot's own, outside their "
             "intervals.",
             "care",
         )
