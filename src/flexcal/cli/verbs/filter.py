@@ -95,11 +95,11 @@ class Filter:
 
     @property
     def _sources(self) -> list[Path]:
-        """Files that the new program has too."""
+        """Files that the new program has too; as given where some are missing, which `run` refuses."""
         from flexcal.jobs.deployment import written_files
 
-        require_robot_and_files(self.robot, self.program, "program")
-        return written_files(self.program)
+        there = all(file.is_file() for file in self.program)
+        return written_files(self.program) if there and self.program else list(self.program)
 
     def _place_of(self, item: dict[str, Any]) -> str:
         """Line of a target, with its file where the program has several."""
@@ -111,6 +111,7 @@ class Filter:
         from flexcal.jobs.deployment import filter_program_file
         from flexcal.units import MILLIMETRE
 
+        require_robot_and_files(self.robot, self.program, "program")
         out = self.out
         console = Console(self.json)
         result = filter_program_file(
