@@ -85,7 +85,8 @@ class Filter:
     @property
     def out(self) -> Path:
         """File or folder of the new program."""
-        return self.place or Path("corrected" + ("" if self.leaves else self._sources[0].suffix))
+        suffix = self._sources[0].suffix if len(self._sources) == 1 else ""
+        return self.place or Path("corrected" + suffix)
 
     @property
     def leaves(self) -> tuple[str, ...]:
