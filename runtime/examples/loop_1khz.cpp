@@ -33,14 +33,15 @@ int main(int count, char** arguments) {
     const auto model = flexcal::runtime::read_model_file(arguments[1], error);
     if (!model) return std::fprintf(stderr, "%s\n", error.c_str()), 1;
     const std::size_t n = model->joints.size();
-    const auto cycles = static_cast<std::size_t>(1000 * (count > 2 ? std::atof(arguments[2]) : 2.0));
+    const double seconds = count > 2 ? std::atof(arguments[2]) : 2.0;
+    const std::size_t cycles = seconds > 0 && seconds < 1e5 ? static_cast<std::size_t>(1000 * seconds) : 0;
     if (cycles == 0) return std::fprintf(stderr, "the seconds must be a positive number\n"), 2;
 
     // everything that allocates comes before the loop
     flexcal::runtime::Solver solver(*model);
     std::vector<double> nominal(n), command(n), took, late;
     took.reserve(cycles), late.reserve(cycles);
-    std::size_t refused = 0;
+    std::size_t became[7] = {};  // how many cycles had each status
 
     auto next = Clock::now();
     for (std::size_t cycle = 0; cycle < cycles; ++cycle) {
@@ -54,12 +55,14 @@ int main(int count, char** arguments) {
             nominal[j] = 0.5 * (lower + upper) + 0.3 * (upper - lower) * std::sin((0.3 + 0.1 * static_cast<double>(j)) * t);
         }
         // on any other status the last command stays: the robot holds, and the cause is told
-        if (solver.compensate(nominal.data(), 0, command.data()) != flexcal::runtime::Status::ok) ++refused;
+        ++became[static_cast<int>(solver.compensate(nominal.data(), 0, command.data()))];
         // ... command goes to the motors here ...
         took.push_back(microseconds(Clock::now() - woken));
         late.push_back(microseconds(woken - next));
     }
-    std::printf("%zu cycles, %zu without a command\n", cycles, refused);
+    std::printf("%zu cycles\n", cycles);
+    for (int status = 0; status < 7; ++status)
+        if (became[status]) std::printf("%8zu: %s\n", became[status], flexcal::runtime::describe(static_cast<flexcal::runtime::Status>(status)));
     for (auto [name, values] : {std::pair{"compensation", &took}, std::pair{"wake-up after the deadline", &late}})
         std::printf("%-27s median %.1f us, 99.99 %% %.1f us, most %.1f us\n", name, quantile(*values, 0.5), quantile(*values, 0.9999),
                     quantile(*values, 1.0));

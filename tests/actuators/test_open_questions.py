@@ -8,6 +8,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from refusals import refused
 from servo_arm import NAMES, TRUTH, arm, command, simulate
 
 from flexcal.data.recordings import CommandLog
@@ -100,6 +101,18 @@ def test_gravity_tells_them_too(tmp_path: Path) -> None:
     assert value(found, "stiffness") == pytest.approx(STIFFNESS, rel=0.05)
     low, high = found.estimate.interval("turn.actuator.armature") or (0.0, 0.0)
     assert low < ARMATURE < high
+
+
+def test_logs_of_the_same_numbers_twice_or_of_exchanged_columns_are_refused(tmp_path: Path) -> None:
+    log = moves()
+    with refused("E-DYN-048", "turn"):
+        identify_actuators(robot(tmp_path), [replace(log, q=log.command)])
+    with refused("E-DYN-050", "turn"):
+        identify_actuators(robot(tmp_path), [replace(log, q=-log.q)])
+    commands = command(20.0, 100.0, np.random.default_rng(5))
+    q = np.roll(commands, 1, axis=0) + 1e-4 * np.random.default_rng(6).standard_normal(commands.shape)
+    with refused("E-DYN-049", "shoulder", "elbow"):
+        identify_actuators(arm(tmp_path), [CommandLog(0.01, commands, q[:, ::-1], name="log")])
 
 
 def test_gravity_compensation_is_found(tmp_path: Path) -> None:

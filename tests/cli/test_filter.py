@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import shutil
 from pathlib import Path
 
@@ -300,3 +301,70 @@ def test_nothing_is_said_to_be_corrected_that_stays(
     assert filtered(folder, "far.script", "far_new.script") == 0
     told = capsys.readouterr().out
     assert "out of reach" in told and "when the program runs" in told and "as corrected" not in told
+
+
+def test_the_printed_command_leads_back_with_the_same_options(
+    cell: tuple[Path, Ur5],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The tool and the start of this run stand in it, and names with spaces are quoted."""
+    folder, _ = cell
+    monkeypatch.chdir(tmp_path)
+    robot = tmp_path / "my robot"
+    robot.mkdir()
+    for file in folder.iterdir():
+        if file.is_file() and file.suffix in (".yaml", ".urdf"):
+            (robot / file.name).write_bytes(file.read_bytes())
+    source = "movel(p[-0.4, 0.1, 0.3, 0, 3, 0])\n"
+    Path("a b.script").write_text(source, "utf-8")
+    estimates = next(path for path in folder.rglob("estimates.yaml"))
+    given = ["--tool", "0", "0", "0.1", "0", "0", "0", "--start", "0", "-1", "1", "-1", "1", "0"]
+    run = ["filter", str(robot / "robot.yaml"), "a b.script", "--estimates", str(estimates), *given]
+    assert main([*run, "--out", "new.script"]) == 0
+    back = capsys.readouterr().out.rpartition("the way back: ")[2].strip()
+    words = shlex.split(back)
+    assert words[:2] == ["flexcal", "filter"] and main(words[1:]) == 0, back
+    assert "the way back" not in capsys.readouterr().out
+    numbers = [float(x) for x in re.findall(r"-?\d+\.?\d*", Path("ORIGINAL.script").read_text("utf-8"))]
+    np.testing.assert_allclose(numbers, [-0.4, 0.1, 0.3, 0, 3, 0], atol=1e-6)
+
+
+def test_a_program_is_never_its_own_output(
+    cell: tuple[Path, Ur5], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, _ = cell
+    source = tmp_path / "b.script"
+    source.write_text("movej([0,-1,1,-1,1,0])\n", "utf-8")
+    assert filtered(folder, str(source), str(tmp_path / "new.script")) == 0
+    before = (tmp_path / "new.script").read_bytes()
+    capsys.readouterr()
+    assert filtered(folder, str(tmp_path / "new.script"), str(tmp_path / "new.script")) == 2
+    assert "E-PROG-017" in capsys.readouterr().err
+    assert (tmp_path / "new.script").read_bytes() == before
+
+
+@pytest.mark.parametrize("text", ["", "milk\neggs\n"])
+def test_what_is_no_program_is_refused(
+    cell: tuple[Path, Ur5], tmp_path: Path, text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, _ = cell
+    (tmp_path / "list.script").write_text(text, "utf-8")
+    assert filtered(folder, str(tmp_path / "list.script"), str(tmp_path / "new.script")) == 2
+    assert "E-PROG-016" in capsys.readouterr().err and not (tmp_path / "new.script").exists()
+
+
+def test_a_guessed_configuration_is_told(cell: tuple[Path, Ur5], capsys: pytest.CaptureFixture[str]) -> None:
+    folder, _ = cell
+    text = (
+        "set_tcp(p[0,0,0,0,0,0])\nmovej([0,-1,1,-1,1,0])\nmovej(somewhere)\nmovel(p[-0.4, 0.1, 0.3, 0, 3, 0])\n"
+        "movel(p[-0.4, 0.12, 0.3, 0, 3, 0])\n"
+    )
+    (folder / "guess.script").write_text(text, "utf-8")
+    capsys.readouterr()
+    assert filtered(folder, "guess.script", "guess_new.script") == 0
+    assert (
+        "configuration is taken to be that of the last known one: line 4; check it there"
+        in capsys.readouterr().out
+    )

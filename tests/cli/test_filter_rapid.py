@@ -242,7 +242,7 @@ _HOME = f"MoveAbsJ [[0,0,0,0,30,0],{_NONE}],v100,fine,tool0;\n"
             0,
             "external axes",
         ),
-        ('TPWrite "nothing";\n', 0, "no motion of the program"),
+        ('TPWrite "nothing";\n', 2, "has no motion in RAPID of ABB"),
     ],
 )
 def test_what_stays_is_said(

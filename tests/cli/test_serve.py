@@ -144,6 +144,8 @@ NONSENSE = [
     b'{"q": [0, 0, 0, 0, 0, 0], "point": ["smr"]}\n',
     b'{"q": [0, 0, 0, 0, 0, 0], "payload": "heavy"}\n',
     b'{"q": [0, -1, 1, 0, 1, 0], "payload": 3}\n',
+    b'{"q": [0, -1, 1, 0, 1, 0], "paylaod": 0}\n',
+    b'{"q": [0, -1, 1, 0, 1, 0], "payload": -1}\n',
     b'{"do": "drop"}\n',
     b'{"do": {"a": 1}}\n',
     b'{"do": "inverse", "near": [0, -1, 1, 0, 1, 0], "position": [0, 0, 0], "quaternion_wxyz": [0, 0, 0, 0]}\n',

@@ -203,7 +203,9 @@ def test_the_filter_answers_every_line(built: Path, robot_file: Path, expected: 
 
 def test_the_loop_tells_how_it_keeps_its_time(built: Path, robot_file: Path) -> None:
     said = run(built / "loop_1khz", robot_file, "0.2")
-    assert said.startswith("200 cycles, ") and "compensation" in said and "99.99 %" in said
+    assert (
+        said.startswith("200 cycles\n") and ": done" in said and "compensation" in said and "99.99 %" in said
+    )
 
 
 def test_the_page_s_commands_do_what_they_say(root: Path, tmp_path: Path) -> None:

@@ -31,6 +31,8 @@ _ROUGH = 0.05
 _SHARE = 0.2
 """Standard deviations that a parameter may be from the optimum in the mean; dry friction makes the cost too uneven to find it closer."""
 _MOST_STEPS = 30
+_UNLIKE, _ALIKE = 0.8, 0.9
+"""Correlations of measured and commanded positions of which the columns of two joints are exchanged."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,3 +146,24 @@ def _require_motion(model: RobotModel, logs: Sequence[CommandLog], motions: Sequ
             f"{name} moves by {moved[still[0]]:.3g} {unit} in all of {logs[0].name}"
             f"{' and others' if len(logs) > 1 else ''}, so nothing of its actuator shows; move every joint.",
         )
+    q, command = (np.concatenate([getattr(log, name) for log in logs]) for name in ("q", "command"))
+    if (np.ptp(q - command, axis=0) <= 1e-9 * np.ptp(q, axis=0)).any():
+        joint = model.joint_names[int(np.argmin(np.ptp(q - command, axis=0)))]
+        raise FlexcalError(
+            "E-DYN-048",
+            f"the measured positions of {joint} in {logs[0].name} are the commanded ones; log what its encoder reads.",
+        )
+    likeness = np.corrcoef(q.T, command.T)[: model.n, model.n :]
+    for i in range(model.n):
+        j = int(np.argmax(np.abs(likeness[i])))
+        if abs(likeness[i, i]) < _UNLIKE < _ALIKE < abs(likeness[i, j]):
+            raise FlexcalError(
+                "E-DYN-049",
+                f"the measured positions of {model.joint_names[i]} in {logs[0].name} follow the commands of {model.joint_names[j]}, not "
+                "its own; exchange the columns.",
+            )
+        if likeness[i, i] < -_ALIKE:
+            raise FlexcalError(
+                "E-DYN-050",
+                f"{model.joint_names[i]} moves against its commands in {logs[0].name}; one of the two has another sign.",
+            )

@@ -74,7 +74,29 @@ class TargetList:
             place: k for k, place in enumerate(place for place in self.targets if place not in self.doubtful)
         }
         ordered = sorted(left, key=lambda item: (item.file, item.line))
-        return Program(dialect, tuple(files), tuple(kept), tuple(ordered), tuple(remarks), self._moves(index))
+        told = (*remarks, *self._guessed(index, kept))
+        return Program(dialect, tuple(files), tuple(kept), tuple(ordered), told, self._moves(index))
+
+    def _guessed(
+        self, index: Mapping[tuple[int, int], int], targets: Sequence[ProgramTarget]
+    ) -> tuple[str, ...]:
+        """Remark on poses whose configuration is that of a target before, though the motion between goes elsewhere."""
+        lines: dict[int, None] = {}
+        lost = begun = False
+        for motion in self.motions:
+            goals = [None if place is None else index.get(place) for place in motion.goals]
+            known = [targets[goal] for goal in goals if goal is not None]
+            free = [each for each in known if not (each.joints or each.configuration or each.near)]
+            if lost and begun:
+                lines |= dict.fromkeys(target.line for target in free)
+            begun = begun or bool(known)
+            lost = bool(goals) and None in goals
+        if not lines:
+            return ()
+        return (
+            f"the motion before goes to a target that is not known, so the arm's configuration is taken to be that of the last known one: "
+            f"line{'s' if len(lines) > 1 else ''} {', '.join(map(str, lines))}; check it there",
+        )
 
     def _moves(self, index: Mapping[tuple[int, int], int]) -> tuple[Move, ...]:
         """Straight motions and arcs between targets of known indices."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import glob
 import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -22,9 +23,9 @@ from flexcal.cli.arguments.shared_options import (
     file_argument,
     require_robot_and_files,
 )
-from flexcal.cli.arguments.suggested_commands import estimates_option
 from flexcal.cli.terminal.console import Console
 
+_FLANGE = "tool0"
 _LISTED = 20
 
 
@@ -67,7 +68,7 @@ class Filter:
     """Signs of the joints where the URDF counts them otherwise than the controller: URDF = sign * controller + zero."""
     joint_zeros: Annotated[Numbers, arg(metavar="Q...", help_behavior_hint="(default: 0 0 0 0 0 0)")] = ()
     """Joint positions of the URDF at those of the controller that are zero, in the program's units."""
-    flange: Annotated[str, arg(metavar="FRAME")] = "tool0"
+    flange: Annotated[str, arg(metavar="FRAME")] = _FLANGE
     """URDF frame of the flange, in which tools are given."""
     reverse: Annotated[bool, arg(help_behavior_hint="")] = False
     """Return from a corrected program to the original one."""
@@ -147,20 +148,41 @@ class Filter:
             console.say(remark)
         if self.report is not None:
             console.say(f"wrote {self.report}")
-        where = estimates_option(self.estimates)
-        given = shlex.join(map(str, self.program))
         if self.dry_run:
-            console.finish(document, f"flexcal filter {self.robot} {given}{where} --out {out} writes it")
+            command = self._command(self.program, self.reverse, str(out), self._further)
+            console.finish(
+                document, f"{command} writes it" if rows else "see above why no target is corrected"
+            )
             return
         console.say(f"wrote {out}")
         tables = [file for file in self.program if file not in self._sources]
         files = [out / file.name for file in self._sources] if self.leaves else [out]
-        new = shlex.join(map(str, [*files, *tables]))
+        if self.reverse:
+            console.finish(document, f"compare {out} with the original program")
+            return
         back = "ORIGINAL" if self.leaves else f"ORIGINAL{out.suffix}"
-        console.finish(
-            document,
-            f"run {out} slowly first; the way back: flexcal filter {self.robot} {new} --reverse --out {back}{where}",
-        )
+        command = self._command([*files, *tables], True, back)
+        console.finish(document, f"run {out} slowly first; the way back: {command}")
+
+    def _command(self, files: Sequence[Path], reverse: bool, out: str, further: Sequence[str] = ()) -> str:
+        """Command line for these files with the options of this one that say how programs are read."""
+        words = ["flexcal", "filter", str(self.robot), *map(str, files)]
+        for option, values in (
+            ("--tool", self.tool),
+            ("--start", self.start),
+            ("--joint-signs", self.joint_signs),
+            ("--joint-zeros", self.joint_zeros),
+        ):
+            words += [option, *(f"{value:.15g}" for value in values)] if values else []
+        words += ["--flange", self.flange] if self.flange != _FLANGE else []
+        words += ["--reverse"] if reverse else []
+        words += [*further, "--out", out]
+        words += [] if self.estimates is None else ["--estimates", str(self.estimates)]
+        return shlex.join(words)
+
+    @property
+    def _further(self) -> list[str]:
+        return [] if self.subdivide is None else ["--subdivide", f"{self.subdivide:g}"]
 
 
 def _numbers(values: list[float]) -> str:

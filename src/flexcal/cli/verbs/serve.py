@@ -56,6 +56,6 @@ class Serve:
             served = serve_tcp(answers, self.port, self.token, ready)
         console = Console(self.json)
         console.say(
-            f"answered {served.answers} lines of {served.connections} connections, of which {served.refused} were refused"
+            f"{served.answers} lines answered, {served.connections} connections, {served.refused} of them closed with a sentence"
         )
         console.finish({"address": where[0], **asdict(served)}, "start it again the same way")

@@ -7,6 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from flexcal.errors import FlexcalError
+
 GAP = 2.5
 """Ratio of a step to the time step above which it is a gap, unless it is short enough to be filled in."""
 JITTER = 0.02
@@ -72,7 +74,8 @@ def in_order(t: np.ndarray, values: np.ndarray, positions: int) -> Samples:
 def clock_of(t: np.ndarray, positions: np.ndarray, fill: float) -> Clock:
     """Clock of ascending time stamps (N,) with positions (N, n); steps up to `fill` (s) are no gaps.
 
-    The time step is that of the longest part without gaps. A rate within 1e-6, or five standard errors, of a whole number of Hz is taken as
+    The time step is that of the longest part without gaps. Raises `FlexcalError` where the stamps stand still. A
+    rate within 1e-6, or five standard errors, of a whole number of Hz is taken as
     that one, so that logs of one controller have one time step.
     """
     gap = _longest_step(t, fill)
@@ -85,6 +88,11 @@ def clock_of(t: np.ndarray, positions: np.ndarray, fill: float) -> Clock:
     regular = number is not None
     number = np.arange(t.size, dtype=float) if number is None else number
     step = line(t, number)[1]
+    if step <= 0:
+        raise FlexcalError(
+            "E-LOG-024",
+            f"the time stands still: samples have the same stamp, {t[0]:.9g} s; write the time with more digits, or repair the log.",
+        )
     gap = max(GAP * step, fill)
     deviation = t - t[0] - step * number
     if np.ptp(deviation) <= 2 * JITTER * step and number[-1] == t.size - 1:
@@ -112,6 +120,8 @@ def line(t: np.ndarray, number: np.ndarray) -> tuple[float, float]:
     size = float(centred @ centred)
     step = float(centred @ (t - t[0])) / size
     residual = t - t[0] - step * number
+    if step <= 0:
+        return float(t[0]), 0.0
     error = float(residual.std()) / float(np.sqrt(size)) / step
     rate = 1.0 / step
     if round(rate) and abs(rate - round(rate)) < max(1e-6, min(5 * error, 1e-3)) * rate:

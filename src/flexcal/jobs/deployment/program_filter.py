@@ -171,8 +171,13 @@ def filter_program_file(
     """
     program = read_program(*files)
     sources = [Path(file.name) for file in program.files]
+    if not (program.targets or program.computed or program.remarks):
+        raise InputError(
+            "E-PROG-016",
+            f"{sources[0]} has no motion in {program.dialect.name}; check that the file is in that language, and its encoding.",
+        )
     if out is not None:
-        output_places(written_files(sources), out)
+        _refuse_own_output(sources, output_places(written_files(sources), out))
     if page is not None and page.suffix.lower() != ".html":
         raise InputError("E-PROG-012", f"{page} must end in .html; give another --report.")
     robot = CalibratedRobot.from_yaml(robot_file, estimates)
@@ -196,6 +201,16 @@ def filter_program_file(
     return result
 
 
+def _refuse_own_output(sources: Sequence[Path], places: Sequence[Path]) -> None:
+    """Raise `InputError` where the new program would replace the old one, which could then be corrected twice."""
+    for place in places:
+        if place.exists() and any(source.exists() and source.samefile(place) for source in sources):
+            raise InputError(
+                "E-PROG-017",
+                f"{place} is the program itself, which stays; give another --out (where it is corrected already, --reverse leads back).",
+            )
+
+
 def _controller_joints(
     nominal: RobotModel, dialect: Dialect, signs: Sequence[float], zeros: Sequence[float]
 ) -> ControllerJoints:
@@ -216,6 +231,8 @@ def _tool(dialect: Dialect, tool: Sequence[float]) -> Pose | None:
 def _checked(name: str, values: Sequence[float], count: int, meaning: str) -> np.ndarray | None:
     if len(values) not in (0, count):
         raise InputError("E-PROG-003", f"--{name} has {len(values)} values; give the {count} of {meaning}.")
+    if not np.isfinite(values).all():
+        raise InputError("E-PROG-018", f"--{name} has a value that is no finite number; correct it.")
     return np.array(values, dtype=float) if len(values) else None
 
 

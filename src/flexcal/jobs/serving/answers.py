@@ -17,6 +17,7 @@ from flexcal.kernels import RuntimeRobot
 from flexcal.model.parts import rotation_wxyz, wxyz_rotation
 
 _DONE = "done"
+_KEYS = ("id", "do", "q", "dq", "ddq", "near", "position", "quaternion_wxyz", "point", "payload")
 
 
 class _UnclearError(Exception):
@@ -53,6 +54,9 @@ class Answers:
             asked = _parsed(line)
             number = asked.get("id")
             verb = asked.get("do", "compensate")
+            unknown = [key for key in asked if key not in _KEYS]
+            if unknown:
+                raise _UnclearError(f"'{unknown[0]}' is unknown; there are {', '.join(_KEYS)}")
             if not isinstance(verb, str) or verb not in self._verbs:
                 raise _UnclearError(f"'do' must be one of {', '.join(self._verbs)}")
             answer = self._verbs[verb](asked)
@@ -89,10 +93,7 @@ class Answers:
         return _placed(position[0], rotation[0])
 
     def _nominal(self, asked: Mapping[str, Any]) -> dict[str, Any]:
-        q = self._positions(asked, "q")
-        if not np.isfinite(q).all():
-            raise _UnclearError("'q' must be finite")
-        position, rotation = self._robot.nominal(q, self._point(asked))
+        position, rotation = self._robot.nominal(self._positions(asked, "q"), self._point(asked))
         return _placed(position[0], rotation[0])
 
     def _torque(self, asked: Mapping[str, Any]) -> dict[str, Any]:
@@ -133,7 +134,10 @@ def _numbers(asked: Mapping[str, Any], key: str, count: int) -> np.ndarray:
         or not all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
     ):
         raise _UnclearError(f"'{key}' must be a list of {count} numbers")
-    return np.array([_real(value) for value in values])
+    found = np.array([_real(value) for value in values])
+    if not np.isfinite(found).all():
+        raise _UnclearError(f"'{key}' has a number that is not finite")
+    return found
 
 
 def _real(value: float) -> float:
@@ -149,8 +153,8 @@ def _payload(asked: Mapping[str, Any]) -> np.ndarray:
     mass = asked.get("payload")
     if mass is None:
         return np.array([np.nan])
-    if not isinstance(mass, int | float) or isinstance(mass, bool) or not np.isfinite(_real(mass)):
-        raise _UnclearError("'payload' must be a mass in kg")
+    if not isinstance(mass, int | float) or isinstance(mass, bool) or not 0 <= _real(mass) < np.inf:
+        raise _UnclearError("'payload' must be a mass in kg, not negative")
     return np.array([_real(mass)])
 
 
