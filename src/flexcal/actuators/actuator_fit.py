@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -98,13 +99,14 @@ def fit_actuators(
     for rough in (True, False):
         residual = error.residual(parameters.coordinates())
         problem = error.problem(_rms(residual), parameters, rough=rough)
-        estimate = solve(
-            problem,
-            covariance="posterior" if rough else "sandwich",
-            max_iterations=_MOST_STEPS,
-            tolerance=_ROUGH if rough else _SHARE * np.sqrt(len(parameters) / residual.size),
-            progress=lambda stage, share, late=not rough: progress(stage, 0.5 * (late + share)),
-        )
+        with _diverging(logs[0].name):
+            estimate = solve(
+                problem,
+                covariance="posterior" if rough else "sandwich",
+                max_iterations=_MOST_STEPS,
+                tolerance=_ROUGH if rough else _SHARE * np.sqrt(len(parameters) / residual.size),
+                progress=lambda stage, share, late=not rough: progress(stage, 0.5 * (late + share)),
+            )
         parameters = estimate.parameters
     found = coordinates.actuators(estimate.parameters.coordinates())
     fitted = TrackingErrors.of(simulation, found, seen)
@@ -128,6 +130,21 @@ def fit_actuators(
         settling,
         counts,
     )
+
+
+@contextmanager
+def _diverging(name: str) -> Iterator[None]:
+    """Say of a simulation whose positions are not finite what is behind it."""
+    try:
+        yield
+    except FlexcalError as problem:
+        if problem.code != "E-FIT-010":
+            raise
+        raise FlexcalError(
+            "E-DYN-051",
+            f"no simulation comes near the motion in {name}; check that the joints turn as those of the URDF do, by sign, order and unit, "
+            "and that its links have their masses.",
+        ) from problem
 
 
 def _rms(residual: np.ndarray) -> np.ndarray:
