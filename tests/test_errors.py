@@ -18,7 +18,7 @@ from flexcal.errors import FlexcalError, InputError, naming, unreadable
 from flexcal.files.structuring.faults import Failure, Fault, StructureError
 
 CODE = re.compile(r"E-([A-Z]+)-(\d{3})")
-CLASSES = {"FlexcalError", "InputError", "OneFlank", "TooFewSamples", "Fault", "Failure"}
+CLASSES = {"FlexcalError", "InputError", "NotFinite", "OneFlank", "TooFewSamples", "Fault", "Failure"}
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from flexcal.actuators.torque_scale import torques_without_effect
 from flexcal.actuators.tracking_errors import TrackingErrors
 from flexcal.data.recordings import CommandLog
 from flexcal.errors import FlexcalError
-from flexcal.estimation import Estimate, solve
+from flexcal.estimation import Estimate, NotFinite, solve
 from flexcal.export import COMPENSATED, OF_ERROR, Actuators
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
@@ -137,9 +137,7 @@ def _diverging(name: str) -> Iterator[None]:
     """Say of a simulation whose positions are not finite what is behind it."""
     try:
         yield
-    except FlexcalError as problem:
-        if not problem.code.startswith("E-FIT"):
-            raise
+    except NotFinite as problem:
         raise FlexcalError(
             "E-DYN-051",
             f"no simulation comes near the motion in {name}; check that the joints turn as those of the URDF do, by sign, order and unit, "

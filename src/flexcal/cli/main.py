@@ -136,8 +136,7 @@ def _carry_out(verb: Verb, arguments: list[str]) -> int:
         raise parse_error(verb, said.getvalue()) from None
     complete_interrupted_runs(parsed)
     leaves = getattr(parsed, "leaves", verb.leaves)
-    out = None if getattr(parsed, "dry_run", False) else parsed.out
-    with outputs(verb.name, out, leaves, page=verb.page, beside=verb.beside):
+    with outputs(verb.name, parsed.out, leaves, page=verb.page, beside=verb.beside):
         parsed.run()
     return 0
 

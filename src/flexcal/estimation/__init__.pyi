@@ -5,6 +5,7 @@ from .gaussian_distance import distance_probability, distance_quantile, mean_dis
 from .identifiability import RANK_TOLERANCE, Identifiability, analyse, name_direction
 from .loss import Cauchy, Huber, Loss, Squares, loss_named
 from .misfit import Misfit
+from .objective import NotFinite
 from .parameter import Parameter, Parameters
 from .problem import Problem
 from .profile_likelihood import profile_cost_increase
@@ -28,6 +29,7 @@ __all__ = [
     "Identifiability",
     "Loss",
     "Misfit",
+    "NotFinite",
     "Parameter",
     "Parameters",
     "Problem",

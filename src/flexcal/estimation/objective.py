@@ -12,6 +12,10 @@ from flexcal.estimation.loss import Loss
 from flexcal.estimation.problem import Problem
 
 
+class NotFinite(FlexcalError):
+    """A model gives a residual or a derivative that is not finite."""
+
+
 @dataclass(frozen=True, eq=False)
 class Grouping:
     """`labels` (G,) in ascending order, the group `number` (m,) of every row, the `sizes` (G,)."""
@@ -68,11 +72,11 @@ class Objective:
         return cls(problem, loss, grouping, thresholds, problem.prior_rows(), problem.parameters.prior_mean())
 
     def linearise(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Residual (m,) and Jacobian (m, p); raises FlexcalError when they are not finite."""
+        """Residual (m,) and Jacobian (m, p); raises `NotFinite` when they are not finite."""
         return self.checked(*self.problem.linearise(x))
 
     def checked(self, residual: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The same residual (m,) and Jacobian (m, p); raises FlexcalError when they are not finite."""
+        """The same residual (m,) and Jacobian (m, p); raises `NotFinite` when they are not finite."""
         names = self.problem.parameters.names
         rows = self.grouping.number.size
         if np.shape(residual) != (rows,) or np.shape(jacobian) != (rows, len(names)):
@@ -83,12 +87,12 @@ class Objective:
             )
         if not np.all(np.isfinite(residual)):
             row = int(np.argmin(np.isfinite(residual)))
-            raise FlexcalError(
+            raise NotFinite(
                 "E-FIT-009", f"The residual's row {row} is not finite; check the data and the model there."
             )
         if not np.all(np.isfinite(jacobian)):
             name = names[int(np.argmin(np.all(np.isfinite(jacobian), axis=0)))]
-            raise FlexcalError(
+            raise NotFinite(
                 "E-FIT-010", f"The derivative of the residual by {name} is not finite; check the model there."
             )
         return residual, jacobian

@@ -8,12 +8,13 @@ from dataclasses import dataclass, field, replace
 from flexcal.programs.arm_at_zero import ArmAtZero
 from flexcal.programs.dialect import Dialect
 from flexcal.programs.krl_configuration import StatusAndTurn
-from flexcal.programs.krl_data import KrlData, Line, components, is_list, lines_of, numbers_of, variable_name
+from flexcal.programs.krl_data import KrlData, components, is_list, numbers_of, statements_of, variable_name
 from flexcal.programs.krl_frames import KRL_NOTATION, POSE, KrlFrames, Setting
 from flexcal.programs.pose import Pose
 from flexcal.programs.program import Divisible, Program, ProgramFile, ProgramTarget, Span, Word
 from flexcal.programs.syntax import (
     Node,
+    Statement,
     between_commas,
     end_of,
     is_token,
@@ -70,8 +71,10 @@ def parse_krl(files: Sequence[ProgramFile]) -> Program:
     >>> program.computed[0].reason
     'it is relative to where the robot stands'
     """
-    lines = [line for k, file in enumerate(files) for line in lines_of(parse_text(file, "krl"), k)]
-    return _Reader(files, lines, KrlData.of(files, lines)).program()
+    statements = [
+        statement for k, file in enumerate(files) for statement in statements_of(parse_text(file, "krl"), k)
+    ]
+    return _Reader(files, statements, KrlData.of(files, statements)).program()
 
 
 @dataclass
@@ -79,7 +82,7 @@ class _Reader:
     """Walk through the lines in the order of the text, with the frames that hold there."""
 
     files: Sequence[ProgramFile]
-    lines: Sequence[Line]
+    statements: Sequence[Statement]
     data: KrlData
     moved_axes: list[str] = field(default_factory=list)
     found: TargetList = field(default_factory=TargetList)
@@ -88,22 +91,25 @@ class _Reader:
         """The program that was read."""
         frames = KrlFrames(self.data)
         held = []
-        for line in self.lines:
-            frames = frames.after(line)
+        for statement in self.statements:
+            frames = frames.after(statement)
             held.append(frames)
         tools = _distinct([each.tool for each in held if each.tool is not None])
         bases = _distinct([each.base for each in held if each.base is not None])
-        for line, frames in zip(self.lines, held, strict=True):
-            name = name_of(line.nodes[0])
-            if not names_in(line.nodes).isdisjoint(("def", "deffct")):
+        for statement, frames in zip(self.statements, held, strict=True):
+            name = name_of(statement.nodes[0])
+            if not names_in(statement.nodes).isdisjoint(("def", "deffct")):
                 self.found.interrupt()
             if name in _RELATIVE:
                 self.found.begin(1, straight=False)
                 self.found.leave(
-                    line.number, line.text(self.files), "it is relative to where the robot stands", line.file
+                    statement.line,
+                    statement.text(self.files),
+                    "it is relative to where the robot stands",
+                    statement.file,
                 )
-            elif name in _MOTIONS and len(line.nodes) > 1 and line.nodes[1] != "=":
-                self._motion(line, name, frames, tools, bases)
+            elif name in _MOTIONS and len(statement.nodes) > 1 and statement.nodes[1] != "=":
+                self._motion(statement, name, frames, tools, bases)
         self.found.interrupt()
         self._unused()
         remarks = []
@@ -116,36 +122,36 @@ class _Reader:
         return self.found.program(KRL, self.files, names, remarks)
 
     def _motion(
-        self, line: Line, motion: str, frames: KrlFrames, tools: list[Setting], bases: list[Setting]
+        self, statement: Statement, motion: str, frames: KrlFrames, tools: list[Setting], bases: list[Setting]
     ) -> None:
         """Note the targets of a motion."""
-        ends = [k for k, node in enumerate(line.nodes) if name_of(node) == "with"]
-        end = ends[0] if ends else len(line.nodes)
-        for part in between_commas(line.nodes[end + 1 :]):
+        ends = [k for k, node in enumerate(statement.nodes) if name_of(node) == "with"]
+        end = ends[0] if ends else len(statement.nodes)
+        for part in between_commas(statement.nodes[end + 1 :]):
             if len(part) > 2 and part[1] == "=":
                 value = [node for node in part[2:] if not name_of(node).startswith("c_")]
-                frames = frames.set(name_of(part[0]), value, line.file)
-        arguments = between_commas(line.nodes[1:end])
-        divisible = self._divisible(line, arguments[0]) if motion in ("lin", "slin") else None
+                frames = frames.set(name_of(part[0]), value, statement.file)
+        arguments = between_commas(statement.nodes[1:end])
+        divisible = self._divisible(statement, arguments[0]) if motion in ("lin", "slin") else None
         self.found.begin(_MOTIONS[motion], straight=motion not in ("ptp", "sptp"), divisible=divisible)
         for argument in arguments[: _MOTIONS[motion]]:
             expression = [node for node in argument if not name_of(node).startswith("c_")]
-            reason = self._target(line, motion, expression, frames, tools, bases)
+            reason = self._target(statement, motion, expression, frames, tools, bases)
             if reason:
-                self.found.leave(line.number, line.text(self.files), reason, line.file)
+                self.found.leave(statement.line, statement.text(self.files), reason, statement.file)
 
-    def _divisible(self, line: Line, argument: list[Node]) -> Divisible | None:
+    def _divisible(self, statement: Statement, argument: list[Node]) -> Divisible | None:
         target = [node for node in argument if not name_of(node).startswith("c_")]
         if not target:
             return None
         return Divisible(
-            Span(start_of(line.nodes[0]), end_of(line.nodes[-1]), line.file),
-            Span(start_of(target[0]), end_of(target[-1]), line.file),
+            Span(start_of(statement.nodes[0]), end_of(statement.nodes[-1]), statement.file),
+            Span(start_of(target[0]), end_of(target[-1]), statement.file),
         )
 
     def _target(
         self,
-        line: Line,
+        statement: Statement,
         motion: str,
         expression: list[Node],
         frames: KrlFrames,
@@ -153,9 +159,9 @@ class _Reader:
         bases: list[Setting],
     ) -> str:
         """Note a target of a motion; why there is none that can be corrected, or empty."""
-        value = self.data.value(expression, line.file)
+        value = self.data.value(expression, statement.file)
         if value is None:
-            return self._why(line, expression)
+            return self._why(statement, expression)
         joints = numbers_of(*value, _AXES)
         numbers = joints or numbers_of(*value, POSE)
         if numbers is None:
@@ -188,7 +194,7 @@ class _Reader:
             literal=None if moves else Span(start_of(value[0]), end_of(value[0]), value[1]),
         )
         if joints is None and base is not None and base.known is not None:
-            frame = self._robot_root(line.file).inverse() @ base.known
+            frame = self._robot_root(statement.file).inverse() @ base.known
             target = replace(target, frame=frame, configuration=self._words(*value))
         self.found.add(target)
         return ""
@@ -200,12 +206,12 @@ class _Reader:
         return Pose.identity() if numbers is None else KRL_NOTATION.pose([each.value for each in numbers])
 
     def _turned(self, node: Node, file: int, axis: str) -> bool:
-        number = written_number(components(node, file).get(axis, []), file)
+        number = written_number(components(node).get(axis, []), file)
         return number is not None and number.value != 0
 
     def _words(self, node: Node, file: int) -> tuple[Word, ...]:
         """S and T; empty where one is missing."""
-        parts = components(node, file)
+        parts = components(node)
         words = []
         for name in ("s", "t"):
             part = parts.get(name, [])
@@ -215,11 +221,11 @@ class _Reader:
             words.append(Word(self.files[file].text[first:end], first, end, file))
         return tuple(words)
 
-    def _why(self, line: Line, expression: list[Node]) -> str:
+    def _why(self, statement: Statement, expression: list[Node]) -> str:
         name = variable_name(expression)
         if not name or not expression or is_tree(expression[0], "aggregate"):
             return RUN_TIME
-        variable = self.data.find(name, line.file)
+        variable = self.data.find(name, statement.file)
         if variable is None:
             return f"{expression[0]} is not set in the files given: give the data list (.dat) that has it too"
         if len(variable.values) > 1:
@@ -230,7 +236,10 @@ class _Reader:
         """Name the variables with numbers that the program uses, but in no motion that is read."""
         places = {(target.file, target.numbers[0].first) for target in self.found.targets.values()}
         named = {
-            name for line in self.lines if not is_list(self.files[line.file]) for name in names_in(line.nodes)
+            name
+            for statement in self.statements
+            if not is_list(self.files[statement.file])
+            for name in names_in(statement.nodes)
         }
         left = {name for item in self.found.computed for name in item.text.lower().split()}
         for (_, name), variable in self.data.known.items():

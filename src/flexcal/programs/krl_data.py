@@ -11,13 +11,11 @@ from lark import Tree
 from flexcal.programs.program import ProgramFile, Written
 from flexcal.programs.syntax import (
     Node,
+    Statement,
     between_commas,
-    end_of,
     is_token,
     is_tree,
-    line_of,
     name_of,
-    start_of,
     written_number,
 )
 
@@ -26,25 +24,7 @@ _ALIASES = 8
 """Longest chain of variables that are set to one another."""
 
 
-@dataclass(frozen=True)
-class Line:
-    """A line with something in it: its nodes, the index of its file, and the routine that it stands in, in lower case."""
-
-    nodes: list[Node]
-    file: int
-    routine: str
-
-    @property
-    def number(self) -> int:
-        """Its number."""
-        return line_of(self.nodes[0])
-
-    def text(self, files: Sequence[ProgramFile]) -> str:
-        """Its text without a comment."""
-        return files[self.file].text[start_of(self.nodes[0]) : end_of(self.nodes[-1])]
-
-
-def lines_of(nodes: Sequence[Node], file: int) -> Iterator[Line]:
+def statements_of(nodes: Sequence[Node], file: int) -> Iterator[Statement]:
     """Lines of a file."""
     part: list[Node] = []
     routine = ""
@@ -57,11 +37,11 @@ def lines_of(nodes: Sequence[Node], file: int) -> Iterator[Line]:
             header = [k for k, name in enumerate(names) if name in ("def", "deffct")]
             if header and (later := [name for name in names[header[0] + 1 :] if name]):
                 routine = later[0] if names[header[0]] == "def" else later[-1]
-            yield Line(part, file, routine)
+            yield Statement(part, file, routine)
         part = []
 
 
-def components(node: Node, file: int) -> dict[str, list[Node]]:
+def components(node: Node) -> dict[str, list[Node]]:
     """Values of {NAME value, …} by name in lower case, without the type that stands before a colon."""
     if not is_tree(node, "aggregate") or not isinstance(node, Tree):
         return {}
@@ -76,7 +56,7 @@ def components(node: Node, file: int) -> dict[str, list[Node]]:
 
 def numbers_of(node: Node, file: int, names: Sequence[str]) -> tuple[Written, ...] | None:
     """Numbers of the components of these names; None where one is missing or no number."""
-    parts = components(node, file)
+    parts = components(node)
     found = [written_number(parts.get(name, []), file) for name in names]
     return tuple(number for number in found if number is not None) if all(found) else None
 
@@ -102,11 +82,11 @@ class KrlData:
     known: dict[tuple[str, str], Variable] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, files: Sequence[ProgramFile], lines: Sequence[Line]) -> KrlData:
+    def of(cls, files: Sequence[ProgramFile], statements: Sequence[Statement]) -> KrlData:
         """Declarations and assignments of the lines: data lists first, then programs."""
         data = cls(files)
-        for line in sorted(lines, key=lambda line: not is_list(files[line.file])):
-            data._note(line)
+        for statement in sorted(statements, key=lambda statement: not is_list(files[statement.file])):
+            data._note(statement)
         return data
 
     def module(self, file: int) -> str:
@@ -133,8 +113,8 @@ class KrlData:
             nodes, file = [variable.value], variable.file
         return None
 
-    def _note(self, line: Line) -> None:
-        nodes = line.nodes
+    def _note(self, statement: Statement) -> None:
+        nodes = statement.nodes
         equals = next((k for k, node in enumerate(nodes) if node == "="), None)
         if not equals:
             return
@@ -150,12 +130,14 @@ class KrlData:
                 if known.startswith(stem):
                     variable.values.append(None)
             return
-        variable = self.find(name, line.file)
-        declared = is_list(self.files[line.file]) or any(name_of(node) in _TYPES for node in nodes[:first])
-        if variable is None or (declared and variable.file != line.file):
-            variable = self.known.setdefault((self.module(line.file), name), Variable(line.file))
+        variable = self.find(name, statement.file)
+        declared = is_list(self.files[statement.file]) or any(
+            name_of(node) in _TYPES for node in nodes[:first]
+        )
+        if variable is None or (declared and variable.file != statement.file):
+            variable = self.known.setdefault((self.module(statement.file), name), Variable(statement.file))
         if not variable.values:
-            variable.file = line.file
+            variable.file = statement.file
         rest = nodes[equals + 1 :]
         alias = len(rest) == 1 and (is_tree(rest[0], "aggregate") or bool(name_of(rest[0])))
         variable.values.append(rest[0] if whole and alias else None)

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from lark import Tree
 
-from flexcal.programs.krl_data import KrlData, Line, components, numbers_of, variable_name
+from flexcal.programs.krl_data import KrlData, components, numbers_of, variable_name
 from flexcal.programs.notation import Notation
 from flexcal.programs.orientation import RollPitchYaw
 from flexcal.programs.pose import Pose
-from flexcal.programs.syntax import Node, between_commas, is_tree, name_of, written_number
+from flexcal.programs.syntax import Node, Statement, between_commas, is_tree, name_of, written_number
 from flexcal.units import DEGREE, MILLIMETRE
 
 KRL_NOTATION = Notation(MILLIMETRE, DEGREE, RollPitchYaw((2, 1, 0)), 6)
@@ -49,27 +49,27 @@ class KrlFrames:
     form: tuple[Node, int] | None = None
     """Data of the inline form (FDAT_ACT), and the index of their file."""
 
-    def after(self, line: Line) -> KrlFrames:
+    def after(self, statement: Statement) -> KrlFrames:
         """Frames that hold behind a line."""
-        nodes = line.nodes
+        nodes = statement.nodes
         names = [name_of(node) for node in nodes]
         if "def" in names or "deffct" in names:
             return KrlFrames(self.data)
         if len(nodes) > 2 and nodes[1] == "=":
             if names[0] == "fdat_act":
-                return replace(self, form=self.data.value(nodes[2:], line.file))
-            return self.set(names[0], nodes[2:], line.file)
+                return replace(self, form=self.data.value(nodes[2:], statement.file))
+            return self.set(names[0], nodes[2:], statement.file)
         if len(nodes) > 2 and nodes[1] == "." and names[0] in ("$tool", "$base"):
             return replace(self, **{names[0][1:]: Setting(None, f"{names[0].upper()} is set by parts")})
         if names[0] == "bas" and len(nodes) == 2 and isinstance(nodes[1], Tree):
             given = between_commas(nodes[1].children)
             command = "".join(str(node).lower() for node in given[0])
-            number = written_number(given[1], line.file) if len(given) > 1 else None
+            number = written_number(given[1], statement.file) if len(given) > 1 else None
             if command in _OF_FORM:
                 return self._by_form(self.form)
             if command in ("#tool", "#base"):
                 kind, index = command[1:], None if number is None else int(number.value)
-                return replace(self, **{kind: self._numbered(kind, index, line.file)})
+                return replace(self, **{kind: self._numbered(kind, index, statement.file)})
             if command == "#ex_base":
                 return replace(self, base=Setting(None, "an external kinematic system carries the base"))
         return self
@@ -105,7 +105,7 @@ class KrlFrames:
         if form is None:
             wrong = "the data of its inline form (FDAT) are not in the files given"
             return replace(self, tool=Setting(None, wrong), base=Setting(None, wrong), outside="")
-        parts = components(*form)
+        parts = components(form[0])
         numbers = [written_number(parts.get(name, []), form[1]) for name in ("tool_no", "base_no")]
         tool, base = (
             self._numbered(kind, None if number is None else int(number.value), form[1])

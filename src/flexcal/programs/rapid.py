@@ -14,11 +14,12 @@ from flexcal.programs.orientation import Quaternion
 from flexcal.programs.pose import Pose
 from flexcal.programs.program import Program, ProgramFile, ProgramTarget, Span, Written
 from flexcal.programs.rapid_configuration import QuadrantConfiguration
-from flexcal.programs.rapid_data import RapidData, Statement, statements_of
+from flexcal.programs.rapid_data import RapidData, statements_of
 from flexcal.programs.rapid_frames import RapidFrames, Unreadable
 from flexcal.programs.rapid_motion import KINDS, Arguments, MotionKind, divisible, motion_in
 from flexcal.programs.syntax import (
     Node,
+    Statement,
     as_word,
     between_commas,
     end_of,

@@ -7,16 +7,13 @@ from dataclasses import dataclass, field
 
 from lark import Tree
 
-from flexcal.programs.program import ProgramFile
 from flexcal.programs.syntax import (
     Node,
+    Statement,
     between_commas,
-    end_of,
     is_token,
     is_tree,
-    line_of,
     name_of,
-    start_of,
     written_number,
 )
 
@@ -29,24 +26,6 @@ _AFTER = (*_ENDS, "endmodule", "endrecord", "then", "else", "do", "endif", "endf
 _AFTER = (*_AFTER, "error", "undo", "backward")
 _ALIASES = 8
 """Longest chain of data that are declared as others."""
-
-
-@dataclass(frozen=True)
-class Statement:
-    """A statement: its nodes, the index of its file, and the routine that it stands in, in lower case."""
-
-    nodes: list[Node]
-    file: int
-    routine: str
-
-    @property
-    def line(self) -> int:
-        """Its first line."""
-        return line_of(self.nodes[0])
-
-    def text(self, files: Sequence[ProgramFile], first: int = 0) -> str:
-        """Its text from the node of index `first` on."""
-        return files[self.file].text[start_of(self.nodes[first]) : end_of(self.nodes[-1])]
 
 
 @dataclass

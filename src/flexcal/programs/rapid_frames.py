@@ -10,9 +10,10 @@ from lark import Tree
 
 from flexcal.model.parts import wxyz_rotation
 from flexcal.programs.pose import Pose
-from flexcal.programs.rapid_data import RapidData, Statement
+from flexcal.programs.rapid_data import RapidData
 from flexcal.programs.syntax import (
     Node,
+    Statement,
     between_commas,
     name_of,
     written_number,

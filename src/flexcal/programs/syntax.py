@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -14,6 +15,24 @@ from flexcal.errors import InputError
 from flexcal.programs.program import ProgramFile, Word, Written
 
 Node = Tree | Token
+
+
+@dataclass(frozen=True)
+class Statement:
+    """A statement of a program: its nodes, the index of its file, and the routine that it stands in, in lower case."""
+
+    nodes: list[Node]
+    file: int
+    routine: str
+
+    @property
+    def line(self) -> int:
+        """Its first line."""
+        return line_of(self.nodes[0])
+
+    def text(self, files: Sequence[ProgramFile], first: int = 0) -> str:
+        """Its text from the node of index `first` on, without a comment behind it."""
+        return files[self.file].text[start_of(self.nodes[first]) : end_of(self.nodes[-1])]
 
 
 def parse_text(file: ProgramFile, dialect: str) -> list[Node]:

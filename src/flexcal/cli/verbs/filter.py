@@ -6,6 +6,7 @@ import glob
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -84,7 +85,12 @@ class Filter:
     json: Json = False
 
     @property
-    def out(self) -> Path:
+    def out(self) -> Path | None:
+        """File or folder that is written: none by a dry run."""
+        return None if self.dry_run else self._destination
+
+    @property
+    def _destination(self) -> Path:
         """File or folder of the new program."""
         suffix = self._sources[0].suffix if len(self._sources) == 1 else ""
         return self.place or Path("corrected" + suffix)
@@ -95,7 +101,7 @@ class Filter:
         names = [glob.escape(file.name) for file in self._sources]
         return tuple(names) if len(names) > 1 else ()
 
-    @property
+    @cached_property
     def _sources(self) -> list[Path]:
         """Files that the new program has too; as given where some are missing, which `run` refuses."""
         from flexcal.jobs.deployment import written_files
@@ -114,12 +120,12 @@ class Filter:
         from flexcal.units import MILLIMETRE
 
         require_robot_and_files(self.robot, self.program, "program")
-        out = self.out
+        out = self._destination
         console = Console(self.json)
         result = filter_program_file(
             self.robot,
             self.program,
-            None if self.dry_run else out,
+            self.out,
             estimates=self.estimates,
             tool=self.tool,
             start=self.start,

@@ -12,7 +12,7 @@ from flexcal.dynamics.inverse_model import motor_shares
 from flexcal.dynamics.torque_model.velocities import VELOCITY_TERMS, stored_velocities
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block
-from flexcal.model.parts import LINK_PARAMETERS
+from flexcal.model.parts import LINK_PARAMETERS, parallel_axis
 from flexcal.model.robot import FRICTION_PARAMETERS, RobotModel
 from flexcal.model.statics import carried_mass, twist_from_torque
 from flexcal.model.torques import inertial_parameters, torque_regressor
@@ -169,10 +169,7 @@ class TorqueModel:
         """Torques (N, n) of rotors, friction, couplings, springs and cables under the links' `load` (N, n)."""
         model = self.model
         drives, (stiffness, constant) = model.drives, self._springs
-        known = {
-            key: np.nan_to_num(getattr(drives, key))
-            for key in ("rotor_inertia", "viscous", "coulomb", "torque_offset")
-        }
+        known = self._classic
         torque = (
             known["rotor_inertia"] * ddq
             + known["viscous"] * dq
@@ -201,12 +198,17 @@ class TorqueModel:
         return torque + own @ shares
 
     @property
+    def _classic(self) -> dict[str, np.ndarray]:
+        """Parameters (n,) of rotors and of the classic friction terms by name, zero where there is none."""
+        return {key: np.nan_to_num(getattr(self.model.drives, key)) for key in _CLASSIC}
+
+    @property
     def _per_kilogram(self) -> np.ndarray:
         """The ten parameters of a payload of 1 kg, in its link."""
         held = self.model.payload
         assert held is not None
         one = held.carried(1.0)
-        inertia = one.inertia + (one.com @ one.com) * np.eye(3) - np.outer(one.com, one.com)
+        inertia = one.inertia + parallel_axis(one.mass, one.com)
         return np.array([1.0, *one.com, *inertia[np.triu_indices(3)]])
 
     @property
@@ -228,12 +230,8 @@ class TorqueModel:
         """What the runtime needs, as a JSON document."""
         model, drives = self.model, self.model.drives
         stiffness, constant = self._springs
-        plain = {
-            key: np.nan_to_num(getattr(drives, key))
-            for key in ("rotor_inertia", "viscous", "coulomb", "torque_offset")
-        }
         columns = {
-            **plain,
+            **self._classic,
             **{key: _friction(model, key) for key in _KEPT},
             **{f"{term}_velocity": velocity for term, velocity in self.velocities.items()},
             "spring_stiffness": stiffness,
@@ -266,6 +264,7 @@ class TorqueModel:
         }
 
 
+_CLASSIC = ("rotor_inertia", "viscous", "coulomb", "torque_offset")
 _KEPT = ("coulomb_asymmetry", "sublinear_viscous", "presliding", "stribeck", "load_coulomb", "load_stribeck")
 """Friction that does not pass as the robot warms up; cables are springs."""
 

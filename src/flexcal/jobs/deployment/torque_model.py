@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flexcal.calibration.fit import probable_robot
 from flexcal.dynamics.torque_model import TorqueModel
-from flexcal.files.formats import read_estimates
-from flexcal.jobs.inputs import measured_points, stored_estimates
-from flexcal.model.robot import RobotModel, with_blocks
+from flexcal.jobs.deployment.export import identified_robot
 
 
 def read_torque_model(path: str | Path, estimates: str | Path | None = None) -> TorqueModel:
@@ -30,7 +27,7 @@ def read_torque_model(path: str | Path, estimates: str | Path | None = None) -> 
     Raises
     ------
     InputError
-        As reading does, with file and line.
+        As reading does, with file and line, and where the named estimates do not exist.
 
     Examples
     --------
@@ -38,8 +35,5 @@ def read_torque_model(path: str | Path, estimates: str | Path | None = None) -> 
     >>> read_torque_model("examples/tx40/robot.yaml").identified
     False
     """
-    nominal = RobotModel.from_yaml(path, estimates=False)
-    stored = stored_estimates(nominal, None if estimates is None else Path(estimates))
-    blocks = read_estimates(stored) if stored.exists() or estimates is not None else {}
-    model, measured = with_blocks(nominal, blocks, stored), measured_points(nominal, blocks)
-    return TorqueModel.of_blocks(probable_robot(model, measured) if measured else model, blocks)
+    robot = identified_robot(Path(path), None if estimates is None else Path(estimates))
+    return TorqueModel.of_blocks(robot.probable if robot.targets else robot.model, robot.blocks)
