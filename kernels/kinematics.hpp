@@ -52,12 +52,7 @@ inline void point_kinematics(const Tree& tree, const Target& target, const doubl
         const Vector3 p = foot + r * tip;
         double* position = out.position + 3 * s;
         position[0] = p.x, position[1] = p.y, position[2] = p.z;
-        if (out.orientation) {
-            const Rotation t = transpose(r);
-            double* m = out.orientation + 9 * s;
-            const Vector3 rows[3] = {t.x, t.y, t.z};
-            for (int k = 0; k < 3; ++k) m[3 * k] = rows[k].x, m[3 * k + 1] = rows[k].y, m[3 * k + 2] = rows[k].z;
-        }
+        if (out.orientation) write_rows(r, out.orientation + 9 * s);
         constexpr Vector3 zero{0, 0, 0};
         if (out.geometry_jacobian) {
             double* j = out.geometry_jacobian + 6 * geometry_columns * s;

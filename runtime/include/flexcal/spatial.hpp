@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <cmath>
+#include <limits>
 
 namespace flexcal {
 
@@ -73,6 +74,28 @@ inline void turn_x(Rotation& r, double angle) {
     const Vector3 y = c * r.y + s * r.z;
     r.z = c * r.z - s * r.y;
     r.y = y;
+}
+
+// Columns to a row-major 3x3 array.
+inline void write_rows(const Rotation& r, double* m) {
+    const Rotation t = transpose(r);
+    const Vector3 rows[3] = {t.x, t.y, t.z};
+    for (int k = 0; k < 3; ++k) m[3 * k] = rows[k].x, m[3 * k + 1] = rows[k].y, m[3 * k + 2] = rows[k].z;
+}
+
+// Largest entry of RᵀR - 1: 0 for a rotation, infinite where an entry is not finite.
+inline double departure_from_rotation(const Rotation& r) {
+    const Rotation square = transpose(r) * r;
+    const Vector3 columns[3] = {square.x, square.y, square.z};
+    double worst = 0;
+    for (int i = 0; i < 3; ++i) {
+        const double entries[3] = {columns[i].x, columns[i].y, columns[i].z};
+        for (int k = 0; k < 3; ++k) {
+            const double off = std::abs(entries[k] - (i == k));
+            worst = std::isfinite(off) ? std::fmax(worst, off) : std::numeric_limits<double>::infinity();
+        }
+    }
+    return worst;
 }
 
 // Rotation by an angle about a unit axis (Rodrigues).

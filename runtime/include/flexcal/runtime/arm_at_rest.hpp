@@ -33,7 +33,7 @@ class ArmAtRest {
         : model_(model), n_(model.size()), d_(static_cast<int>(model.axes.size())), rigid_axes_(every_axis(model)),
           masses_{model.mass.data(), model.first_moment.data(), nullptr, model.payload.joint, model.payload.com},
           rigid_(model.tree, rigid_axes_, model.geometry.data(), masses_, model.gravity),
-          elastic_(model.tree, model.axes, model.geometry.data(), masses_, model.gravity), prepared_(model.tree.prepare(model.geometry.data())),
+          elastic_(model.tree, model.axes, model.geometry.data(), masses_, model.gravity),
           still_(3 * n_, 0.0), bent_(3 * n_, 0.0), deflection_(3 * n_, 0.0), load_(n_), free_(n_), flank_(n_), torque_(n_), moved_(n_),
           factored_at_(n_, std::numeric_limits<double>::infinity()), hessian_(d_ * d_), step_(d_) {}
 
@@ -97,7 +97,7 @@ class ArmAtRest {
             load_[i] = -rigid_.load(at);
             lateral_tilt_[2 * i] = lateral_tilt_[2 * i + 1] = 0;
             if (joint.lateral_compliance[0] == 0 && joint.lateral_compliance[1] == 0) continue;
-            const double motion = model_.tree.tilts_first ? 0.0 : q[i] + prepared_[i].offset;
+            const double motion = model_.tree.tilts_first ? 0.0 : q[i] + model_.prepared[i].offset;
             const double c = std::cos(motion), s = std::sin(motion), on_y = rigid_.load(at + 1), on_x = rigid_.load(at + 2);
             const Vector3 across[2] = {joint.lateral_1, joint.lateral_2};
             for (int side = 0; side < 2; ++side) {
@@ -172,7 +172,6 @@ class ArmAtRest {
     const std::vector<ElasticAxis> rigid_axes_;  // twist, tilt_y and tilt_x of every revolute joint
     const Masses masses_;
     GravityLoad rigid_, elastic_;
-    const std::vector<Prepared> prepared_;
     const std::vector<double> still_;
     std::vector<double> bent_;  // of the springs alone, kept as the start of the next search
     std::vector<double> deflection_, load_, free_, flank_, torque_, moved_, factored_at_;

@@ -12,7 +12,7 @@ namespace flexcal::runtime {
 class InverseDynamics {
   public:
     explicit InverseDynamics(const Model& model)
-        : model_(model), n_(model.size()), prepared_(model.tree.prepare(model.geometry.data())), frames_(n_), links_(n_), force_(n_), moment_(n_),
+        : model_(model), n_(model.size()), frames_(n_), links_(n_), force_(n_), moment_(n_),
           speed_(n_), load_(n_), moved_(n_) {}
 
     // q, dq, ddq, result: (n,); payload: true kg; elastic: whether the drives' springs give way to what the motion asks of them.
@@ -77,7 +77,7 @@ class InverseDynamics {
     void move(int i, double q, double dq, double ddq, double payload) {
         constexpr double still[3] = {0, 0, 0};
         const int parent = model_.tree.joints[i].parent;
-        frames_[i] = model_.tree.advance(i, prepared_[i], parent < 0 ? nullptr : &frames_[parent], q, still);
+        frames_[i] = model_.tree.advance(i, model_.prepared[i], parent < 0 ? nullptr : &frames_[parent], q, still);
         const Frames& f = frames_[i];
         Link link{{0, 0, 0}, {0, 0, 0}, -1.0 * model_.gravity};
         if (parent >= 0) {
@@ -113,7 +113,6 @@ class InverseDynamics {
 
     const Model& model_;
     const int n_;
-    const std::vector<Prepared> prepared_;
     std::vector<Frames> frames_;
     std::vector<Link> links_;
     std::vector<Vector3> force_, moment_;

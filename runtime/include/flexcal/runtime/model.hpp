@@ -78,6 +78,7 @@ struct Model {
     double reach = 0;  // m
     Vector3 gravity{0, 0, 0};
     Tree tree, nominal_tree;
+    std::vector<Prepared> prepared, nominal_prepared;  // the trees with their errors
     std::vector<double> geometry, nominal_geometry;  // (n, 6)
     std::vector<JointData> joints;
     std::vector<RatioError> ratio_errors;
@@ -168,14 +169,7 @@ class ModelReader {
         double values[9];
         if (!numbers(from, name, 9, values)) return false;
         value = rotation(values);
-        const Rotation square = transpose(value) * value;
-        const Vector3 columns[3] = {square.x, square.y, square.z};
-        for (int i = 0; i < 3; ++i) {
-            const double entries[3] = {columns[i].x, columns[i].y, columns[i].z};
-            for (int k = 0; k < 3; ++k)
-                if (!(std::abs(entries[k] - (i == k)) < 1e-9)) return fail(std::string("'") + name + "' is no rotation");
-        }
-        return true;
+        return departure_from_rotation(value) < 1e-9 || fail(std::string("'") + name + "' is no rotation");
     }
 
     const std::vector<Json>* list(const Json& from, const char* name) {
@@ -202,6 +196,8 @@ class ModelReader {
         if (joints->empty() || points->empty()) return fail("it has no joint or no point");
         for (const Json& each : *joints)
             if (!joint(each, static_cast<int>(joints->size()), model)) return in("joint", model.joints.size() - 1);
+        model.prepared = model.tree.prepare(model.geometry.data());
+        model.nominal_prepared = model.nominal_tree.prepare(model.nominal_geometry.data());
         for (const Json& each : *points) {
             model.points.emplace_back();
             if (!point(each, model.size(), model.points.back())) return in("point", model.points.size() - 1);

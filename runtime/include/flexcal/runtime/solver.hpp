@@ -18,8 +18,7 @@ struct Pose {
 class Solver {
   public:
     explicit Solver(const Model& model)
-        : model_(model), n_(model.size()), arm_(model), dynamics_(model), prepared_(model.tree.prepare(model.geometry.data())),
-          nominal_prepared_(model.nominal_tree.prepare(model.nominal_geometry.data())), frames_(n_), still_(3 * n_, 0.0),
+        : model_(model), n_(model.size()), arm_(model), dynamics_(model), frames_(n_), still_(3 * n_, 0.0),
           jacobian_(rows_ * n_), square_(rows_ * rows_), right_(rows_), q_(n_), origin_(n_), flank_(n_), held_(n_) {
         for (const PointData& point : model.points) paths_.push_back(model.tree.path(point.joint));
         payload_ = model.payload.mass;
@@ -44,7 +43,7 @@ class Solver {
         for (int i = 0; flank && i < n_; ++i)
             if (flank[i] != 1 && flank[i] != -1) return Status::bad_input;
         const Status status = arm_.settle(q, payload_, flank);
-        if (status == Status::ok) write(place(model_.tree, prepared_, q, arm_.deflection(), point, model_.points[point].real), pose);
+        if (status == Status::ok) write(place(model_.tree, model_.prepared, q, arm_.deflection(), point, model_.points[point].real), pose);
         return status;
     }
 
@@ -96,23 +95,16 @@ class Solver {
     }
 
     static bool is_pose(const Pose& pose) {
-        const Rotation r = rotation(pose.rotation), square = transpose(r) * r;
-        const Vector3 columns[3] = {square.x, square.y, square.z};
-        double worst = 0;
-        for (int i = 0; i < 3; ++i) {
-            if (!std::isfinite(pose.position[i])) return false;
-            const double entries[3] = {columns[i].x, columns[i].y, columns[i].z};
-            for (int k = 0; k < 3; ++k) worst = std::max(worst, std::isfinite(entries[k]) ? std::abs(entries[k] - (i == k)) : 1.0);
-        }
-        return worst < 1e-6 && dot(cross(r.x, r.y), r.z) > 0;
+        const Rotation r = rotation(pose.rotation);
+        for (const double value : pose.position)
+            if (!std::isfinite(value)) return false;
+        return departure_from_rotation(r) < 1e-6 && dot(cross(r.x, r.y), r.z) > 0;
     }
 
     static void write(const Hung& placed, Pose& pose) {
         const Vector3 p = placed.position;
         pose.position[0] = p.x, pose.position[1] = p.y, pose.position[2] = p.z;
-        const Rotation t = transpose(placed.rotation);
-        const Vector3 rows[3] = {t.x, t.y, t.z};
-        for (int k = 0; k < 3; ++k) pose.rotation[3 * k] = rows[k].x, pose.rotation[3 * k + 1] = rows[k].y, pose.rotation[3 * k + 2] = rows[k].z;
+        write_rows(placed.rotation, pose.rotation);
     }
 
     Hung place(const Tree& tree, const std::vector<Prepared>& prepared, const double* q, const double* deflection, int point, const Hung& hung) {
@@ -125,7 +117,7 @@ class Solver {
     }
 
     Hung nominal_place(const double* q, int point) {
-        return place(model_.nominal_tree, nominal_prepared_, q, still_.data(), point, model_.points[point].nominal);
+        return place(model_.nominal_tree, model_.nominal_prepared, q, still_.data(), point, model_.points[point].nominal);
     }
 
     // Vector of the rotation that turns `from` to `to`, in the base.
@@ -153,7 +145,7 @@ class Solver {
                 std::copy(arm_.flank(), arm_.flank() + n_, flank_.begin());
                 flank = flank_.data();
             }
-            const Hung at = place(model_.tree, prepared_, q_.data(), arm_.deflection(), point, model_.points[point].real);
+            const Hung at = place(model_.tree, model_.prepared, q_.data(), arm_.deflection(), point, model_.points[point].real);
             const double off = residual(aim, at, model_.points[point].rows);
             if (off < there) {
                 if (!flanks_turned && arm_.turned()) {
@@ -274,7 +266,6 @@ class Solver {
     const int n_;
     ArmAtRest arm_;
     InverseDynamics dynamics_;
-    const std::vector<Prepared> prepared_, nominal_prepared_;
     std::vector<std::vector<int>> paths_;
     std::vector<Frames> frames_;
     const std::vector<double> still_;
