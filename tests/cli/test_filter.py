@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from program_cell import calibrate_cell
+from six_axis_arm import registered
 
 from flexcal.cli.main import main
 
@@ -127,14 +129,6 @@ def moved(text: str, q: np.ndarray) -> list[np.ndarray]:
     return stops
 
 
-def registered(at: np.ndarray, goals: np.ndarray) -> np.ndarray:
-    """Distances (N,) of positions from goals after the best rigid motion: where the base stands, points of a tracker do not tell."""
-    mean, aim = at.mean(axis=0), goals.mean(axis=0)
-    left, _, right = np.linalg.svd((at - mean).T @ (goals - aim))
-    turn = left @ np.diag([1, 1, np.linalg.det(left @ right)]) @ right
-    return np.linalg.norm((at - mean) @ turn - (goals - aim), axis=1)
-
-
 _PROGRAM = """def palletise():\r
   # made by hand in K\xf6ln: "brackets ( in comments" do not count
   set_tcp(p[0, 0, .031, 0.3, 0.0, 0.0])
@@ -170,18 +164,7 @@ def cell(tmp_path_factory: pytest.TempPathFactory, examples: Path) -> tuple[Path
         at = arm.tool(q)[:3, 3] + rng.normal(0, 1.5e-5, 3)
         rows.append(",".join([str(k), *map(repr, q.tolist()), *map(repr, at.tolist())]))
     (folder / "points.csv").write_text("\n".join(rows) + "\n", "utf-8")
-    assert (
-        main(
-            [
-                "calibrate",
-                str(folder / "robot.yaml"),
-                str(folder / "points.csv"),
-                "--out",
-                str(folder / "out"),
-            ]
-        )
-        == 0
-    )
+    calibrate_cell(folder)
     stops = np.array([-0.1, -1.3, 2.0, -2.2, -1.5, 0.2]) + rng.uniform(-0.5, 0.5, (13, 6))
     above, *others = (written(NOMINAL.tool(q)) for q in stops)
     moves = "".join(f"    movel(p[{pose}], a=1.2, v=0.25, r=0.01)\n" for pose in others)

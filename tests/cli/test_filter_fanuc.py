@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fanuc_arm import LrMate, moved, numbers_of, pose, true_arm, urdf_text
+from program_cell import calibrate_cell, verified_error
+from six_axis_arm import registered
 
 from flexcal.cli.main import main
 
@@ -92,8 +94,7 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, LrMate]:
             at = (arm.flange(joints) @ pose(TOOL))[:3, 3] + rng.normal(0, 1.5e-5, 3) + [0, 0, 0.33]
             rows.append(",".join([str(k), *map(repr, q.tolist()), *map(repr, at.tolist())]))
         (folder / f"{name}.csv").write_text("\n".join(rows) + "\n", "utf-8")
-    robot = str(folder / "robot.yaml")
-    assert main(["calibrate", robot, str(folder / "points.csv"), "--out", str(folder / "out")]) == 0
+    calibrate_cell(folder)
     stops = HOME + rng.uniform(-30, 30, (12, 6)) * [1, 1, 1, 1, 0.8, 1]
     lines, places = [], [jointed('1:"home"', HOME), cartesian("2", stops[0])]
     for k, joints in enumerate(stops[1:], 3):
@@ -113,14 +114,6 @@ def filtered(folder: Path, *words: str) -> int:
     return main(["filter", str(folder / "robot.yaml"), *words, "--estimates", str(folder / "out")])
 
 
-def registered(at: np.ndarray, goals: np.ndarray) -> np.ndarray:
-    """Distances from points to others after a best-fit registration: where the base stands, points of a tracker do not tell."""
-    mean, aim = at.mean(axis=0), goals.mean(axis=0)
-    left, _, right = np.linalg.svd((at - mean).T @ (goals - aim))
-    turn = left @ np.diag([1, 1, np.linalg.det(left @ right)]) @ right
-    return np.linalg.norm((at - mean) @ turn - (goals - aim), axis=1)
-
-
 def test_the_corrected_program_brings_the_true_tool_there(
     cell: tuple[Path, LrMate], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -137,10 +130,7 @@ def test_the_corrected_program_brings_the_true_tool_there(
     assert missed.keys() == {"P[3]", "P[6]", "P[7]", "P[10]", "P[11]"}
     goals = np.array([(NOMINAL.flange(q) @ pose(TOOL))[:3, 3] for q in wanted])
     was, there = (np.array([(arm.flange(q) @ pose(TOOL))[:3, 3] for q in each]) for each in (wanted, now))
-    capsys.readouterr()
-    estimates = ["--estimates", str(folder / "out"), "--json"]
-    assert main(["verify", str(folder / "robot.yaml"), str(folder / "others.csv"), *estimates]) == 0
-    verified = json.loads(capsys.readouterr().out)["verification"]["measured"]["mean_mm"] / 1e3
+    verified = verified_error(folder, capsys)
     assert registered(was, goals).mean() > 2e-4 and registered(there, goals).mean() < 1.1 * verified < 4e-5
     number = r" *-?\d*\.\d+"
     assert re.sub(number, "#", before) == re.sub(number, "#", after), "only numbers change"

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from program_cell import calibrate_cell, verified_error
 from six_axis_arm import KR6, Arm, frame, registered, turn
 
 from flexcal.cli.main import main
@@ -122,14 +123,7 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Arm]:
     """A calibrated KR 6 and its program."""
     folder, arm = tmp_path_factory.mktemp("krl"), KR6.true_one(5)
     arm.measured(folder, _TOOL[:3, 3])
-    calibrated = [
-        "calibrate",
-        str(folder / "robot.yaml"),
-        str(folder / "points.csv"),
-        "--out",
-        str(folder / "out"),
-    ]
-    assert main(calibrated) == 0
+    calibrate_cell(folder)
     rng = np.random.default_rng(4)
     stops = KR6.middle() + rng.uniform(-35, 35, (11, 6))
     stops[3, 4] = -50.0  # the wrist flipped
@@ -171,16 +165,7 @@ def test_the_corrected_program_brings_the_true_tool_there(
     cell: tuple[Path, Arm], capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder, arm = cell
-    capsys.readouterr()
-    checked = [
-        "verify",
-        str(folder / "robot.yaml"),
-        str(folder / "others.csv"),
-        "--estimates",
-        str(folder / "out"),
-    ]
-    assert main([*checked, "--json"]) == 0
-    verification = json.loads(capsys.readouterr().out)
+    limit = verified_error(folder, capsys)
     assert filtered(folder, ".", "new", "--json") == 0
     found = json.loads(capsys.readouterr().out)
     before, after = texts(folder), texts(folder / "new")
@@ -193,7 +178,6 @@ def test_the_corrected_program_brings_the_true_tool_there(
         for each in (wanted, now)
     ]
     assert errors[0].mean() > 2e-4
-    limit = verification["verification"]["measured"]["mean_mm"] * 1e-3
     assert errors[1].mean() < 1.1 * limit < 3e-5
     assert np.abs(np.array(wanted) - np.array(now)).max() < 1.0, "no configuration is left"
     number = r"-?\d*\.\d+|-?\d+"
