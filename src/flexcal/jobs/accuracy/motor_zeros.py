@@ -9,7 +9,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from flexcal.calibration.fit import probable_robots
 from flexcal.calibration.verification import best_placement, can_register_with_points
 from flexcal.data.poses import PoseSet, read_poses
 from flexcal.errors import FlexcalError, InputError
@@ -220,7 +219,7 @@ def export_motor_zeros(
         )
     own = joint_motors(calibration, read_motor_calibrations(calibration), robot.nominal.joint_names, motors)
     seen = _unseen(robot, tuple(verification))
-    model = probable_robots(robot.model, robot.targets)[0]
+    model = robot.probable
     rendered = render_offsets(model, robot.nominal, undetermined=undetermined_zeros(robot))
     table, names = rendered.table["joints"], robot.nominal.joint_names
     determined = tuple(name in table and table[name]["determined"] for name in names)

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from flexcal.calibration.fit import probable_robots
 from flexcal.dynamics.torque_model import TorqueModel
 from flexcal.errors import FlexcalError, InputError
 from flexcal.export import (
@@ -150,8 +149,7 @@ def export_robot(
             "time_step": time_step,
         },
     )
-    nominal, measured = robot.nominal, robot.targets
-    probable, unseen = probable_robots(robot.model, measured) if measured else (robot.model, None)
+    nominal, probable = robot.nominal, robot.probable
     rendered: RenderedModel
     if format in _CONVENTIONS:
         rendered = render_dh(
@@ -160,7 +158,7 @@ def export_robot(
             _CONVENTIONS[format],
             point=point,
             four_parameters=four_parameters,
-            unseen=unseen,
+            unseen=robot.unseen if robot.targets else None,
         )
     elif format == "offsets":
         rendered = render_offsets(

@@ -13,6 +13,7 @@ from flexcal.jobs.deployment.controller_poses import ControllerPoses
 from flexcal.jobs.deployment.tool_paths import ToolPath
 from flexcal.model.robot import RobotModel
 from flexcal.programs import Move, NewNumbers, Pose, Program, ProgramTarget
+from flexcal.units import MILLIMETRE
 
 _SHARES = (0.25, 0.5, 0.75)
 """Where between its ends a path is looked at."""
@@ -48,10 +49,10 @@ class PathCorrections:
         _, needed = self._needed(moves, shares)
         flange = _poses(self.places, needed)
         distances = np.full(len(moves), np.nan)
-        for k, (move, share, pose) in enumerate(zip(moves, shares, flange, strict=True)):
+        paths = self._paths(moves, self.after)
+        for k, (move, path, share, pose) in enumerate(zip(moves, paths, shares, flange, strict=True)):
             if pose is not None:
-                position = (pose @ self._tool(move)).position
-                distances[k] = self._path(move, self.after).distance(position, share)
+                distances[k] = path.distance((pose @ self._tool(move)).position, share)
         largest[rows] = distances.reshape(len(rows), -1).max(axis=1)
         return largest
 
@@ -97,6 +98,12 @@ class PathCorrections:
         assert tool is not None
         return tool
 
+    def _paths(self, moves: Sequence[Move], q: np.ndarray) -> list[ToolPath]:
+        """Path of every move between targets at joint positions (N, 6), once for a move that is there several times."""
+        paths = {id(move): move for move in moves}
+        made = {key: self._path(move, q) for key, move in paths.items()}
+        return [made[id(move)] for move in moves]
+
     def _path(self, move: Move, q: np.ndarray) -> ToolPath:
         """Path of the tool between targets at joint positions (N, 6)."""
         via = move.start if move.via is None else move.via
@@ -108,8 +115,8 @@ class PathCorrections:
     def _needed(self, moves: Sequence[Move], shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Joint positions (K, 6) of the nominal robot at shares of the nominal paths, and compensated ones; NaN where there are none."""
         aims, starts = [], []
-        for move, share in zip(moves, shares, strict=True):
-            aims.append(self._path(move, self.before).pose(share) @ self._tool(move).inverse())
+        for move, path, share in zip(moves, self._paths(moves, self.before), shares, strict=True):
+            aims.append(path.pose(share) @ self._tool(move).inverse())
             starts.append((1 - share) * self.before[move.start] + share * self.before[move.end])
         name = np.full(len(aims), self.places.flange)
         aim = ToolPoseTarget(
@@ -145,18 +152,19 @@ def path_remarks(
     if not np.isfinite(deviations).any():
         return ()
     worst = int(np.nanargmax(deviations))
+    most = np.nanmax(deviations) / MILLIMETRE
     remarks = [
-        f"between their points straight motions and arcs miss the needed correction by {np.nanmax(deviations) * 1e3:.3f} mm at most, on "
+        f"between their points straight motions and arcs miss the needed correction by {most:.3f} mm at most, on "
         f"the way to {_named(program, program.moves[worst])}"
     ]
     if limit is None:
         return tuple(remarks)
-    count = sum(map(len, inserted.values()))
+    count, allowed = sum(map(len, inserted.values())), f"{limit / MILLIMETRE:g} mm"
     remarks.append(
-        f"{count} points inserted in {len(inserted)} motions, after which lines miss it by {limit * 1e3:g} mm at most; they have the other "
+        f"{count} points inserted in {len(inserted)} motions, after which lines miss it by {allowed} at most; they have the other "
         "arguments of the motion that they divide, so that the arm stops at each where that one has no blending"
         if count
-        else f"no points inserted for {limit * 1e3:g} mm"
+        else f"no points inserted for {allowed}"
     )
     left = [k for k in np.flatnonzero(deviations > limit).tolist() if k not in inserted]
     if left:

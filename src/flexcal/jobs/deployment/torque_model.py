@@ -36,4 +36,4 @@ def read_torque_model(path: str | Path, estimates: str | Path | None = None) -> 
     False
     """
     robot = identified_robot(Path(path), None if estimates is None else Path(estimates))
-    return TorqueModel.of_blocks(robot.probable if robot.targets else robot.model, robot.blocks)
+    return TorqueModel.of_blocks(robot.probable, robot.blocks)

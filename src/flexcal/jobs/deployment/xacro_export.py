@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from flexcal.calibration.fit import probable_robots
 from flexcal.errors import InputError, unreadable
 from flexcal.export import XacroExport, XacroSource, Zeros, render_xacro, shifted_limits
 from flexcal.files.transaction import atomic_path
@@ -111,8 +110,7 @@ def export_xacro(
             f"{joint_limits} stays valid while the zeros are in the origins; give --zeros ros2_control, or leave --joint-limits out.",
         )
     robot = identified_robot(robot_file, estimates)
-    measured = robot.targets
-    model = probable_robots(robot.model, measured)[0] if measured else robot.model
+    model = robot.probable
     source = XacroSource(xacro or robot.nominal.urdf, arguments or {}, packages or {})
     export = render_xacro(model, robot.nominal, source, zeros)
     folder, files, changes, main = _below_one_folder(export)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from flexcal.calibration.fit import probable_robot, with_calibrated_points
+from flexcal.calibration.fit import probable_robots, with_calibrated_points
 from flexcal.calibration.kinds import is_inclinometer
 from flexcal.errors import InputError
 from flexcal.estimation import Estimate
@@ -98,10 +98,19 @@ class CalibratedRobot:
         """Points measured in the calibration."""
         return tuple(name for name in self.targets if not is_inclinometer(self.nominal, name))
 
-    @cached_property
+    @property
     def probable(self) -> RobotModel:
         """Robot with the most probable values along the directions that the measured points do not determine; for all other frames."""
-        return probable_robot(self.model, self.targets)
+        return self._most_probable[0]
+
+    @property
+    def unseen(self) -> RobotModel:
+        """The same robot with only what the measured points leave open in its posterior."""
+        return self._most_probable[1]
+
+    @cached_property
+    def _most_probable(self) -> tuple[RobotModel, RobotModel]:
+        return probable_robots(self.model, self.targets)
 
     @cached_property
     def with_points(self) -> RobotModel:
