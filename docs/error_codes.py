@@ -41,6 +41,7 @@ SUBJECTS = {
     "RUN": "Verbs and what they are given",
     "SERVE": "Server",
     "STIFF": "Stiffness",
+    "STUDIO": "Studio",
     "TABLE": "Tables",
     "TOOL": "Tool and work object",
     "URDF": "URDF",

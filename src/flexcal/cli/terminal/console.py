@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -15,8 +17,11 @@ if TYPE_CHECKING:
     from rich.console import Console as RichConsole
     from rich.table import Table
 
+PROGRESS = "FLEXCAL_PROGRESS"
 _WIDTH = 120
 """Columns where the output is no terminal."""
+_STEP = 0.01
+"""Smallest share between two lines of progress."""
 
 
 @dataclass(frozen=True)
@@ -47,8 +52,12 @@ class Console:
     def progress(self) -> Iterator[Progress]:
         """A function `progress(stage, share)` that draws a bar a stage on standard error, where that is a terminal.
 
-        Where it is none, it writes one line when a stage begins.
+        Where it is none, it writes one line when a stage begins; with FLEXCAL_PROGRESS=json in the environment, for programs, JSON objects
+        with "stage" and "share", a line each.
         """
+        if os.environ.get(PROGRESS) == "json":
+            yield _json_lines()
+            return
         rich = self._rich("error")
         if not rich.is_terminal:
             yield _stage_lines()
@@ -80,6 +89,18 @@ class Console:
             width = None if stream.isatty() else _WIDTH
             self._streams[name] = SafeConsole(file=stream, width=width)
         return self._streams[name]
+
+
+def _json_lines() -> Progress:
+    told: dict[str, float] = {}
+
+    def advance(stage: str, share: float) -> None:
+        share = round(min(share, 1.0), 3)
+        if share in (0.0, 1.0) or share - told.get(stage, -1.0) >= _STEP:
+            told[stage] = share
+            print(json.dumps({"stage": stage, "share": share}), file=sys.stderr, flush=True)
+
+    return advance
 
 
 def _stage_lines() -> Progress:

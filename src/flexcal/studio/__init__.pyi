@@ -1,0 +1,3 @@
+from .application import run_studio
+
+__all__ = ["run_studio"]

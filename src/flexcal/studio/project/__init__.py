@@ -1,0 +1,5 @@
+"""The project's folder: its files, and what was chosen in the window."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,25 @@
+from .choices import Choices
+from .project import (
+    CALIBRATION,
+    CHECK_PLAN,
+    CHECKED,
+    MAP,
+    MEASURED,
+    PLAN,
+    ROBOT,
+    VERIFICATION,
+    Project,
+)
+
+__all__ = [
+    "CALIBRATION",
+    "CHECKED",
+    "CHECK_PLAN",
+    "MAP",
+    "MEASURED",
+    "PLAN",
+    "ROBOT",
+    "VERIFICATION",
+    "Choices",
+    "Project",
+]

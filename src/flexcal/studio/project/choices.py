@@ -1,0 +1,50 @@
+"""What was chosen in the window: kept in the project's folder, so that a restart goes on where it was."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from flexcal.files.transaction import write_text
+
+FILE = ".studio.json"
+_LARGEST = 100_000
+"""Bytes of a file of choices; a larger one is not ours."""
+
+
+@dataclass
+class Choices:
+    """Values by name, such as the file that a step reads; written when they change.
+
+    A file that cannot be read is ignored: every choice has a default.
+    """
+
+    folder: Path
+    values: dict[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def read(cls, folder: Path) -> Choices:
+        """Choices of a project's folder."""
+        path = folder / FILE
+        try:
+            values = json.loads(path.read_text(encoding="utf-8")) if path.stat().st_size < _LARGEST else {}
+        except (OSError, ValueError):
+            values = {}
+        return cls(folder, values if isinstance(values, dict) else {})
+
+    def get(self, name: str, default: Any) -> Any:
+        """A choice, of the type of `default`; that where it was not made."""
+        value = self.values.get(name, default)
+        return value if isinstance(value, type(default)) else default
+
+    def put(self, name: str, value: Any) -> None:
+        """Keep a choice; a folder that cannot be written keeps none."""
+        if self.values.get(name) == value:
+            return
+        self.values[name] = value
+        try:
+            write_text(self.folder / FILE, json.dumps(self.values, indent=1))
+        except Exception:
+            return

@@ -1,0 +1,126 @@
+"""The folder of a calibration: the same files that the command line reads and writes."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from flexcal.errors import InputError
+
+ROBOT = "robot.yaml"
+PLAN = "poses.yaml"
+"""Plan of the poses to calibrate on."""
+MEASURED = "poses.csv"
+"""Measured poses of a guided session."""
+CHECK_PLAN = "others.yaml"
+"""Plan of the poses to verify on."""
+CHECKED = "others.csv"
+CALIBRATION = "calibration"
+VERIFICATION = "verification"
+MAP = "map"
+_DEPTH = 3
+"""Folders below the project's in which files are offered."""
+_MANY = 2000
+"""Files that are looked at, at most."""
+_HIDDEN = (".", "__pycache__", "node_modules")
+
+
+@dataclass(frozen=True)
+class Project:
+    """The folder of a calibration.
+
+    Parameters
+    ----------
+    folder : Path
+        An existing folder, absolute.
+    """
+
+    folder: Path
+
+    @classmethod
+    def open(cls, folder: Path) -> Project:
+        """Project of a folder; raises `InputError` where there is none."""
+        if not folder.is_dir():
+            raise InputError(
+                "E-STUDIO-120", f"{folder} is not a folder; give the folder of the robot's files."
+            )
+        return cls(folder.resolve())
+
+    @property
+    def name(self) -> str:
+        """Name of the folder."""
+        return self.folder.name or str(self.folder)
+
+    @property
+    def robot_file(self) -> Path:
+        """File that describes the robot and its cell, whether it is there or not."""
+        return self.folder / ROBOT
+
+    def path(self, name: str) -> Path:
+        """Path of a file or folder by its name relative to the project; it need not exist.
+
+        Raises
+        ------
+        InputError
+            Where it lies outside the project, links followed, or is no name of a file.
+        """
+        outside = InputError(
+            "E-STUDIO-121", f"'{name}' is not in the folder {self.name}; give the name of a file there."
+        )
+        if not name.strip() or "\0" in name or Path(name).is_absolute():
+            raise outside
+        try:
+            place = (self.folder / name).resolve()
+        except (OSError, RuntimeError) as problem:
+            raise outside from problem
+        if not place.is_relative_to(self.folder) or place == self.folder:
+            raise outside
+        return self.folder / os.path.normpath(name)
+
+    def files(self, *endings: str) -> list[str]:
+        """Names of the project's files with one of these endings (as '.csv'), sorted; hidden ones and links are left out."""
+        found: list[str] = []
+        seen = 0
+        for place, folders, names in os.walk(self.folder):
+            depth = len(Path(place).relative_to(self.folder).parts)
+            folders[:] = [f for f in sorted(folders) if not f.startswith(_HIDDEN)] if depth < _DEPTH else []
+            for name in sorted(names):
+                seen += 1
+                path = Path(place, name)
+                if name.endswith(endings) and not name.startswith(".") and not path.is_symlink():
+                    found.append(path.relative_to(self.folder).as_posix())
+            if seen > _MANY:
+                break
+        return found
+
+    def results(self, kind: str | None = None) -> list[str]:
+        """Names of the folders with a results.json, newest last; of one kind (as 'calibrate') where it is given."""
+        from flexcal.jobs.result_files import RESULTS, read_results
+
+        folders = []
+        for name in self.files(RESULTS):
+            folder = Path(name).parent
+            if folder == Path(".") or Path(name).name != RESULTS:
+                continue
+            if kind is None or _kind(read_results, self.folder / folder) == kind:
+                folders.append(folder.as_posix())
+        return sorted(folders, key=lambda name: (self.folder / name / RESULTS).stat().st_mtime_ns)
+
+    def stamp(self) -> tuple[tuple[str, int, int], ...]:
+        """Name, time of change (ns) and size of each file that a step may show; equal stamps mean that nothing changed."""
+        stamps = []
+        for name in self.files(".yaml", ".yml", ".csv", ".parquet", ".json", ".urdf", ".npz"):
+            try:
+                status = (self.folder / name).stat()
+            except OSError:  # it has just been removed
+                continue
+            stamps.append((name, status.st_mtime_ns, status.st_size))
+        return tuple(stamps)
+
+
+def _kind(read, folder: Path) -> str | None:
+    try:
+        return read(folder).get("kind")
+    except InputError:
+        return None

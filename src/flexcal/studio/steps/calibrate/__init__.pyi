@@ -1,0 +1,3 @@
+from .calibrate_step import CalibrateStep
+
+__all__ = ["CalibrateStep"]

@@ -1,0 +1,3 @@
+from .compare_step import CompareStep
+
+__all__ = ["CompareStep"]

@@ -1,0 +1,3 @@
+from .measure_step import MeasureStep
+
+__all__ = ["MeasureStep"]

@@ -1,0 +1,3 @@
+from .plan_step import PlanStep
+
+__all__ = ["PlanStep"]

@@ -1,0 +1,3 @@
+from .robot_step import RobotStep
+
+__all__ = ["RobotStep"]

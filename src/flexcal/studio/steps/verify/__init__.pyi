@@ -1,0 +1,3 @@
+from .verify_step import VerifyStep
+
+__all__ = ["VerifyStep"]

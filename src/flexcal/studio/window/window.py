@@ -1,0 +1,199 @@
+"""The window of a project."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import traceback
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from flexcal.errors import FlexcalError
+from flexcal.studio.commands import CommandRun, CommandRunner
+from flexcal.studio.project import Choices, Project
+from flexcal.studio.window.command_box import CommandBox
+from flexcal.studio.window.figures_panel import FiguresPanel
+from flexcal.studio.window.markup import Tone, paragraph
+from flexcal.studio.window.selection import Selection
+from flexcal.studio.window.step import Step
+
+if TYPE_CHECKING:
+    import viser
+
+    from flexcal.model.robot import RobotModel
+
+_PERIOD = 0.2
+"""Seconds between looks at the folder and the command that runs."""
+_WIDTH = 400
+_PROGRAM_ERROR = "an error of the program, not of your files; the terminal has the details"
+
+
+class Window:
+    """The window of a project: steps, the command that runs, messages; the same in every browser that shows it.
+
+    Parameters
+    ----------
+    server : viser.ViserServer
+        Server that it is shown by.
+    project : Project
+        The folder.
+    steps : sequence of type of Step
+        The steps, in their order.
+
+    Attributes
+    ----------
+    gui, scene
+        viser's; steps add to them.
+    choices : Choices
+        What was chosen, kept in the folder.
+    runner : CommandRunner
+        Commands that run in processes of their own.
+    figures : FiguresPanel
+        Figures on the left.
+    selection : Selection
+        The selected pose.
+    """
+
+    def __init__(self, server: viser.ViserServer, project: Project, steps: Sequence[type[Step]]):
+        self.gui, self.scene, self.project = server.gui, server.scene, project
+        self.server = server
+        self.choices = Choices.read(project.folder)
+        self.runner = CommandRunner(project.folder)
+        self.selection = Selection()
+        self._lock = threading.RLock()
+        self._stamp: object = None
+        self._models: dict[bool, tuple[object, RobotModel]] = {}
+        self._stopped = threading.Event()
+        self._dark = self.choices.get("dark", False)
+        self._theme()
+        server.gui.main_panel.dock_right()
+        server.gui.main_panel.set_width(_WIDTH)
+        self._steps = [step(self) for step in steps]
+        titles = [step.title for step in self._steps]
+        self._tabs = server.gui.add_button_group("Step", titles)
+        self._tabs.on_click(lambda event: self.guarded(lambda: self.go_to(event.target.value)))
+        self._heading = server.gui.add_html("")
+        self._message = server.gui.add_html("", visible=False)
+        self._place = server.gui.add_folder(None)
+        self._commands = CommandBox(server.gui, self.runner)
+        self.figures = FiguresPanel(server.gui)
+        self._add_hotkeys(titles)
+        self.selection.listen(self._selected)
+        self._open: Step | None = None
+        first = self.choices.get("step", titles[0])
+        self.go_to(first if first in titles else titles[0])
+
+    def run(self) -> None:
+        """Watch the folder and the command that runs, until `stop`."""
+        while not self._stopped.wait(_PERIOD):
+            self.guarded(self._watch)
+
+    def stop(self) -> None:
+        """End `run`, and cancel the command that runs."""
+        self._stopped.set()
+        self.runner.cancel()
+
+    def guarded(self, action: Callable[[], None]) -> None:
+        """Carry out what a click asks for, one at a time; an error is shown as its sentence, and loses nothing."""
+        with self._lock:
+            try:
+                action()
+            except FlexcalError as problem:
+                self.say(f"{problem} [{problem.code}]", "bad")
+            except OSError as problem:
+                self.say(f"{problem.filename or 'a file'}: {problem.strerror or problem}.", "bad")
+            except Exception as problem:
+                traceback.print_exc(file=sys.stderr)
+                self.say(f"{type(problem).__name__}: {_PROGRAM_ERROR}.", "bad")
+
+    def say(self, text: str, tone: Tone = "plain") -> None:
+        """Show a sentence above the step; an empty one removes it."""
+        self._message.content = paragraph(text, tone) if text else ""
+        self._message.visible = bool(text)
+
+    def go_to(self, title: str) -> None:
+        """Open a step in place of the one that is open."""
+        if self._open is not None:
+            self._open.close()
+        self._place.remove()
+        self.figures.clear()
+        self.say("")
+        self._open = next(step for step in self._steps if step.title == title)
+        self.choices.put("step", title)
+        self._heading.content = paragraph(
+            f"{self._steps.index(self._open) + 1}. {title} · {self.project.name}"
+        )
+        self._place = self.gui.add_folder(None, order=self._message.order + 0.5)
+        with self._place:
+            self._open.open()
+        self._open.refresh()
+
+    def button(
+        self, label: str, action: Callable[[], None], *, hint: str = "", main: bool = False
+    ) -> viser.GuiButtonHandle:
+        """A button that carries out `action`, guarded; `main` for the one that goes on."""
+        button = self.gui.add_button(label, hint=hint or None, color=None if main else "gray")
+        button.on_click(lambda _: self.guarded(action))
+        return button
+
+    def command(self, arguments: Sequence[str], then: Callable[[CommandRun], None] | None = None) -> None:
+        """Run a command line of flexcal in the folder; the step is refreshed at its end, and `then` called where it succeeded.
+
+        Raises `FlexcalError` while another one runs.
+        """
+
+        def ended(run: CommandRun) -> None:
+            if run.status == "done" and then is not None:
+                then(run)
+            if self._open is not None:
+                self._open.refresh()
+
+        self.say("")
+        self.runner.start(arguments, ended)
+        self._commands.refresh()
+
+    def model(self, *, estimates: bool = True) -> RobotModel:
+        """The robot as its files describe it now, with or without what was estimated; raises `InputError` where they cannot be used."""
+        from flexcal.model.robot import RobotModel
+
+        stamp = self.project.stamp()
+        kept = self._models.get(estimates)
+        if kept is None or kept[0] != stamp:
+            kept = (stamp, RobotModel.from_yaml(self.project.robot_file, estimates=estimates))
+            self._models[estimates] = kept
+        return kept[1]
+
+    def _watch(self) -> None:
+        self.runner.settle()
+        self._commands.refresh()
+        if self._open is None:
+            return
+        self._open.tick()
+        stamp = self.project.stamp()
+        if stamp != self._stamp:
+            self._stamp = stamp
+            self._open.refresh()
+
+    def _selected(self) -> None:
+        if self._open is not None:
+            self._open.refresh()
+
+    def _theme(self) -> None:
+        self.gui.configure_theme(
+            dark_mode=self._dark, show_logo=False, show_share_button=False, control_width="large"
+        )
+        self.gui.set_panel_label("flexcal studio")
+
+    def _toggle_dark(self) -> None:
+        self._dark = not self._dark
+        self.choices.put("dark", self._dark)
+        self._theme()
+
+    def _add_hotkeys(self, titles: Sequence[str]) -> None:
+        for number, title in enumerate(titles, 1):
+            command = self.gui.add_command(f"{number}. {title}", hotkey=str(number))  # pyright: ignore[reportArgumentType]
+            command.on_trigger(lambda _, title=title: self.guarded(lambda: self.go_to(title)))
+        dark = self.gui.add_command("Dark or light", hotkey="D")
+        dark.on_trigger(lambda _: self.guarded(self._toggle_dark))
+        none = self.gui.add_command("Deselect the pose", hotkey="escape")
+        none.on_trigger(lambda _: self.guarded(lambda: self.selection.pick(None)))
