@@ -3,18 +3,23 @@ from .forward import PointKinematics, joint_batch, motor_motion, point_kinematic
 from .inverse import damped_step, reach_points
 from .joint_space import joint_limits, joint_ranges, low_discrepancy_configurations, random_configurations
 from .link_poses import joint_origins, link_frames
-from .link_surface import LinkSurface
+from .link_surface import LinkSurface, link_capsules
 from .placements import bearing_placement, found_xyz, joint_placement, link_placement, point_placement
 from .relative import carrier_kinematics, relative_kinematics, relative_motion
 from .tool_rotations import rotation_freedom
+from .triangle_meshes import box, cylinder, decimated, ellipsoid
 
 __all__ = [
     "JointMotion",
     "LinkSurface",
     "PointKinematics",
     "bearing_placement",
+    "box",
     "carrier_kinematics",
+    "cylinder",
     "damped_step",
+    "decimated",
+    "ellipsoid",
     "found_xyz",
     "joint_batch",
     "joint_limits",
@@ -23,6 +28,7 @@ __all__ = [
     "joint_placement",
     "joint_positions",
     "joint_ranges",
+    "link_capsules",
     "link_frames",
     "link_placement",
     "loop_gap",

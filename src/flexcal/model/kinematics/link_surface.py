@@ -30,7 +30,7 @@ class LinkSurface:
     @classmethod
     def of(cls, model: RobotModel) -> LinkSurface:
         """Surface from the URDF's visual shapes; without them, or with missing meshes, from its collision shapes; else from capsules."""
-        return cls._joined(_urdf_shapes(model) or _capsules(model))
+        return cls._joined(_urdf_shapes(model) or link_capsules(model))
 
     @classmethod
     def _joined(cls, parts: list[tuple[int, np.ndarray, np.ndarray]]) -> LinkSurface:
@@ -100,8 +100,11 @@ def _mesh(shape: Any) -> tuple[np.ndarray, np.ndarray] | None:
     return None
 
 
-def _capsules(model: RobotModel) -> list[tuple[int, np.ndarray, np.ndarray]]:
-    """Capsules in every link from its joint to the next joints and to the first point."""
+def link_capsules(model: RobotModel) -> list[tuple[int, np.ndarray, np.ndarray]]:
+    """Capsules in every link from its joint to the next joints and to the first point.
+
+    (joint or −1 for the base, vertices (V, 3) m in its link, triangles (F, 3)) of each.
+    """
     ends = [(model.joints[k].parent, joint_placement(model, k)[0]) for k in range(len(model.joints))]
     ends += [point_placement(model, name)[:2] for name in list(model.points)[:1]]
     radius = _SLENDER * sum(float(np.linalg.norm(end)) for _, end in ends)

@@ -1,10 +1,11 @@
 from .description import Description, Frame, locked_joints, read_urdf
-from .elements import read_elements
+from .elements import Element, read_elements
 from .serial_arm import Arm, find_arm
 
 __all__ = [
     "Arm",
     "Description",
+    "Element",
     "Frame",
     "find_arm",
     "locked_joints",
