@@ -217,9 +217,9 @@ PLACES = {
 
 
 def test_every_verb_has_a_place() -> None:
-    """`demo` is run by tests/test_readme.py, and `serve`, which goes on, by test_serve.py."""
+    """`demo` is run by tests/test_readme.py, and `serve` and `studio`, which go on, by tests of theirs."""
     named = {name for names in PLACES.values() for name in names}
-    assert named | {"demo", "serve"} == {verb.name for verb in VERBS}
+    assert named | {"demo", "serve", "studio"} == {verb.name for verb in VERBS}
 
 
 @pytest.mark.parametrize("place", [own_robot, foreign_file, calibrated_arm], ids=lambda place: place.__name__)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 
 def run_studio(folder: Path, host: str, port: int | None, ready: Callable[[str], None]) -> None:
-    """Serve the studio of a folder until it is interrupted.
+    """Serve the studio of a folder until `KeyboardInterrupt`.
 
     Parameters
     ----------
@@ -22,23 +23,34 @@ def run_studio(folder: Path, host: str, port: int | None, ready: Callable[[str],
 
     Raises
     ------
+    FlexcalError
+        Without viser, and with one that cannot be protected.
     InputError
         For a folder that is not there, and where nothing can listen at the address.
     """
-    import viser
-
     from flexcal.studio.project import Project
+    from flexcal.studio.server import NO_CONTENT, Answer, ProjectFiles, Route, StudioServer
     from flexcal.studio.steps import CalibrateStep, CompareStep, MeasureStep, PlanStep, RobotStep, VerifyStep
     from flexcal.studio.window import Window
 
     project = Project.open(folder)
-    server = viser.ViserServer(host=host, port=port or 8080, verbose=False)
-    window = Window(
-        server, project, [RobotStep, PlanStep, MeasureStep, CalibrateStep, VerifyStep, CompareStep]
-    )
-    ready(f"http://{host}:{server.get_port()}/")
+    routes: dict[str, Route] = {}
+    server = StudioServer.start(host, port, routes, ProjectFiles(project.folder))
     try:
-        window.run()
+        steps = [RobotStep, PlanStep, MeasureStep, CalibrateStep, VerifyStep, CompareStep]
+        window = Window(server.viser, project, steps)
+
+        def pick(key: str) -> Answer:
+            window.guarded(lambda: window.selection.pick(key))
+            return NO_CONTENT
+
+        routes["pick"] = pick
+        try:
+            with suppress(KeyboardInterrupt):
+                ready(server.url)
+                window.run()
+        finally:
+            window.stop()
     finally:
-        window.stop()
+        server.stop()
         server.stop()

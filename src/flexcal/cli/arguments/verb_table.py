@@ -327,6 +327,18 @@ STEPS = (
         ),
     ),
     Step(
+        "All of it in a window",
+        (
+            Verb(
+                ("studio",),
+                "studio",
+                "Studio",
+                "a project folder in the browser: the same files and computations, step by step",
+                "flexcal studio robot",
+            ),
+        ),
+    ),
+    Step(
         "For the shell",
         (
             Verb(

@@ -1,0 +1,73 @@
+"""`flexcal studio`."""
+
+from __future__ import annotations
+
+import os
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, ClassVar
+
+from tyro.conf import Positional, arg
+
+from flexcal.cli.arguments.shared_options import Json
+from flexcal.cli.terminal.console import Console
+from flexcal.errors import InputError
+
+_LOOPBACK = "127.0.0.1"
+
+
+@dataclass(frozen=True)
+class Studio:
+    """Open a project folder in a window of the browser: the same files and computations as on the command line.
+
+    Only this machine reaches it, at the address that is printed, which has a secret in it. Close the window any time: all is in the
+    folder. Ctrl-C stops it.
+    """
+
+    out: ClassVar[None] = None
+    folder: Annotated[Positional[Path], arg(metavar="[DIR]", help="project folder, which may be empty")] = (
+        Path()
+    )
+    host: Annotated[str, arg(metavar="ADDRESS")] = _LOOPBACK
+    """Address of this machine to listen on; all but 127.0.0.1 let others in who know the address, unencrypted. 0.0.0.0: all."""
+    port: Annotated[
+        int | None,
+        arg(metavar="N", help_behavior_hint="(default: 8080, or the next that is free)"),
+    ] = None
+    """TCP port; 0 takes any free one."""
+    no_browser: bool = False
+    """Print the address only."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Serve until stopped."""
+        from flexcal.studio import run_studio
+
+        if not self.folder.is_dir():
+            raise InputError("E-STUDIO-005", f"{self.folder} is no folder; make it, or give another.")
+        run_studio(self.folder, self.host, self.port, self._ready)
+        console = Console(self.json)
+        console.say("the studio is closed")
+        console.finish({"folder": str(self.folder)}, f"flexcal studio {self.folder}")
+
+    def _ready(self, url: str) -> None:
+        # standard output is shown when a verb has ended
+        print(f"the studio is open at {url}", file=sys.stderr)
+        if self.host not in (_LOOPBACK, "localhost", "::1"):
+            print(
+                "whoever knows this address can read and change the folder and compute on this machine; "
+                "what is sent is not encrypted, so that others on the network can read it, the address too",
+                file=sys.stderr,
+            )
+        print("Ctrl-C stops it", file=sys.stderr, flush=True)
+        if not self.no_browser and _has_display():
+            import webbrowser
+
+            webbrowser.open(url)
+
+
+def _has_display() -> bool:
+    return sys.platform in ("darwin", "win32") or any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
+    )

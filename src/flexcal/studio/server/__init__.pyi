@@ -1,0 +1,6 @@
+from .answer import NO_CONTENT, Answer, Route
+from .gate import Gate, Passage
+from .project_files import ProjectFiles
+from .studio_server import StudioServer
+
+__all__ = ["NO_CONTENT", "Answer", "Gate", "Passage", "ProjectFiles", "Route", "StudioServer"]

@@ -1,0 +1,130 @@
+"""Who may talk to the server: a pure decision on path and headers of a request."""
+
+from __future__ import annotations
+
+import hmac
+import ipaddress
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from urllib.parse import urlsplit
+
+
+@dataclass(frozen=True)
+class Passage:
+    """A request that is let in: the `path` behind the token, with its query and without a leading slash, and the `host` it was sent to.
+
+    `files` where it came with the token of the files; `upgrade` where it asks for a websocket. `path` is None where even the slash
+    behind the token is missing.
+    """
+
+    path: str | None
+    host: str
+    files: bool = False
+    upgrade: bool = False
+
+
+@dataclass(frozen=True)
+class Gate:
+    """Lets in requests whose path begins with a token, and that were sent to an allowed host by nobody else's page.
+
+    Parameters
+    ----------
+    token : str
+        Opens everything.
+    files_token : str
+        Opens files of the project alone. Pages among them may be anybody's: they know their own address, hence not `token`.
+    hosts : frozenset of str
+        Allowed `Host` headers, as `127.0.0.1:8080`, in lower case. Other names are those of DNS rebinding.
+    port : int
+        Of the server.
+    any_address : bool
+        Whether every IP address with that port is allowed too, for a server that listens on all interfaces; rebinding needs a name.
+    """
+
+    token: str = field(repr=False)
+    files_token: str = field(repr=False)
+    hosts: frozenset[str]
+    port: int
+    any_address: bool = False
+
+    def passage(self, target: str, headers: Iterable[tuple[str, str]]) -> Passage | None:
+        """What a request of a path and headers may have; None where it is to be refused."""
+        values: dict[str, list[str]] = {}
+        for name, value in headers:
+            values.setdefault(name.lower(), []).append(value.strip())
+        if any(len(values.get(name, ())) > 1 for name in _SINGLE):
+            return None
+        single = {name: values[name][0] for name in _SINGLE if name in values}
+        host = single.get("host", "").lower()
+        upgrade = "upgrade" in values or any(name.startswith("sec-websocket-") for name in values)
+        found = self._behind_token(target)
+        if found is None or not self._is_own(host):
+            return None
+        path, files = found
+        origin = single.get("origin")
+        if origin is None:
+            if upgrade:
+                return None
+        elif not self._is_own_origin(origin):
+            return None
+        if files and upgrade:
+            return None
+        if single.get("sec-fetch-site", "none").lower() not in ("none", "same-origin"):
+            to_page = files or not path or path.startswith("?")
+            if upgrade or not to_page or not _is_navigation(single):
+                return None
+        return Passage(path, host, files, upgrade)
+
+    def _behind_token(self, target: str) -> tuple[str | None, bool] | None:
+        """The path behind a token, and whether it was that of the files."""
+        if not target.startswith("/") or not target.isascii():
+            return None
+        given, slash, rest = target[1:].partition("/")
+        given, question, query = given.partition("?")
+        if question:  # /TOKEN?query has no slash behind the token
+            slash, rest = "", f"?{query}"
+        path = rest if slash else None
+        opens = [
+            hmac.compare_digest(given.encode(errors="replace"), token.encode())
+            for token in (self.token, self.files_token)
+        ]
+        return (path, opens[1]) if any(opens) else None
+
+    def _is_own(self, host: str) -> bool:
+        if host in self.hosts:
+            return True
+        if not self.any_address:
+            return False
+        try:
+            parts = urlsplit(f"http://{host}")
+            ipaddress.ip_address(parts.hostname or "")
+            return parts.netloc == host and (parts.port or 80) == self.port and "@" not in host
+        except ValueError:
+            return False
+
+    def _is_own_origin(self, origin: str) -> bool:
+        scheme, separator, host = origin.lower().partition("://")
+        return scheme == "http" and bool(separator) and self._is_own(host)
+
+
+_SINGLE = ("host", "origin", "sec-fetch-site", "sec-fetch-mode", "sec-fetch-dest", "upgrade")
+"""Headers that a request has once at most; twice, two programs may read two different ones."""
+
+
+def _is_navigation(headers: dict[str, str]) -> bool:
+    """Whether a window goes to the page, as by a link in a mail, rather than another page that loads or embeds it."""
+    return (
+        headers.get("sec-fetch-mode", "").lower() == "navigate"
+        and headers.get("sec-fetch-dest", "").lower() == "document"
+    )
+
+
+def own_hosts(names: Iterable[str], port: int) -> frozenset[str]:
+    """`Host` headers of names and addresses with a port, which browsers leave out where it is 80."""
+    hosts = set()
+    for name in names:
+        bracketed = f"[{name}]" if ":" in name else name
+        hosts.add(f"{bracketed}:{port}".lower())
+        if port == 80:
+            hosts.add(bracketed.lower())
+    return frozenset(hosts)

@@ -1,0 +1,67 @@
+"""Files of a project folder for the browser to show."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+from flexcal.studio.server.answer import PLAIN, Answer, said
+
+_KINDS = {
+    ".html": "text/html; charset=utf-8",
+    ".csv": PLAIN,
+    ".yaml": PLAIN,
+    ".urdf": PLAIN,
+    ".json": "application/json",
+    ".png": "image/png",
+}
+_POLICY = (
+    "sandbox allow-scripts allow-downloads allow-modals; default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' blob:; "
+    "style-src 'unsafe-inline'; img-src data: blob:; font-src data:; worker-src blob:; form-action 'none'; base-uri 'none'; "
+    "frame-ancestors 'none'"
+)
+"""A page may be anybody's: it runs its own scripts, as figures need, in an origin of its own, and can load and send nothing."""
+_LARGEST = 1 << 26
+"""Bytes of a file."""
+
+
+class ProjectFiles:
+    """The route to pages and results inside a folder, to be read only: .html, .csv, .yaml, .urdf, .json and .png.
+
+    Nothing outside is read, wherever links lead; folders are not listed, and hidden files and folders stay so.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder.resolve()
+
+    def __call__(self, path: str) -> Answer | None:
+        """As `Route`."""
+        kind = _KINDS.get(Path(path).suffix)
+        parts = path.split("/")
+        if kind is None or any(not part or part.startswith(".") for part in parts):
+            return None
+        if "\\" in path or any(ord(letter) < 32 for letter in path):
+            return None
+        try:
+            found = (self._folder / path).resolve(strict=True)
+            if not found.is_relative_to(self._folder) or found.suffix != Path(path).suffix:
+                return None
+            content = _read(found)
+        except (OSError, ValueError, RuntimeError):
+            return None
+        if content is None:
+            return said(413, f"The file is larger than {_LARGEST >> 20} MiB; open it from the folder.")
+        return Answer(200, kind, content, _POLICY)
+
+
+def _read(path: Path) -> bytes | None:
+    """What a regular file holds, None where that is too much; raises `OSError` where it is none."""
+    # a pipe must not be waited for, nor a link followed that took the file's place
+    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    with os.fdopen(handle, "rb") as file:
+        found = os.fstat(handle)
+        if not stat.S_ISREG(found.st_mode):
+            raise OSError(f"{path} is no file")
+        content = file.read(_LARGEST + 1)
+    return content if len(content) <= _LARGEST else None
