@@ -1,6 +1,6 @@
 from .comparison import compare_folders
 from .customer import customer_report
-from .report import REPORT, report_folder, two_stage_study
+from .report import REPORT, folder_page, report_folder, two_stage_study
 from .result import (
     Identification,
     PlottedResult,
@@ -21,6 +21,7 @@ __all__ = [
     "WrittenResult",
     "compare_folders",
     "customer_report",
+    "folder_page",
     "report_folder",
     "summary_row",
     "two_stage_study",

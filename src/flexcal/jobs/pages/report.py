@@ -30,7 +30,7 @@ from flexcal.jobs.result_files import (
     read_tilts,
     read_verification,
 )
-from flexcal.report.layout import write_page
+from flexcal.report.layout import Page, write_page
 from flexcal.report.pages import (
     CalibrationStudy,
     DynamicsStudy,
@@ -65,51 +65,57 @@ def report_folder(folder: Path) -> Path:
 
     Raises `InputError` where there are no results, or none that a report could show, and where a file cannot be read.
     """
+    path = folder / REPORT
+    write_page(path, folder_page(folder))
+    return path
+
+
+def folder_page(folder: Path) -> Page:
+    """The report of a verb's folder before it becomes HTML; raises as `report_folder`."""
     if not current_path(folder / RESULTS).is_file():
         raise InputError(
             "E-REPORT-008",
             f"{folder} holds no {RESULTS}; give the folder that demo, an identify verb, calibrate or verify wrote with --out.",
         )
-    results, path = read_results(folder), folder / REPORT
-    kind: Kind = results["kind"]
+    results = read_results(folder)
     try:
-        if kind == "actuators":
-            page = actuators_page(results)
-        elif kind == "inertials":
-            page = inertials_page(InertialsStudy(results, _block(folder, "dynamics")))
-        elif kind == "gains":
-            page = gains_page(results)
-        elif kind == "payload":
-            page = payload_page(PayloadStudy(results, _block(folder, "payload"), read_predictions(folder)))
-        elif kind == "dynamics":
-            page = dynamics_page(DynamicsStudy(results, _block(folder, "dynamics"), read_predictions(folder)))
-        elif kind == "verification":
-            points = read_points(folder, sigma=DEFAULT_SIGMA)
-            page = verification_page(VerificationStudy(results, points, read_arm(folder)))
-        elif kind == "calibration":
-            tilts = _tilts(folder, results)
-            if tilts is not None and not results["calibration"]["selected"]["poses"]:
-                page = inclination_page(InclinationStudy(results, _block(folder, "calibration"), tilts))
-            else:
-                page = calibration_page(calibration_study(folder))
-        elif kind == "demo":
-            page = two_stage_page(two_stage_study(folder))
-        elif kind == "stiffness":
-            stiffness = StiffnessStudy(results, _block(folder, "stiffness"), read_fitted_responses(folder))
-            page = stiffness_page(stiffness)
-        elif kind == "excitation":
-            page = excitation_page(ExcitationStudy(results, read_response_arrays(folder)))
-        elif kind == "response":
-            page = response_page(ResponseStudy(results, _responses(folder, results)))
-        else:
-            raise InputError(
-                "E-REPORT-009",
-                f"{folder / RESULTS} holds no calibration, verification or identification; give the folder of one of these.",
-            )
-        write_page(path, page)
+        return _page(folder, results, results["kind"])
     except KeyError as problem:
         raise missing_key_error(folder, problem) from problem
-    return path
+
+
+def _page(folder: Path, results: Mapping[str, Any], kind: Kind) -> Page:
+    if kind == "actuators":
+        return actuators_page(results)
+    if kind == "inertials":
+        return inertials_page(InertialsStudy(results, _block(folder, "dynamics")))
+    if kind == "gains":
+        return gains_page(results)
+    if kind == "payload":
+        return payload_page(PayloadStudy(results, _block(folder, "payload"), read_predictions(folder)))
+    if kind == "dynamics":
+        return dynamics_page(DynamicsStudy(results, _block(folder, "dynamics"), read_predictions(folder)))
+    if kind == "verification":
+        points = read_points(folder, sigma=DEFAULT_SIGMA)
+        return verification_page(VerificationStudy(results, points, read_arm(folder)))
+    if kind == "calibration":
+        tilts = _tilts(folder, results)
+        if tilts is not None and not results["calibration"]["selected"]["poses"]:
+            return inclination_page(InclinationStudy(results, _block(folder, "calibration"), tilts))
+        return calibration_page(calibration_study(folder))
+    if kind == "demo":
+        return two_stage_page(two_stage_study(folder))
+    if kind == "stiffness":
+        stiffness = StiffnessStudy(results, _block(folder, "stiffness"), read_fitted_responses(folder))
+        return stiffness_page(stiffness)
+    if kind == "excitation":
+        return excitation_page(ExcitationStudy(results, read_response_arrays(folder)))
+    if kind == "response":
+        return response_page(ResponseStudy(results, _responses(folder, results)))
+    raise InputError(
+        "E-REPORT-009",
+        f"{folder / RESULTS} holds no calibration, verification or identification; give the folder of one of these.",
+    )
 
 
 def missing_key_error(folder: Path, problem: KeyError) -> InputError:

@@ -31,7 +31,7 @@ from .notation import (
     statistics_cells,
     to_half_width,
 )
-from .palette import AXIS, ELASTIC, GRID, INK, LIGHT, LINKS, NOMINAL, PAGE, QUIET, RIGID
+from .palette import AXIS, ELASTIC, GRID, INK, LIGHT, LINKS, NOMINAL, PAGE, QUIET, RIGID, dark_colours
 from .rendering import templates, write_page
 
 __all__ = [
@@ -62,6 +62,7 @@ __all__ = [
     "Verdict",
     "as_float32",
     "canvas",
+    "dark_colours",
     "document_millimetres",
     "log_ticks",
     "millimetre_axis",

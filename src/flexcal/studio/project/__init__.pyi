@@ -1,4 +1,5 @@
 from .choices import Choices
+from .pose_files import pose_files
 from .project import (
     CALIBRATION,
     CHECK_PLAN,
@@ -22,4 +23,5 @@ __all__ = [
     "VERIFICATION",
     "Choices",
     "Project",
+    "pose_files",
 ]

@@ -1,6 +1,9 @@
 from .command_box import CommandBox
+from .error_course import error_course
 from .figures_panel import FiguresPanel
-from .markup import command_text, facts, paragraph, picked_rows, table
+from .markup import Tone, command_text, facts, paragraph, picked_rows, table
+from .report_figures import ReportFigures
+from .report_view import add_sections, add_verdict
 from .selection import Selection
 from .step import Step
 from .window import Window
@@ -8,10 +11,15 @@ from .window import Window
 __all__ = [
     "CommandBox",
     "FiguresPanel",
+    "ReportFigures",
     "Selection",
     "Step",
+    "Tone",
     "Window",
+    "add_sections",
+    "add_verdict",
     "command_text",
+    "error_course",
     "facts",
     "paragraph",
     "picked_rows",

@@ -52,6 +52,8 @@ class Window:
         Figures on the left.
     selection : Selection
         The selected pose.
+    dark : bool
+        Whether the window is dark.
     """
 
     def __init__(self, server: viser.ViserServer, project: Project, steps: Sequence[type[Step]]):
@@ -64,7 +66,7 @@ class Window:
         self._stamp: object = None
         self._models: dict[bool, tuple[object, RobotModel]] = {}
         self._stopped = threading.Event()
-        self._dark = self.choices.get("dark", False)
+        self.dark = self.choices.get("dark", False)
         self._theme()
         server.gui.main_panel.dock_right()
         server.gui.main_panel.set_width(_WIDTH)
@@ -180,14 +182,16 @@ class Window:
 
     def _theme(self) -> None:
         self.gui.configure_theme(
-            dark_mode=self._dark, show_logo=False, show_share_button=False, control_width="large"
+            dark_mode=self.dark, show_logo=False, show_share_button=False, control_width="large"
         )
         self.gui.set_panel_label("flexcal studio")
 
     def _toggle_dark(self) -> None:
-        self._dark = not self._dark
-        self.choices.put("dark", self._dark)
+        self.dark = not self.dark
+        self.choices.put("dark", self.dark)
         self._theme()
+        if self._open is not None:
+            self.go_to(self._open.title)
 
     def _add_hotkeys(self, titles: Sequence[str]) -> None:
         for number, title in enumerate(titles, 1):
