@@ -25,6 +25,22 @@ def paragraph(text: str, tone: Tone = "plain") -> str:
     return f'<div{role} style="{_TEXT}{_STYLE[tone]}">{_WORD[tone]}{escape(text)}</div>'
 
 
+def step_links(titles: Sequence[str], current: str, project: str) -> str:
+    """The steps as links to `step/TITLE`, the current one marked, below the project's name."""
+    links = []
+    for number, title in enumerate(titles, 1):
+        mark = "font-weight:700;border-bottom:3px solid #228be6;" if title == current else "opacity:0.8;"
+        here = ' aria-current="step"' if title == current else ""
+        links.append(
+            f'<a href="step/{escape(title, quote=True)}"{here} title="key {number}" style="color:inherit;text-decoration:none;'
+            f'padding:0.3em 0.15em;{mark}">{number} {escape(title)}</a>'
+        )
+    return (
+        f'<div style="font-size:0.8em;opacity:0.8;margin:0 0.6em;">{escape(project)}</div><nav aria-label="Steps" '
+        f'style="display:flex;flex-wrap:wrap;gap:0.1em 0.7em;font-size:0.85em;margin:0.1em 0.5em 0.5em;">{"".join(links)}</nav>'
+    )
+
+
 def command_text(line: str) -> str:
     """A command line to copy, in a box that a click selects as a whole."""
     return (

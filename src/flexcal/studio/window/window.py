@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import queue
 import sys
 import threading
+import time
 import traceback
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from flexcal.errors import FlexcalError
@@ -13,8 +16,9 @@ from flexcal.studio.commands import CommandRun, CommandRunner
 from flexcal.studio.project import Choices, Project
 from flexcal.studio.window.command_box import CommandBox
 from flexcal.studio.window.figures_panel import FiguresPanel
-from flexcal.studio.window.markup import Tone, paragraph
+from flexcal.studio.window.markup import Tone, paragraph, step_links
 from flexcal.studio.window.selection import Selection
+from flexcal.studio.window.shown_robot import ShownRobot
 from flexcal.studio.window.step import Step
 
 if TYPE_CHECKING:
@@ -48,6 +52,8 @@ class Window:
         What was chosen, kept in the folder.
     runner : CommandRunner
         Commands that run in processes of their own.
+    robot : ShownRobot
+        The robot in the scene.
     figures : FiguresPanel
         Figures on the left.
     selection : Selection
@@ -62,7 +68,8 @@ class Window:
         self.choices = Choices.read(project.folder)
         self.runner = CommandRunner(project.folder)
         self.selection = Selection()
-        self._lock = threading.RLock()
+        self.robot = ShownRobot(server, project.folder)
+        self._actions: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         self._stamp: object = None
         self._models: dict[bool, tuple[object, RobotModel]] = {}
         self._stopped = threading.Event()
@@ -72,8 +79,6 @@ class Window:
         server.gui.main_panel.set_width(_WIDTH)
         self._steps = [step(self) for step in steps]
         titles = [step.title for step in self._steps]
-        self._tabs = server.gui.add_button_group("Step", titles)
-        self._tabs.on_click(lambda event: self.guarded(lambda: self.go_to(event.target.value)))
         self._heading = server.gui.add_html("")
         self._message = server.gui.add_html("", visible=False)
         self._place = server.gui.add_folder(None)
@@ -86,27 +91,34 @@ class Window:
         self.go_to(first if first in titles else titles[0])
 
     def run(self) -> None:
-        """Watch the folder and the command that runs, until `stop`."""
-        while not self._stopped.wait(_PERIOD):
-            self.guarded(self._watch)
+        """Carry out what clicks ask for, and watch the folder and the command that runs, until `stop`."""
+        watched = 0.0
+        while not self._stopped.is_set():
+            with suppress(queue.Empty):
+                self._carry_out(self._actions.get(timeout=_PERIOD))
+            if time.monotonic() - watched > _PERIOD:
+                self._carry_out(self._watch)
+                watched = time.monotonic()
 
     def stop(self) -> None:
         """End `run`, and cancel the command that runs."""
         self._stopped.set()
         self.runner.cancel()
 
-    def guarded(self, action: Callable[[], None]) -> None:
-        """Carry out what a click asks for, one at a time; an error is shown as its sentence, and loses nothing."""
-        with self._lock:
-            try:
-                action()
-            except FlexcalError as problem:
-                self.say(f"{problem} [{problem.code}]", "bad")
-            except OSError as problem:
-                self.say(f"{problem.filename or 'a file'}: {problem.strerror or problem}.", "bad")
-            except Exception as problem:
-                traceback.print_exc(file=sys.stderr)
-                self.say(f"{type(problem).__name__}: {_PROGRAM_ERROR}.", "bad")
+    def post(self, action: Callable[[], None]) -> None:
+        """Have what a click asks for carried out by the thread of `run`, in order; an error is shown as its sentence."""
+        self._actions.put(action)
+
+    def _carry_out(self, action: Callable[[], None]) -> None:
+        try:
+            action()
+        except FlexcalError as problem:
+            self.say(f"{problem} [{problem.code}]", "bad")
+        except OSError as problem:
+            self.say(f"{problem.filename or 'a file'}: {problem.strerror or problem}.", "bad")
+        except Exception as problem:
+            traceback.print_exc(file=sys.stderr)
+            self.say(f"{type(problem).__name__}: {_PROGRAM_ERROR}.", "bad")
 
     def say(self, text: str, tone: Tone = "plain") -> None:
         """Show a sentence above the step; an empty one removes it."""
@@ -121,10 +133,9 @@ class Window:
         self.figures.clear()
         self.say("")
         self._open = next(step for step in self._steps if step.title == title)
+        self._show_robot()
         self.choices.put("step", title)
-        self._heading.content = paragraph(
-            f"{self._steps.index(self._open) + 1}. {title} · {self.project.name}"
-        )
+        self._heading.content = step_links([step.title for step in self._steps], title, self.project.name)
         self._place = self.gui.add_folder(None, order=self._message.order + 0.5)
         with self._place:
             self._open.open()
@@ -133,9 +144,9 @@ class Window:
     def button(
         self, label: str, action: Callable[[], None], *, hint: str = "", main: bool = False
     ) -> viser.GuiButtonHandle:
-        """A button that carries out `action`, guarded; `main` for the one that goes on."""
+        """A button that has `action` carried out; `main` for the one that goes on."""
         button = self.gui.add_button(label, hint=hint or None, color=None if main else "gray")
-        button.on_click(lambda _: self.guarded(action))
+        button.on_click(lambda _: self.post(action))
         return button
 
     def command(self, arguments: Sequence[str], then: Callable[[CommandRun], None] | None = None) -> None:
@@ -165,6 +176,13 @@ class Window:
             self._models[estimates] = kept
         return kept[1]
 
+    def _show_robot(self) -> None:
+        try:
+            self.robot.show(self.model(estimates=False))
+        except FlexcalError as problem:
+            self.robot.clear()
+            self.robot.problem = str(problem)
+
     def _watch(self) -> None:
         self.runner.settle()
         self._commands.refresh()
@@ -174,6 +192,7 @@ class Window:
         stamp = self.project.stamp()
         if stamp != self._stamp:
             self._stamp = stamp
+            self._show_robot()
             self._open.refresh()
 
     def _selected(self) -> None:
@@ -196,8 +215,8 @@ class Window:
     def _add_hotkeys(self, titles: Sequence[str]) -> None:
         for number, title in enumerate(titles, 1):
             command = self.gui.add_command(f"{number}. {title}", hotkey=str(number))  # pyright: ignore[reportArgumentType]
-            command.on_trigger(lambda _, title=title: self.guarded(lambda: self.go_to(title)))
+            command.on_trigger(lambda _, title=title: self.post(lambda: self.go_to(title)))
         dark = self.gui.add_command("Dark or light", hotkey="D")
-        dark.on_trigger(lambda _: self.guarded(self._toggle_dark))
+        dark.on_trigger(lambda _: self.post(self._toggle_dark))
         none = self.gui.add_command("Deselect the pose", hotkey="escape")
-        none.on_trigger(lambda _: self.guarded(lambda: self.selection.pick(None)))
+        none.on_trigger(lambda _: self.post(lambda: self.selection.pick(None)))

@@ -43,7 +43,7 @@ class CalibrateStep(Step):
             names or [_NONE],
             initial_value=chosen if chosen in names else (names or [_NONE])[0],
         )
-        self._measured.on_update(lambda _: window.guarded(self._choose))
+        self._measured.on_update(lambda _: window.post(self._choose))
         self._place = gui.add_folder(None)
         self._result = gui.add_folder(None)
 

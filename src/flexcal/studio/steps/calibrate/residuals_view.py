@@ -48,8 +48,8 @@ class ResidualsView:
         self._factor = gui.add_slider("Exaggeration", min=1, max=2000, step=1, initial_value=self._fitting())
         self._table = gui.add_html("")
         self._course = None
-        self._model.on_update(lambda _: window.guarded(self._changed))
-        self._factor.on_update(lambda _: window.guarded(self._stretch))
+        self._model.on_update(lambda _: window.post(self._changed))
+        self._factor.on_update(lambda _: window.post(self._stretch))
 
     def add_course(self) -> None:
         """Add the figure of errors in measuring order at the current place of the GUI."""
