@@ -41,10 +41,14 @@ def run_studio(folder: Path, host: str, port: int | None, ready: Callable[[str],
         window = Window(server.viser, project, steps)
 
         def pick(key: str) -> Answer:
-            window.guarded(lambda: window.selection.pick(key))
+            window.post(lambda: window.selection.pick(key))
             return NO_CONTENT
 
-        routes["pick"] = pick
+        def step(title: str) -> Answer:
+            window.post(lambda: window.go_to(title))
+            return NO_CONTENT
+
+        routes |= {"pick": pick, "step": step}
         try:
             with suppress(KeyboardInterrupt):
                 ready(server.url)
@@ -52,5 +56,4 @@ def run_studio(folder: Path, host: str, port: int | None, ready: Callable[[str],
         finally:
             window.stop()
     finally:
-        server.stop()
         server.stop()

@@ -105,6 +105,6 @@ class ShownRobot:
 
 def _comfortable(model: RobotModel) -> np.ndarray:
     """Zero, or the middle of the joint's range where that leaves zero out."""
-    ranges = np.array([(joint.lower, joint.upper) for joint in model.moving])
+    ranges = np.array([(joint.lower, joint.upper) for joint in model.motor_joints])
     outside = (ranges[:, 0] > 0) | (ranges[:, 1] < 0)
     return np.where(outside, np.where(outside, ranges.mean(axis=1), 0.0), 0.0)

@@ -126,7 +126,9 @@ class Window:
         self._message.visible = bool(text)
 
     def go_to(self, title: str) -> None:
-        """Open a step in place of the one that is open."""
+        """Open a step in place of the one that is open; another title does nothing."""
+        if title not in [step.title for step in self._steps]:
+            return
         if self._open is not None:
             self._open.close()
         self._place.remove()

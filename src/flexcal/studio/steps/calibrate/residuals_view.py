@@ -64,6 +64,8 @@ class ResidualsView:
             self._course.content = error_course(self._keys, sizes, chosen, word="error")
         largest = np.argsort(-sizes)[:_ROWS].tolist()
         here = self._keys.index(chosen) if chosen in self._keys else None
+        if here is not None:
+            self._window.robot.pose(self._points.poses.q[here])
         if here is not None and here not in largest:
             largest.append(here)
         rows = {
