@@ -151,9 +151,12 @@ def test_points_in_blocks_and_in_quotes(tmp_path: Path) -> None:
         "  a: {frame: tool0, xyz: [0.500000, 0.250000, -0.125000]}  # a: xyz: [9, 9, 9]" in robot.read_text()
     )
     robot.write_text(
-        "robot: arm.urdf\npoints:\n  a:\n    frame: tool0\n    xyz:\n      - 1\n      - 2\n      - 3\n"
+        "robot: arm.urdf\npoints:\n  a:\n    frame: tool0\n    xyz:\n      - 1\n      - 2  # down\n      - 3\n"
     )
-    text = robot.read_text()
+    write_point_position(robot, "a", np.zeros(3))
+    assert "- 0.000000\n      - 0.000000  # down\n      - 0.000000\n" in robot.read_text()
+    text = "robot: arm.urdf\npoints:\n  a: {frame: tool0, xyz: &p [1, 2, 3]}\n  b: {frame: tool0, xyz: *p}\n"
+    robot.write_text(text)
     with refused("E-RUN-090"):
         write_point_position(robot, "a", np.zeros(3))
     assert robot.read_text() == text

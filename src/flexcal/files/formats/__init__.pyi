@@ -11,17 +11,26 @@ from .estimates_file import (
 from .json_conversion import json_values
 from .npz_reader import ArrayForm, NpzFile, refuse_foreign
 from .npz_writer import write_npz
+from .yaml_document import parse_document
+from .yaml_editor import REMOVED, Removed, edited_yaml
+from .yaml_places import Node, Place, yaml_nodes
 from .yaml_reader import YamlFile, read_yaml, read_yaml_file
 from .yaml_writer import to_plain, write_yaml, yaml_text
 
 __all__ = [
     "BLOCKS",
+    "REMOVED",
     "ArrayForm",
     "Block",
+    "Node",
     "NpzFile",
+    "Place",
+    "Removed",
     "YamlFile",
     "block_sha256",
+    "edited_yaml",
     "json_values",
+    "parse_document",
     "provenance",
     "read_estimates",
     "read_yaml",
@@ -33,5 +42,6 @@ __all__ = [
     "write_estimates",
     "write_npz",
     "write_yaml",
+    "yaml_nodes",
     "yaml_text",
 ]

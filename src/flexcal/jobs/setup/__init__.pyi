@@ -1,3 +1,5 @@
+from .description_check import FileProblem, description_problems
+from .description_editing import edit_robot
 from .measurement_import import ImportedFile, import_file
 from .motor_readings import MotorReadings
 from .point_declaration import write_point_position
@@ -5,9 +7,12 @@ from .robot_description import init_robot
 from .signals_declaration import add_signals
 
 __all__ = [
+    "FileProblem",
     "ImportedFile",
     "MotorReadings",
     "add_signals",
+    "description_problems",
+    "edit_robot",
     "import_file",
     "init_robot",
     "write_point_position",

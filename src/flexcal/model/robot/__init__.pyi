@@ -13,6 +13,7 @@ from .config import (
     SocketsConfig,
     WireConfig,
 )
+from .loading import read_robot
 from .parameter_groups import Links, Stations
 from .parameter_names import (
     BOARD_SCALE,
@@ -104,6 +105,7 @@ __all__ = [
     "mounting_names",
     "propagated_covariance_root",
     "ratio_errors",
+    "read_robot",
     "sensitivity_name",
     "sensor_column",
     "sensor_delay_name",

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.files.formats import YamlFile, read_yaml_file
+from flexcal.files.formats import YamlFile
 from flexcal.files.structuring import suggestion
 from flexcal.model.parts import (
     LOOP,
@@ -35,11 +34,10 @@ if TYPE_CHECKING:
 HARMONICS = (1, 2, 3)
 
 
-def read_robot(robot_type: type[RobotModel], path: Path) -> RobotModel:
+def read_robot(robot_type: type[RobotModel], file: YamlFile) -> RobotModel:
     """Robot model of a robot.yaml and its URDF; raises `InputError` with file and line for inconsistent content."""
-    file = read_yaml_file(path)
     config = file.structure(RobotConfig)
-    urdf = path.parent / config.robot
+    urdf = file.path.parent / config.robot
     description = read_urdf(urdf, config.locked)
     joints = description.joints
     relations = read_relations(file, config, description)

@@ -13,7 +13,7 @@ import numpy as np
 
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
-from flexcal.files.formats import Block
+from flexcal.files.formats import Block, read_yaml_file
 from flexcal.files.structuring import suggestion
 from flexcal.files.transaction import current_path
 from flexcal.kernels import Tree
@@ -161,7 +161,7 @@ class RobotModel:
         from flexcal.model.robot.loading import read_robot
         from flexcal.model.robot.stored_estimates import apply_estimates
 
-        model = read_robot(cls, Path(path))
+        model = read_robot(cls, read_yaml_file(path))
         stored = model.path.parent / model.config.estimates
         return (
             apply_estimates(model, stored, without=without)
