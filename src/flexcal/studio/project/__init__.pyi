@@ -1,5 +1,5 @@
 from .choices import Choices
-from .pose_files import pose_files
+from .pose_tables import pose_files
 from .project import (
     CALIBRATION,
     CHECK_PLAN,

@@ -1,5 +1,5 @@
 from .command_box import CommandBox
-from .error_course import error_course
+from .course_figure import error_course
 from .figures_panel import FiguresPanel
 from .markup import Tone, command_text, facts, paragraph, picked_rows, table
 from .report_figures import ReportFigures
