@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.studio.scene import RobotView, Surroundings
+from flexcal.studio.scene import GHOST, RobotView, Surroundings
 
 if TYPE_CHECKING:
     import viser
@@ -75,8 +75,6 @@ class ShownRobot:
 
     def ghost(self, q: np.ndarray | None) -> None:
         """Show a ghost at joint positions (n,), rad or m; None hides it."""
-        from flexcal.studio.scene.colours import GHOST
-
         if q is None or self._view is None:
             if self._ghost is not None:
                 self._ghost.visible = False
