@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 import sys
+import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 ARGUMENTS = [
@@ -25,18 +27,41 @@ def chromium() -> str | None:
     return shutil.which("chromium") or shutil.which("chromium-browser")
 
 
+@dataclass
+class Running:
+    """A studio in a process of its own, and what it has said on standard error so far."""
+
+    process: subprocess.Popen[str]
+    url: str
+    said: list[str]
+
+    def stop(self, number: int) -> str:
+        """Standard output after a signal that ends it."""
+        self.process.send_signal(number)
+        said, _ = self.process.communicate(timeout=20)
+        return said
+
+
 @contextmanager
-def studio(folder: Path, *arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """The process of `flexcal studio` on a folder, and its URL; killed after."""
+def studio(folder: Path, *arguments: str) -> Iterator[Running]:
+    """A studio on a folder, killed after."""
     command = [sys.executable, "-m", "flexcal.cli.main", "studio", str(folder), "--no-browser", *arguments]
     if "--port" not in arguments:
         command += ["--port", "0"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env={**os.environ}) as process:
-        assert process.stderr is not None
+    with (
+        tempfile.TemporaryFile("w+", encoding="utf-8") as errors,
+        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True) as process,
+    ):
         try:
-            said = process.stderr.readline()
-            assert "http://" in said, said + process.stderr.read()
-            yield process, said.split()[-1]
+            deadline = time.monotonic() + 60
+            while True:
+                errors.seek(0)
+                said = errors.read().splitlines()
+                if said and said[-1] == "Ctrl-C stops it":
+                    break
+                assert process.poll() is None and time.monotonic() < deadline, said
+                time.sleep(0.02)
+            yield Running(process, said[-2].split()[-1], said)
         finally:
             process.kill()
             process.wait(10)

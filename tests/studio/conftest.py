@@ -37,5 +37,5 @@ def studio_url(tmp_path: Path) -> Iterator[str]:
     pytest.importorskip("viser", reason="viser is absent: pip install 'flexcal[studio]'")
     folder = tmp_path / "project"
     folder.mkdir()
-    with studio(folder) as (_, url):
-        yield url
+    with studio(folder) as running:
+        yield running.url

@@ -49,6 +49,8 @@ def test_hosts_of_this_machine(host: str) -> None:
         f"http://127.0.0.1:8080/{TOKEN}/",
         f"/{TOKEN}\udcff/",
         f"/{TOKEN}/\udcff",
+        f"/{TOKEN}/\r",
+        f"/{TOKEN}/\x00",
     ],
 )
 def test_token_must_be_the_first_name_of_the_path(target: str) -> None:

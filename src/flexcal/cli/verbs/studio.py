@@ -15,6 +15,10 @@ from flexcal.cli.terminal.console import Console
 from flexcal.errors import InputError
 
 _LOOPBACK = "127.0.0.1"
+_WARNING = (
+    "warning: whoever knows this address can read and change the folder and compute on this machine; "
+    "nothing is encrypted, so that others on the network can read all of it, the address too"
+)
 
 
 @dataclass(frozen=True)
@@ -52,15 +56,11 @@ class Studio:
         console.finish({"folder": str(self.folder)}, f"flexcal studio {self.folder}")
 
     def _ready(self, url: str) -> None:
-        # standard output is shown when a verb has ended
-        print(f"the studio is open at {url}", file=sys.stderr)
+        lines = [f"the studio is open at {url}", "Ctrl-C stops it"]
         if self.host not in (_LOOPBACK, "localhost", "::1"):
-            print(
-                "whoever knows this address can read and change the folder and compute on this machine; "
-                "what is sent is not encrypted, so that others on the network can read it, the address too",
-                file=sys.stderr,
-            )
-        print("Ctrl-C stops it", file=sys.stderr, flush=True)
+            lines.insert(0, _WARNING)
+        # standard output is shown when a verb has ended
+        print("\n".join(lines), file=sys.stderr, flush=True)
         if not self.no_browser and _has_display():
             import webbrowser
 

@@ -77,7 +77,7 @@ class Gate:
 
     def _behind_token(self, target: str) -> tuple[str | None, bool] | None:
         """The path behind a token, and whether it was that of the files."""
-        if not target.startswith("/") or not target.isascii():
+        if not target.startswith("/") or not (target.isascii() and target.isprintable()):
             return None
         given, slash, rest = target[1:].partition("/")
         given, question, query = given.partition("?")

@@ -145,9 +145,10 @@ def _gated(site: Site, inner: Any) -> Any:
 async def _routed(site: Site, passage: Passage) -> Answer | None:
     """The answer of a route, None where viser is to answer."""
     assert passage.path is not None
-    name, slash, rest = passage.path.partition("?")[0].partition("/")
-    if not slash:
-        return REFUSAL if passage.files else None
+    path = passage.path.partition("?")[0]
+    if not path and not passage.files:
+        return None  # the window is one page; viser has no other files
+    name, _, rest = path.partition("/")
     if name == FILES:
         if not passage.files:
             # a page from the folder knows its own address: one that opens nothing else
@@ -155,7 +156,7 @@ async def _routed(site: Site, passage: Passage) -> Answer | None:
         return await _call(site.files, rest)
     if passage.files:
         return REFUSAL
-    return await _call(site.routes[name], rest) if name in site.routes else None
+    return await _call(site.routes[name], rest) if name in site.routes else _ABSENT
 
 
 async def _call(route: Route, rest: str) -> Answer:

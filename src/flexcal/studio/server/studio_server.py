@@ -141,7 +141,9 @@ def _status(address: str, port: int, path: str, host: str) -> int | None:
     connection = http.client.HTTPConnection(address, port, timeout=5)
     try:
         connection.request("GET", path, headers={"Host": host})
-        return connection.getresponse().status
+        response = connection.getresponse()
+        response.read()
+        return response.status
     except (OSError, http.client.HTTPException):
         return None
     finally:
