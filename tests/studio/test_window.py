@@ -28,6 +28,29 @@ def test_window_opens_and_talks_to_this_server_alone(page: Any, studio_url: str)
     assert foreign and {urlsplit(url).netloc for url in foreign} == {place} and len(sockets) >= 1
 
 
+MARKUP = """<img src=x onerror="document.title='run'"><svg onload="document.title='run'"></svg>
+<iframe srcdoc="<script>parent.document.title='run'</script>"></iframe>
+<a id=link href="javascript:document.title='run'">link</a>"""
+
+
+def test_markup_that_got_into_the_page_runs_nothing(page: Any, tmp_path: Any) -> None:
+    """Names from files are escaped; where one were forgotten, the policy would still keep its scripts from running."""
+    from flexcal.studio.server import ProjectFiles, StudioServer
+
+    server = StudioServer.start("127.0.0.1", 0, {}, ProjectFiles(tmp_path))
+    try:
+        server.viser.gui.add_html(MARKUP)
+        refused: list[str] = []
+        page.on("console", lambda message: refused.append(message.text) if message.type == "error" else None)
+        page.goto(server.url)
+        page.locator("#link").click(timeout=15_000)
+        page.wait_for_timeout(500)
+        assert "run" not in page.title()
+        assert sum("Content Security Policy" in text for text in refused) >= 4, refused
+    finally:
+        server.stop()
+
+
 HOSTILE = """<!doctype html><title>report</title><script>
 const results = {};
 const attempt = async (name, action) => {

@@ -22,6 +22,7 @@ from websockets.http11 import Request, Response
 
 from flexcal.studio.server.answer import Answer, Route, said
 from flexcal.studio.server.gate import Gate, Passage
+from flexcal.studio.server.window_page import window_page
 
 REFUSAL = said(403, "This address is not open to you. Use the one that flexcal studio has printed.")
 _ABSENT = said(404, "There is nothing at this address.")
@@ -36,15 +37,6 @@ _COMMON = {
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
 }
-
-
-def _window_policy(host: str) -> str:
-    """What viser's page needs: scripts and styles inside it, code that Plotly makes, WebAssembly, and one websocket."""
-    return (
-        "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' blob:; style-src 'unsafe-inline'; "
-        f"img-src 'self' data: blob:; font-src data:; media-src data: blob:; connect-src 'self' ws://{host} data: blob:; "
-        "worker-src blob: data:; base-uri 'none'; form-action 'none'; object-src 'none'; frame-ancestors 'none'"
-    )
 
 
 @dataclass(frozen=True)
@@ -129,15 +121,15 @@ def _gated(site: Site, inner: Any) -> Any:
         answer = await _routed(site, passage)
         if answer is not None:
             return _response(answer)
-        forwarded = replace(request, path=f"/{passage.path}")
-        response = inner(connection, forwarded)
+        plain = [
+            (name, value) for name, value in request.headers.raw_items() if name.lower() != "accept-encoding"
+        ]
+        response = inner(connection, replace(request, path="/", headers=Headers(plain)))
         if inspect.isawaitable(response):
             response = await response
-        if response is None:  # viser took it for a websocket, which it is not
-            return _response(REFUSAL)
-        for name, value in {**_COMMON, "Content-Security-Policy": _window_policy(passage.host)}.items():
-            response.headers[name] = value
-        return response
+        if response is None or response.status_code != 200:
+            return _response(_ABSENT)
+        return _response(window_page(bytes(response.body), passage.host))
 
     return process_request
 
