@@ -1,14 +1,40 @@
-from .colours import GHOST
+from .accuracy_volume import AccuracyVolume
+from .colliding_links import colliding_links
+from .colour_scale import ColourScale
+from .colours import BLOCKED, COLLIDING, GHOST, INSTRUMENT, LINE_OF_SIGHT, LINK, MEASURED, SELECTED, TARGET
+from .draggable_point import DraggablePoint
+from .instrument import Instrument
 from .link_shapes import LinkShapes
 from .mesh_file import MeshFolder, MeshNotDrawn
+from .motion import Motion
+from .points import Points
+from .residual_arrows import ResidualArrows
 from .robot_view import RobotView
 from .surroundings import Surroundings
+from .working_box import WorkingBox
 
 __all__ = [
+    "BLOCKED",
+    "COLLIDING",
     "GHOST",
+    "INSTRUMENT",
+    "LINE_OF_SIGHT",
+    "LINK",
+    "MEASURED",
+    "SELECTED",
+    "TARGET",
+    "AccuracyVolume",
+    "ColourScale",
+    "DraggablePoint",
+    "Instrument",
     "LinkShapes",
     "MeshFolder",
     "MeshNotDrawn",
+    "Motion",
+    "Points",
+    "ResidualArrows",
     "RobotView",
     "Surroundings",
+    "WorkingBox",
+    "colliding_links",
 ]

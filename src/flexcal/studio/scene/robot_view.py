@@ -13,7 +13,7 @@ from flexcal.model.robot import RobotModel
 from flexcal.studio.scene.colours import COLLIDING, LINK
 from flexcal.studio.scene.link_shapes import LinkShapes
 from flexcal.studio.scene.mesh_file import MeshNotDrawn
-from flexcal.studio.scene.quaternions import quaternions
+from flexcal.studio.scene.rotations import quaternions
 
 if TYPE_CHECKING:
     import viser
@@ -64,11 +64,11 @@ class RobotView:
         self._frames: dict[int, viser.FrameHandle] = {}
         self._meshes: dict[int, viser.MeshHandle] = {}
         self._marked: frozenset[int] = frozenset()
+        for joint in range(-1, len(model.joints)):
+            self._frames[joint] = scene.add_frame(self.node(joint), show_axes=False)
         for joint, (vertices, faces) in self.shapes.meshes.items():
-            node = f"{name}/link_{joint + 1}"
-            self._frames[joint] = scene.add_frame(node, show_axes=False)
             self._meshes[joint] = scene.add_mesh_simple(
-                f"{node}/mesh", vertices, faces, color=colour, opacity=None if opacity >= 1.0 else opacity,
+                f"{self.node(joint)}/mesh", vertices, faces, color=colour, opacity=None if opacity >= 1.0 else opacity,
                 flat_shading=True, side="double", cast_shadow=False, receive_shadow=False,
             )  # fmt: skip
         self.q = np.zeros(model.n)
@@ -87,6 +87,10 @@ class RobotView:
     @visible.setter
     def visible(self, shown: bool) -> None:
         self._root.visible = shown
+
+    def node(self, joint: int) -> str:
+        """Name of the node at the frame of a joint's link (−1: the base), below which things move with the link."""
+        return f"{self._root.name}/link_{joint + 1}"
 
     def pose(self, q: np.ndarray) -> None:
         """Move all links to joint positions `q` (n,), rad or m, at once.
