@@ -10,12 +10,14 @@ import numpy as np
 if TYPE_CHECKING:
     import viser
 
+_NEARLY = 0.008
+"""Angle, rad, by which a click may miss a body: some five pixels."""
+
 
 class MergedBodies:
     """Bodies of one shape in a few colours: those of one colour are one mesh.
 
-    A processor without graphics draws a thousand of them in a fifth of the time that viser's arrows take. viser says which mesh was
-    clicked; which body follows from the ray.
+    A processor without graphics draws a thousand arrows so in less time than as viser's arrows, line segments or batched meshes.
 
     Parameters
     ----------
@@ -33,7 +35,7 @@ class MergedBodies:
         self._meshes: dict[int, viser.MeshHandle] = {}
         self._members: dict[int, np.ndarray] = {}
         self._vertices = np.zeros((0, 0, 3))
-        self._clicked: Callable[[int], None] | None = None
+        self._clicked: Callable[[viser.SceneClickEvent], None] | None = None
 
     @property
     def visible(self) -> bool:
@@ -64,7 +66,6 @@ class MergedBodies:
                     f"{self._name}/colour_{number}", vertices[members].reshape(-1, 3), faces, color=(red, green, blue),
                     flat_shading=True, cast_shadow=False, receive_shadow=False,
                 )  # fmt: skip
-                self._listen(number)
 
     def move(self, vertices: np.ndarray) -> None:
         """Give the bodies other `vertices` (N, V, 3); their colours, and which are drawn, stay."""
@@ -74,36 +75,47 @@ class MergedBodies:
                 mesh.vertices = vertices[self._members[number]].reshape(-1, 3).astype(np.float32)
 
     def on_click(self, callback: Callable[[int], None]) -> None:
-        """Call `callback` with the number of the body that was clicked."""
-        self._clicked = callback
-        for number in self._meshes:
-            self._listen(number)
+        """Call `callback` with the number of a body that is clicked, in place of the callback before.
 
-    def hit(self, origin: np.ndarray, direction: np.ndarray) -> int | None:
-        """Number of the first body that the ray from `origin` (3,) along `direction` (3,) meets; None where it meets none."""
+        The scene is asked for clicks, not each mesh: viser would outline all bodies of a mesh under the pointer.
+        """
+        self._forget()
+
+        @self._scene.on_click()
+        def clicked(event: viser.SceneClickEvent) -> None:
+            body = self.pick(np.array(event.ray_origin), np.array(event.ray_direction))
+            if body is not None and self.visible:
+                callback(body)
+
+        self._clicked = clicked
+
+    def pick(self, origin: np.ndarray, direction: np.ndarray) -> int | None:
+        """Number of the first body that a ray from `origin` (3,) along `direction` (3,) meets, else nearly meets; None for neither."""
         if not self._members:
             return None
         drawn = np.concatenate(list(self._members.values()))
-        a, b, c = np.moveaxis(self._vertices[drawn][:, self._faces], 2, 0)
-        along = _distance(np.asarray(origin, dtype=float), np.asarray(direction, dtype=float), a, b, c)
-        nearest = int(np.argmin(along))
-        return int(drawn[nearest // len(self._faces)]) if np.isfinite(along.flat[nearest]) else None
+        vertices, ray = self._vertices[drawn], np.asarray(direction, dtype=float)
+        ray /= np.linalg.norm(ray)
+        a, b, c = np.moveaxis(vertices[:, self._faces], 2, 0)
+        along = _distance(np.asarray(origin, dtype=float), ray, a, b, c).min(axis=1)
+        if np.isfinite(along).any():
+            return int(drawn[np.argmin(along)])
+        samples = np.concatenate([vertices, vertices.mean(axis=1, keepdims=True)], axis=1) - origin
+        depth = samples @ ray
+        beside = np.linalg.norm(samples - depth[..., None] * ray, axis=-1)
+        angle = np.where(depth > 0, beside / np.maximum(depth, 1e-9), np.inf).min(axis=1)
+        nearest = int(np.argmin(angle))
+        return int(drawn[nearest]) if angle[nearest] < _NEARLY else None
 
     def remove(self) -> None:
         """Take them out of the scene."""
+        self._forget()
         self._root.remove()
 
-    def _listen(self, number: int) -> None:
-        if self._clicked is None:
-            return
-        mesh = self._meshes[number]
-        mesh.remove_click_callback()
-
-        @mesh.on_click
-        def _(event: viser.SceneNodePointerEvent[viser.MeshHandle]) -> None:
-            body = self.hit(np.array(event.ray_origin), np.array(event.ray_direction))
-            if body is not None and self._clicked is not None:
-                self._clicked(body)
+    def _forget(self) -> None:
+        if self._clicked is not None:
+            self._scene.remove_click_callback(self._clicked)
+        self._clicked = None
 
 
 def _distance(origin: np.ndarray, ray: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:

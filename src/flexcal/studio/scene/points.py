@@ -43,7 +43,7 @@ class Points:
         colours: np.ndarray | tuple[int, int, int] = MEASURED,
         *,
         name: str = "/points",
-        size: float = 0.012,
+        size: float = 0.018,
     ) -> None:
         self._size = size
         self._points = MergedBodies(scene, name, _FACES)
