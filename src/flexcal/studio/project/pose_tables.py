@@ -2,35 +2,43 @@
 
 from __future__ import annotations
 
-from flexcal.studio.project.project import CALIBRATION, MEASURED, VERIFICATION, Project
+import re
+from pathlib import Path
+
+from flexcal.studio.project.project import MEASURED, Project
 
 _HEADER = 4096
 """Bytes of a file in which its header is looked for."""
 
 
 def pose_files(project: Project) -> list[str]:
-    """Names of tables that may be measured poses: a guided session's first, then by size, those without joint columns last.
+    """Names of tables that may be measured poses: a guided session's first, then by size.
 
-    Tables within folders of results are left out.
+    These are tables with joint and measured columns; all tables where robot.yaml declares columns of its own. Those within folders of
+    results are left out.
     """
+    own = _declares_columns(project)
     names = [
         name
         for name in project.files(".csv", ".parquet")
-        if not name.startswith((f"{CALIBRATION}/", f"{VERIFICATION}/")) and not _is_result(project, name)
+        if not _is_result(project, name) and (own or _has_readings(project.folder / name))
     ]
+    return sorted(names, key=lambda name: (name != MEASURED, -(project.folder / name).stat().st_size))
 
-    def order(name: str) -> tuple[bool, bool, int]:
-        path = project.folder / name
-        return name != MEASURED, not _has_joints(path), -path.stat().st_size
 
-    return sorted(names, key=order)
+def _declares_columns(project: Project) -> bool:
+    try:
+        return "\nsignals:" in project.robot_file.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return False
 
 
 def _is_result(project: Project, name: str) -> bool:
     return (project.folder / name).with_name("results.json").is_file() and "/" in name
 
 
-def _has_joints(path) -> bool:
+def _has_readings(path: Path) -> bool:
+    """Whether the header has joint positions and a reading of an instrument."""
     if path.suffix == ".parquet":
         return True
     try:
@@ -39,6 +47,8 @@ def _has_joints(path) -> bool:
     except OSError:
         return False
     columns = {cell.strip().strip('"') for cell in head[0].split(",")} if head else set()
-    return "q1" in columns and not columns.isdisjoint(
-        {"x", "length", "theodolite_h", "u", "inclination", "socket"}
-    )
+    return "q1" in columns and any(not _PLANNED.fullmatch(name) for name in columns)
+
+
+_PLANNED = re.compile(r"q\d+|pose|payload|plan|set|name|seed")
+"""Columns that a table of planned poses has too."""

@@ -6,9 +6,18 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from flexcal.errors import FlexcalError
+from flexcal.jobs.result_files import RESULTS
 from flexcal.studio.project import CALIBRATION, pose_files
 from flexcal.studio.steps.calibrate.residuals_view import ResidualsView
-from flexcal.studio.steps.calibrate.stages import Stage, State, stages
+from flexcal.studio.steps.calibrate.stages import (
+    INERTIALS,
+    STIFFNESS,
+    Stage,
+    State,
+    stages,
+    use_estimates,
+    used_estimates,
+)
 from flexcal.studio.window import ReportFigures, Step, Tone, Window, add_sections, add_verdict, paragraph
 
 if TYPE_CHECKING:
@@ -76,6 +85,8 @@ class CalibrateStep(Step):
         with self._place:
             for stage in listed:
                 self.window.gui.add_html(paragraph(f"{stage.title}: {stage.sentence}", _TONES[stage.state]))
+                if stage.folder in (INERTIALS, STIFFNESS) and stage.state == "done":
+                    self._add_use(stage)
                 if stage.state != "blocked":
                     again = " again" if stage.state == "done" else ""
                     self.window.button(
@@ -84,6 +95,18 @@ class CalibrateStep(Step):
                         hint="$ flexcal " + " ".join(stage.arguments),
                         main=stage.folder == CALIBRATION,
                     )
+
+    def _add_use(self, stage: Stage) -> None:
+        """A button that makes the following stages begin with these estimates, or that they do."""
+        file = f"{stage.folder}/estimates.yaml"
+        if used_estimates(self.window.project) == file:
+            self.window.gui.add_html(paragraph("the following stages begin with these estimates", "faint"))
+            return
+        self.window.button(
+            f"Use: {stage.title.lower()}",
+            lambda: use_estimates(self.window.project, file),
+            hint=f"writes 'estimates: {file}' to robot.yaml, which the following stages read",
+        )
 
     def _run(self, stage: Stage) -> None:
         self._stage = stage.title
@@ -107,6 +130,7 @@ class CalibrateStep(Step):
             except FlexcalError as problem:
                 window.gui.add_html(paragraph(str(problem), "bad"))
                 return
+            self._add_choice(folder)
             window.gui.add_html(paragraph(page.subtitle))
             add_verdict(window.gui, page)
             if folder == CALIBRATION and (window.project.folder / folder / "points.csv").is_file():
@@ -125,13 +149,26 @@ class CalibrateStep(Step):
     def _add_figures(self, blocks: Sequence[FigureBlock]) -> None:
         self._figures = ReportFigures(self.window.gui, blocks, dark=self.window.dark)
 
+    def _add_choice(self, folder: str) -> None:
+        """A choice of the stage whose result is shown, where there are several."""
+        found = {stage.title: stage.folder for stage in self._with_results()}
+        if len(found) < 2:
+            return
+        here = next(title for title, place in found.items() if place == folder)
+        choice = self.window.gui.add_dropdown("Result of", tuple(found), initial_value=here)
+
+        def chosen() -> None:
+            self._stage = choice.value
+            self.window.choices.put("stage", self._stage)
+            self.refresh()
+
+        choice.on_update(lambda _: self.window.post(chosen))
+
     def _folder(self) -> str | None:
         """Folder of the result to show: of the stage that ran last, else of the last one that is there."""
-        found = [
-            stage
-            for stage in stages(self.window.project, "")
-            if (self.window.project.folder / stage.folder / "results.json").is_file()
-        ]
-        if not found:
-            return None
-        return next((s.folder for s in found if s.title == self._stage), found[-1].folder)
+        found = self._with_results()
+        return next((s.folder for s in found if s.title == self._stage), found[-1].folder if found else None)
+
+    def _with_results(self) -> list[Stage]:
+        folder = self.window.project.folder
+        return [s for s in stages(self.window.project, "") if (folder / s.folder / RESULTS).is_file()]

@@ -6,8 +6,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 from flexcal.errors import FlexcalError, InputError
+from flexcal.jobs.result_files import RESULTS
 from flexcal.studio.project import CALIBRATION, MEASURED, Project
 
+INERTIALS, RESPONSES, STIFFNESS = "inertials", "responses", "stiffness"
+"""Folders of results."""
 State = Literal["done", "ready", "blocked"]
 
 
@@ -46,25 +49,25 @@ def stages(project: Project, measured: str) -> list[Stage]:
             project,
             "Inertias and friction",
             excitation,
-            ("identify", "inertials", "robot.yaml", excitation or "", "--out", "inertials"),
-            "inertials",
+            ("identify", "inertials", "robot.yaml", excitation or "", "--out", INERTIALS),
+            INERTIALS,
             "no recordings of an exciting trajectory in the folder. Masses stay as the URDF has them, which suffices for most robots",
         ),
         _stage(
             project,
             "Frequency responses",
             frequency,
-            ("identify", "response", "robot.yaml", frequency or "", "--out", "responses"),
-            "responses",
+            ("identify", "response", "robot.yaml", frequency or "", "--out", RESPONSES),
+            RESPONSES,
             "no recordings of a frequency experiment in the folder. The robot is then calibrated as rigid, with compliance under "
             "gravity where the poses show it",
         ),
         _stage(
             project,
             "Stiffness and damping",
-            "responses" if (project.folder / "responses" / "results.json").is_file() else None,
-            ("identify", "stiffness", "robot.yaml", "responses", "--out", "stiffness"),
-            "stiffness",
+            RESPONSES if (project.folder / RESPONSES / RESULTS).is_file() else None,
+            ("identify", "stiffness", "robot.yaml", RESPONSES, "--out", STIFFNESS),
+            STIFFNESS,
             "no frequency responses yet"
             if frequency
             else "no frequency experiment, hence no frequency responses",
@@ -80,10 +83,28 @@ def stages(project: Project, measured: str) -> list[Stage]:
     ]
 
 
+def used_estimates(project: Project) -> str:
+    """File of the estimates that robot.yaml names, relative to it; its default where robot.yaml cannot be read."""
+    from flexcal.files.formats import read_yaml_file
+    from flexcal.model.robot import RobotConfig
+
+    try:
+        return read_yaml_file(project.robot_file).structure(RobotConfig).estimates
+    except FlexcalError:
+        return RobotConfig.estimates
+
+
+def use_estimates(project: Project, file: str) -> None:
+    """Have robot.yaml name a file of estimates, which the following stages then begin with; raises `InputError` as `edit_robot`."""
+    from flexcal.jobs.setup import edit_robot
+
+    edit_robot(project.robot_file, {("estimates",): file})
+
+
 def _stage(
     project: Project, title: str, data: str | None, arguments: tuple[str, ...], folder: str, reason: str
 ) -> Stage:
-    done = (project.folder / folder / "results.json").is_file()
+    done = (project.folder / folder / RESULTS).is_file()
     if not project.robot_file.is_file():
         return Stage(title, "blocked", "blocked: no robot.yaml yet (step 1).", arguments, folder)
     if data is None:
