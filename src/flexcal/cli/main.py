@@ -134,6 +134,9 @@ def _carry_out(verb: Verb, arguments: list[str]) -> int:
         if stop.code == 0:  # --help
             return 0
         raise parse_error(verb, said.getvalue()) from None
+    if verb.interactive:
+        parsed.run()
+        return 0
     complete_interrupted_runs(parsed)
     leaves = getattr(parsed, "leaves", verb.leaves)
     with outputs(verb.name, parsed.out, leaves, page=verb.page, beside=verb.beside):

@@ -17,7 +17,8 @@ class Verb:
     """A verb: its words, the module and class that carry it out, what it does in a line, and a command line to copy.
 
     `leaves` are the files (glob patterns) that it leaves in the folder of --out; none where --out is the file itself, beside which it may
-    leave a `page` of the same name, and files `beside` it: glob patterns of what follows its stem.
+    leave a `page` of the same name, and files `beside` it: glob patterns of what follows its stem. The files of a verb that is
+    `interactive` appear as it writes them, those of others all at its end.
     """
 
     words: tuple[str, ...]
@@ -28,6 +29,7 @@ class Verb:
     leaves: tuple[str, ...] = ()
     page: bool = False
     beside: tuple[str, ...] = ()
+    interactive: bool = False
 
     @property
     def name(self) -> str:
@@ -335,6 +337,7 @@ STEPS = (
                 "Studio",
                 "a project folder in the browser: the same files and computations, step by step",
                 "flexcal studio robot",
+                interactive=True,
             ),
         ),
     ),

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from flexcal.errors import FlexcalError
 from flexcal.files.transaction import write_text
 
 FILE = ".studio.json"
@@ -46,5 +47,5 @@ class Choices:
         self.values[name] = value
         try:
             write_text(self.folder / FILE, json.dumps(self.values, indent=1))
-        except Exception:
-            return
+        except (FlexcalError, OSError):
+            return  # the choice holds until the end
