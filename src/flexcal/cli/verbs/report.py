@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from tyro.conf import Positional, arg
 
@@ -27,6 +27,9 @@ class Report(ParticularsOptions):
     folder: Annotated[Positional[Path], arg(metavar="DIR", help="folder with results.json")]
     compare: Annotated[MaybePath, arg(metavar="OTHER", help_behavior_hint="(default: none)")] = None
     """Another folder of calibrate, verify or demo; DIR/comparison.html then compares accuracy and parameters of the two."""
+    robot: MaybePath = None
+    """With --compare: the robot.yaml of both calibrations, from which it is told whether the robot changed; by default one in or above
+    the folders."""
     customer: bool = False
     """Write the two sheets for a customer, from a folder of calibrate or verify."""
     json: Json = False
@@ -78,7 +81,11 @@ class Report(ParticularsOptions):
         from flexcal.jobs.pages import compare_folders
 
         with stored_files(self.folder, other):
-            document = compare_folders(self.folder, other)
+            document = compare_folders(self.folder, other, self.robot)
+        if document["geometry"] is not None:
+            _say_change(console, document["geometry"])
+        elif document["geometry_not_compared"]:
+            console.say(document["geometry_not_compared"])
         first, second = document["runs"]
         difference = document["difference_mm"]
         real = "significant" if difference["significant"] else "not significant"
@@ -96,3 +103,14 @@ class Report(ParticularsOptions):
             )
         console.say(f"wrote {self.out}")
         console.finish({"report": self.out} | document, f"open {self.out}")
+
+
+def _say_change(console: Console, change: dict[str, Any]) -> None:
+    """Verdict on the robot, and how far its tool moved."""
+    moved = change["displacement_mm"]
+    place = ", ".join(f"{value:.2f}" for value in moved["worst_at_m"])
+    console.say(f"the robot: {change['verdict']}")
+    console.say(
+        f"the tool moved by {moved['p90_mm']:.3f} mm (P90) within the joint ranges of both, at most {moved['max_mm']:.3f} mm at "
+        f"[{place}] m, where {moved['std']:.3f} mm are uncertain (1σ), after the base was registered"
+    )

@@ -1,4 +1,4 @@
-from .comparison import compare_folders
+from .comparison import compare_folders, folder_comparison
 from .customer import customer_report
 from .report import REPORT, folder_page, report_folder, two_stage_study
 from .result import (
@@ -21,6 +21,7 @@ __all__ = [
     "WrittenResult",
     "compare_folders",
     "customer_report",
+    "folder_comparison",
     "folder_page",
     "report_folder",
     "summary_row",

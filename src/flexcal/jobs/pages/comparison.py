@@ -9,6 +9,7 @@ from typing import Any
 from flexcal.data.poses import DEFAULT_SIGMA
 from flexcal.errors import InputError
 from flexcal.files.formats import read_estimates
+from flexcal.jobs.pages.changed_robot import geometry_change
 from flexcal.jobs.pages.report import missing_key_error
 from flexcal.jobs.result_files import (
     ESTIMATES,
@@ -28,8 +29,17 @@ _DECLARED = (".yaml", ".yml", ".urdf", ".xml")
 """Inputs that describe the robot and are not measurements."""
 
 
-def compare_folders(first: Path, second: Path) -> dict[str, Any]:
-    """Write comparison.html into the folder `first`, and return its numbers.
+def compare_folders(first: Path, second: Path, robot: Path | None = None) -> dict[str, Any]:
+    """Write comparison.html into the folder `first`, and return its numbers; as `folder_comparison`."""
+    comparison = folder_comparison(first, second, robot)
+    write_page(first / COMPARISON, comparison_page(comparison))
+    return comparison.document()
+
+
+def folder_comparison(first: Path, second: Path, robot: Path | None = None) -> Comparison:
+    """Comparison of two folders: errors, parameters, and where both are calibrations, how the robot changed.
+
+    `robot` is the robot.yaml of both, by default one that is found in or above the folders, or in the working folder.
 
     Raises `InputError` where one holds no calibration, verification or demo, they are of different kinds or robots, or both are the same.
     """
@@ -46,9 +56,8 @@ def compare_folders(first: Path, second: Path) -> dict[str, Any]:
             "E-REPORT-003",
             f"{first} is of the robot '{one.robot}', {second} of '{two.robot}'; compare two runs of one robot.",
         )
-    comparison = Comparison(one, two)
-    write_page(first / COMPARISON, comparison_page(comparison))
-    return comparison.document()
+    change, why = geometry_change(first, second, one, two, robot)
+    return Comparison(one, two, change, why)
 
 
 def _names(first: Path, second: Path) -> tuple[str, str]:

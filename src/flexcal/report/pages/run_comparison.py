@@ -29,7 +29,7 @@ from flexcal.report.layout import (
 )
 from flexcal.report.layout import Block as PageBlock
 from flexcal.report.results import LEVEL, Comparison, Run
-from flexcal.report.sections import error_range
+from flexcal.report.sections import change_section, error_range
 from flexcal.units import MILLIMETRE
 
 _FEW = 20
@@ -40,6 +40,8 @@ def comparison_page(comparison: Comparison) -> Page:
     """The page before it becomes HTML."""
     first, second = comparison.first, comparison.second
     sections = [_errors(comparison)]
+    if comparison.change is not None or comparison.no_change_why:
+        sections.insert(0, change_section(comparison))
     if comparison.changes:
         sections.append(_parameters(comparison))
     sections.append(_provenance(first, second))
@@ -76,6 +78,8 @@ def comparison_verdict(comparison: Comparison) -> Verdict:
         )
     if better.after.p90 > worse.after.p90:
         sentence += f" Yet P90 is smaller in {worse.name}."
+    if comparison.verdict:
+        sentence = f"The robot: {comparison.verdict}. {sentence}"
     facts = (
         *(
             Fact(

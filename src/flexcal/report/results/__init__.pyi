@@ -1,3 +1,4 @@
+from .change_sentence import amount, chance_in_words, change_sentence, explanation_in_words
 from .fitted_response import FittedResponse, fitted_responses
 from .identifiability import IdentifiableParameters
 from .measured_response import MeasuredResponse, relative_to_diagonal, uncertainty_sentence
@@ -20,6 +21,10 @@ __all__ = [
     "PublishedValues",
     "Run",
     "TwoStageStudy",
+    "amount",
+    "chance_in_words",
+    "change_sentence",
+    "explanation_in_words",
     "fitted_responses",
     "parameter_changes",
     "relative_to_diagonal",

@@ -9,9 +9,11 @@ from typing import Literal
 
 import numpy as np
 
+from flexcal.calibration.comparison import GeometryChange
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.estimation import Estimate
 from flexcal.files.formats import BLOCKS, Block
+from flexcal.report.results.change_sentence import change_sentence
 from flexcal.report.results.run_significance import (
     MeanDifference,
     ParameterChanges,
@@ -49,10 +51,35 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Run `second` against run `first`."""
+    """Run `second` against run `first`.
+
+    `change` is that of the robot's geometry between two calibrations; where there is none, `no_change_why` says why.
+    """
 
     first: Run
     second: Run
+    change: GeometryChange | None = None
+    no_change_why: str = ""
+
+    @property
+    def verdict(self) -> str:
+        """Whether the robot changed, and what of it, in one sentence; empty where that is not known."""
+        return "" if self.change is None else change_sentence(self.change)
+
+    @property
+    def points(self) -> np.ndarray:
+        """Positions (N, 3), m, base frame, of the tool's points at random poses within the joint ranges of both; (0, 3) if not known."""
+        return np.zeros((0, 3)) if self.change is None else self.change.points
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """How far these moved (N, 3), m, the best-fit motion of the whole robot taken out."""
+        return np.zeros((0, 3)) if self.change is None else self.change.displacement
+
+    @property
+    def std(self) -> np.ndarray:
+        """Standard deviations (N,) of the sizes of `displacement`, m."""
+        return np.zeros(0) if self.change is None else self.change.std
 
     @cached_property
     def difference(self) -> MeanDifference:
@@ -124,4 +151,48 @@ class Comparison:
                 }
                 for block, changes in self.changes.items()
             },
+            "geometry": None if self.change is None else _change_document(self.change),
+            "geometry_not_compared": self.no_change_why or None,
         }
+
+
+def _change_document(change: GeometryChange) -> dict[str, object]:
+    """Numbers of a change of geometry: displacements in millimetres, parameters in SI units."""
+    worst = int(np.argmax(change.distance))
+    return {
+        "verdict": change_sentence(change),
+        "changed": change.changed,
+        "probability": change.probability,
+        "chi2": change.statistic,
+        "combinations": change.combinations,
+        "degrees_of_freedom": change.freedom if np.isfinite(change.freedom) else None,
+        "explanations": [
+            {
+                "subject": item.subject,
+                "parameters": dict(zip(item.names, item.change, strict=True)),
+                "std": dict(zip(item.names, item.std, strict=True)),
+                "probability": item.probability,
+                "alternatives": list(item.alternatives),
+            }
+            for item in change.explanations
+        ],
+        "parameters": [
+            {
+                "name": item.name,
+                "unit": item.unit,
+                "change": item.change,
+                "std": item.std,
+                "probability": item.probability,
+                "adjusted_probability": item.adjusted,
+                "with": list(item.absorbed),
+            }
+            for item in change.shifts
+        ],
+        "displacement_mm": {
+            **change.statistics.in_millimetres(),
+            "std": float(np.sqrt(np.mean(change.std**2))) / MILLIMETRE,
+            "worst_at_m": change.points[worst].tolist(),
+            "worst_q": change.q[worst].tolist(),
+        },
+        "joint_ranges": change.ranges.T.tolist(),
+    }

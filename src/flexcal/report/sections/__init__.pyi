@@ -1,4 +1,5 @@
 from .base_parameters import base_parameters_section
+from .changed_robot import change_section
 from .first_screen import error_range, headline_facts
 from .friction import friction_section
 from .geometry import ARROW_FACTORS, arm_figure, error_figures, exaggeration, geometry_section
@@ -30,6 +31,7 @@ __all__ = [
     "arm_figure",
     "base_parameters_section",
     "budget_table",
+    "change_section",
     "common_origin",
     "comparison_section",
     "coverage",
