@@ -7,6 +7,9 @@ import os
 import signal
 import subprocess
 import sys
+import time
+import urllib.error
+import urllib.request
 from pathlib import Path
 
 import pytest
@@ -52,3 +55,25 @@ def test_without_viser(tmp_path: Path) -> None:
     assert ended.returncode == 2
     assert_refusal(ended.stderr, "E-STUDIO-001")
     assert "pip install 'flexcal[studio]'" in ended.stderr
+
+
+def test_browser_is_not_given_the_token(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The program that `BROWSER` names is started with an address that is good once, and leads to the window."""
+    pytest.importorskip("viser", reason="viser is absent: pip install 'flexcal[studio]'")
+    browser = tmp_path / "browser.sh"
+    browser.write_text(
+        f'#!/bin/sh\necho "$1" > "{tmp_path}/seen.part" && mv "{tmp_path}/seen.part" "{tmp_path}/seen"\n'
+    )
+    browser.chmod(0o755)
+    monkeypatch.setenv("BROWSER", str(browser))
+    monkeypatch.setenv("DISPLAY", ":0")
+    with studio(tmp_path, browser=True) as running:
+        deadline = time.monotonic() + 10
+        while not (tmp_path / "seen").exists() and time.monotonic() < deadline:
+            time.sleep(0.02)
+        seen = (tmp_path / "seen").read_text().strip()
+        assert running.url not in seen
+        with urllib.request.urlopen(seen) as response:
+            assert response.url == running.url and response.status == 200
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            urllib.request.urlopen(seen)

@@ -43,9 +43,11 @@ class Running:
 
 
 @contextmanager
-def studio(folder: Path, *arguments: str) -> Iterator[Running]:
-    """A studio on a folder, killed after."""
-    command = [sys.executable, "-m", "flexcal.cli.main", "studio", str(folder), "--no-browser", *arguments]
+def studio(folder: Path, *arguments: str, browser: bool = False) -> Iterator[Running]:
+    """A studio on a folder, killed after; it opens a browser where told to."""
+    command = [sys.executable, "-m", "flexcal.cli.main", "studio", str(folder), *arguments]
+    if not browser:
+        command.append("--no-browser")
     if "--port" not in arguments:
         command += ["--port", "0"]
     with (

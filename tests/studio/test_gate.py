@@ -6,8 +6,8 @@ import pytest
 
 from flexcal.studio.server.gate import Gate, own_hosts
 
-TOKEN, FILES = "t" * 43, "f" * 43
-GATE = Gate(TOKEN, FILES, own_hosts(["127.0.0.1", "localhost", "::1"], 8080), 8080)
+TOKEN, FILES, TICKET = "t" * 43, "f" * 43, "k" * 43
+GATE = Gate(TOKEN, FILES, TICKET, own_hosts(["127.0.0.1", "localhost", "::1"], 8080), 8080)
 HOST = ("Host", "127.0.0.1:8080")
 ORIGIN = ("Origin", "http://127.0.0.1:8080")
 UPGRADE = ("Upgrade", "websocket")
@@ -15,13 +15,13 @@ UPGRADE = ("Upgrade", "websocket")
 
 def test_own_page_and_websocket_are_let_in() -> None:
     page = GATE.passage(f"/{TOKEN}/pick/12?a=1", [HOST])
-    assert page is not None and (page.path, page.files, page.upgrade) == ("pick/12?a=1", False, False)
+    assert page is not None and (page.path, page.key, page.upgrade) == ("pick/12?a=1", "token", False)
     socket = GATE.passage(f"/{TOKEN}", [HOST, ORIGIN, UPGRADE])
     assert socket is not None and socket.upgrade
     bare = GATE.passage(f"/{TOKEN}", [HOST])
     assert bare is not None and bare.path is None
     files = GATE.passage(f"/{FILES}/files/report.html", [HOST])
-    assert files is not None and files.files and files.path == "files/report.html"
+    assert files is not None and files.key == "files_token" and files.path == "files/report.html"
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1:8080", "LOCALHOST:8080", "[::1]:8080"])
@@ -118,12 +118,18 @@ def test_other_pages_may_lead_here_and_no_more(site: str) -> None:
     assert GATE.passage(f"/{TOKEN}/", [*leads, ORIGIN, UPGRADE]) is None
 
 
-def test_token_of_files_opens_no_websocket() -> None:
-    assert GATE.passage(f"/{FILES}", [HOST, ORIGIN, UPGRADE]) is None
+def test_token_of_files_and_ticket_open_no_websocket() -> None:
+    for token in (FILES, TICKET):
+        assert GATE.passage(f"/{token}", [HOST, ORIGIN, UPGRADE]) is None
+
+
+def test_ticket_is_told_from_the_token() -> None:
+    ticket = GATE.passage(f"/{TICKET}/", [HOST])
+    assert ticket is not None and ticket.key == "ticket"
 
 
 def test_any_address_but_no_other_name_where_all_interfaces_are_served() -> None:
-    gate = Gate(TOKEN, FILES, own_hosts(["cell-pc"], 8080), 8080, any_address=True)
+    gate = Gate(TOKEN, FILES, TICKET, own_hosts(["cell-pc"], 8080), 8080, any_address=True)
     for host in ("192.168.1.7:8080", "[fe80::1]:8080", "cell-pc:8080"):
         assert gate.passage(f"/{TOKEN}/", [("Host", host)]) is not None, host
     for host in (
@@ -141,4 +147,4 @@ def test_the_port_80_is_left_out_by_browsers() -> None:
 
 
 def test_tokens_are_not_in_the_text_of_a_gate() -> None:
-    assert TOKEN not in repr(GATE) and FILES not in repr(GATE)
+    assert not [token for token in (TOKEN, FILES, TICKET) if token in repr(GATE)]

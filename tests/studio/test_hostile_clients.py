@@ -359,6 +359,22 @@ def test_picks_of_poses_that_are_none(target: Target) -> None:
     assert target.ask(f"/{target.token}/").status == 200
 
 
+def test_address_for_the_command_line_of_a_browser_opens_once(tmp_path: Path) -> None:
+    """Other users see it there; once it has been used, they are late."""
+    server = StudioServer.start("127.0.0.1", 0, {}, ProjectFiles(tmp_path))
+    try:
+        window, path = Target(server.url, tmp_path), urlsplit(server.ticket_url).path
+        assert window.token not in server.ticket_url
+        for elsewhere in ("pick/1", "files/a.csv", "x"):
+            assert_refused(window.ask(path + elsewhere), window)
+        assert_refused(window.ask(path, host="evil.example"), window)
+        sent = window.ask(path)
+        assert (sent.status, sent.headers["location"]) == (302, f"/{window.token}/")
+        assert_refused(window.ask(path), window)
+    finally:
+        server.stop()
+
+
 class Tunnel:
     """In place of viser's way to share.viser.studio: counts who asked for it, and fails."""
 

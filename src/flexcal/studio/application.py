@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from flexcal.studio.server import StudioServer
 
 
-def run_studio(folder: Path, host: str, port: int | None, ready: Callable[[str], None]) -> None:
+def run_studio(folder: Path, host: str, port: int | None, ready: Callable[[StudioServer], None]) -> None:
     """Serve the studio of a folder until `KeyboardInterrupt`.
 
     Parameters
@@ -19,7 +23,7 @@ def run_studio(folder: Path, host: str, port: int | None, ready: Callable[[str],
     port : int or None
         Port; None for the first free one from 8080.
     ready : callable
-        Called with the URL, which has the token.
+        Called with the server, which has the URL, once the window can be opened.
 
     Raises
     ------
@@ -51,7 +55,7 @@ def run_studio(folder: Path, host: str, port: int | None, ready: Callable[[str],
         routes |= {"pick": pick, "step": step}
         try:
             with suppress(KeyboardInterrupt):
-                ready(server.url)
+                ready(server)
                 window.run()
         finally:
             window.stop()

@@ -6,13 +6,16 @@ import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import Positional, arg
 
 from flexcal.cli.arguments.shared_options import Json
 from flexcal.cli.terminal.console import Console
 from flexcal.errors import InputError
+
+if TYPE_CHECKING:
+    from flexcal.studio.server import StudioServer
 
 _LOOPBACK = "127.0.0.1"
 _WARNING = (
@@ -55,16 +58,18 @@ class Studio:
         console.say("the studio is closed")
         console.finish({"folder": str(self.folder)}, f"flexcal studio {self.folder}")
 
-    def _ready(self, url: str) -> None:
-        lines = [f"the studio is open at {url}", "Ctrl-C stops it"]
+    def _ready(self, server: StudioServer) -> None:
+        lines = [f"the studio is open at {server.url}", "Ctrl-C stops it"]
         if self.host not in (_LOOPBACK, "localhost", "::1"):
             lines.insert(0, _WARNING)
         # standard output is shown when a verb has ended
         print("\n".join(lines), file=sys.stderr, flush=True)
         if not self.no_browser and _has_display():
+            import threading
             import webbrowser
 
-            webbrowser.open(url)
+            # some browsers are waited for until they are closed
+            threading.Thread(target=webbrowser.open, args=(server.ticket_url,), daemon=True).start()
 
 
 def _has_display() -> bool:

@@ -6,20 +6,22 @@ import hmac
 import ipaddress
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Literal
 from urllib.parse import urlsplit
+
+Key = Literal["token", "files_token", "ticket"]
 
 
 @dataclass(frozen=True)
 class Passage:
     """A request that is let in: the `path` behind the token, with its query and without a leading slash, and the `host` it was sent to.
 
-    `files` where it came with the token of the files; `upgrade` where it asks for a websocket. `path` is None where even the slash
-    behind the token is missing.
+    `key` is what opened; `upgrade` whether it asks for a websocket. `path` is None where even the slash behind the token is missing.
     """
 
     path: str | None
     host: str
-    files: bool = False
+    key: Key = "token"
     upgrade: bool = False
 
 
@@ -33,6 +35,8 @@ class Gate:
         Opens everything.
     files_token : str
         Opens files of the project alone. Pages among them may be anybody's: they know their own address, hence not `token`.
+    ticket : str
+        Opens the way to `token`, once; whoever counts that is told.
     hosts : frozenset of str
         Allowed `Host` headers, as `127.0.0.1:8080`, in lower case. Other names are those of DNS rebinding.
     port : int
@@ -43,6 +47,7 @@ class Gate:
 
     token: str = field(repr=False)
     files_token: str = field(repr=False)
+    ticket: str = field(repr=False)
     hosts: frozenset[str]
     port: int
     any_address: bool = False
@@ -60,23 +65,23 @@ class Gate:
         found = self._behind_token(target)
         if found is None or not self._is_own(host):
             return None
-        path, files = found
+        path, key = found
         origin = single.get("origin")
         if origin is None:
             if upgrade:
                 return None
         elif not self._is_own_origin(origin):
             return None
-        if files and upgrade:
+        if key != "token" and upgrade:
             return None
         if single.get("sec-fetch-site", "none").lower() not in ("none", "same-origin"):
-            to_page = files or not path or path.startswith("?")
+            to_page = key == "files_token" or not path or path.startswith("?")
             if upgrade or not to_page or not _is_navigation(single):
                 return None
-        return Passage(path, host, files, upgrade)
+        return Passage(path, host, key, upgrade)
 
-    def _behind_token(self, target: str) -> tuple[str | None, bool] | None:
-        """The path behind a token, and whether it was that of the files."""
+    def _behind_token(self, target: str) -> tuple[str | None, Key] | None:
+        """The path behind a token, and which one it was."""
         if not target.startswith("/") or not (target.isascii() and target.isprintable()):
             return None
         given, slash, rest = target[1:].partition("/")
@@ -84,11 +89,15 @@ class Gate:
         if question:  # /TOKEN?query has no slash behind the token
             slash, rest = "", f"?{query}"
         path = rest if slash else None
-        opens = [
-            hmac.compare_digest(given.encode(errors="replace"), token.encode())
-            for token in (self.token, self.files_token)
+        tokens: dict[Key, str] = {
+            "token": self.token,
+            "files_token": self.files_token,
+            "ticket": self.ticket,
+        }
+        opens: list[Key] = [
+            key for key, token in tokens.items() if hmac.compare_digest(given.encode(), token.encode())
         ]
-        return (path, opens[1]) if any(opens) else None
+        return (path, opens[0]) if opens else None
 
     def _is_own(self, host: str) -> bool:
         if host in self.hosts:

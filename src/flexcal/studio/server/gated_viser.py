@@ -22,6 +22,7 @@ from websockets.http11 import Request, Response
 
 from flexcal.studio.server.answer import Answer, Route, said
 from flexcal.studio.server.gate import Gate, Passage
+from flexcal.studio.server.ticket import Ticket
 from flexcal.studio.server.window_page import window_page
 
 REFUSAL = said(403, "This address is not open to you. Use the one that flexcal studio has printed.")
@@ -41,9 +42,13 @@ _COMMON = {
 
 @dataclass(frozen=True)
 class Site:
-    """What is served beside viser's page, and the gate before all of it: `routes` by the first name of a path, and `files` below FILES."""
+    """What is served beside viser's page, and the gate before all of it: `routes` by the first name of a path, and `files` below FILES.
+
+    `ticket` is that of the gate.
+    """
 
     gate: Gate
+    ticket: Ticket
     routes: Mapping[str, Route]
     files: Route
 
@@ -116,6 +121,9 @@ def _gated(site: Site, inner: Any) -> Any:
             if request.headers.get("Upgrade", "").lower() != "websocket":
                 return _response(REFUSAL)
             return None
+        if passage.key == "ticket":
+            spent = not passage.path and site.ticket.spend()
+            return _response(Answer(302, location=f"/{site.gate.token}/") if spent else REFUSAL)
         if passage.path is None:
             return _response(Answer(308, location=request.path + "/"))
         answer = await _routed(site, passage)
@@ -138,15 +146,15 @@ async def _routed(site: Site, passage: Passage) -> Answer | None:
     """The answer of a route, None where viser is to answer."""
     assert passage.path is not None
     path = passage.path.partition("?")[0]
-    if not path and not passage.files:
+    if not path and passage.key == "token":
         return None  # the window is one page; viser has no other files
     name, _, rest = path.partition("/")
     if name == FILES:
-        if not passage.files:
+        if passage.key == "token":
             # a page from the folder knows its own address: one that opens nothing else
             return Answer(302, location=f"/{site.gate.files_token}/{passage.path}")
         return await _call(site.files, rest)
-    if passage.files:
+    if passage.key != "token":
         return REFUSAL
     return await _call(site.routes[name], rest) if name in site.routes else _ABSENT
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from flexcal.errors import FlexcalError, InputError
 from flexcal.studio.server.answer import Route
 from flexcal.studio.server.gate import Gate, own_hosts
+from flexcal.studio.server.ticket import Ticket
 
 if TYPE_CHECKING:
     import viser
@@ -26,14 +27,16 @@ _PORTS = 20
 class StudioServer:
     """A server for one user, who knows its `url`; the window is built on its `viser`.
 
+    `ticket_url` leads to `url` once, in the two minutes after the start: it is for the command line of a browser, which others can see.
     Everybody else is refused: requests without the token in their path, sent to another name, or by another site's page.
     """
 
     viser: viser.ViserServer
     url: str
+    ticket_url: str
 
-    def __init__(self, server: viser.ViserServer, url: str) -> None:
-        self.viser, self.url = server, url
+    def __init__(self, server: viser.ViserServer, url: str, ticket_url: str) -> None:
+        self.viser, self.url, self.ticket_url = server, url, ticket_url
 
     @classmethod
     def start(cls, host: str, port: int | None, routes: Mapping[str, Route], files: Route) -> StudioServer:
@@ -53,8 +56,9 @@ class StudioServer:
             ) from problem
         listening = _listening(host, port)
         found, number = listening.getsockname()[:2]
-        gate = _gate(host, found, number)
-        server = gated_viser.start_viser(listening, gated_viser.Site(gate, routes, files))
+        ticket = Ticket()
+        gate = _gate(host, found, number, ticket)
+        server = gated_viser.start_viser(listening, gated_viser.Site(gate, ticket, routes, files))
         if server is None or not _refuses(found, number, gate.token):
             import viser
 
@@ -65,7 +69,8 @@ class StudioServer:
                 "E-STUDIO-002",
                 f"the studio cannot keep others out with viser {viser.__version__} and does not start; pip install 'flexcal[studio]'.",
             )
-        return cls(server, f"http://{_shown(host, found, number)}/{gate.token}/")
+        place = f"http://{_shown(host, found, number)}"
+        return cls(server, f"{place}/{gate.token}/", f"{place}/{ticket.code}/")
 
     def stop(self) -> None:
         """Close all connections, and free the port."""
@@ -103,13 +108,17 @@ def _listening(host: str, port: int | None) -> socket.socket:
     raise AssertionError
 
 
-def _gate(host: str, address: str, port: int) -> Gate:
+def _gate(host: str, address: str, port: int, ticket: Ticket) -> Gate:
     names = [LOOPBACK, "localhost", "::1", host, address]
     if not _is_loopback(address):
         names += [socket.gethostname(), f"{socket.gethostname()}.local"]
-    tokens = secrets.token_urlsafe(32), secrets.token_urlsafe(32)
     return Gate(
-        *tokens, own_hosts(names, port), port, any_address=ipaddress.ip_address(address).is_unspecified
+        secrets.token_urlsafe(32),
+        secrets.token_urlsafe(32),
+        ticket.code,
+        own_hosts(names, port),
+        port,
+        any_address=ipaddress.ip_address(address).is_unspecified,
     )
 
 
