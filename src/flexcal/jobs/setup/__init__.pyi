@@ -5,6 +5,7 @@ from .motor_readings import MotorReadings
 from .point_declaration import write_point_position
 from .robot_description import init_robot
 from .signals_declaration import add_signals
+from .urdf_robot import urdf_robot
 
 __all__ = [
     "FileProblem",
@@ -15,5 +16,6 @@ __all__ = [
     "edit_robot",
     "import_file",
     "init_robot",
+    "urdf_robot",
     "write_point_position",
 ]

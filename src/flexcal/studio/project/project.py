@@ -23,6 +23,21 @@ _DEPTH = 3
 """Folders below the project's in which files are offered."""
 _MANY = 2000
 """Files that are looked at, at most."""
+_STAMPED = (
+    ".yaml",
+    ".yml",
+    ".csv",
+    ".parquet",
+    ".json",
+    ".urdf",
+    ".npz",
+    ".stl",
+    ".obj",
+    ".dae",
+    ".STL",
+    ".OBJ",
+    ".DAE",
+)
 _HIDDEN = (".", "__pycache__", "node_modules")
 
 
@@ -110,7 +125,7 @@ class Project:
     def stamp(self) -> tuple[tuple[str, int, int], ...]:
         """Name, time of change (ns) and size of each file that a step may show; equal stamps mean that nothing changed."""
         stamps = []
-        for name in self.files(".yaml", ".yml", ".csv", ".parquet", ".json", ".urdf", ".npz"):
+        for name in self.files(*_STAMPED):
             try:
                 status = (self.folder / name).stat()
             except OSError:  # it has just been removed

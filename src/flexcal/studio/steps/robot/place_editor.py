@@ -1,0 +1,163 @@
+"""Measured points, payload and instrument: in the scene, as numbers, and in robot.yaml."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from flexcal.errors import InputError
+from flexcal.files.formats import REMOVED
+from flexcal.files.structuring import Keys
+from flexcal.model.robot import RobotModel
+from flexcal.model.urdf import read_urdf
+from flexcal.studio.steps.robot.place_marker import PlaceMarkers
+from flexcal.studio.steps.robot.places import BASE, Place, Triple, places_of
+from flexcal.studio.window import Window, paragraph, table
+
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}")
+_KINDS = ("measured point", "payload", "instrument")
+
+
+class PlaceEditor:
+    """The places of robot.yaml, of which one at a time is edited; nothing is written before its button says so.
+
+    Parameters
+    ----------
+    window : Window
+        Where it is shown: elements are added at the current place of its GUI.
+    model : RobotModel
+        The robot as robot.yaml has it.
+    """
+
+    def __init__(self, window: Window, model: RobotModel):
+        self._window, self._model = window, model
+        self._frames = read_urdf(model.urdf, model.config.locked).frames
+        self._markers = PlaceMarkers(window.scene, model, dict(self._frames))
+        self.places = places_of(model)
+        titles = [place.title for place in self.places]
+        kept = window.choices.get("place", "")
+        self._index = titles.index(kept) if kept in titles else 0 if titles else None
+        gui = window.gui
+        self._table = gui.add_html(
+            table(("", "frame", "x, y, z / mm", "mass"), [p.row() for p in self.places])
+        )
+        if self._index is not None:
+            self._choice = gui.add_dropdown("Edit", titles, initial_value=titles[self._index])
+            self._choice.on_update(lambda _: window.post(self._choose))
+        self._fields = gui.add_folder(None)
+        with gui.add_folder("Add a point, payload or instrument", expand_by_default=not self.places):
+            self._kind = gui.add_dropdown("What", self._kinds())
+            self._name = gui.add_text("Name", "", hint="letters, digits and _; the columns of files have it")
+            window.button("Add to robot.yaml", self._add)
+        self._show()
+
+    def follow(self) -> None:
+        """Move the markers with the robot."""
+        self._markers.follow(self._window.robot.q)
+
+    def close(self) -> None:
+        """Take the markers out of the scene."""
+        self._markers.remove()
+
+    @property
+    def _saved(self) -> Place:
+        assert self._index is not None
+        return self.places[self._index]
+
+    def _kinds(self) -> tuple[str, ...]:
+        has_load = any(place.kind == "payload" for place in self.places)
+        return tuple(kind for kind in _KINDS if kind != "payload" or not has_load)
+
+    def _show(self) -> None:
+        order = self._fields.order
+        self._fields.remove()
+        self._fields = self._window.gui.add_folder(None, order=order)
+        self._markers.show(
+            self.places, self._index, lambda xyz: self._window.post(lambda: self._dragged(xyz))
+        )
+        self._markers.follow(self._window.robot.q)
+        if self._index is None:
+            return
+        place, gui, window = self._saved, self._window.gui, self._window
+        with self._fields:
+            frames = (BASE,) if place.frame == BASE else tuple(self._frames)
+            self._frame = gui.add_dropdown(
+                "Frame", frames, initial_value=place.frame, disabled=place.frame == BASE
+            )
+            word = "Centre of mass" if place.kind == "payload" else "Position"
+            self._xyz = gui.add_vector3(f"{word} x, y, z / mm", place.xyz, step=0.1)
+            self._mass = None
+            if place.mass is not None:
+                self._mass = gui.add_number("Mass / kg", place.mass, min=0.0, step=0.001)
+                self._mass.on_update(lambda _: window.post(self._edited))
+            self._frame.on_update(lambda _: window.post(self._edited))
+            self._xyz.on_update(lambda _: window.post(self._edited))
+            self._difference = gui.add_html(paragraph("Drag it in the scene, or type the numbers.", "faint"))
+            self._write = window.button("Write to robot.yaml", self._save, main=True)
+            self._back = window.button("Take back", self._show)
+            self._write.visible = self._back.visible = False
+            window.button(f"Remove {place.title}", self._remove)
+
+    def _edited_place(self) -> Place:
+        x, y, z = (round(float(value), 6) for value in self._xyz.value)
+        mass = None if self._mass is None else float(self._mass.value)
+        return replace(self._saved, frame=self._frame.value, xyz=(x, y, z), mass=mass)
+
+    def _choose(self) -> None:
+        titles = [place.title for place in self.places]
+        self._index = titles.index(self._choice.value)
+        self._window.choices.put("place", self._choice.value)
+        self._show()
+
+    def _dragged(self, xyz: Triple) -> None:
+        if self._index is not None:
+            self._xyz.value = xyz
+            self._edited(dragging=True)
+
+    def _edited(self, *, dragging: bool = False) -> None:
+        place = self._edited_place()
+        assert self._index is not None
+        self._markers.move(self._index, place.xyz, handles=not dragging)
+        told = self._saved.told_changes(place)
+        self._difference.content = paragraph(
+            f"not written yet: {told}" if told else "as in robot.yaml", "warning" if told else "faint"
+        )
+        self._write.visible = self._back.visible = bool(told)
+
+    def _save(self) -> None:
+        place, saved = self._edited_place(), self._saved
+        self._edit(saved.changes(place), f"{saved.title}: {saved.told_changes(place)}")
+
+    def _remove(self) -> None:
+        self._edit({self._saved.keys: REMOVED}, f"{self._saved.title} removed")
+
+    def _add(self) -> None:
+        place = self._new_place()
+        self._window.choices.put("place", place.title)
+        self._edit(
+            {place.keys: place.entry()}, f"{place.title} added at {place.row()[2]} mm in {place.frame}"
+        )
+
+    def _new_place(self) -> Place:
+        kind, name = self._kind.value, self._name.value.strip()
+        reach = round(1000.0 * max(self._model.reach, 0.3), -1)
+        carrier = next((place.frame for place in self.places if place.frame != BASE), list(self._frames)[-1])
+        if kind == "payload":
+            return Place("payload", "payload", carrier, (0.0, 0.0, 100.0), 1.0)
+        config = self._model.config
+        if not _NAME.fullmatch(name) or name in config.points or name in config.stations:
+            raise InputError(
+                "E-STUDIO-079",
+                f"'{name}' cannot be the name of another {kind}; give one of letters, digits and _ that robot.yaml does not have yet.",
+            )
+        if kind == "instrument":
+            return Place("instrument", name, BASE, (2.0 * reach, 0.0, round(0.5 * reach, -1)))
+        return Place("measured point", name, carrier, (0.0, 0.0, 0.0))
+
+    def _edit(self, changes: Mapping[Keys, Any], told: str) -> None:
+        from flexcal.jobs.setup import edit_robot
+
+        edit_robot(self._window.project.robot_file, changes)
+        self._window.say(f"robot.yaml: {told}.", "good")
