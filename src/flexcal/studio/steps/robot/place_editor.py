@@ -86,14 +86,18 @@ class PlaceEditor:
             self._frame = gui.add_dropdown(
                 "Frame", frames, initial_value=place.frame, disabled=place.frame == BASE
             )
-            word = "Centre of mass" if place.kind == "payload" else "Position"
-            self._xyz = gui.add_vector3(f"{word} x, y, z / mm", place.xyz, step=0.1)
+            of = "centre of mass " if place.kind == "payload" else ""
+            self._xyz = [
+                gui.add_number(f"{of}{axis} / mm", value, step=0.1)
+                for axis, value in zip("xyz", place.xyz, strict=True)
+            ]
             self._mass = None
             if place.mass is not None:
                 self._mass = gui.add_number("Mass / kg", place.mass, min=0.0, step=0.001)
                 self._mass.on_update(lambda _: window.post(self._edited))
             self._frame.on_update(lambda _: window.post(self._edited))
-            self._xyz.on_update(lambda _: window.post(self._edited))
+            for number in self._xyz:
+                number.on_update(lambda _: window.post(self._edited))
             self._difference = gui.add_html(paragraph("Drag it in the scene, or type the numbers.", "faint"))
             self._write = window.button("Write to robot.yaml", self._save, main=True)
             self._back = window.button("Take back", self._show)
@@ -101,7 +105,7 @@ class PlaceEditor:
             window.button(f"Remove {place.title}", self._remove)
 
     def _edited_place(self) -> Place:
-        x, y, z = (round(float(value), 6) for value in self._xyz.value)
+        x, y, z = (round(float(number.value), 6) for number in self._xyz)
         mass = None if self._mass is None else float(self._mass.value)
         return replace(self._saved, frame=self._frame.value, xyz=(x, y, z), mass=mass)
 
@@ -113,7 +117,8 @@ class PlaceEditor:
 
     def _dragged(self, xyz: Triple) -> None:
         if self._index is not None:
-            self._xyz.value = xyz
+            for number, value in zip(self._xyz, xyz, strict=True):
+                number.value = value
             self._edited(dragging=True)
 
     def _edited(self, *, dragging: bool = False) -> None:
