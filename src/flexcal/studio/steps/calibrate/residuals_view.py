@@ -1,4 +1,4 @@
-"""Residuals of a calibration on the robot, in a table and in measuring order, with one selection for all."""
+"""Residuals of measured poses on the robot, in a table and in measuring order, with one selection for all."""
 
 from __future__ import annotations
 
@@ -8,48 +8,54 @@ import numpy as np
 
 from flexcal.calibration.verification import CALIBRATED
 from flexcal.data.poses import DEFAULT_SIGMA
+from flexcal.studio.scene import ResidualArrows
 from flexcal.studio.window import Window, error_course, picked_rows
 from flexcal.units import MILLIMETRE
 
 _ROWS = 150
 """Rows of the table, the largest errors."""
+_LENGTH = 0.1
+"""Length, m, of the larger arrows at first."""
 _MODELS = {
-    "calibrated": "calibrated",
+    CALIBRATED: "calibrated",
     "rigid": "rigid geometry",
-    "own": "before, instrument registered",
-    "nominal": "before",
+    "own": "before, instrument and target registered",
+    "nominal": "before, instrument registered",
+    "declared": "before, as declared",
 }
 
 
 class ResidualsView:
-    """Residuals at the measured poses.
+    """Residuals at the measured poses: arrows on the robot, measured minus predicted, a table and a figure.
 
     Parameters
     ----------
     window : Window
         Where they are shown; the table at the current place of its GUI.
     folder : Path
-        A folder with points.csv.
+        A folder with points.csv and arm.npz.
     """
 
     def __init__(self, window: Window, folder: Path):
-        from flexcal.jobs.result_files import read_points
+        from flexcal.jobs.result_files import read_arm, read_points
 
         self._window = window
-        self._points = read_points(folder, sigma=DEFAULT_SIGMA)
-        numbers = np.asarray(self._points.poses.pose)
+        self._poses = read_points(folder, sigma=DEFAULT_SIGMA).poses
+        points, self._arm = read_points(folder, sigma=DEFAULT_SIGMA), read_arm(folder)
+        self._errors = points.errors
+        numbers = np.asarray(self._poses.pose)
         several = len(np.unique(numbers)) < len(numbers)
         self._keys = [f"{n}.{row + 1}" if several else f"{n}" for row, n in enumerate(numbers)]
-        labels = {_MODELS.get(name, name): name for name in self._points.errors}
+        self._labels = {_MODELS.get(name, name): name for name in self._errors}
         gui = window.gui
-        self._labels = labels
-        calibrated = _MODELS[CALIBRATED]
-        self._model = gui.add_dropdown("Residuals", tuple(labels), initial_value=calibrated)
+        self._model = gui.add_dropdown("Model", tuple(self._labels), initial_value=_MODELS[CALIBRATED])
         self._factor = gui.add_slider("Exaggeration", min=1, max=2000, step=1, initial_value=self._fitting())
         self._table = gui.add_html("")
         self._course = None
+        self._arrows: ResidualArrows | None = None
         self._model.on_update(lambda _: window.post(self._changed))
         self._factor.on_update(lambda _: window.post(self._stretch))
+        self._draw()
 
     def add_course(self) -> None:
         """Add the figure of errors in measuring order at the current place of the GUI."""
@@ -58,16 +64,22 @@ class ResidualsView:
 
     def refresh(self) -> None:
         """Show the selected pose everywhere."""
-        errors, chosen = self._errors() / MILLIMETRE, self._window.selection.key
+        errors, chosen = (
+            self._errors[self._labels[self._model.value]] / MILLIMETRE,
+            self._window.selection.key,
+        )
         sizes = np.linalg.norm(errors, axis=1)
         if self._course is not None:
             self._course.content = error_course(self._keys, sizes, chosen, word="error")
         largest = np.argsort(-sizes)[:_ROWS].tolist()
         here = self._keys.index(chosen) if chosen in self._keys else None
         if here is not None:
-            self._window.robot.pose(self._points.poses.q[here])
-        if here is not None and here not in largest:
-            largest.append(here)
+            self._window.robot.pose(self._poses.q[here])
+            if here not in largest:
+                largest.insert(0, here)
+        if self._arrows is not None:
+            shown = np.flatnonzero(self._rows == here) if here is not None else []
+            self._arrows.highlight(int(shown[0]) if len(shown) else None)
         rows = {
             self._keys[i]: (f"pose {self._keys[i]}", f"{sizes[i]:.3f}", *(f"{e:+.3f}" for e in errors[i]))
             for i in largest
@@ -76,17 +88,31 @@ class ResidualsView:
 
     def close(self) -> None:
         """Remove the arrows from the scene."""
+        if self._arrows is not None:
+            self._arrows.remove()
+            self._arrows = None
 
-    def _errors(self) -> np.ndarray:
-        return self._points.errors[self._labels[self._model.value]]
+    def _draw(self) -> None:
+        """Arrows of the model that is chosen; drawings of the arm have a selection of the poses where there are many."""
+        self.close()
+        vectors = self._arm.errors.get(self._labels[self._model.value])
+        self._rows = np.unique(np.linspace(0, len(self._poses) - 1, len(self._arm.tip)).astype(int))
+        if vectors is None:
+            return
+        self._arrows = ResidualArrows(self._window.scene, self._arm.tip, vectors, self._factor.value)
+        self._arrows.on_click(
+            lambda i: self._window.post(lambda: self._window.selection.pick(self._keys[self._rows[i]]))
+        )
 
     def _changed(self) -> None:
+        self._draw()
         self.refresh()
 
     def _stretch(self) -> None:
-        return
+        if self._arrows is not None:
+            self._arrows.exaggeration = self._factor.value
 
     def _fitting(self) -> int:
-        """A magnification with which the larger errors are 0.1 m long."""
-        size = float(np.percentile(np.linalg.norm(self._points.errors[CALIBRATED], axis=1), 90))
-        return int(np.clip(0.1 / max(size, 1e-9), 1, 2000))
+        """A magnification that makes the larger arrows 0.1 m long."""
+        size = float(np.percentile(np.linalg.norm(self._errors[CALIBRATED], axis=1), 90))
+        return int(np.clip(_LENGTH / max(size, 1e-9), 1, 2000))
