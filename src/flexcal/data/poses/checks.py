@@ -57,7 +57,7 @@ def check_same_pose(pose: np.ndarray, q: np.ndarray, table: Table) -> None:
             row,
             f"q{joint + 1}",
             f"pose {numbers[inverse[row]]} stands at {q[row, joint]:g} here, but at {q[original, joint]:g} "
-            f"in {table.file.row_word} {table.first + original}; give every pose its own number.",
+            f"in {table.file.row_word} {table.number_of(original)}; give every pose its own number.",
         )
 
 

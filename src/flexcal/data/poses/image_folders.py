@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from flexcal.data.poses.excluded_rows import EXCLUDED
 from flexcal.data.tables import open_table
 from flexcal.errors import InputError
 
@@ -25,7 +26,7 @@ def images_of(table: Path) -> list[Path]:
     file = open_table(table)
     if "image" not in file.columns:
         return []
-    others = [name for name in file.text_columns() if name != "image"]
+    others = [EXCLUDED, *(name for name in file.text_columns() if name != "image")]
     names = file.leaving_out(others).read(("image",)).columns["image"]
     return [table.parent / name for name in dict.fromkeys(names.tolist())]
 

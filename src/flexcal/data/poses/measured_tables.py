@@ -29,6 +29,7 @@ from flexcal.data.poses.distance_tables import (
     measures_distances,
     read_distances,
 )
+from flexcal.data.poses.excluded_rows import EXCLUDED, without_excluded
 from flexcal.data.poses.image_folders import tables_of
 from flexcal.data.poses.moving_base import BASE, seen_from_base
 from flexcal.data.poses.pose_set import DEFAULT_SIGMA, PLANE, PoseSet, concatenate
@@ -146,7 +147,7 @@ def read_pose_pool(path: str | Path, model: RobotModel) -> PosePool:
     Rows of one pose count once. Raises `InputError` with file, line and column as `read_poses` does, for a pose outside the joint
     limits, and for payloads that differ.
     """
-    file = open_table(path)
+    file, _ = without_excluded(open_table(path))
     texts = tuple(name for name in _TEXTS if name in file.columns)
     signals = assign(file, model, ("pose", "q"), (*_NUMBERS, "xyz", "length"), texts)
     stamps = timestamp_columns(signals)
@@ -219,10 +220,14 @@ def _read_by_one(path: str | Path, poses: PoseSet) -> Mapping[str, np.ndarray]:
 
 def _labels(path: Path, column: str) -> np.ndarray:
     """Texts (rows,) of one column of a table; raises `InputError` for a file without it."""
-    file = open_table(path)
+    file, _ = without_excluded(open_table(path))
     if column not in file.columns:
         raise file.error("E-POSES-041", f"there is no column '{column}' by which to hold out measurements.")
-    others = [name for name in file.text_columns() if name != column]
+    if column == EXCLUDED:
+        raise file.error(
+            "E-POSES-081", f"the rows that are used have nothing in '{EXCLUDED}'; hold out by another column."
+        )
+    others = [*file.unread, *(name for name in file.text_columns() if name != column)]
     return file.leaving_out(others).read((column,)).columns[column]
 
 
@@ -230,8 +235,8 @@ def _of_views(path: Path, labels: np.ndarray, poses: PoseSet) -> np.ndarray:
     """Labels (N,) of the measurements of a file from those of its rows, of which a view has several, and views left out none."""
     if not poses.seen.any():
         return labels
-    file = open_table(path)
-    others = [name for name in file.text_columns() if name != "pose"]
+    file, _ = without_excluded(open_table(path))
+    others = [*file.unread, *(name for name in file.text_columns() if name != "pose")]
     numbers = file.leaving_out(others).read().columns["pose"].astype(np.int64)
     first = dict(zip(reversed(numbers.tolist()), reversed(labels.tolist()), strict=True))
     return np.array([first[number] for number in poses.pose.tolist()])
@@ -244,20 +249,17 @@ def _named_texts(file: TableFile, further: Sequence[str]) -> tuple[str, ...]:
 
 
 def _read(path: Path, model: RobotModel, further: tuple[str, ...]) -> PoseSet:
-    file = open_table(path)
+    file, excluded = without_excluded(open_table(path))
     # a quantity of the file is read as such, even if its values group the measurements
     quantities = {column for name in (*UNITS, "pose") for column in standard_columns(name, model.n)}
     quantities |= {column for signal in model.config.signals.values() for column in signal.columns}
     further = tuple(name for name in further if name not in quantities)
-    file = file.leaving_out(
-        _remarks(file, {*quantities, *model.joint_names, *_named_texts(file, further), *_TEXT_COLUMNS})
-    )
-    poses = _read_kind(file, model, further)
-    if not file.unread:
-        return poses
-    columns = ", ".join(file.unread)
-    note = f"{path.name}: the texts in {columns} are not used"
-    return replace(poses, notes=(*poses.notes, note))
+    known = {*quantities, *model.joint_names, *_named_texts(file, further), *_TEXT_COLUMNS, EXCLUDED}
+    remarks = _remarks(file, known)
+    poses = _read_kind(file.leaving_out([*file.unread, *remarks]), model, further)
+    if remarks:
+        excluded = (*excluded, f"{path.name}: the texts in {', '.join(remarks)} are not used")
+    return replace(poses, notes=(*poses.notes, *excluded)) if excluded else poses
 
 
 def _remarks(file: TableFile, known: Collection[str]) -> list[str]:

@@ -156,8 +156,8 @@ def _require_one_place(table: Table, touched: np.ndarray, known: np.ndarray) -> 
                 "E-TOOL-015",
                 row,
                 "point",
-                f"'{name}' has other coordinates wx, wy, wz than in {table.file.row_word} {table.first + before}; a point has one place, "
-                "or another name.",
+                f"'{name}' has other coordinates wx, wy, wz than in {table.file.row_word} {table.number_of(before)}; a point has one "
+                "place, or another name.",
             )
 
 
@@ -177,7 +177,7 @@ def _poses(
 
 def _places(table: Table) -> tuple[str, ...]:
     file = table.file
-    return tuple(f"{file.path} {file.row_word} {table.first + row}" for row in range(len(table)))
+    return tuple(f"{file.path} {file.row_word} {table.number_of(row)}" for row in range(len(table)))
 
 
 def _joined(parts: Sequence[Touches]) -> Touches:

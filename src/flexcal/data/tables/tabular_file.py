@@ -31,31 +31,40 @@ _QUOTED = 20
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Rows of a file: numbers as float64 arrays (N,), texts as arrays (N,) of `str`, by column."""
+    """Rows of a file: numbers as float64 arrays (N,), texts as arrays (N,) of `str`, by column.
+
+    `first` is the number of the first row in the file; `number` (N,) are those of all rows, where some are left out.
+    """
 
     file: TableFile
     first: int
     columns: Mapping[str, np.ndarray]
+    number: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
 
+    def number_of(self, row: int) -> int:
+        """Number in the file of a row of this table."""
+        return int(self.first + row if self.number is None else self.number[row])
+
     def error(self, code: str, row: int, column: str | None, sentence: str) -> InputError:
         """An `InputError` that places `sentence` at a row (index in this table) and a column."""
-        place = f"{self.file.path} {self.file.row_word} {self.first + row}"
+        place = f"{self.file.path} {self.file.row_word} {self.number_of(row)}"
         return InputError(code, f"{place}{f', column {column}' if column else ''}: {sentence}")
 
 
 @dataclass(frozen=True)
 class TableFile:
     """Table whose header is read. `first` is the number of its first row: a line in CSV, else counted from 1; columns that are `unread` may
-    hold anything.
+    hold anything, and rows that are `skipped`, counted from 0, are checked and not returned by `read`.
     """
 
     path: Path
     columns: tuple[str, ...]
     first: int
     unread: tuple[str, ...] = ()
+    skipped: tuple[int, ...] = ()
 
     @property
     def row_word(self) -> str:
@@ -64,6 +73,27 @@ class TableFile:
     def leaving_out(self, columns: Collection[str]) -> TableFile:
         """The same table without reading these columns."""
         return replace(self, unread=tuple(columns))
+
+    def skipping(self, rows: Collection[int]) -> TableFile:
+        """The same table without these rows, counted from 0."""
+        return replace(self, skipped=tuple(rows))
+
+    def texts(self, column: str) -> list[str]:
+        """All cells of one column as text; empty where there is nothing. Raises `InputError` where a line cannot be read."""
+        if self.path.suffix == ".csv":
+            with _open(self.path) as stream:
+                lines = stream.read().rstrip().split(b"\n")[self.first - 1 :]
+            place = self.columns.index(column)
+            rows = [
+                _row(self.path, number, _decoded(self.path, raw, number).strip("\r"))
+                for number, raw in enumerate(lines, start=self.first)
+                if raw.strip()
+            ]
+            return [row[place] if place < len(row) else "" for row in rows]
+        import polars as pl
+
+        series = pl.read_parquet(current_path(self.path), columns=[column])[column]
+        return [str(value).strip() if value is not None else "" for value in series.cast(pl.String).to_list()]
 
     def text_columns(self) -> tuple[str, ...]:
         """Columns whose first cell that is not empty, in the first rows, is no number."""
@@ -95,7 +125,12 @@ class TableFile:
         blocks = list(self.blocks(texts, None))
         if not blocks:
             raise self.error("E-TABLE-019", "the file has a header but no rows; add some.")
-        return blocks[0]
+        (table,) = blocks
+        if not self.skipped:
+            return table
+        kept = np.delete(np.arange(len(table)), self.skipped)
+        columns = {name: values[kept] for name, values in table.columns.items()}
+        return Table(self, table.first, columns, table.first + kept)
 
     def blocks(self, texts: Collection[str] = (), rows: int | None = 1_000_000) -> Iterator[Table]:
         """The rows in blocks of about this many (None: all at once), in order; raises `InputError` as `read` does."""

@@ -186,7 +186,7 @@ class Certificate(Result):
     @property
     def remarks(self) -> tuple[str, ...]:
         """One sentence each."""
-        remarks = list(self.uncalibrated)
+        remarks = [*dict.fromkeys([*self.before.poses.notes, *self.after.poses.notes]), *self.uncalibrated]
         if self.unmatched_targets:
             remarks.append(
                 f"targets that were measured only before or only after are not compared: {self.unmatched_targets}"

@@ -106,7 +106,7 @@ class Repeatability(PlottedResult):
     def remarks(self) -> tuple[str, ...]:
         """Remarks, one sentence each."""
         timed = self.poses.time is not None
-        remarks = list(ignored_columns_remarks(replace(self.poses, time=None)))
+        remarks = [*self.poses.notes, *ignored_columns_remarks(replace(self.poses, time=None))]
         if timed and not self.drifts:
             remarks.append(
                 f"drift is evaluated at poses with {2 * VISITS_PER_SET} visits or more, with times that increase from row to row "

@@ -156,6 +156,7 @@ class Verification(ReportedResult):
         """Remarks, one sentence each."""
         remarks = [
             *verification_subsample_remark(self.sample, self.everywhere),
+            *self.poses.notes,
             *ignored_columns_remarks(self.poses),
             *([self.outside] if self.outside else []),
             *refit_remarks(self.predicted, self.poses, self.refit, self.better),

@@ -1,0 +1,21 @@
+from .followed_file import FollowedFile
+from .judgement import Finding, Judgement, JudgementCode
+from .measured_rows import MeasuredRow, MeasuredRows
+from .outlook import Outlook
+from .pose_choice import PoseChoice
+from .row_cells import RowReader, cells_of
+from .session import GuidedSession
+
+__all__ = [
+    "Finding",
+    "FollowedFile",
+    "GuidedSession",
+    "Judgement",
+    "JudgementCode",
+    "MeasuredRow",
+    "MeasuredRows",
+    "Outlook",
+    "PoseChoice",
+    "RowReader",
+    "cells_of",
+]

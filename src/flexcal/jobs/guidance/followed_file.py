@@ -1,0 +1,71 @@
+"""A table to which another program appends while it measures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from flexcal.errors import InputError, unreadable
+from flexcal.jobs.guidance.measured_rows import split_line
+from flexcal.jobs.guidance.row_cells import RowReader
+from flexcal.model.robot import RobotModel
+
+
+class FollowedFile:
+    """Reads the rows that were appended to a CSV file since the last time, complete lines only.
+
+    Parameters
+    ----------
+    path : Path
+        The file, which need not be there yet.
+    model : RobotModel
+        Robot whose joints the columns name.
+    """
+
+    def __init__(self, path: Path, model: RobotModel) -> None:
+        self.path, self.model = path, model
+        self._start, self._columns = 0, tuple[str, ...]()
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Columns of the header; none before it is complete."""
+        return self._columns
+
+    def new_rows(self) -> list[dict[str, str]]:
+        """Rows, texts by column, of the lines that are complete now and were not before; none where there is no file.
+
+        Raises `InputError` for a header that names other columns, a line with more or fewer values, and a file that has become shorter.
+        """
+        try:
+            with self.path.open("rb") as stream:
+                size = stream.seek(0, 2)
+                if size < self._start:
+                    self._start, self._columns = 0, ()
+                    raise InputError(
+                        "E-STUDIO-030",
+                        f"{self.path} has become shorter: another program wrote it anew; the rows that it has now are read from its start.",
+                    )
+                stream.seek(self._start)
+                content = stream.read()
+        except FileNotFoundError:
+            return []
+        except OSError as problem:
+            raise unreadable(self.path, problem) from problem
+        rows: list[dict[str, str]] = []
+        for raw in content[: content.rfind(b"\n") + 1].splitlines(keepends=True):
+            line = raw.decode("utf-8", "replace").lstrip("\ufeff").strip()
+            cells = [] if not line or line.startswith("#") else split_line(line)
+            if cells and not self._columns:
+                RowReader(self.path, tuple(cells), self.model)
+                self._columns = tuple(cells)
+            elif cells and len(cells) == len(self._columns):
+                rows.append(dict(zip(self._columns, cells, strict=True)))
+            elif cells and rows:
+                return rows  # what is wrong with this line is said at the next call
+            self._start += len(raw)
+            if cells and len(cells) != len(self._columns):
+                raise InputError(
+                    "E-STUDIO-031",
+                    f"{self.path}: the line '{line[:60]}' has {len(cells)} values, but the header names {len(self._columns)} columns; it "
+                    "is left out.",
+                )
+        return rows

@@ -1,0 +1,201 @@
+"""Measured rows of a project, its poses.csv, with a journal from which every change can be undone."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from flexcal.errors import InputError, unreadable
+from flexcal.files.transaction import atomic_paths, current_path
+from flexcal.jobs.guidance.row_cells import EXCLUDED
+
+ROWS, HISTORY = "poses.csv", "poses.history.jsonl"
+
+
+@dataclass(frozen=True)
+class MeasuredRow:
+    """Row of the table: its `cells` by column, and the reason for which it is `excluded` (empty: it is used)."""
+
+    cells: Mapping[str, str]
+    excluded: str = ""
+
+
+@dataclass(frozen=True)
+class MeasuredRows:
+    """The file poses.csv of a project and its journal poses.history.jsonl in a `folder`.
+
+    Both are written together, all or nothing: when the process is killed, one change at most is lost. The texts of cells are kept as they
+    are. A row that an undo takes out of poses.csv stays in the journal.
+    """
+
+    folder: Path
+
+    @property
+    def path(self) -> Path:
+        """The table."""
+        return self.folder / ROWS
+
+    @property
+    def history(self) -> Path:
+        """The journal, one JSON object a line."""
+        return self.folder / HISTORY
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Columns of the table, without `excluded`; none where there is no file yet."""
+        return tuple(name for name in self._table().columns if name != EXCLUDED)
+
+    def rows(self) -> tuple[MeasuredRow, ...]:
+        """Rows in the order of measuring, excluded ones too; none where there is no file yet. Raises `InputError` for a broken line."""
+        return self._table().rows
+
+    def append(self, rows: Sequence[Mapping[str, str]]) -> None:
+        """Append rows, texts by column; raises `InputError` where their columns are not those of the table."""
+        table = self._table()
+        columns = table.columns or tuple(dict.fromkeys(name for cells in rows for name in cells))
+        for cells in rows:
+            if odd := {*cells} ^ {*columns} - {EXCLUDED}:
+                raise InputError(
+                    "E-STUDIO-024",
+                    f"the new row and {self.path} do not have the same columns ({', '.join(sorted(odd))} only in one); name all alike.",
+                )
+        added = tuple(MeasuredRow(dict(cells)) for cells in rows)
+        entry = {"do": "append", "row": len(table.rows), "cells": [dict(cells) for cells in rows]}
+        self._write(_Table(columns, (*table.rows, *added), table.head), entry)
+
+    def exclude(self, row: int, reason: str) -> None:
+        """Exclude a row, counted from 0; raises `InputError` without a reason, and for a row that is not there."""
+        if not reason.strip():
+            raise InputError("E-STUDIO-025", "a row is excluded for a reason that is kept with it; say why.")
+        self._mark(row, " ".join(reason.split()))
+
+    def include(self, row: int) -> None:
+        """Use a row, counted from 0, again; raises `InputError` for one that is not there."""
+        self._mark(row, "")
+
+    def undo(self) -> str | None:
+        """Take back the last change that is not taken back yet, and return it in words; None where there is none.
+
+        Raises `InputError` where another program has changed what it would take back.
+        """
+        done: list[dict[str, Any]] = []
+        for entry in self._entries():
+            if entry["do"] != "undo":
+                done.append(entry)
+            elif done:
+                done.pop()
+        if not done:
+            return None
+        table, last = self._table(), done[-1]
+        row, rows = int(last["row"]), list(table.rows)
+        if last["do"] == "append":
+            count = len(last["cells"])
+            if [dict(one.cells) for one in rows[row : row + count]] != last["cells"]:
+                raise self._changed()
+            del rows[row : row + count]
+            words = f"{count} row{'s' * (count > 1)} taken out"
+        else:
+            if row >= len(rows) or rows[row].excluded != last["reason"]:
+                raise self._changed()
+            rows[row] = MeasuredRow(rows[row].cells, last["before"])
+            words = f"row {row + 1} {'excluded' if last['before'] else 'used'} again"
+        self._write(_Table(table.columns, tuple(rows), table.head), {"do": "undo"})
+        return words
+
+    def _mark(self, row: int, reason: str) -> None:
+        table = self._table()
+        if not 0 <= row < len(table.rows):
+            raise InputError(
+                "E-STUDIO-026", f"{self.path} has {len(table.rows)} rows, and none of number {row + 1}."
+            )
+        rows, before = list(table.rows), table.rows[row].excluded
+        rows[row] = MeasuredRow(rows[row].cells, reason)
+        entry = {"do": "exclude", "row": row, "reason": reason, "before": before}
+        self._write(_Table(table.columns, tuple(rows), table.head), entry)
+
+    def _write(self, table: _Table, entry: Mapping[str, Any]) -> None:
+        journal = "".join(json.dumps(one, ensure_ascii=False) + "\n" for one in [*self._entries(), entry])
+        with atomic_paths(self.path, self.history) as (rows, history):
+            rows.write_bytes(table.text().encode())
+            history.write_bytes(journal.encode())
+
+    def _entries(self) -> list[dict[str, Any]]:
+        text = _text(self.history)
+        try:
+            return [json.loads(line) for line in text.splitlines() if line.strip()]
+        except ValueError as problem:
+            raise InputError(
+                "E-STUDIO-027",
+                f"{self.history} is not the journal of {ROWS} ({problem}); move it away, and go on without undo.",
+            ) from problem
+
+    def _table(self) -> _Table:
+        return _Table.parsed(self.path, _text(self.path))
+
+    def _changed(self) -> InputError:
+        return InputError(
+            "E-STUDIO-028",
+            f"{self.path} was changed by another program since, so the last change cannot be taken back.",
+        )
+
+
+@dataclass(frozen=True)
+class _Table:
+    """Columns and rows of a table, and the lines before its header."""
+
+    columns: tuple[str, ...]
+    rows: tuple[MeasuredRow, ...]
+    head: tuple[str, ...] = ()
+
+    @classmethod
+    def parsed(cls, path: Path, text: str) -> _Table:
+        """Table of a text; raises `InputError` for a line with more or fewer cells than columns."""
+        lines = text.lstrip("\ufeff").splitlines()
+        first = next((k for k, line in enumerate(lines) if line.strip() and not line.startswith("#")), None)
+        if first is None:
+            return cls((), (), tuple(lines))
+        columns, rows = split_line(lines[first]), []
+        for number, line in enumerate(lines[first + 1 :], start=first + 2):
+            if not line.strip():
+                continue
+            cells = split_line(line)
+            if len(cells) != len(columns):
+                raise InputError(
+                    "E-STUDIO-029",
+                    f"{path} line {number}: there are {len(cells)} values, but the header names {len(columns)} columns; correct the line.",
+                )
+            named = dict(zip(columns, cells, strict=True))
+            rows.append(MeasuredRow(named, named.pop(EXCLUDED, "")))
+        return cls(tuple(columns), tuple(rows), tuple(lines[:first]))
+
+    def text(self) -> str:
+        """The table as CSV, with a column `excluded` where a row is."""
+        columns = list(self.columns)
+        if EXCLUDED not in columns and any(row.excluded for row in self.rows):
+            columns.append(EXCLUDED)
+        stream = io.StringIO()
+        stream.writelines(line + "\n" for line in self.head)
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(columns)
+        for row in self.rows:
+            writer.writerow([row.excluded if name == EXCLUDED else row.cells[name] for name in columns])
+        return stream.getvalue()
+
+
+def split_line(line: str) -> list[str]:
+    """Cells of a line of CSV, without the blanks around them."""
+    return [cell.strip() for cell in next(csv.reader([line]), [])]
+
+
+def _text(path: Path) -> str:
+    try:
+        return current_path(path).read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return ""
+    except (OSError, UnicodeDecodeError) as problem:
+        raise unreadable(path, problem) from problem

@@ -1,0 +1,66 @@
+"""Poses among which a guided session chooses the next, and the working poses at which the tool error counts; computed once a session."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.data.poses import DEFAULT_SIGMA, PosePool, PoseSet
+from flexcal.design.poses import random_candidates
+from flexcal.design.scene import CollisionChecker, MeasuringSetup, visible
+from flexcal.jobs.experiments import PoseRequest
+from flexcal.model.robot import RobotModel
+from flexcal.progress import Progress, silent
+
+CANDIDATES = 800
+_WORKING = 200
+
+
+@dataclass(frozen=True, eq=False)
+class PoseChoice:
+    """Candidates `q` (M, n) with their numbers `pose` (M,), and `working` poses (W, n), at which the tool error counts.
+
+    All are within the joint limits and free of collision, and the instrument sees the target at the candidates.
+    """
+
+    q: np.ndarray
+    pose: np.ndarray
+    working: np.ndarray
+    setup: MeasuringSetup
+
+    @classmethod
+    def of(cls, model: RobotModel, request: PoseRequest, progress: Progress = silent) -> PoseChoice:
+        """Candidates of a request, random ones or of its pool; raises `FlexcalError` where too few poses pass the checks."""
+        checker, given = CollisionChecker(model), request.candidates
+        setup = MeasuringSetup.declared(model, request.payload, request.measure)
+        rng = np.random.default_rng([request.seed, 8])
+        place = request.volume(checker)
+        if isinstance(given, PosePool):
+            pool = given.subset(visible(checker, given.q, setup))
+        else:
+            q = random_candidates(checker, given, rng, setup, preload=True, progress=progress)
+            pool = PosePool(q, np.arange(1, len(q) + 1))
+        anywhere = replace(setup, acceptance=None, measure=None)
+        working = random_candidates(checker, _WORKING, rng, anywhere) if place is None else place.q[:_WORKING]
+        return cls(pool.q, pool.pose, working, setup)
+
+    def rows(self, model: RobotModel, q: np.ndarray, like: PoseSet | None) -> PoseSet:
+        """Rows that would be measured at `q` (M, n), with target, station, payload and noise as the last row of those measured."""
+        count = len(q)
+        if like is not None:
+            many = like.subset(np.full(count, len(like) - 1))
+            sigma = np.broadcast_to(np.median(like.sigma, axis=0), (count, 3)).copy()
+            return replace(many, q=q, torque=None, sigma=sigma, pose=np.arange(1, count + 1))
+        payload = self.setup.payload
+        return PoseSet(
+            q=q,
+            position=np.zeros((count, 3)),
+            sigma=np.full((count, 3), DEFAULT_SIGMA),
+            torque=None,
+            payload=None if payload is None else np.full(count, payload),
+            target=np.full(count, model.point(self.setup.point).name),
+            station=np.full(count, self.setup.station or model.stations.names[0]),
+            temperature=None,
+            pose=np.arange(1, count + 1),
+        )

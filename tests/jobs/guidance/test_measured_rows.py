@@ -1,0 +1,169 @@
+"""The project's rows: appended, excluded, included, undone; never half written; and files that another program appends to."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dh_arm import DHArm
+from refusals import refused
+
+from flexcal import RobotModel, read_poses
+from flexcal.jobs.guidance import FollowedFile, MeasuredRows, RowReader, cells_of
+
+
+@pytest.fixture(scope="module")
+def cells() -> list[dict[str, str]]:
+    arm = DHArm.drawn(0)
+    q = arm.poses(8)
+    return [
+        {"pose": str(k + 1)}
+        | {f"q{i + 1}": repr(float(v)) for i, v in enumerate(one)}
+        | dict(zip("xyz", map(repr, point.tolist()), strict=True))
+        for k, (one, point) in enumerate(zip(q, arm.measured(q), strict=True))
+    ]
+
+
+def test_rows_come_back_and_are_read_by_the_verbs(
+    tmp_path: Path, cells: list[dict[str, str]], ur5: RobotModel
+):
+    rows = MeasuredRows(tmp_path)
+    assert rows.rows() == () and rows.undo() is None
+    for one in cells:
+        rows.append([one])
+    rows.exclude(2, "tripod, bumped\n by the door")
+    assert [row.cells for row in rows.rows()] == cells
+    poses = read_poses(rows.path, ur5)
+    assert poses.pose.tolist() == [1, 2, 4, 5, 6, 7, 8]
+    assert poses.notes == ("poses.csv: 1 row is excluded: pose 3 'tripod, bumped by the door'",)
+    own = RowReader(rows.path, rows.columns, ur5).poses(
+        [row.cells for row in rows.rows() if not row.excluded]
+    )
+    assert np.array_equal(own.q, poses.q) and np.array_equal(own.position, poses.position)
+    assert cells_of(own)[0].items() >= cells[0].items()
+
+
+def test_undo_takes_back_one_change_at_a_time(tmp_path: Path, cells: list[dict[str, str]]):
+    rows = MeasuredRows(tmp_path)
+    states = [rows.rows()]
+    for change in (
+        lambda: rows.append(cells[:2]),
+        lambda: rows.exclude(0, "first reason"),
+        lambda: rows.exclude(0, "another"),
+        lambda: rows.append(cells[2:3]),
+        lambda: rows.include(0),
+    ):
+        change()
+        states.append(rows.rows())
+    for before in reversed(states[:-1]):
+        assert rows.undo() is not None
+        assert rows.rows() == before
+    assert rows.undo() is None
+    # what was taken out is in the journal still
+    assert cells[2]["x"] in rows.history.read_text()
+    rows.append(cells[:1])
+    assert rows.undo() == "1 row taken out"
+
+
+def test_changes_of_another_program_are_not_taken_back(tmp_path: Path, cells: list[dict[str, str]]):
+    rows = MeasuredRows(tmp_path)
+    rows.append(cells[:2])
+    text = rows.path.read_text()
+    rows.path.write_text(text.replace(cells[1]["x"], "0.123"))
+    with refused("E-STUDIO-028", str(rows.path)):
+        rows.undo()
+    with refused("E-STUDIO-026"):
+        rows.exclude(2, "there is none")
+    with refused("E-STUDIO-025"):
+        rows.exclude(0, " ")
+    with refused("E-STUDIO-024", "temperature"):
+        rows.append([cells[0] | {"temperature": "20"}])
+
+
+def test_texts_and_comments_of_a_file_that_is_there_stay(tmp_path: Path, cells: list[dict[str, str]]):
+    path = tmp_path / "poses.csv"
+    names = list(cells[0])
+    path.write_text(
+        "# measured on Monday\n"
+        + ",".join([*names, "note"])
+        + "\n"
+        + ",".join([*cells[0].values(), '"a, b"'])
+        + "\n"
+    )
+    rows = MeasuredRows(tmp_path)
+    before = path.read_text().splitlines()
+    rows.exclude(0, "why")
+    assert path.read_text().splitlines() == [before[0], before[1] + ",excluded", before[2] + ",why"]
+    rows.include(0)
+    assert path.read_text().splitlines() == [before[0], before[1] + ",excluded", before[2] + ","]
+
+
+def test_a_killed_process_leaves_whole_rows(tmp_path: Path, ur5: RobotModel):
+    """kill -9 while rows are appended as fast as possible: the table and its journal agree, and hold all rows but at most the last."""
+    code = (
+        "import sys\nfrom pathlib import Path\nfrom flexcal.jobs.guidance import MeasuredRows\n"
+        "rows = MeasuredRows(Path(sys.argv[1]))\n"
+        "for k in range(10**6):\n"
+        "    rows.append([{'pose': str(k), **{f'q{i}': '0.1' for i in range(1, 7)}, 'x': '1', 'y': '2', 'z': '3'}])\n"
+        "    print(k, flush=True)\n"
+    )
+    for pause in range(3):
+        folder = tmp_path / str(pause)
+        folder.mkdir()
+        process = subprocess.Popen(
+            [sys.executable, "-c", code, str(folder)], stdout=subprocess.PIPE, text=True
+        )
+        assert process.stdout is not None
+        for _ in range(5 + 7 * pause):
+            said = int(process.stdout.readline())
+        os.kill(process.pid, signal.SIGKILL)
+        rest = [int(line) for line in process.stdout.read().split()]
+        process.wait()
+        said = rest[-1] if rest else said
+        rows = MeasuredRows(folder)
+        rows.append([{"pose": "-1", **{f"q{i}": "0.1" for i in range(1, 7)}, "x": "1", "y": "2", "z": "3"}])
+        numbers = [int(row.cells["pose"]) for row in rows.rows()]
+        assert numbers[-1] == -1 and numbers[:-1] == list(range(len(numbers) - 1))
+        assert len(numbers) - 1 in (said + 1, said + 2)
+        for _ in range(3):
+            assert rows.undo() == "1 row taken out"
+
+
+def test_a_followed_file_gives_complete_lines_only(
+    tmp_path: Path, cells: list[dict[str, str]], ur5: RobotModel
+):
+    path = tmp_path / "tracker.csv"
+    followed = FollowedFile(path, ur5)
+    assert followed.new_rows() == []
+    text = ",".join(cells[0]) + "\r\n" + "".join(",".join(one.values()) + "\r\n" for one in cells)
+    got: list[dict[str, str]] = []
+    for end in range(0, len(text) + 1, 37):
+        path.write_bytes(text[:end].encode())
+        got += followed.new_rows()
+        assert got == cells[: len(got)]
+    path.write_bytes(text.encode())
+    assert got + followed.new_rows() == cells
+    with path.open("ab") as stream:
+        stream.write(b"9,0.1,0.2\n" + ",".join(cells[0].values()).encode() + b"\n")
+    with refused("E-STUDIO-031", "9,0.1,0.2"):
+        followed.new_rows()
+    assert followed.new_rows() == cells[:1]
+    path.write_bytes(text[:200].encode())
+    with refused("E-STUDIO-030"):
+        followed.new_rows()
+
+
+@pytest.mark.parametrize(
+    "header", ["Point;X [mm];Y [mm];Z [mm]", "J1,J2,J3,J4,J5,J6,X,Y,Z", "pose;q1;q2;q3;q4;q5;q6;x;y;z"]
+)
+def test_a_followed_file_of_other_columns_names_import(tmp_path: Path, header: str, ur5: RobotModel):
+    path = tmp_path / "other.csv"
+    path.write_text(header + "\n")
+    for _ in range(2):
+        with refused("E-STUDIO-022", "flexcal import"):
+            FollowedFile(path, ur5).new_rows()
