@@ -7,7 +7,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from dh_arm import FAULTS, DHArm, series
+from measured_dh_arm import FAULTS, DHArm, series
 from refusals import refused
 
 from flexcal import PosePlan, RobotModel

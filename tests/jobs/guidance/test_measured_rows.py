@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dh_arm import DHArm
+from measured_dh_arm import DHArm
 from refusals import refused
 
 from flexcal import RobotModel, read_poses

@@ -67,8 +67,9 @@ FAULTS = ("clean", "joints", "swapped", "sign", "unit", "moved", "turned", "outl
 def series(fault: str, seed: int, count: int = 40) -> tuple[np.ndarray, np.ndarray, int]:
     """Joint angles (N, 6) and measured points (N, 3) of a series with one fault, and the row from which it can show.
 
-    "moved": the tracker by 0.5 mm before row 15; "turned": by 1 mrad about the points' middle; "outlier": one row by 1 mm; "drift": 10
-    µm a row; "joints": one row with the joint angles of the row before; "swapped": x and y, "sign": of y, "unit": a row in mm. Noise 0.05 mm.
+    "moved": the tracker by 0.5 mm before row 15; "turned": by 1 mrad about the points' middle; "outlier": one row by 1 mm; "drift": 10 µm
+    a row; "joints": one row with the joint angles of the row before; "swapped": x and y, "sign": of y, "unit": a row in mm.
+    The noise is 0.05 mm.
     """
     arm = DHArm.drawn(seed)
     q = arm.poses(count)
