@@ -88,7 +88,8 @@ class Window:
         self.selection.listen(self._selected)
         self._open: Step | None = None
         first = self.choices.get("step", titles[0])
-        self.go_to(first if first in titles else titles[0])
+        self._going: str | None = None
+        self._open_step(first if first in titles else titles[0])
 
     def run(self) -> None:
         """Carry out what clicks ask for, and watch the folder and the command that runs, until `stop`."""
@@ -111,7 +112,8 @@ class Window:
 
     def _carry_out(self, action: Callable[[], None]) -> None:
         try:
-            action()
+            with self._place:  # what it adds belongs to the step
+                action()
         except FlexcalError as problem:
             self.say(f"{problem} [{problem.code}]", "bad")
         except OSError as problem:
@@ -119,6 +121,9 @@ class Window:
         except Exception as problem:
             traceback.print_exc(file=sys.stderr)
             self.say(f"{type(problem).__name__}: {_PROGRAM_ERROR}.", "bad")
+        if self._going is not None:
+            title, self._going = self._going, None
+            self._open_step(title)
 
     def say(self, text: str, tone: Tone = "plain") -> None:
         """Show a sentence above the step; an empty one removes it."""
@@ -126,9 +131,11 @@ class Window:
         self._message.visible = bool(text)
 
     def go_to(self, title: str) -> None:
-        """Open a step in place of the one that is open; another title does nothing."""
-        if title not in [step.title for step in self._steps]:
-            return
+        """Open a step in place of the one that is open, when the present action has ended; another title does nothing."""
+        if title in [step.title for step in self._steps]:
+            self._going = title
+
+    def _open_step(self, title: str) -> None:
         if self._open is not None:
             self._open.close()
         self._place.remove()
@@ -139,9 +146,8 @@ class Window:
         self.choices.put("step", title)
         self._heading.content = step_links([step.title for step in self._steps], title, self.project.name)
         self._place = self.gui.add_folder(None, order=self._message.order + 0.5)
-        with self._place:
-            self._open.open()
-        self._open.refresh()
+        self._carry_out(self._open.open)
+        self._carry_out(self._open.refresh)
 
     def button(
         self, label: str, action: Callable[[], None], *, hint: str = "", main: bool = False
