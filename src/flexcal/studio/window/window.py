@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 _PERIOD = 0.2
 """Seconds between looks at the folder and the command that runs."""
 _WIDTH = 400
+_DESCRIBING = (".yaml", ".yml", ".urdf", ".xacro")
+"""Endings of the files that describe a robot."""
 _PROGRAM_ERROR = "an error of the program, not of your files; the terminal has the details"
 
 
@@ -178,6 +180,8 @@ class Window:
         from flexcal.model.robot import RobotModel
 
         stamp = self.project.stamp()
+        if not estimates:  # measured rows do not change it
+            stamp = tuple(entry for entry in stamp if entry[0].endswith(_DESCRIBING))
         kept = self._models.get(estimates)
         if kept is None or kept[0] != stamp:
             kept = (stamp, RobotModel.from_yaml(self.project.robot_file, estimates=estimates))

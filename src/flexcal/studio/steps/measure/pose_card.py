@@ -1,0 +1,44 @@
+"""The next pose, readable from the robot."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexcal.studio.window import paragraph
+from flexcal.units import DEGREE, MILLIMETRE
+
+if TYPE_CHECKING:
+    from flexcal.model.robot import RobotModel
+    from flexcal.studio.steps.measure.next_pose import NextPose
+
+
+def pose_card(model: RobotModel, pose: NextPose, place: str) -> str:
+    """HTML of a pose: its number and `place` in the series, and the joint positions as typed at a pendant, in degrees and rad.
+
+    Joint positions are those of the URDF; of prismatic joints mm and m.
+    """
+    cells = "".join(
+        _joint(joint.name, joint.kind == "prismatic", float(value))
+        for joint, value in zip(model.motor_joints, pose.q, strict=True)
+    )
+    payload = "" if pose.payload is None else paragraph(f"payload {pose.payload:g} kg")
+    return (
+        f'<div style="margin:0.2em 0.5em;font-size:1.15em;font-weight:700;">Next: pose {pose.number}'
+        f'<span style="font-weight:400;font-size:0.75em;opacity:0.8;"> · {escape(place)}</span></div>'
+        '<div role="group" aria-label="joint positions of the next pose" style="display:grid;grid-template-columns:1fr 1fr;'
+        f'gap:0.1em 0.6em;margin:0 0.5em 0.3em;">{cells}</div>{payload}'
+    )
+
+
+def _joint(name: str, slides: bool, value: float) -> str:
+    large, unit = (f"{value / MILLIMETRE:.3f}", "mm") if slides else (f"{value / DEGREE:.3f}", "°")
+    large = large.replace("-", "\N{MINUS SIGN}") if np.isfinite(value) else "?"
+    small = f"{value:.6f} {'m' if slides else 'rad'}"
+    return (
+        f'<div style="line-height:1.15;"><div style="font-size:0.7em;opacity:0.8;">{escape(name)} · {small}</div>'
+        f'<div style="font-size:1.65em;font-weight:600;font-variant-numeric:tabular-nums;white-space:nowrap;">{large}'
+        f'<span style="font-size:0.6em;font-weight:400;"> {unit}</span></div></div>'
+    )

@@ -1,0 +1,63 @@
+"""A point typed as the tracker shows it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from flexcal.errors import InputError
+from flexcal.studio.steps.measure.sources.row_source import Measuring, RowSource
+from flexcal.units import MILLIMETRE
+
+
+class TypedSource(RowSource):
+    """The point of the next pose, typed in mm."""
+
+    title = "typed"
+
+    def __init__(self, measuring: Measuring):
+        super().__init__(measuring)
+        self._taken: tuple[float, ...] | None = None
+
+    def add(self) -> None:
+        """Add a field a coordinate, and the button that takes them."""
+        gui = self.window.gui
+        self._fields = [gui.add_number(f"{axis} / mm", 0.0, step=0.0001) for axis in "xyz"]
+        self.window.button("Take this point (N)", self.measure_next, main=True)
+
+    def measure_next(self) -> None:
+        """Take the point; raises `InputError` where it was not typed, and where no pose is next."""
+        from flexcal.data.poses import DEFAULT_SIGMA, PoseSet
+        from flexcal.jobs.guidance import cells_of
+
+        series, pose = self.measuring.series, self.measuring.following
+        values = tuple(float(field.value) for field in self._fields)
+        if pose is None:
+            raise InputError("E-STUDIO-091", "no pose is next, so the point is of none; choose a pose first.")
+        if values == self._taken or not any(values):
+            raise InputError("E-STUDIO-092", f"type x, y and z of pose {pose.number} first.")
+        last = None if series.poses is None else series.poses.subset([len(series.poses) - 1])
+        model = series.model
+        poses = PoseSet(
+            q=pose.q[None],
+            position=np.array([values]) * MILLIMETRE,
+            sigma=np.full((1, 3), DEFAULT_SIGMA),
+            torque=None,
+            payload=None if pose.payload is None else np.array([pose.payload]),
+            target=np.array([model.point().name]),
+            station=np.array([model.stations.names[0]]),
+            temperature=None,
+            pose=np.array([pose.number]),
+            sigma_given=False,
+        )
+        if last is not None:
+            poses = replace(
+                poses,
+                target=last.target,
+                station=last.station,
+                sigma=last.sigma,
+                sigma_given=last.sigma_given,
+            )
+        self.measuring.take(cells_of(poses))
+        self._taken = values
