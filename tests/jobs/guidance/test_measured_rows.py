@@ -14,7 +14,7 @@ from measured_dh_arm import DHArm
 from refusals import refused
 
 from flexcal import RobotModel, read_poses
-from flexcal.jobs.guidance import FollowedFile, MeasuredRows, RowReader, cells_of
+from flexcal.jobs.guidance import FollowedFile, MeasuredRows, RowReader, Source, cells_of
 
 
 @pytest.fixture(scope="module")
@@ -167,3 +167,33 @@ def test_a_followed_file_of_other_columns_names_import(tmp_path: Path, header: s
     for _ in range(2):
         with refused("E-STUDIO-022", "flexcal import"):
             FollowedFile(path, ur5).new_rows()
+
+
+def test_a_followed_file_goes_on_where_its_rows_were_taken(
+    tmp_path: Path, cells: list[dict[str, str]], ur5: RobotModel
+):
+    """How far it was read is kept with the rows, whatever becomes of them; a file that was written anew is read from its start."""
+    path = tmp_path / "tracker.csv"
+    lines = [",".join(cells[0]), *(",".join(one.values()) for one in cells)]
+    path.write_text("\n".join(lines[:4]) + "\n" + lines[4][:10])
+    rows = MeasuredRows(tmp_path)
+    followed = FollowedFile(path, ur5)
+    rows.append(followed.new_rows(), Source("tracker.csv", followed.end))
+    rows.undo()
+    assert rows.rows() == () and rows.taken() == {"tracker.csv": len("\n".join(lines[:4])) + 1}
+    path.write_text("\n".join(lines[:6]) + "\n")
+    followed = FollowedFile(path, ur5, rows.taken()["tracker.csv"])
+    assert followed.new_rows() == cells[3:5] and followed.end == path.stat().st_size
+    path.write_text("\n".join(lines[:2]) + "\n")
+    with refused("E-STUDIO-030"):
+        followed.new_rows()
+    assert followed.new_rows() == cells[:1]
+
+
+def test_rows_to_verify_on_have_a_journal_of_their_own(tmp_path: Path, cells: list[dict[str, str]]):
+    first, second = MeasuredRows(tmp_path), MeasuredRows(tmp_path, "others.csv")
+    first.append(cells[:2])
+    second.append(cells[2:3])
+    first.undo()
+    assert [row.cells for row in second.rows()] == cells[2:3] and first.rows() == ()
+    assert second.undo() == "1 row taken out" and second.undo() is None

@@ -1,6 +1,6 @@
 from .followed_file import FollowedFile
 from .judgement import Finding, Judgement, JudgementCode
-from .measured_rows import MeasuredRow, MeasuredRows
+from .measured_rows import MeasuredRow, MeasuredRows, Source
 from .outlook import Outlook
 from .pose_choice import PoseChoice
 from .row_cells import RowReader, cells_of
@@ -17,5 +17,6 @@ __all__ = [
     "Outlook",
     "PoseChoice",
     "RowReader",
+    "Source",
     "cells_of",
 ]

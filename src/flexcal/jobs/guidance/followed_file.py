@@ -19,11 +19,19 @@ class FollowedFile:
         The file, which need not be there yet.
     model : RobotModel
         Robot whose joints the columns name.
+    end : int
+        Bytes that were read before, as `end` was then.
     """
 
-    def __init__(self, path: Path, model: RobotModel) -> None:
+    def __init__(self, path: Path, model: RobotModel, end: int = 0) -> None:
         self.path, self.model = path, model
         self._start, self._columns = 0, tuple[str, ...]()
+        self._skipped = end
+
+    @property
+    def end(self) -> int:
+        """Bytes up to the end of the last line that was read."""
+        return max(self._start, self._skipped)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -38,8 +46,8 @@ class FollowedFile:
         try:
             with self.path.open("rb") as stream:
                 size = stream.seek(0, 2)
-                if size < self._start:
-                    self._start, self._columns = 0, ()
+                if size < self.end:
+                    self._start, self._columns, self._skipped = 0, (), 0
                     raise InputError(
                         "E-STUDIO-030",
                         f"{self.path} has become shorter: another program wrote it anew; the rows that it has now are read from its start.",
@@ -57,12 +65,14 @@ class FollowedFile:
             if cells and not self._columns:
                 RowReader(self.path, tuple(cells), self.model)
                 self._columns = tuple(cells)
+            elif cells and self._start < self._skipped:
+                pass
             elif cells and len(cells) == len(self._columns):
                 rows.append(dict(zip(self._columns, cells, strict=True)))
             elif cells and rows:
                 return rows  # what is wrong with this line is said at the next call
             self._start += len(raw)
-            if cells and len(cells) != len(self._columns):
+            if cells and len(cells) != len(self._columns) and self._start > self._skipped:
                 raise InputError(
                     "E-STUDIO-031",
                     f"{self.path}: the line '{line[:60]}' has {len(cells)} values, but the header names {len(self._columns)} columns; it "

@@ -1,4 +1,4 @@
-"""Measured rows of a project, its poses.csv, with a journal from which every change can be undone."""
+"""Measured rows of a project, a table as poses.csv, with a journal from which every change can be undone."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from flexcal.errors import InputError, unreadable
 from flexcal.files.transaction import atomic_paths, current_path
 from flexcal.jobs.guidance.row_cells import EXCLUDED
 
-ROWS, HISTORY = "poses.csv", "poses.history.jsonl"
+ROWS = "poses.csv"
 
 
 @dataclass(frozen=True)
@@ -26,24 +26,33 @@ class MeasuredRow:
 
 
 @dataclass(frozen=True)
+class Source:
+    """A file from which rows are taken: its `name`, and the bytes up to the `end` of the last line that was."""
+
+    name: str
+    end: int
+
+
+@dataclass(frozen=True)
 class MeasuredRows:
-    """The file poses.csv of a project and its journal poses.history.jsonl in a `folder`.
+    """A table of a project, as poses.csv, and its journal, as poses.history.jsonl, in a `folder`.
 
     Both are written together, all or nothing: when the process is killed, one change at most is lost. The texts of cells are kept as they
-    are. A row that an undo takes out of poses.csv stays in the journal.
+    are. A row that an undo takes out of the table stays in the journal.
     """
 
     folder: Path
+    name: str = ROWS
 
     @property
     def path(self) -> Path:
         """The table."""
-        return self.folder / ROWS
+        return self.folder / self.name
 
     @property
     def history(self) -> Path:
         """The journal, one JSON object a line."""
-        return self.folder / HISTORY
+        return self.path.with_suffix(".history.jsonl")
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -54,8 +63,11 @@ class MeasuredRows:
         """Rows in the order of measuring, excluded ones too; none where there is no file yet. Raises `InputError` for a broken line."""
         return self._table().rows
 
-    def append(self, rows: Sequence[Mapping[str, str]]) -> None:
-        """Append rows, texts by column; raises `InputError` where their columns are not those of the table."""
+    def append(self, rows: Sequence[Mapping[str, str]], source: Source | None = None) -> None:
+        """Append rows, texts by column, and keep how far their `source` is taken with them.
+
+        Raises `InputError` where their columns are not those of the table.
+        """
         table = self._table()
         columns = table.columns or tuple(dict.fromkeys(name for cells in rows for name in cells))
         for cells in rows:
@@ -66,7 +78,13 @@ class MeasuredRows:
                 )
         added = tuple(MeasuredRow(dict(cells)) for cells in rows)
         entry = {"do": "append", "row": len(table.rows), "cells": [dict(cells) for cells in rows]}
+        if source is not None:
+            entry |= {"from": source.name, "end": source.end}
         self._write(_Table(columns, (*table.rows, *added), table.head), entry)
+
+    def taken(self) -> dict[str, int]:
+        """Bytes of every source that are taken, by its name; those of rows that an undo took out too."""
+        return {str(one["from"]): int(one["end"]) for one in self._entries() if "from" in one}
 
     def exclude(self, row: int, reason: str) -> None:
         """Exclude a row, counted from 0; raises `InputError` without a reason, and for a row that is not there."""
@@ -131,7 +149,7 @@ class MeasuredRows:
         except ValueError as problem:
             raise InputError(
                 "E-STUDIO-027",
-                f"{self.history} is not the journal of {ROWS} ({problem}); move it away, and go on without undo.",
+                f"{self.history} is not the journal of {self.name} ({problem}); move it away, and go on without undo.",
             ) from problem
 
     def _table(self) -> _Table:
