@@ -47,8 +47,8 @@ def explain(
 ) -> tuple[Explanation, ...]:
     """Explanations of a whitened `difference` (m,) by forward selection, while what is left is beyond chance.
 
-    `freedom` are the degrees of freedom of the noise. Among candidates that explain about the same, the point on the tool is taken before a
-    joint: a reflector is more often moved than an axis.
+    `freedom` are the degrees of freedom of the noise. Among candidates that explain about the same, the place of a point on the tool comes
+    first, then joint zeros: reflectors and belts slip more often than axes bend.
     """
     chosen: list[Candidate] = []
     chances: list[float] = []
@@ -61,8 +61,8 @@ def explain(
         best = max(range(len(left)), key=lambda k: gains[k][0] - 2 * gains[k][1], default=None)
         if best is None:
             break
-        points = [k for k, c in enumerate(left) if _is_point(c) and gains[k][0] > gains[best][0] - _ALIKE]
-        best = points[0] if points else best
+        alike = [k for k in range(len(left)) if gains[k][0] > gains[best][0] - _ALIKE]
+        best = min(alike, key=lambda k: (_rank(left[k]), -gains[k][0]))
         chance = min(1.0, len(left) * chance_of(*gains[best], freedom))
         if chance > LEVEL:
             break
@@ -129,8 +129,11 @@ def _gain(difference: np.ndarray, chosen: list[Candidate], candidate: Candidate)
     return before[0] - after[0], after[1] - before[1]
 
 
-def _is_point(candidate: Candidate) -> bool:
-    return len(candidate.names) > 1
+def _rank(candidate: Candidate) -> int:
+    """Rank of a candidate among those that explain the same: points on the tool, joint zeros, others."""
+    return (
+        0 if candidate.subject not in candidate.names else 1 if candidate.subject.endswith(".offset") else 2
+    )
 
 
 def candidates_of(

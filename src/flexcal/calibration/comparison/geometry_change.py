@@ -34,8 +34,8 @@ from flexcal.model.robot import GEOMETRY, RobotModel, declared_parameter, unit_i
 _POSES = 200
 _RANK = 1e-7
 """Relative singular value below which parameters move no point."""
-_FLOOR = 5e-7
-"""Root mean square displacement, m, that counts as none: second-order terms of the difference."""
+_FLOOR = 1e-6
+"""Root mean square displacement, m, that counts as none: second-order terms of the difference, and rounding of controllers."""
 _KNOWN_SHARE = 0.5
 """Largest share of the variance by what was known beforehand of a combination that both calibrations determine."""
 _TOLD = 1e-3
@@ -170,7 +170,8 @@ def compare_geometry(
     moved = moved - gauge @ (gauge.T @ moved)
 
     splits = [_split(nominal, estimate, names, pair, same_springs) for estimate in pair]
-    known = difference_of_known(*splits)
+    # the size of the waves is itself estimated from the points, so what is known of them does not cancel
+    known = difference_of_known(*splits, apart=[*_waves(first), *_waves(second)])
     noise = splits[0].noise + splits[1].noise
     spread = jacobian @ np.hstack([_root(noise), known])
     variance = (spread**2).sum(axis=1).reshape(-1, 3).sum(axis=1)

@@ -16,7 +16,7 @@ class SplitCovariance:
     effect on the estimate of one standard deviation of each of `sources`, of which only a prior is known.
 
     A posterior of covariance C with the prior covariance P of its parameters has C P⁻¹ C of the prior, for which the columns C P⁻¹ᐟ² stand,
-    and the remainder of the noise.
+    and the remainder of the noise. A parameter that is held has its column by the estimate's response to it.
     """
 
     names: tuple[str, ...]
@@ -50,37 +50,34 @@ def split_covariance(
         and covariance[k, k] > 0
         and name not in joint[0]
     ]
-    stds = {name: np.sqrt(covariance[k, k]) for k, name in enumerate(names) if name in held}
-    varied = [name for k, name in enumerate(names) if covariance[k, k] > 0]
-    stds |= {name: std for name, std in prior.items() if name in varied}
-    blocks: list[np.ndarray] = [
-        covariance[:, [names.index(name) for name in stds]] / np.array(list(stds.values()))
-    ]
-    sources = list(stds)
+    by_held = covariance[:, [names.index(name) for name in held]]
+    by_held = by_held / np.sqrt([covariance[names.index(name), names.index(name)] for name in held])
+    # held parameters are not updated by the measurements, the others are: given those, their covariance is that of a posterior
+    inside = covariance - by_held @ by_held.T
+    varied = [name for k, name in enumerate(names) if inside[k, k] > 0 and name in prior and name not in held]
+    by_prior = inside[:, [names.index(name) for name in varied]] / np.array([prior[name] for name in varied])
     together = [name for name in joint[0] if name in names and name in every]
-    if together:
-        at = [list(joint[0]).index(name) for name in together]
-        root = np.linalg.cholesky(joint[1][np.ix_(at, at)])
-        blocks.append(np.linalg.solve(root, covariance[[names.index(name) for name in together]]).T)
-        sources += together
-    known = np.concatenate(blocks, axis=1)
-    values, vectors = np.linalg.eigh(
-        _scaled(covariance - known @ known.T, np.sqrt(np.maximum(np.diag(covariance), 1e-300)))
-    )
-    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))[:, None]
-    root = scale * vectors * np.sqrt(np.maximum(values, 0.0))
-    return SplitCovariance(tuple(names), root @ root.T, known, tuple(sources))
+    at = [list(joint[0]).index(name) for name in together]
+    root = np.linalg.cholesky(joint[1][np.ix_(at, at)])
+    by_joint = np.linalg.solve(root, inside[[names.index(name) for name in together]]).T
+    known = np.hstack([by_held, by_prior, by_joint])
+    noise = covariance - known @ known.T
+    size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    values, vectors = np.linalg.eigh(noise / np.outer(size, size))
+    root = size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    return SplitCovariance(tuple(names), root @ root.T, known, (*held, *varied, *together))
 
 
-def difference_of_known(first: SplitCovariance, second: SplitCovariance) -> np.ndarray:
-    """Columns (p, k) of the difference by what is known beforehand: a source that both have counts once, as it moves both."""
-    every = list(dict.fromkeys([*first.sources, *second.sources]))
-    result = np.zeros((len(first.names), len(every)))
-    for sign, side in ((1.0, second), (-1.0, first)):
+def difference_of_known(
+    first: SplitCovariance, second: SplitCovariance, *, apart: Sequence[str] = ()
+) -> np.ndarray:
+    """Columns (p, k) of the difference by what is known beforehand: a source that both have counts once, as it moves both.
+
+    Sources that are kept `apart` count for each.
+    """
+    columns: dict[tuple[str, int], np.ndarray] = {}
+    for number, (sign, side) in enumerate(((-1.0, first), (1.0, second))):
         for column, source in zip(side.known.T, side.sources, strict=True):
-            result[:, every.index(source)] += sign * column
-    return result
-
-
-def _scaled(matrix: np.ndarray, size: np.ndarray) -> np.ndarray:
-    return matrix / np.outer(size, size)
+            place = (source, number if source in apart else 0)
+            columns[place] = columns.get(place, np.zeros(len(column))) + sign * column
+    return np.column_stack([np.zeros((len(first.names), 0)), *columns.values()])
