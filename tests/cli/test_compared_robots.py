@@ -19,7 +19,7 @@ def cell(run, tmp_path: Path):
     rng = np.random.default_rng(3)
 
     def calibrated(name: str, arm: DHArm, centre: float = 0.0) -> Path:
-        q = postures(rng, 45) + [centre, 0, 0, 0, 0, 0]
+        q = postures(rng, 45) + centre * np.eye(6)[0]
         file = write_poses(tmp_path / f"{name}.csv", q, tracked(arm.points(q), rng, 2e-5), 2e-5)
         assert run("calibrate", robot, file, "--out", tmp_path / "runs" / name).status == 0
         return tmp_path / "runs" / name

@@ -94,6 +94,8 @@ class Report(ParticularsOptions):
             f"{difference['high']:+.3f} mm: {real}"
         )
         for block, changes in document["parameters"].items():
+            if block == "calibration" and document["geometry"] is not None:
+                continue  # the robots were compared, whatever the fits dropped
             console.say(
                 f"{block}: {len(changes['changed'])} of {changes['compared']} parameters changed by more than their joint uncertainty"
             )

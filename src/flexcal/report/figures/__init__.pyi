@@ -12,6 +12,7 @@ from .estimated_parameters import (
 from .frequency_plan import amplitude_spectrum, planned_arm, poses_against_std, predicted_springs
 from .frequency_responses import bode, response_fit, response_levels, sensor_fit
 from .learning_curve import learning_curves
+from .moved_tool import tool_displacement
 from .pose_errors import ErrorSeries, calibration_errors, error_components, pose_courses, verification_errors
 from .pose_plan import joint_positions, plan_space, pose_numbers
 from .residuals import (
@@ -72,6 +73,7 @@ __all__ = [
     "term_scores",
     "tilt_joints",
     "tilt_order",
+    "tool_displacement",
     "torque_spectra",
     "torque_traces",
     "variance_shares",

@@ -42,7 +42,7 @@ def comparison_page(comparison: Comparison) -> Page:
     sections = [_errors(comparison)]
     if comparison.change is not None or comparison.no_change_why:
         sections.insert(0, change_section(comparison))
-    if comparison.changes:
+    if comparison.single_changes:
         sections.append(_parameters(comparison))
     sections.append(_provenance(first, second))
     return Page(
@@ -186,7 +186,7 @@ def _parameters(comparison: Comparison) -> Section:
         f"the summed variances in {100 * LEVEL:.0f} of 100 parameters."
     )
     blocks: list[PageBlock] = []
-    for block in comparison.changes:
+    for block in comparison.single_changes:
         blocks += _changes(comparison, block)
     return Section(
         "parameters", "Parameters that changed by more than their uncertainty", words, tuple(blocks)

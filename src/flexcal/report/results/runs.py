@@ -103,6 +103,11 @@ class Comparison:
         }
 
     @property
+    def single_changes(self) -> dict[Block, ParameterChanges]:
+        """Those of `changes` that are compared parameter by parameter: not those of calibrations whose robots are compared."""
+        return {k: v for k, v in self.changes.items() if k != "calibration" or self.change is None}
+
+    @property
     def shared(self) -> tuple[str, ...]:
         """Names of measurements, and of blocks of estimates, that both runs used."""
         known = set(self.second.data.values())

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from flexcal.calibration.comparison import GeometryChange
+from flexcal.report.figures import tool_displacement
 from flexcal.report.layout import Block as PageBlock
-from flexcal.report.layout import Section, Table, Text, millimetres
+from flexcal.report.layout import FigureBlock, Section, Table, Text, millimetres
 from flexcal.report.results import Comparison, amount, chance_in_words, explanation_in_words
 
 _SHOWN = 12
@@ -99,6 +100,13 @@ def _moved(change: GeometryChange) -> list[PageBlock]:
                 f"{millimetres(float((change.std**2).mean() ** 0.5))} mm (root mean square).",
             ),
             "How far the tool moved where",
+        ),
+        FigureBlock(
+            "figure-moved",
+            "Displacement of the tool",
+            tool_displacement(change),
+            "Colour: how far the tool moved. Arrows: where to, exaggerated, the longest the same in every figure.",
+            f"Points in the base frame; the tool moved by {millimetres(moved.p90)} mm (P90) and {millimetres(moved.max)} mm at most.",
         ),
         Table(
             "table-moved",

@@ -1,0 +1,65 @@
+"""Displacement of the tool between two calibrations."""
+
+from __future__ import annotations
+
+import numpy as np
+import plotly.graph_objects as go
+
+from flexcal.calibration.comparison import GeometryChange
+from flexcal.report.figures.accuracy_map import COLOURS, SHOWN
+from flexcal.report.figures.robot_arm import space_axes
+from flexcal.report.layout import RIGID, as_float32, canvas
+from flexcal.units import MILLIMETRE
+
+_ARROW = 0.15
+"""Length of the longest arrow, relative to the extent of the points."""
+
+
+def tool_displacement(change: GeometryChange) -> go.Figure:
+    """Points in the base frame, coloured by how far they moved (mm), with exaggerated arrows that show where to."""
+    rows = slice(None, None, max(1, -(-len(change.q) // SHOWN)))
+    at, moved, size, std = (
+        values[rows] for values in (change.points, change.displacement, change.distance, change.std)
+    )
+    extent = float(np.ptp(at, axis=0).max()) or 1.0
+    tips = at + moved * _ARROW * extent / max(float(size.max()), 1e-12)
+    lines = np.full((len(at), 3, 3), np.nan)
+    lines[:, 0], lines[:, 1] = at, tips
+    ends = lines.reshape(-1, 3)
+    figure = canvas(560, legend=False)
+    figure.add_trace(
+        go.Scatter3d(
+            x=as_float32(ends[:, 0]),
+            y=as_float32(ends[:, 1]),
+            z=as_float32(ends[:, 2]),
+            mode="lines",
+            line={"color": RIGID, "width": 2},
+            hoverinfo="skip",
+        )
+    )
+    told = [f"{m:.3f} ± {s:.3f}" for m, s in zip(size / MILLIMETRE, std / MILLIMETRE, strict=True)]
+    figure.add_trace(
+        go.Scatter3d(
+            x=as_float32(at[:, 0]),
+            y=as_float32(at[:, 1]),
+            z=as_float32(at[:, 2]),
+            mode="markers",
+            marker={
+                "size": 3,
+                "color": as_float32(size / MILLIMETRE),
+                "colorscale": COLOURS,
+                "cmin": 0.0,
+                "colorbar": {
+                    "title": {"text": "moved / mm", "side": "top"},
+                    "thickness": 12,
+                    "len": 0.7,
+                    "x": 1,
+                    "xanchor": "right",
+                },
+            },
+            text=told,
+            hovertemplate="moved by %{text} mm<extra></extra>",
+        )
+    )
+    figure.update_layout(scene=space_axes(), margin={"l": 0, "r": 0, "t": 10, "b": 0})
+    return figure
