@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from flexcal.errors import FlexcalError
 from flexcal.jobs.result_files import RESULTS
 from flexcal.studio.project import CALIBRATION, pose_files
-from flexcal.studio.steps.calibrate.residuals_view import ResidualsView
 from flexcal.studio.steps.calibrate.stages import (
     INERTIALS,
     STIFFNESS,
@@ -18,6 +17,7 @@ from flexcal.studio.steps.calibrate.stages import (
     use_estimates,
     used_estimates,
 )
+from flexcal.studio.steps.residuals import ResidualsView
 from flexcal.studio.window import ReportFigures, Step, Tone, Window, add_sections, add_verdict, paragraph
 
 if TYPE_CHECKING:

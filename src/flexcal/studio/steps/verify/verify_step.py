@@ -2,14 +2,65 @@
 
 from __future__ import annotations
 
-from flexcal.studio.window import Step, paragraph
+from flexcal.studio.project import CALIBRATION
+from flexcal.studio.steps.verify.exports import Exports
+from flexcal.studio.steps.verify.fresh_poses import FreshPoses
+from flexcal.studio.steps.verify.links import step_link
+from flexcal.studio.steps.verify.part import Part
+from flexcal.studio.window import Step, Window, paragraph
+
+_PARTS: tuple[type[Part], ...] = (FreshPoses, Exports)
 
 
 class VerifyStep(Step):
-    """Accuracy at fresh poses, accuracy map, compensation, export."""
+    """What the calibration is worth and is used for: one part at a time, chosen by a button."""
 
     title = "Verify"
 
+    def __init__(self, window: Window):
+        super().__init__(window)
+        self._part: Part | None = None
+
     def open(self) -> None:
-        """Add its elements."""
-        self.window.gui.add_html(paragraph("not built yet"))
+        """Add the choice of the part, and the part that was chosen last."""
+        gui = self.window.gui
+        choice = gui.add_button_group("Show", tuple(part.title for part in _PARTS))
+        choice.on_click(lambda _: self.window.post(lambda: self._go_to(choice.value)))
+        self._missing = gui.add_html("", visible=False)
+        self._place = gui.add_folder(None)
+        self._go_to(self.window.choices.get("part", _PARTS[0].title))
+
+    def refresh(self) -> None:
+        """Show what is missing, or the part as the folder has it."""
+        calibrated = (self.window.project.folder / CALIBRATION / "estimates.yaml").is_file()
+        self._missing.visible = not calibrated
+        self._missing.content = (
+            ""
+            if calibrated
+            else paragraph(
+                f"There is no calibration yet (folder {CALIBRATION}), and hence nothing to verify or to use."
+            )
+            + step_link("Calibrate", "calibrate first")
+        )
+        self._place.visible = calibrated
+        if self._part is not None and calibrated:
+            self._part.refresh()
+
+    def close(self) -> None:
+        """Remove what the part has in the scene."""
+        if self._part is not None:
+            self._part.close()
+            self._part = None
+
+    def _go_to(self, title: str) -> None:
+        self.close()
+        self.window.figures.clear()
+        order = self._place.order
+        self._place.remove()
+        chosen = next((part for part in _PARTS if part.title == title), _PARTS[0])
+        self.window.choices.put("part", chosen.title)
+        self._place = self.window.gui.add_folder(chosen.title, order=order)
+        with self._place:
+            self._part = chosen(self.window)
+            self._part.open()
+        self.refresh()

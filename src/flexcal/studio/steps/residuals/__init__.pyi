@@ -1,0 +1,3 @@
+from .residuals_view import ResidualsView
+
+__all__ = ["ResidualsView"]

@@ -1,0 +1,134 @@
+"""The calibrated robot for other programs, and the report for a customer."""
+
+from __future__ import annotations
+
+import shlex
+
+from flexcal.errors import FlexcalError
+from flexcal.jobs.result_files import RESULTS
+from flexcal.studio.commands import CommandRun
+from flexcal.studio.project import CALIBRATION, VERIFICATION
+from flexcal.studio.steps.verify.export_formats import ExportFormat, export_formats
+from flexcal.studio.steps.verify.links import file_link
+from flexcal.studio.steps.verify.part import Part
+from flexcal.studio.window import Window, command_text, paragraph
+
+_CUSTOMER = "customer.html"
+_PARTICULARS = {
+    "--instrument": "Instrument",
+    "--instrument-serial": "Its serial number",
+    "--robot-serial": "Robot's serial number",
+    "--operator": "Measured by",
+    "--date": "Date",
+}
+
+
+class Exports(Part):
+    """A format and its command line; the customer's report and its particulars; what they wrote, as links."""
+
+    title = "Export"
+
+    def __init__(self, window: Window):
+        super().__init__(window)
+        self._formats: list[ExportFormat] = []
+        self._shown: object = None
+
+    def open(self) -> None:
+        """Add the place of formats and report."""
+        self._place = self.window.gui.add_folder(None)
+
+    def refresh(self) -> None:
+        """Show formats and links anew where files have changed."""
+        stamp = self.window.project.stamp()
+        if stamp == self._shown:
+            return
+        self._shown = stamp
+        order = self._place.order
+        self._place.remove()
+        self._place = self.window.gui.add_folder(None, order=order)
+        with self._place:
+            try:
+                self._formats = export_formats(self.window.project)
+            except FlexcalError as problem:
+                self.window.gui.add_html(paragraph(str(problem), "bad"))
+                return
+            self._add_formats()
+            with self.window.gui.add_folder("Report for the customer"):
+                self._add_report()
+
+    def close(self) -> None:
+        """Nothing of it is in the scene."""
+
+    def _add_formats(self) -> None:
+        window, gui = self.window, self.window.gui
+        offered = {each.name: each for each in self._formats if not each.refusal}
+        chosen = window.choices.get("format", "urdf")
+        choice = gui.add_dropdown(
+            "Format", tuple(offered), initial_value=chosen if chosen in offered else next(iter(offered))
+        )
+        told = gui.add_html("")
+        window.button(
+            "Export", lambda: window.command(offered[choice.value].arguments, self._tell_loss), main=True
+        )
+        gui.add_html(self._links())
+        for each in self._formats:
+            if each.refusal:
+                gui.add_html(paragraph(f"not offered: {each.name}: {each.refusal}", "faint"))
+
+        def show() -> None:
+            format = offered[choice.value]
+            window.choices.put("format", format.name)
+            told.content = paragraph(format.summary) + _line(format.arguments)
+
+        choice.on_update(lambda _: window.post(show))
+        show()
+
+    def _tell_loss(self, run: CommandRun) -> None:
+        """What the file does not carry, as the command's document says."""
+        error = run.document.get("tool_error")
+        if error:
+            self.window.say(
+                f"With this file the tool is {error['mean_mm']:.3f} mm off on average and {error['max_mm']:.3f} mm at most, because the "
+                f"format cannot carry {', '.join(term['term'] for term in run.document.get('lost', []))}.",
+                "warning" if error["max_mm"] >= 0.01 else "plain",
+            )
+
+    def _links(self) -> str:
+        folder = self.window.project.folder
+        names = [name for each in self._formats for name in each.written(folder)]
+        return "".join(file_link(name, f"open {name}") for name in names)
+
+    def _add_report(self) -> None:
+        window, gui = self.window, self.window.gui
+        folder = VERIFICATION if (window.project.folder / VERIFICATION / RESULTS).is_file() else CALIBRATION
+        gui.add_html(
+            paragraph(
+                f"Two sheets of A4 from the folder {folder}: errors before and after, and their uncertainty. What is left empty is a line "
+                "to fill in by hand."
+            )
+        )
+        fields = {
+            option: gui.add_text(label, window.choices.get(option, ""))
+            for option, label in _PARTICULARS.items()
+        }
+        line = gui.add_html("")
+
+        def arguments() -> tuple[str, ...]:
+            given = [(option, field.value.strip()) for option, field in fields.items()]
+            return ("report", folder, "--customer", *(word for pair in given if pair[1] for word in pair))
+
+        def show() -> None:
+            for option, field in fields.items():
+                window.choices.put(option, field.value)
+            line.content = _line(arguments())
+
+        for field in fields.values():
+            field.on_update(lambda _: window.post(show))
+        window.button("Write the customer's report", lambda: window.command(arguments()))
+        show()
+        if (window.project.folder / folder / _CUSTOMER).is_file():
+            gui.add_html(file_link(f"{folder}/{_CUSTOMER}", f"open {folder}/{_CUSTOMER}"))
+
+
+def _line(arguments: tuple[str, ...]) -> str:
+    return command_text("$ flexcal " + shlex.join(arguments))
