@@ -61,7 +61,7 @@ def test_map_of_a_box_and_its_table(run, ur5: Path) -> None:
     done = run("map", ur5 / "robot.yaml", *arguments, "--verification", ur5 / "random.csv", "--json")
     assert done.status == 0 and "next: flexcal compensate" in done.err
     document, table = done.document, pl.read_csv(out)
-    assert table.columns == ["x", "y", "z", *Q, "mean_mm", "p95_mm"] and len(table) == 600
+    assert table.columns == ["x", "y", "z", *Q, "mean_mm", "p95_mm", "uncalibrated_mm"] and len(table) == 600
     model = RobotModel.from_yaml(ur5 / "robot.yaml")
     at = point_kinematics(model, table.select(Q).to_numpy(), jacobians=False).position
     np.testing.assert_allclose(table.select("x", "y", "z").to_numpy(), at, atol=1e-12)

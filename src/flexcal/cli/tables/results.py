@@ -74,14 +74,15 @@ def uncalibrated_rows(document: Mapping[str, Any], *, held: bool = False) -> dic
 
 
 def map_table(document: Mapping[str, Any]) -> Table:
-    """Predicted mean and 95 % of the tool's error: median, P90 and maximum over the poses, mm."""
+    """Error of the uncalibrated tool, predicted mean and 95 % of the calibrated one: median, P90 and maximum over the poses, mm."""
     table = Table(title="predicted error of the tool", title_justify="left")
     table.add_column("")
     for heading in ("median mm", "P90 mm", "max mm"):
         table.add_column(heading, justify="right")
-    for label, key in (("mean", "mean"), ("95 % within", "p95")):
-        numbers = document["predicted"][key].values()
-        table.add_row(label, *(_millimetres(value) for value in numbers))
+    for label, key in (("uncalibrated", "uncalibrated"), ("mean", "mean"), ("95 % within", "p95")):
+        numbers = document["predicted"][key]
+        if numbers is not None:
+            table.add_row(label, *(_millimetres(value) for value in numbers.values()))
     return table
 
 

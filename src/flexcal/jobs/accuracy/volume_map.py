@@ -9,7 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration.accuracy import PredictedAccuracy, error_sources, predicted_accuracy, random_poses_in
+from flexcal.calibration.accuracy import (
+    PredictedAccuracy,
+    distance_to_nominal,
+    error_sources,
+    predicted_accuracy,
+    random_poses_in,
+)
 from flexcal.calibration.fit import StratifiedSample
 from flexcal.calibration.measurement import Propagation, propagation
 from flexcal.calibration.verification import (
@@ -63,6 +69,9 @@ class AccuracyMap(PlottedResult):
         Poses of the map, and how parameters act on the tool there.
     predicted : PredictedAccuracy
         Predicted errors: `position` (N, 3), `mean` and `p95` (N,), m.
+    uncalibrated : ndarray or None
+        Distance (N,), m, of the tool of the uncalibrated robot, best-fit registered, from that of the calibrated one; None for fewer than
+        four poses.
     box : ndarray or None
         Working volume, smallest and largest x, y, z (2, 3), m; None for given poses or anywhere.
     worst : ndarray
@@ -91,6 +100,7 @@ class AccuracyMap(PlottedResult):
 
     reach: Propagation
     predicted: PredictedAccuracy
+    uncalibrated: np.ndarray | None
     box: np.ndarray | None
     worst: np.ndarray
     sources: dict[str, float]
@@ -163,7 +173,11 @@ class AccuracyMap(PlottedResult):
             "payload_kg": self.reach.payload,
             "box_m": self.box,
             "before": None if self.before is None else self.before.document(),
-            "predicted": {"mean": _quantiles(predicted.mean), "p95": _quantiles(predicted.p95)},
+            "predicted": {
+                "uncalibrated": None if self.uncalibrated is None else _quantiles(self.uncalibrated),
+                "mean": _quantiles(predicted.mean),
+                "p95": _quantiles(predicted.p95),
+            },
             "sources": self.sources,
             "worst": [
                 {
@@ -280,6 +294,7 @@ def _checked_map(
         model,
         reach,
         predicted,
+        distance_to_nominal(model, robot.with_points, q, reach.target, reach.payload),
         box,
         worst,
         {kind: float(values.mean()) for kind, values in error_sources(reach, some).items()},
@@ -339,7 +354,7 @@ def map_accuracy(
     fitted = fitted_files(robot, verification) or accuracy.fitted
     result = replace(accuracy, fitted=fitted, record=RunRecord(origin, command))
     if out != page_beside(out):
-        _write_table(out, result.predicted)
+        _write_table(out, result)
     result.report(page_beside(out))
     return result
 
@@ -381,10 +396,13 @@ def _worst(predicted: PredictedAccuracy) -> np.ndarray:
     return np.array(chosen)
 
 
-def _write_table(out: Path, predicted: PredictedAccuracy) -> None:
+def _write_table(out: Path, accuracy: AccuracyMap) -> None:
+    predicted = accuracy.predicted
     columns = {name: predicted.position[:, i] for i, name in enumerate("xyz")}
     columns |= {f"q{i + 1}": predicted.q[:, i] for i in range(predicted.q.shape[1])}
     errors = {"mean_mm": predicted.mean / MILLIMETRE, "p95_mm": predicted.p95 / MILLIMETRE}
+    if accuracy.uncalibrated is not None:
+        errors["uncalibrated_mm"] = accuracy.uncalibrated / MILLIMETRE
     write_table(out, columns | errors)
 
 

@@ -108,7 +108,8 @@ def _numbers(study: MapStudy) -> Section:
                 for column in ("median_mm", "p90_mm", "worst_mm")
             ),
         )
-        for label, key in (("mean error", "mean"), ("95 % bound", "p95"))
+        for label, key in (("uncalibrated", "uncalibrated"), ("mean error", "mean"), ("95 % bound", "p95"))
+        if results["predicted"][key] is not None
     )
     places = []
     for item in results["worst"]:
@@ -144,6 +145,7 @@ def _numbers(study: MapStudy) -> Section:
                 "The error is the distance between the position predicted by the calibrated model and that measured by an instrument at "
                 f"the station '{results['station']}' without the instrument's noise. It is propagated from the covariance of "
                 "all estimates; effects that are not modelled, such as wear or warm-up, are not included.",
+                "Of the uncalibrated robot, best-fit registered over these poses, it is the distance to the calibrated model.",
             )
         ),
     ]

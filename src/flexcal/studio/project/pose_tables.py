@@ -47,8 +47,12 @@ def _has_readings(path: Path) -> bool:
     except OSError:
         return False
     columns = {cell.strip().strip('"') for cell in head[0].split(",")} if head else set()
-    return "q1" in columns and any(not _PLANNED.fullmatch(name) for name in columns)
+    return (
+        "q1" in columns and not columns & _COMPUTED and any(not _PLANNED.fullmatch(name) for name in columns)
+    )
 
 
+_COMPUTED = {"p95_mm", "unambiguous"}
+"""Columns of accuracy maps and of commands."""
 _PLANNED = re.compile(r"q\d+|pose|payload|plan|set|name|seed")
 """Columns that a table of planned poses has too."""

@@ -11,14 +11,15 @@ from flexcal.studio.project import CALIBRATION, VERIFICATION
 from flexcal.studio.steps.verify.export_formats import ExportFormat, export_formats
 from flexcal.studio.steps.verify.links import file_link
 from flexcal.studio.steps.verify.part import Part
+from flexcal.studio.steps.verify.place import Place
 from flexcal.studio.window import Window, command_text, paragraph
 
 _CUSTOMER = "customer.html"
 _PARTICULARS = {
     "--instrument": "Instrument",
-    "--instrument-serial": "Its serial number",
-    "--robot-serial": "Robot's serial number",
-    "--operator": "Measured by",
+    "--instrument-serial": "Its serial no.",
+    "--robot-serial": "Robot serial no.",
+    "--operator": "Operator",
     "--date": "Date",
 }
 
@@ -35,7 +36,7 @@ class Exports(Part):
 
     def open(self) -> None:
         """Add the place of formats and report."""
-        self._place = self.window.gui.add_folder(None)
+        self._place = Place(self.window.gui)
 
     def refresh(self) -> None:
         """Show formats and links anew where files have changed."""
@@ -43,10 +44,7 @@ class Exports(Part):
         if stamp == self._shown:
             return
         self._shown = stamp
-        order = self._place.order
-        self._place.remove()
-        self._place = self.window.gui.add_folder(None, order=order)
-        with self._place:
+        with self._place.anew():
             try:
                 self._formats = export_formats(self.window.project)
             except FlexcalError as problem:

@@ -9,6 +9,7 @@ from flexcal.studio.steps.residuals import ResidualsView
 from flexcal.studio.steps.verify.fresh_files import fresh_files
 from flexcal.studio.steps.verify.links import file_link, step_link
 from flexcal.studio.steps.verify.part import Part
+from flexcal.studio.steps.verify.place import Place
 from flexcal.studio.window import ReportFigures, Window, add_sections, add_verdict, paragraph
 
 _NONE = "none"
@@ -26,8 +27,8 @@ class FreshPoses(Part):
 
     def open(self) -> None:
         """Add the choice of the poses, the button, and the place of the result."""
-        self._choice = self.window.gui.add_folder(None)
-        self._result = self.window.gui.add_folder(None)
+        self._choice = Place(self.window.gui)
+        self._result = Place(self.window.gui)
 
     def refresh(self) -> None:
         """Show the result where files have changed; the selected pose."""
@@ -47,11 +48,9 @@ class FreshPoses(Part):
             self._residuals = None
 
     def _show_choice(self) -> None:
-        window, order = self.window, self._choice.order
+        window = self.window
         names = fresh_files(window.project)
-        self._choice.remove()
-        self._choice = window.gui.add_folder(None, order=order)
-        with self._choice:
+        with self._choice.anew():
             if not names:
                 window.gui.add_html(
                     paragraph(
@@ -81,15 +80,12 @@ class FreshPoses(Part):
     def _show_result(self) -> None:
         from flexcal.jobs.pages import folder_page
 
-        window, order = self.window, self._result.order
-        folder = window.project.folder / VERIFICATION
+        window, folder = self.window, self.window.project.folder / VERIFICATION
         self.close()
         window.figures.clear()
-        self._result.remove()
-        self._result = window.gui.add_folder(None, order=order)
-        if not (folder / RESULTS).is_file():
-            return
-        with self._result:
+        with self._result.anew():
+            if not (folder / RESULTS).is_file():
+                return
             try:
                 page = folder_page(folder)
             except FlexcalError as problem:

@@ -1,4 +1,4 @@
-"""Links to files of the project and to other steps."""
+"""Headings, and links to files of the project and to other steps."""
 
 from __future__ import annotations
 
@@ -6,6 +6,11 @@ from html import escape
 from urllib.parse import quote
 
 _STYLE = "margin:0 0.5em 0.4em;font-size:0.85em;"
+
+
+def heading(text: str) -> str:
+    """The title of a part."""
+    return f'<h2 style="margin:0.3em 0.5em 0.2em;font-size:1em;font-weight:600;">{escape(text)}</h2>'
 
 
 def file_link(name: str, text: str) -> str:

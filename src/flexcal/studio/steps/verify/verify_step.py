@@ -5,8 +5,9 @@ from __future__ import annotations
 from flexcal.studio.project import CALIBRATION
 from flexcal.studio.steps.verify.exports import Exports
 from flexcal.studio.steps.verify.fresh_poses import FreshPoses
-from flexcal.studio.steps.verify.links import step_link
+from flexcal.studio.steps.verify.links import heading, step_link
 from flexcal.studio.steps.verify.part import Part
+from flexcal.studio.steps.verify.place import Place
 from flexcal.studio.window import Step, Window, paragraph
 
 _PARTS: tuple[type[Part], ...] = (FreshPoses, Exports)
@@ -27,7 +28,7 @@ class VerifyStep(Step):
         choice = gui.add_button_group("Show", tuple(part.title for part in _PARTS))
         choice.on_click(lambda _: self.window.post(lambda: self._go_to(choice.value)))
         self._missing = gui.add_html("", visible=False)
-        self._place = gui.add_folder(None)
+        self._place = Place(gui)
         self._go_to(self.window.choices.get("part", _PARTS[0].title))
 
     def refresh(self) -> None:
@@ -55,12 +56,10 @@ class VerifyStep(Step):
     def _go_to(self, title: str) -> None:
         self.close()
         self.window.figures.clear()
-        order = self._place.order
-        self._place.remove()
         chosen = next((part for part in _PARTS if part.title == title), _PARTS[0])
         self.window.choices.put("part", chosen.title)
-        self._place = self.window.gui.add_folder(chosen.title, order=order)
-        with self._place:
+        with self._place.anew():
+            self.window.gui.add_html(heading(chosen.title))
             self._part = chosen(self.window)
             self._part.open()
         self.refresh()
