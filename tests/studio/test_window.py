@@ -15,7 +15,7 @@ def test_window_opens_and_talks_to_this_server_alone(page: Any, studio_url: str)
     page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
     response = page.goto(studio_url)
     assert response.status == 200 and "default-src 'none'" in response.headers["content-security-policy"]
-    page.get_by_text("Robot").first.wait_for(timeout=15_000)
+    page.get_by_text("flexcal studio").first.wait_for(timeout=15_000)
     page.locator("canvas").first.wait_for(timeout=15_000)
     page.wait_for_function(
         "[...document.querySelectorAll('canvas')].some(c => c.width > 300 && c.getContext('webgl2'))",
