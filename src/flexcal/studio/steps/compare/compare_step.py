@@ -1,15 +1,152 @@
-"""Comparison of two calibrations."""
+"""Comparison of two calibrations of one robot: what changed beyond chance, and how far the tool moved where."""
 
 from __future__ import annotations
 
-from flexcal.studio.window import Step, paragraph
+import threading
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexcal.errors import FlexcalError
+from flexcal.studio.project import CALIBRATION
+from flexcal.studio.scene import ResidualArrows
+from flexcal.studio.steps.compare.kept_calibrations import calibrations, keep_calibration
+from flexcal.studio.window import ReportFigures, Step, Window, add_sections, add_verdict, command_text, paragraph
+from flexcal.units import MILLIMETRE
+
+if TYPE_CHECKING:
+    from flexcal.report.results import Comparison
+
+_LENGTH = 0.1
+"""Length, m, of the larger arrows at first."""
 
 
 class CompareStep(Step):
-    """Comparison of two calibrations."""
+    """Comparison of two calibrations of one robot, such as last year's and today's, or before and after a crash."""
 
     title = "Compare"
 
+    def __init__(self, window: Window):
+        super().__init__(window)
+        self._arrows: ResidualArrows | None = None
+        self._names: tuple[str, ...] = ()
+        self._stamp: object = None
+        self._shown: Comparison | None = None
+
     def open(self) -> None:
-        """Add its elements."""
-        self.window.gui.add_html(paragraph("not built yet"))
+        """Add the choice of two calibrations and the place of the result."""
+        self._stamp, self._names = None, ()
+        self._place = self.window.gui.add_folder(None)
+        self._result = self.window.gui.add_folder(None)
+
+    def refresh(self) -> None:
+        """Offer the calibrations that are in the folder."""
+        names = tuple(calibrations(self.window.project))
+        if names == self._names and self._stamp is not None:
+            return
+        self._names, self._stamp = names, object()
+        self._place.remove()
+        self._place = self.window.gui.add_folder(None, order=self._result.order - 0.5)
+        with self._place:
+            self._add_choice(names)
+
+    def close(self) -> None:
+        """Remove the arrows from the scene."""
+        self._stamp = None
+        if self._arrows is not None:
+            self._arrows.remove()
+            self._arrows = None
+
+    def _add_choice(self, names: tuple[str, ...]) -> None:
+        gui = self.window.gui
+        if CALIBRATION in names:
+            self.window.button(
+                "Keep a copy of the calibration",
+                self._keep,
+                hint="copies the folder 'calibration' to one with today's date, before the next calibration replaces it",
+            )
+        if len(names) < 2:
+            gui.add_html(
+                paragraph(
+                    "Two calibrations of this robot are needed: keep a copy of the present one, and measure and calibrate again "
+                    "later, or put an earlier calibration's folder into this one.",
+                    "faint",
+                )
+            )
+            return
+        earlier = names[-2] if names[-1] == CALIBRATION else names[0]
+        self._first = gui.add_dropdown("Earlier", names, initial_value=earlier)
+        self._second = gui.add_dropdown("Later", names, initial_value=next(n for n in reversed(names) if n != earlier))
+        self.window.button("Compare", self._compare, main=True)
+
+    def _keep(self) -> None:
+        self.window.say(f"kept as {keep_calibration(self.window.project)}", "good")
+        self.refresh()
+
+    def _compare(self) -> None:
+        """Compute the comparison beside the window's thread, which shows it."""
+        from flexcal.jobs.pages import folder_comparison
+
+        folder = self.window.project.folder
+        first, second = folder / self._first.value, folder / self._second.value
+        stamp = self._stamp
+
+        def work() -> None:
+            try:
+                comparison = folder_comparison(first, second, self.window.project.robot_file)
+            except FlexcalError as problem:
+                sentence = f"{problem} [{problem.code}]"
+                self.window.post(lambda: self.window.say(sentence, "bad"))
+                return
+            self.window.post(lambda: self._show(comparison) if stamp is self._stamp else None)
+
+        self.window.say("comparing …")
+        threading.Thread(target=work, daemon=True).start()
+
+    def _show(self, comparison: Comparison) -> None:
+        from flexcal.report.pages import comparison_page
+
+        window = self.window
+        window.say("")
+        if self._arrows is not None:
+            self._arrows.remove()
+            self._arrows = None
+        page, order = comparison_page(comparison), self._result.order
+        self._result.remove()
+        self._result = window.gui.add_folder(None, order=order)
+        with self._result:
+            if comparison.change is None:
+                window.gui.add_html(paragraph(comparison.no_change_why, "faint"))
+            else:
+                tone = "warning" if comparison.change.changed else "good"
+                window.gui.add_html(paragraph(comparison.verdict, tone))
+                self._add_displacement(comparison)
+            add_verdict(window.gui, page)
+            add_sections(window.gui, page)
+            line = f"$ flexcal report {comparison.first.name} --compare {comparison.second.name}"
+            window.gui.add_html(paragraph("the same as a page:", "faint") + command_text(line))
+        if page.figures:
+            window.figures.show({"Figures": lambda: ReportFigures(window.gui, page.figures, dark=window.dark)})
+
+    def _add_displacement(self, comparison: Comparison) -> None:
+        change = comparison.change
+        assert change is not None
+        sizes = change.distance / MILLIMETRE
+        where = int(np.argmax(sizes))
+        place = ", ".join(f"{v:.0f}" for v in change.points[where] / MILLIMETRE)
+        self.window.gui.add_html(
+            paragraph(
+                f"The tool moved by {np.mean(sizes):.3f} mm in the mean and {np.max(sizes):.3f} ± "
+                f"{change.std[where] / MILLIMETRE:.3f} mm at most (1σ), at ({place}) mm of the base frame, over {len(sizes)} random poses "
+                "within the joint ranges of both. A motion of the whole robot against the instrument is taken out."
+            )
+        )
+        start = int(np.clip(_LENGTH / max(np.percentile(change.distance, 90), 1e-9), 1, 5000))
+        factor = self.window.gui.add_slider("Exaggeration", min=1, max=5000, step=1, initial_value=start)
+        self._arrows = ResidualArrows(self.window.scene, change.points, change.displacement, start)
+
+        def stretch() -> None:
+            if self._arrows is not None:
+                self._arrows.exaggeration = factor.value
+
+        factor.on_update(lambda _: self.window.post(stretch))
