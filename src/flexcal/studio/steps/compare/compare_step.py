@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,10 +12,19 @@ from flexcal.errors import FlexcalError
 from flexcal.studio.project import CALIBRATION
 from flexcal.studio.scene import ResidualArrows
 from flexcal.studio.steps.compare.kept_calibrations import calibrations, keep_calibration
-from flexcal.studio.window import ReportFigures, Step, Window, add_sections, add_verdict, command_text, paragraph
+from flexcal.studio.window import (
+    ReportFigures,
+    Step,
+    Window,
+    add_sections,
+    add_verdict,
+    command_text,
+    paragraph,
+)
 from flexcal.units import MILLIMETRE
 
 if TYPE_CHECKING:
+    from flexcal.report.layout import FigureBlock
     from flexcal.report.results import Comparison
 
 _LENGTH = 0.1
@@ -76,7 +86,9 @@ class CompareStep(Step):
             return
         earlier = names[-2] if names[-1] == CALIBRATION else names[0]
         self._first = gui.add_dropdown("Earlier", names, initial_value=earlier)
-        self._second = gui.add_dropdown("Later", names, initial_value=next(n for n in reversed(names) if n != earlier))
+        self._second = gui.add_dropdown(
+            "Later", names, initial_value=next(n for n in reversed(names) if n != earlier)
+        )
         self.window.button("Compare", self._compare, main=True)
 
     def _keep(self) -> None:
@@ -126,7 +138,12 @@ class CompareStep(Step):
             line = f"$ flexcal report {comparison.first.name} --compare {comparison.second.name}"
             window.gui.add_html(paragraph("the same as a page:", "faint") + command_text(line))
         if page.figures:
-            window.figures.show({"Figures": lambda: ReportFigures(window.gui, page.figures, dark=window.dark)})
+            window.figures.show(
+                {"Figures": lambda: ReportFigures(window.gui, page.figures, dark=window.dark)}
+            )
+
+    def _add_figures(self, blocks: Sequence[FigureBlock]) -> None:
+        self._figures = ReportFigures(self.window.gui, blocks, dark=self.window.dark)
 
     def _add_displacement(self, comparison: Comparison) -> None:
         change = comparison.change
@@ -134,13 +151,14 @@ class CompareStep(Step):
         sizes = change.distance / MILLIMETRE
         where = int(np.argmax(sizes))
         place = ", ".join(f"{v:.0f}" for v in change.points[where] / MILLIMETRE)
-        self.window.gui.add_html(
-            paragraph(
-                f"The tool moved by {np.mean(sizes):.3f} mm in the mean and {np.max(sizes):.3f} ± "
-                f"{change.std[where] / MILLIMETRE:.3f} mm at most (1σ), at ({place}) mm of the base frame, over {len(sizes)} random poses "
-                "within the joint ranges of both. A motion of the whole robot against the instrument is taken out."
-            )
+        largest = f"{np.max(sizes):.3f} ± {change.std[where] / MILLIMETRE:.3f} mm at most (1σ)"
+        told = (
+            f"The tool moved by {np.mean(sizes):.3f} mm in the mean and {largest}, at ({place}) mm of the base frame,"
+            if change.changed
+            else f"The two differ in the tool's position by {np.mean(sizes):.3f} mm in the mean and {largest}, as chance explains,"
         )
+        scope = f"over {len(sizes)} random poses within the joint ranges of both. A motion of the whole robot against the instrument"
+        self.window.gui.add_html(paragraph(f"{told} {scope} is taken out."))
         start = int(np.clip(_LENGTH / max(np.percentile(change.distance, 90), 1e-9), 1, 5000))
         factor = self.window.gui.add_slider("Exaggeration", min=1, max=5000, step=1, initial_value=start)
         self._arrows = ResidualArrows(self.window.scene, change.points, change.displacement, start)
