@@ -25,7 +25,7 @@ class FiguresPanel:
         self._gui = gui
         self._panel: viser.PanelHandle | None = None
 
-    def show(self, figures: Mapping[str, Callable[[], None]]) -> None:
+    def show(self, figures: Mapping[str, Callable[[], object]]) -> None:
         """Show figures in place of those before: each function adds one, under its title, at the current place of the GUI."""
         self.clear()
         if not figures:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,7 +23,6 @@ from flexcal.studio.window import (
 from flexcal.units import MILLIMETRE
 
 if TYPE_CHECKING:
-    from flexcal.report.layout import FigureBlock
     from flexcal.report.results import Comparison
 
 _LENGTH = 0.1
@@ -141,9 +139,6 @@ class CompareStep(Step):
             window.figures.show(
                 {"Figures": lambda: ReportFigures(window.gui, page.figures, dark=window.dark)}
             )
-
-    def _add_figures(self, blocks: Sequence[FigureBlock]) -> None:
-        self._figures = ReportFigures(self.window.gui, blocks, dark=self.window.dark)
 
     def _add_displacement(self, comparison: Comparison) -> None:
         change = comparison.change
