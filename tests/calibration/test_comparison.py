@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dh_arm import DHArm, postures, tracked, write_poses, write_robot
+from dh_arm import HOME, DHArm, postures, tracked, write_poses, write_robot
+from refusals import refused
 from scipy.stats import binom
 
 from flexcal import RobotModel, fit_geometry, read_poses
 from flexcal.calibration.comparison import GeometryChange, compare_geometry
 from flexcal.estimation import Estimate
+from flexcal.model.robot import with_point
 from flexcal.report.results import change_sentence
 
 SIGMA = 2e-5
@@ -100,15 +102,71 @@ def test_the_order_of_the_two_turns_the_signs_alone(cell: Cell) -> None:
     np.testing.assert_allclose(there.displacement, -back.displacement, atol=1e-6)
 
 
+def narrow(rng: np.random.Generator, count: int) -> np.ndarray:
+    """Postures about another one, in which the wrist hardly turns."""
+    return HOME + 0.1 + rng.uniform(-1, 1, (count, 6)) * [0.3, 0.15, 0.15, 0.35, 0.1, 0.16]
+
+
+def test_parameters_that_only_one_fit_holds_are_no_change(cell: Cell) -> None:
+    """Twenty poses of small motions leave parameters undetermined, at nothing, that the first calibration has far from it."""
+    beside_nothing = 0
+    for seed in range(3):
+        rng, arm = np.random.default_rng(seed), DHArm.made(seed)
+        first = cell.calibrated(arm, rng, postures(rng, 45))
+        second = cell.calibrated(arm, rng, narrow(rng, 20))
+        held = [
+            n for n in first.parameters.names if first.std(n) and n in second.parameters and not second.std(n)
+        ]
+        assert len(held) >= 2
+        beside_nothing += sum(abs(first.values[n]) > 3 * (first.std(n) or 0.0) for n in held)
+        found = compare_geometry(cell.model, first, second)
+        assert not found.changed and found.combinations < 24
+        bumped = cell.calibrated(arm.bumped((0.0, 1e-3, 0.0)), rng, narrow(rng, 20))
+        assert compare_geometry(cell.model, first, bumped).changed
+    assert beside_nothing >= 2
+
+
+def test_joint_ranges_that_do_not_overlap_are_refused(cell: Cell) -> None:
+    rng, arm = np.random.default_rng(1), DHArm.made(1)
+    pair = [cell.calibrated(arm, rng, postures(rng, 45) + shift * np.eye(6)[1]) for shift in (0.0, 1.5)]
+    with refused("E-CAL-032", "joint_2"):
+        compare_geometry(cell.model, *pair)
+    with refused("E-CAL-033", "smr", "other"):
+        other = replace(pair[0], provenance={"option.targets": "other"})
+        model = with_point(cell.model, "other", "flange", np.zeros(3))
+        compare_geometry(model, pair[0], other)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("case", ["same", "few", "noisy"])
+def test_power(cell: Cell) -> None:
+    """A zero that is 0.1 mrad off, five times the noise over the arm's reach, is found and named."""
+    named = 0
+    for seed in range(20):
+        found = cell.compared(300 + seed, lambda arm: arm.turned(3, 1e-4))
+        named += found.changed and found.explanations[0].subject == "joint_3.offset"
+    assert named >= 18
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["same", "few", "noisy", "narrow"])
 def test_the_same_robot_has_not_changed(cell: Cell, case: str) -> None:
     """Forty robots measured twice, at other poses, with the tracker elsewhere; the second time few poses of small motions, or noise of
     0.1 mm.
     """
-    count, spread, sigma = {"same": (45, 1.0, SIGMA), "few": (22, 0.3, SIGMA), "noisy": (45, 1.0, 1e-4)}[case]
+    count, spread, sigma = {
+        "same": (45, 1.0, SIGMA),
+        "few": (22, 0.3, SIGMA),
+        "noisy": (45, 1.0, 1e-4),
+        "narrow": (20, 0.0, SIGMA),
+    }[case]
     changed = 0
     for seed in range(40):
-        found = cell.compared(100 + seed, same, lambda rng, n: postures(rng, n, spread), sigma, count)
+        found = cell.compared(
+            100 + seed,
+            same,
+            lambda rng, n: postures(rng, n, spread) if spread else narrow(rng, n),
+            sigma,
+            count,
+        )
         changed += found.changed
     assert changed <= binom.ppf(0.99, 40, 0.05) and changed <= 2

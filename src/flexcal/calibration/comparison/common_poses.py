@@ -14,6 +14,8 @@ from flexcal.estimation import Estimate
 from flexcal.model.kinematics import joint_limits, random_configurations
 from flexcal.model.robot import RobotModel
 
+_TURN = 2 * np.pi
+"""Largest joint position, rad or m, of joints without a limit."""
 _OVERLAP = 0.1
 """Least overlap of two ranges of a joint, rad or m."""
 
@@ -23,7 +25,7 @@ def common_ranges(model: RobotModel, estimates: Sequence[Estimate]) -> np.ndarra
 
     Raises `FlexcalError` where a joint was measured in ranges that hardly overlap.
     """
-    limits = np.array(joint_limits(model))
+    limits = np.clip(joint_limits(model), -_TURN, _TURN)
     for k, name in enumerate(model.motor_names):
         ranges = [e.ranges[name] for e in estimates if name in e.ranges]
         own = np.array([*ranges, tuple(limits[:, k])])
