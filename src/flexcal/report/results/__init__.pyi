@@ -1,4 +1,4 @@
-from .change_sentence import amount, chance_in_words, change_sentence, explanation_in_words
+from .change_wording import amount, chance_in_words, change_sentence, explanation_in_words
 from .fitted_response import FittedResponse, fitted_responses
 from .identifiability import IdentifiableParameters
 from .measured_response import MeasuredResponse, relative_to_diagonal, uncertainty_sentence

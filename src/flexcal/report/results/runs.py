@@ -13,7 +13,7 @@ from flexcal.calibration.comparison import GeometryChange
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.estimation import Estimate
 from flexcal.files.formats import BLOCKS, Block
-from flexcal.report.results.change_sentence import change_sentence
+from flexcal.report.results.change_wording import change_sentence
 from flexcal.report.results.run_significance import (
     MeanDifference,
     ParameterChanges,
