@@ -1,7 +1,13 @@
 from .accuracy_curve import PoseCurve, pose_curve
 from .candidates import random_candidates
 from .feasibility import PoseCandidates, pose_candidates
-from .geometry_sensitivity import GeometricTolerances, base_sensitivity, geometry_jacobian, pose_sensitivity
+from .geometry_sensitivity import (
+    GeometricTolerances,
+    base_sensitivity,
+    geometry_jacobian,
+    measuring_noise,
+    pose_sensitivity,
+)
 from .gravity_preload import preloaded
 from .ordering import MeasurementOrder, measurement_order
 from .selection import (
@@ -32,6 +38,7 @@ __all__ = [
     "fewest_poses",
     "geometry_jacobian",
     "measurement_order",
+    "measuring_noise",
     "pose_candidates",
     "pose_curve",
     "pose_sensitivity",

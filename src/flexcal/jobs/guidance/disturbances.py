@@ -17,7 +17,7 @@ from flexcal.jobs.guidance.estimate import SessionEstimate
 from flexcal.units import MILLIMETRE
 
 DisturbanceKind = Literal["outlier", "moved", "drift"]
-CHANCE = 1e-3
+CHANCE = 3e-4
 """Largest p-value of a disturbance, multiplied by the number of those of its kind that were tried."""
 ODDS = 20.0
 """Least posterior odds of a disturbance against none."""

@@ -115,11 +115,26 @@ class SessionEstimate:
 
     @property
     def robot_std(self) -> float:
-        """Scatter of a coordinate, m, that the instrument's stated noise does not explain: of the robot and of the model's form."""
+        """Scatter of a coordinate, m, that the instrument's stated noise does not explain: of the robot and of the model's form.
+
+        Where no noise is stated, that of the instrument too.
+        """
         if not self.rows.sigma_given:
             return float(np.median(self.std))
-        excess = self.std**2 - (self.rows.sigma**2).mean(axis=1)
-        return float(np.sqrt(max(np.median(excess), 0.0)))
+        return float(np.sqrt(max(self._excess, 0.0)))
+
+    @property
+    def instrument_share(self) -> float:
+        """Ratio of the instrument's noise to the stated one: one or less, and zero where none is stated."""
+        if not self.rows.sigma_given:
+            return 0.0
+        stated = float(np.median((self.rows.sigma**2).mean(axis=1)))
+        return float(np.sqrt(1 + min(self._excess, 0.0) / stated))
+
+    @property
+    def _excess(self) -> float:
+        """Variance of a coordinate, m², beyond that of the instrument; negative where it is less noisy than stated."""
+        return float(np.median(self.std**2 - (self.rows.sigma**2).mean(axis=1)))
 
 
 def _scaled_solution(

@@ -20,7 +20,9 @@ from flexcal.units import MILLIMETRE
 _CERTAIN = 5.5
 """Standard deviations by which a row must be off to be noticed, about the one at p = 1e-3 among a hundred rows."""
 _SHARP = 1 * MILLIMETRE
-"""Error, m, that must be noticed before a row is called good."""
+"""Error, m, that must be noticed before a row is called good, unless the robot scatters by as much."""
+_BLURRED = 2.0
+"""Factor by which it may exceed what the scatter of robot and instrument alone hides."""
 _NEAR = 2
 """Rows by which the beginning of a motion may change as further rows come."""
 _REPEATED = 2e-4
@@ -94,9 +96,9 @@ class RowJudge:
         error, expected = float(np.linalg.norm(difference)), radius(covariance)
         noticeable = _CERTAIN * float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
         pose = int(self._row.pose[0])
-        if noticeable > _SHARP:
-            estimate = self.after.estimate
-            assert estimate is not None
+        estimate = self.after.estimate
+        assert estimate is not None
+        if noticeable > max(_SHARP, _BLURRED * _CERTAIN * float(estimate.std[-1])):
             needed = max(-(-estimate.unknowns.geometric // 3) + 2, len(self.after.index) + 2)
             return Judgement(
                 "too_early",

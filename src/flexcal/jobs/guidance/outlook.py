@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.data.poses import PoseSet
-from flexcal.design.optimality import TraceOptimal, greedy
+from flexcal.design.optimality import TraceOptimal, exchange_on_shortlist, greedy
 from flexcal.estimation import Parameter, Parameters, Sensitivity
 from flexcal.jobs.guidance.estimate import ROBOT_STD, SessionEstimate
 from flexcal.jobs.guidance.pose_choice import PoseChoice
@@ -15,6 +15,8 @@ from flexcal.jobs.guidance.unknowns import Unknowns
 from flexcal.model.robot import RobotModel
 from flexcal.units import MILLIMETRE
 
+FIRST = 25
+"""Number of poses up to which those to come are chosen together, as each being the best after those before is a poor start."""
 AHEAD = 10
 """Number of further poses whose gain decides whether to go on."""
 WORTH = 0.05
@@ -46,6 +48,8 @@ class Outlook:
         Error, m, at which to stop.
     is_known : bool
         Whether the rows tell this robot's errors; before, the prediction is of the plausible sizes alone.
+    anywhere : bool
+        Whether the working poses are all over the workspace, for want of a working volume.
     """
 
     q: np.ndarray
@@ -55,6 +59,7 @@ class Outlook:
     scatter: float
     desired: float | None
     is_known: bool
+    anywhere: bool = True
 
     @property
     def gain(self) -> float:
@@ -78,29 +83,33 @@ class Outlook:
         if not self.is_known:
             return f"go on: too few rows yet to say how accurate the robot will be; {more} predict a p90 of {then:.3f} mm."
         floor = (
-            f", of which {self.scatter / MILLIMETRE:.3f} mm is scatter of the robot itself"
+            f", of which {self.scatter / MILLIMETRE:.3f} mm is scatter, which more poses do not remove"
             if self.scatter > 0
             else ""
         )
+        where = " anywhere in the workspace" if self.anywhere else " in the working volume"
         if self.desired is not None and not self.is_enough:
             wanted = np.flatnonzero(self.p90 <= self.desired)
-            reach = f"in {int(wanted[0])} more poses" if len(wanted) else f"not within {more} ({then:.3f} mm)"
-            return f"go on: p90 predicted {now:.3f} mm, {self.desired / MILLIMETRE:.3f} mm are reached {reach}{floor}."
+            reach = (
+                f"in {int(wanted[0])} more poses" if len(wanted) else f"not yet with {more} ({then:.3f} mm)"
+            )
+            return f"go on: p90 predicted {now:.3f} mm{where}, {self.desired / MILLIMETRE:.3f} mm are reached {reach}{floor}."
         word = "stop" if self.is_enough else "go on"
-        return f"{word}: p90 predicted {now:.3f} mm, {more} bring {now - then:.3f} mm{floor}."
+        return f"{word}: p90 predicted {now:.3f} mm{where}, {more} bring {now - then:.3f} mm{floor}."
 
 
 @dataclass(frozen=True, eq=False)
 class Prospect:
-    """What is known of the robot now: `model`, `unknowns`, the `covariance` (p, p) of their errors, `std` of a coordinate and the `scatter`
-    of the robot, m.
+    """What is known of the robot now: `model`, `unknowns`, and the `covariance` (p, p) of their errors.
+
+    `share` of the instrument's stated noise is there, and the `scatter`, m, of the robot beside it.
     """
 
     model: RobotModel
     unknowns: Unknowns
     covariance: np.ndarray
     like: PoseSet | None
-    scale: float
+    share: float
     scatter: float
     is_known: bool
 
@@ -111,7 +120,7 @@ class Prospect:
         """Prospect after `rows` with their `estimate`, or before any with the plausible sizes."""
         if estimate is not None:
             return cls(
-                estimate.model, estimate.unknowns, estimate.geometry_covariance, estimate.rows, estimate.scale,
+                estimate.model, estimate.unknowns, estimate.geometry_covariance, estimate.rows, estimate.instrument_share,
                 estimate.robot_std, True,
             )  # fmt: skip
         unknowns = Unknowns.of(model, choice.rows(model, choice.working, rows))
@@ -126,27 +135,33 @@ class Prospect:
         index = np.flatnonzero(free)
         count = min(count, len(index))
         rows = choice.rows(self.model, choice.q[index], self.like)
-        std = self.scale * np.hypot(np.sqrt((rows.sigma**2).mean(axis=1)), ROBOT_STD)
+        std = np.hypot(self.share * np.sqrt((rows.sigma**2).mean(axis=1)), self.scatter)
         columns = self.unknowns.columns(self.model, rows)[1] / std[:, None, None]
         working = self.unknowns.columns(self.model, choice.rows(self.model, choice.working, self.like))[1]
         information = np.linalg.inv(self.covariance)
         flat = working.reshape(-1, working.shape[2])
         items = Parameters(Parameter(name, "1", 0.0) for name in self.unknowns.names)
         sensitivity = Sensitivity(columns, items, (information + information.T) / 2)
-        chosen = greedy(sensitivity, count, TraceOptimal(flat.T @ flat / len(working), "c")).chosen.astype(
-            int
-        )
+        error = TraceOptimal(flat.T @ flat / len(working), "c")
+        horizon = min(max(count, FIRST - (0 if self.like is None else len(self.like))), len(index))
+        together = exchange_on_shortlist(sensitivity, horizon, error).chosen.astype(int)
+        chosen = together[greedy(sensitivity.subset(together), count, error).chosen.astype(int)]
         p90 = []
         for number in range(count + 1):
             added = columns[chosen[:number]].reshape(-1, columns.shape[2])
             covariance = np.linalg.inv(information + added.T @ added)
             p90.append(_quantile(working, covariance, self.scatter))
         alone = _quantile(working[:, :, :1] * 0, np.eye(1), self.scatter)
-        like = self.like
         return Outlook(
-            choice.q[index[chosen]], choice.pose[index[chosen]], 0 if like is None else len(like), np.array(p90), alone,
-            desired, self.is_known,
-        )  # fmt: skip
+            choice.q[index[chosen]],
+            choice.pose[index[chosen]],
+            0 if self.like is None else len(self.like),
+            np.array(p90),
+            alone,
+            desired,
+            self.is_known,
+            choice.anywhere,
+        )
 
 
 def _quantile(columns: np.ndarray, covariance: np.ndarray, scatter: float) -> float:

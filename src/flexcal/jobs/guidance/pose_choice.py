@@ -7,19 +7,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.data.poses import DEFAULT_SIGMA, PosePool, PoseSet
-from flexcal.design.poses import random_candidates
+from flexcal.design.poses import measuring_noise, random_candidates
 from flexcal.design.scene import CollisionChecker, MeasuringSetup, visible
 from flexcal.jobs.experiments import PoseRequest
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 
-CANDIDATES = 800
+CANDIDATES = 1500
 _WORKING = 200
 
 
 @dataclass(frozen=True, eq=False)
 class PoseChoice:
-    """Candidates `q` (M, n) with their numbers `pose` (M,), and `working` poses (W, n), at which the tool error counts.
+    """Candidates `q` (M, n) with their numbers `pose` (M,), and `working` poses (W, n), at which the tool error counts: `anywhere` in the
+    workspace, or in the working volume.
 
     All are within the joint limits and free of collision, and the instrument sees the target at the candidates.
     """
@@ -27,6 +28,7 @@ class PoseChoice:
     q: np.ndarray
     pose: np.ndarray
     working: np.ndarray
+    anywhere: bool
     setup: MeasuringSetup
 
     @classmethod
@@ -43,14 +45,22 @@ class PoseChoice:
             pool = PosePool(q, np.arange(1, len(q) + 1))
         anywhere = replace(setup, acceptance=None, measure=None)
         working = random_candidates(checker, _WORKING, rng, anywhere) if place is None else place.q[:_WORKING]
-        return cls(pool.q, pool.pose, working, setup)
+        return cls(pool.q, pool.pose, working, place is None, setup)
 
     def rows(self, model: RobotModel, q: np.ndarray, like: PoseSet | None) -> PoseSet:
-        """Rows that would be measured at `q` (M, n), with target, station, payload and noise as the last row of those measured."""
+        """Rows that would be measured at `q` (M, n), with target, station and payload as the last row of those measured.
+
+        Where these say how noisy they are, so many times as noisy as expected of the instrument at these distances.
+        """
         count = len(q)
         if like is not None:
             many = like.subset(np.full(count, len(like) - 1))
-            sigma = np.broadcast_to(np.median(like.sigma, axis=0), (count, 3)).copy()
+            sigma = np.full(count, DEFAULT_SIGMA)
+            if like.sigma_given:
+                there = measuring_noise(model, like.q, self.setup)
+                ratio = float(np.median(np.sqrt((like.sigma**2).mean(axis=1)) / there))
+                sigma = ratio * measuring_noise(model, q, self.setup)
+            sigma = np.repeat(sigma[:, None], 3, axis=1)
             return replace(many, q=q, torque=None, sigma=sigma, pose=np.arange(1, count + 1))
         payload = self.setup.payload
         return PoseSet(

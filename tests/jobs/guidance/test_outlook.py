@@ -1,0 +1,85 @@
+"""Next poses and the predicted error, against what fresh poses of a real UR5 and of the virtual cell say."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flexcal import PosePlan, PoseRequest, RobotModel, VirtualCell, read_poses
+from flexcal.data.poses import PosePool
+from flexcal.design.poses import WorkingVolume
+from flexcal.design.scene import CollisionChecker
+from flexcal.jobs.guidance import GuidedSession
+from flexcal.virtual_cell import CellConfig
+
+
+def test_a_real_robot_guided_through_its_measured_poses(ur5: RobotModel, examples: Path):
+    """No row is called wrong, it says stop, and the p90 at 300 other poses is the predicted one within a third."""
+    every = read_poses(examples / "ur5_tracker" / "grid.csv", ur5)
+    order = np.random.default_rng(2).permutation(len(every))
+    fresh, rest = every.subset(order[:300]), every.subset(order[300:])
+    row_of = {int(number): k for k, number in enumerate(rest.pose)}
+    working = WorkingVolume(rest.q[:200], rest.position[:200])
+    request = PoseRequest(candidates=PosePool(rest.q, rest.pose), working=working)
+    session = GuidedSession(ur5, request=request)
+    outlook = session.outlook()
+    assert not outlook.is_enough and outlook.sentence.startswith("go on: too few rows")
+    while not outlook.is_enough and len(session) < 60:
+        judgement, session = session.judged(rest.subset([row_of[int(outlook.pose[0])]]))
+        assert judgement.is_good, judgement.sentence
+        outlook = session.outlook()
+    assert 15 <= len(session) <= 45 and not session.findings
+    assert outlook.sentence.startswith("stop: p90 predicted") and "in the working volume" in outlook.sentence
+    estimate = session.analysis.estimate
+    error = np.linalg.norm(estimate.predicted(fresh)[0] - fresh.position, axis=1)
+    assert outlook.p90[0] == pytest.approx(np.quantile(error, 0.9), rel=1 / 3)
+
+
+@pytest.fixture(scope="module")
+def tx90l(examples: Path) -> RobotModel:
+    return RobotModel.from_yaml(examples / "tx90l" / "robot.yaml", estimates=False)
+
+
+def test_next_poses_can_be_taken_and_come_soon(tx90l: RobotModel):
+    cell = VirtualCell.drawn(tx90l, CellConfig(), 1)[0]
+    session = GuidedSession(tx90l)
+    first = session.next_poses(25)
+    assert not CollisionChecker(tx90l).collides(first).any()
+    session = session.with_rows(cell.measure(PosePlan(q=first)))
+    start = time.perf_counter()
+    outlook = session.outlook()
+    assert time.perf_counter() - start < 1.5
+    assert (np.diff(outlook.p90) < 0).all() and outlook.is_known
+    # none of those is a pose that was measured
+    assert np.abs(outlook.q[:, None] - first[None]).max(axis=2).min() > 0.01
+    assert "more poses bring" in outlook.sentence and "anywhere in the workspace" in outlook.sentence
+
+
+def test_the_desired_error(tx90l: RobotModel):
+    cell = VirtualCell.drawn(tx90l, CellConfig(), 1)[0]
+    measured = cell.measure(PosePlan(q=GuidedSession(tx90l).next_poses(25)))
+    for desired, enough in ((1e-3, True), (0.08e-3, False), (1e-6, False)):
+        session = GuidedSession(
+            tx90l, rows=measured, request=PoseRequest(candidates=500, desired_error=desired)
+        )
+        outlook = session.outlook()
+        assert outlook.is_enough == enough
+        assert ("not yet" in outlook.sentence) == (desired == 1e-6)
+
+
+def test_the_predicted_error_is_that_of_the_cell(tx90l: RobotModel):
+    """The error against noise-free points at 150 poses over the workspace, over 4 robots, 30 rows each."""
+    ratios, choice = [], None
+    for seed in range(4):
+        cell = VirtualCell.drawn(tx90l, CellConfig(), seed)[0]
+        session = GuidedSession(tx90l, choice=choice)
+        choice = session.candidates
+        session = session.with_rows(cell.measure(PosePlan(q=session.next_poses(30))))
+        plan = PosePlan(q=choice.working[:150])
+        estimate = session.analysis.estimate
+        error = estimate.predicted(choice.rows(tx90l, plan.q, session.rows))[0] - cell.noise_free(plan)
+        ratios.append(session.outlook(1).p90[0] / np.quantile(np.linalg.norm(error, axis=1), 0.9))
+    assert 0.7 < np.exp(np.mean(np.log(ratios))) < 1.5
