@@ -13,7 +13,7 @@ from pathlib import Path
 
 from benchmarks.peers import PeerAbsentError
 
-SLOW = ("hard_cell", "kill", "mismatch", "trajectories", "two_stage_seeds")
+SLOW = ("guided_measuring", "hard_cell", "kill", "mismatch", "trajectories", "two_stage_seeds")
 """Asked for by name only: they take hours."""
 
 
