@@ -46,7 +46,7 @@ class WorkingBox:
         )
         self._handles = [
             scene.add_transform_controls(
-                f"{name}/corner_{k}", scale=0.18, disable_rotations=True, disable_sliders=True
+                f"{name}/corner_{k}", scale=0.22, disable_rotations=True, disable_sliders=True, line_width=4.0
             )
             for k in range(2)
         ]
