@@ -73,9 +73,12 @@ def slider_units(model: RobotModel) -> str:
 
 
 def slider_range(joint: Joint) -> tuple[float, float]:
-    """Lower and upper end of a joint's slider, deg or mm: its limits, half a turn or a metre to both sides without."""
+    """Lower and upper end of a joint's slider, deg or mm: its limits, half a turn or a metre to both sides without; to 0.01."""
     free = _FREE_WAY if joint.kind == "prismatic" else _FREE_TURN
-    lower, upper = (limit / _unit(joint) for limit in (joint.lower, joint.upper))
+    lower, upper = (
+        round(limit / _unit(joint), 2) if math.isfinite(limit) else limit
+        for limit in (joint.lower, joint.upper)
+    )
     lower, upper = (lower if math.isfinite(lower) else -free), (upper if math.isfinite(upper) else free)
     return (lower, upper) if upper > lower else (lower, lower + 0.1)
 

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 from flexcal.errors import InputError
 from flexcal.files.formats import REMOVED
-from flexcal.files.structuring import Keys
 from flexcal.model.robot import RobotModel
 from flexcal.model.urdf import read_urdf
-from flexcal.studio.steps.robot.place_marker import PlaceMarkers
+from flexcal.studio.steps.robot.place_markers import PlaceMarkers
 from flexcal.studio.steps.robot.places import BASE, Place, Triple, places_of
+from flexcal.studio.steps.robot.robot_file import RobotFile
 from flexcal.studio.window import Window, paragraph, table
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}")
+_FARTHEST, _HEAVIEST = 99_999.999, 9_999.999
+"""Largest numbers of the fields, mm and kg; they have the decimals that can be typed."""
 _KINDS = ("measured point", "payload", "instrument")
 
 
@@ -29,12 +29,15 @@ class PlaceEditor:
         Where it is shown: elements are added at the current place of its GUI.
     model : RobotModel
         The robot as robot.yaml has it.
+    file : RobotFile
+        That file.
     """
 
-    def __init__(self, window: Window, model: RobotModel):
-        self._window, self._model = window, model
+    def __init__(self, window: Window, model: RobotModel, file: RobotFile):
+        self._window, self._model, self._file = window, model, file
         self._frames = read_urdf(model.urdf, model.config.locked).frames
-        self._markers = PlaceMarkers(window.scene, model, dict(self._frames))
+        self._markers = PlaceMarkers(window, self._frames)
+        self._marked: Triple = (0.0, 0.0, 0.0)
         self.places = places_of(model)
         titles = [place.title for place in self.places]
         kept = window.choices.get("place", "")
@@ -47,6 +50,8 @@ class PlaceEditor:
             self._choice = gui.add_dropdown("Edit", titles, initial_value=titles[self._index])
             self._choice.on_update(lambda _: window.post(self._choose))
         self._fields = gui.add_folder(None)
+        if file.last_change is not None:
+            window.button("Take the last change back", file.take_back, hint=file.last_change)
         with gui.add_folder("Add a point, payload or instrument", expand_by_default=not self.places):
             self._kind = gui.add_dropdown("What", self._kinds())
             self._name = gui.add_text("Name", "", hint="letters, digits and _; the columns of files have it")
@@ -54,12 +59,14 @@ class PlaceEditor:
         self._show()
 
     def follow(self) -> None:
-        """Move the markers with the robot."""
-        self._markers.follow(self._window.robot.q)
+        """Put the markers on the robot again where it has been drawn anew."""
+        if self._markers.stale:
+            self._mark()
 
     def close(self) -> None:
-        """Take the markers out of the scene."""
+        """Take the markers out of the scene; what was asked for meanwhile is no longer done."""
         self._markers.remove()
+        self._index = None
 
     @property
     def _saved(self) -> Place:
@@ -74,10 +81,6 @@ class PlaceEditor:
         order = self._fields.order
         self._fields.remove()
         self._fields = self._window.gui.add_folder(None, order=order)
-        self._markers.show(
-            self.places, self._index, lambda xyz: self._window.post(lambda: self._dragged(xyz))
-        )
-        self._markers.follow(self._window.robot.q)
         if self._index is None:
             return
         place, gui, window = self._saved, self._window.gui, self._window
@@ -88,21 +91,30 @@ class PlaceEditor:
             )
             of = "centre of mass " if place.kind == "payload" else ""
             self._xyz = [
-                gui.add_number(f"{of}{axis} / mm", value, step=0.1)
+                gui.add_number(f"{of}{axis} / mm", value, min=-_FARTHEST, max=_FARTHEST, step=0.1)
                 for axis, value in zip("xyz", place.xyz, strict=True)
             ]
             self._mass = None
             if place.mass is not None:
-                self._mass = gui.add_number("Mass / kg", place.mass, min=0.0, step=0.001)
+                self._mass = gui.add_number("Mass / kg", place.mass, min=0.0, max=_HEAVIEST, step=0.1)
                 self._mass.on_update(lambda _: window.post(self._edited))
-            self._frame.on_update(lambda _: window.post(self._edited))
+            self._frame.on_update(lambda _: window.post(self._reframed))
             for number in self._xyz:
                 number.on_update(lambda _: window.post(self._edited))
             self._difference = gui.add_html(paragraph("Drag it in the scene, or type the numbers.", "faint"))
             self._write = window.button("Write to robot.yaml", self._save, main=True)
-            self._back = window.button("Take back", self._show)
+            self._back = window.button("Keep what robot.yaml has", self._show)
             self._write.visible = self._back.visible = False
             window.button(f"Remove {place.title}", self._remove)
+        self._mark()
+
+    def _mark(self) -> None:
+        """Show all places in the scene, the one that is edited as it is in the fields."""
+        shown = list(self.places)
+        if self._index is not None:
+            shown[self._index] = self._edited_place()
+            self._marked = shown[self._index].xyz
+        self._markers.show(shown, self._index, lambda xyz: self._window.post(lambda: self._dragged(xyz)))
 
     def _edited_place(self) -> Place:
         x, y, z = (round(float(number.value), 6) for number in self._xyz)
@@ -116,32 +128,49 @@ class PlaceEditor:
         self._show()
 
     def _dragged(self, xyz: Triple) -> None:
-        if self._index is not None:
-            for number, value in zip(self._xyz, xyz, strict=True):
-                number.value = value
-            self._edited(dragging=True)
+        if self._index is None:
+            return
+        for number, value in zip(self._xyz, xyz, strict=True):
+            number.value = value
+        self._marked = xyz
+        self._markers.move(xyz, handle=False)
+        self._tell()
 
-    def _edited(self, *, dragging: bool = False) -> None:
-        place = self._edited_place()
-        assert self._index is not None
-        self._markers.move(self._index, place.xyz, handles=not dragging)
-        told = self._saved.told_changes(place)
+    def _edited(self) -> None:
+        if self._index is None:
+            return
+        xyz = self._edited_place().xyz
+        if xyz != self._marked:  # else it is the echo of a drag
+            self._marked = xyz
+            self._markers.move(xyz)
+        self._tell()
+
+    def _reframed(self) -> None:
+        if self._index is None:
+            return
+        self._mark()
+        self._tell()
+
+    def _tell(self) -> None:
+        """Say what is not written yet."""
+        told = self._saved.told_changes(self._edited_place())
         self._difference.content = paragraph(
             f"not written yet: {told}" if told else "as in robot.yaml", "warning" if told else "faint"
         )
-        self._write.visible = self._back.visible = bool(told)
+        if self._write.visible != bool(told):
+            self._write.visible = self._back.visible = bool(told)
 
     def _save(self) -> None:
         place, saved = self._edited_place(), self._saved
-        self._edit(saved.changes(place), f"{saved.title}: {saved.told_changes(place)}")
+        self._file.edit(saved.changes(place), f"{saved.title}: {saved.told_changes(place)}")
 
     def _remove(self) -> None:
-        self._edit({self._saved.keys: REMOVED}, f"{self._saved.title} removed")
+        self._file.edit({self._saved.keys: REMOVED}, f"{self._saved.title} removed")
 
     def _add(self) -> None:
         place = self._new_place()
         self._window.choices.put("place", place.title)
-        self._edit(
+        self._file.edit(
             {place.keys: place.entry()}, f"{place.title} added at {place.row()[2]} mm in {place.frame}"
         )
 
@@ -160,9 +189,3 @@ class PlaceEditor:
         if kind == "instrument":
             return Place("instrument", name, BASE, (2.0 * reach, 0.0, round(0.5 * reach, -1)))
         return Place("measured point", name, carrier, (0.0, 0.0, 0.0))
-
-    def _edit(self, changes: Mapping[Keys, Any], told: str) -> None:
-        from flexcal.jobs.setup import edit_robot
-
-        edit_robot(self._window.project.robot_file, changes)
-        self._window.say(f"robot.yaml: {told}.", "good")

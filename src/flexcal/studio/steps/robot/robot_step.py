@@ -4,15 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flexcal.errors import FlexcalError
+from flexcal.errors import FlexcalError, InputError
+from flexcal.files.formats import read_yaml_file
 from flexcal.jobs.setup import FileProblem, description_problems, urdf_robot
 from flexcal.model.robot import RobotModel
+from flexcal.studio.project import Project
+from flexcal.studio.server import limit_uploads
 from flexcal.studio.steps.robot.joint_sliders import JointSliders, slider_units
 from flexcal.studio.steps.robot.place_editor import PlaceEditor
 from flexcal.studio.steps.robot.places import places_of
 from flexcal.studio.steps.robot.problem_listing import problem_listing
+from flexcal.studio.steps.robot.robot_file import RobotFile
+from flexcal.studio.steps.robot.uploads import LARGEST, require_size
 from flexcal.studio.steps.robot.urdf_choice import UrdfChoice
 from flexcal.studio.window import Step, Window, facts, paragraph
 
@@ -34,6 +40,10 @@ class RobotStep(Step):
         self._sliders: JointSliders | None = None
         self._editor: PlaceEditor | None = None
         self._bare: RobotModel | None = None
+        self._file = RobotFile(window)
+        limit_uploads(
+            window.server, LARGEST, lambda name, size: window.post(lambda: require_size(name, size))
+        )
 
     def open(self) -> None:
         """Add the place for what the folder allows."""
@@ -43,7 +53,7 @@ class RobotStep(Step):
     def refresh(self) -> None:
         """Show the robot of the folder: of robot.yaml, with all of its problems, else of the chosen URDF."""
         files = [entry for entry in self.window.project.stamp() if entry[0].lower().endswith(_SHOWN)]
-        stamp = (files, self.window.choices.get("urdf", ""))
+        stamp = (files, self.window.choices.get("urdf", ""), self.window.choices.get("tip", ""))
         if stamp != self._shown:
             self._shown = stamp
             self._rebuild()
@@ -84,7 +94,7 @@ class RobotStep(Step):
             )
             return
         try:
-            model = urdf_robot(window.project.folder / choice.urdf)
+            model = urdf_robot(window.project.folder / choice.urdf, choice.tip)
         except FlexcalError as problem:
             said.content = paragraph(f"{problem} [{problem.code}]", "bad")
             return
@@ -102,14 +112,30 @@ class RobotStep(Step):
         problems = description_problems(window.project.robot_file)
         if problems:
             gui.add_html(_broken(problems) + problem_listing(problems, window.project.folder))
+            self._show_bare()
             self._show_files()
             return
         model = window.model(estimates=False)
         gui.add_html(_next(model))
         with gui.add_folder("Measured points, payload, instrument"):
-            self._editor = PlaceEditor(window, model)
+            self._editor = PlaceEditor(window, model, self._file)
         self._show_robot(model)
         self._show_files()
+
+    def _show_bare(self) -> None:
+        """While robot.yaml has problems: the robot as its URDF describes it, where that can be read."""
+        urdf = _named_urdf(self.window.project)
+        if urdf is None:
+            return
+        try:
+            self._bare = urdf_robot(urdf)
+        except FlexcalError:
+            return
+        self.window.robot.show(self._bare)
+        self.window.gui.add_html(
+            paragraph("Until then the robot is shown as the URDF alone describes it.", "faint")
+        )
+        self._show_robot(self._bare)
 
     def _show_robot(self, model: RobotModel) -> None:
         window, gui = self.window, self.window.gui
@@ -134,6 +160,17 @@ class RobotStep(Step):
     def _show_files(self) -> None:
         with self.window.gui.add_folder("Files", expand_by_default=False):
             UrdfChoice(self.window, described=True, changed=self.refresh)
+
+
+def _named_urdf(project: Project) -> Path | None:
+    """URDF that robot.yaml names, else the first of the folder; None without."""
+    try:
+        data = read_yaml_file(project.robot_file).data
+    except InputError:
+        data = None
+    name = data.get("robot") if isinstance(data, dict) else None
+    names = [name] if isinstance(name, str) else project.files(".urdf")
+    return project.folder / names[0] if names else None
 
 
 def _broken(problems: list[FileProblem]) -> str:

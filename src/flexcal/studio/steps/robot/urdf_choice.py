@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from flexcal.errors import InputError
+from flexcal.model.urdf import find_arm, read_elements
 from flexcal.studio.steps.robot.examples import examples_here
 from flexcal.studio.steps.robot.uploads import write_upload
 from flexcal.studio.window import Window
@@ -13,6 +16,9 @@ if TYPE_CHECKING:
     import viser
 
 _NONE = "none in the folder"
+_GUESSED = "the one long chain"
+_SEVERAL = ("E-URDF-040", "E-URDF-041")
+"""Errors of a URDF in which the end of the arm has to be chosen."""
 
 
 class UrdfChoice:
@@ -37,6 +43,11 @@ class UrdfChoice:
             first = kept if kept in names else (names or [_NONE])[0]
             self._choice = gui.add_dropdown("URDF", names or [_NONE], initial_value=first)
             self._choice.on_update(lambda _: window.post(self._chosen))
+            ends = self._ends()
+            if ends:
+                kept = self.tip or _GUESSED
+                self._end = gui.add_dropdown("Arm ends at link", (_GUESSED, *ends), initial_value=kept)
+                self._end.on_update(lambda _: window.post(self._ended))
             if names:
                 window.button(
                     "Create robot.yaml",
@@ -62,13 +73,27 @@ class UrdfChoice:
         kept = self._window.choices.get("urdf", "")
         return kept if kept in names else names[0] if names else None
 
+    @property
+    def tip(self) -> str | None:
+        """The link that was chosen as the end of the arm, of a URDF with several; None for the one long chain."""
+        tip = self._window.choices.get("tip", "")
+        return tip if tip in self._ends() else None
+
+    def _ends(self) -> list[str]:
+        return [] if self.urdf is None else arm_ends(self._window.project.folder / self.urdf)
+
+    def _ended(self) -> None:
+        self._window.choices.put("tip", self._end.value)
+        self._changed()
+
     def _chosen(self) -> None:
         self._window.choices.put("urdf", self._choice.value)
         self._changed()
 
     def _create(self) -> None:
         if self.urdf is not None:
-            self._window.command(("init", self.urdf))
+            tip = () if self.tip is None else ("--tip", self.tip)
+            self._window.command(("init", self.urdf, *tip))
 
     def _copy(self) -> None:
         names = self._examples[self._example.value].copy_to(self._window.project)
@@ -85,3 +110,22 @@ class UrdfChoice:
         if place.suffix == ".urdf":
             self._window.choices.put("urdf", written)
         self._window.say(f"{written} is in the folder ({len(content) / 1000:.0f} kB).", "good")
+
+
+def arm_ends(urdf: Path) -> list[str]:
+    """Links where the arm of a URDF may end, in the order of the file; none where it is clear, or the URDF cannot be read."""
+    try:
+        find_arm(urdf)
+        return []
+    except InputError as problem:
+        if problem.code not in _SEVERAL:
+            return []
+    root = read_elements(urdf)
+    ends = {"parent": set[str](), "child": set[str]()}
+    for joint in root.all("joint"):
+        for side, links in ends.items():
+            element = joint.find(side)
+            if element is not None:
+                links.add(element.attributes.get("link", ""))
+    names = [link.attributes.get("name", "") for link in root.all("link")]
+    return [name for name in names if name in ends["child"] - ends["parent"]]
