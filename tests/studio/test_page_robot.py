@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from flexcal.model.robot import RobotModel
+from flexcal.studio.steps.robot.uploads import LARGEST
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 WAIT = 15_000
@@ -28,6 +29,11 @@ def test_from_an_empty_folder_to_a_robot(page: Any, studio_url: str, tmp_path: P
     page.get_by_text("arm.urdf: this is no XML").wait_for(timeout=WAIT)
     upload(page, "empty.urdf", b"")
     page.get_by_text("empty.urdf is empty").wait_for(timeout=WAIT)
+    large = tmp_path / "large.urdf"
+    with large.open("wb") as stream:
+        stream.truncate(LARGEST + 1_000_000)
+    page.locator('input[type="file"]').first.set_input_files(large)
+    page.get_by_text("large.urdf has 51 MB").wait_for(timeout=WAIT)
     assert [p.name for p in folder.iterdir() if p.name != ".studio.json"] == []
 
     urdf = (EXAMPLES / "ur5_tracker" / "ur5.urdf").read_bytes()
@@ -56,3 +62,6 @@ def test_from_an_empty_folder_to_a_robot(page: Any, studio_url: str, tmp_path: P
     page.get_by_text("The robot is described, with 1 measured point.").wait_for(timeout=WAIT)
     assert robot_file.read_text() == made.replace("xyz: [0.0, 0.0, 0.0]", "xyz: [0.0, 0.0, 0.031]")
     assert RobotModel.from_yaml(robot_file).config.points["smr"].xyz == (0.0, 0.0, 0.031)
+    page.get_by_role("button", name="Take the last change back").click()
+    page.get_by_text("Place smr where it is on the tool").wait_for(timeout=WAIT)
+    assert robot_file.read_text() == made

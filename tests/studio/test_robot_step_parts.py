@@ -6,6 +6,7 @@ import math
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 from xml.etree import ElementTree
 
 import numpy as np
@@ -20,7 +21,10 @@ from flexcal.studio.steps.robot.joint_sliders import slider_range, slider_units
 from flexcal.studio.steps.robot.mesh_places import mesh_places
 from flexcal.studio.steps.robot.places import Place, places_of
 from flexcal.studio.steps.robot.problem_listing import problem_listing
+from flexcal.studio.steps.robot.robot_file import RobotFile
 from flexcal.studio.steps.robot.uploads import LARGEST, write_upload
+from flexcal.studio.steps.robot.urdf_choice import arm_ends
+from flexcal.studio.window import Window
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 URDF = (EXAMPLES / "servo_arm" / "arm.urdf").read_bytes()
@@ -203,3 +207,65 @@ def test_problems_stand_beside_their_lines_as_text(project: Project) -> None:
     assert [p.line for p in problems] == [5] and "robot.yaml, line 5" in html
     assert "▶   5  gravitation: 3" in html and "    4    # &lt;script&gt;" in html
     assert "<script" not in html and "<b>" not in html
+
+
+TWO_ARMS = """<robot name="two"><link name="body"/>{}</robot>"""
+
+
+def arm(side: str, joints: int = 6) -> str:
+    """A chain of revolute joints on `body`, with links `<side>_1` to the last."""
+    parts = []
+    for k in range(1, joints + 1):
+        parent = "body" if k == 1 else f"{side}_{k - 1}"
+        parts.append(
+            f'<link name="{side}_{k}"/><joint name="{side}_joint_{k}" type="revolute"><parent link="{parent}"/><child link="{side}_{k}"/>'
+            '<origin xyz="0 0 0.2"/><axis xyz="0 1 0"/><limit lower="-3" upper="3" velocity="1" effort="1"/></joint>'
+        )
+    return "".join(parts)
+
+
+def test_ends_of_several_arms_are_offered(project: Project) -> None:
+    urdf = project.folder / "two.urdf"
+    urdf.write_text(TWO_ARMS.format(arm("left") + arm("right")))
+    assert arm_ends(urdf) == ["left_6", "right_6"]
+    assert urdf_robot(urdf, "right_6").motor_names == tuple(f"right_joint_{k}" for k in range(1, 7))
+    urdf.write_text(TWO_ARMS.format(arm("left")))
+    assert arm_ends(urdf) == []
+    urdf.write_text("<robot")
+    assert arm_ends(urdf) == []
+
+
+class SilentWindow:
+    """What a `RobotFile` uses of a window."""
+
+    def __init__(self, project: Project):
+        self.project, self.said = project, []
+
+    def say(self, text: str, tone: str) -> None:
+        self.said.append(text)
+
+
+def test_a_change_is_taken_back_unless_the_file_was_changed_since(project: Project) -> None:
+    for path in (EXAMPLES / "ur5_tracker").glob("*"):
+        shutil.copy(path, project.folder)
+    before = project.robot_file.read_bytes()
+    window = SilentWindow(project)
+    file = RobotFile(cast("Window", window))
+    assert file.last_change is None
+    file.edit({("points", "smr", "xyz"): [0.0, 0.0, 0.045]}, "smr moved")
+    assert (
+        project.robot_file.read_bytes() == before.replace(b"[0, 0, 0.031]", b"[0.0, 0.0, 0.045]")
+        and file.last_change == "smr moved"
+    )
+    file.take_back()
+    assert project.robot_file.read_bytes() == before and file.last_change is None
+    file.edit({("points", "smr", "xyz"): [0.0, 0.0, 0.046]}, "smr moved")
+    project.robot_file.write_bytes(before + b"# mine\n")
+    assert file.last_change is None
+    file.take_back()
+    assert project.robot_file.read_bytes() == before + b"# mine\n"
+    assert window.said == [
+        "robot.yaml: smr moved.",
+        "robot.yaml: taken back: smr moved.",
+        "robot.yaml: smr moved.",
+    ]
