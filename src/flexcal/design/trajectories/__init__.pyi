@@ -1,5 +1,6 @@
 from .criterion import TrajectoryCriterion
 from .excitation_problem import NEAR
+from .limit_usage import MotionLimits
 from .motion_space import Kind
 from .optimisation import TrajectoryDesign, optimise_trajectories
 from .regressor_columns import BaseRegressor
@@ -13,6 +14,7 @@ __all__ = [
     "VISCOUS",
     "BaseRegressor",
     "Kind",
+    "MotionLimits",
     "SequenceName",
     "TimedMotion",
     "TrajectoryCriterion",

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexcal.design.trajectories.regressor_columns import BaseRegressor
 from flexcal.model.kinematics import joint_ranges
 from flexcal.model.robot import RobotModel
 
@@ -52,3 +53,16 @@ class MotionLimits:
     def cartesian(self) -> bool:
         """Whether the target point is limited."""
         return bool(np.isfinite(self.speed) or np.isfinite(self.box).any())
+
+    def shares(self, motion: np.ndarray, columns: BaseRegressor) -> dict[str, np.ndarray]:
+        """Fractions (N, n) of the limits used by q, q̇, q̈ (3, N, n), and by the motor torques, with friction, of the robot of `columns`.
+
+        Accelerations are left out where none is limited.
+        """
+        q, dq, ddq = motion
+        half, middle = (self.upper - self.lower) / 2, (self.upper + self.lower) / 2
+        torque = np.einsum("jrn,r->nj", columns.write(motion), columns.base_values)
+        taken = {"position": (q - middle) / half, "velocity": dq / self.velocity}
+        if np.isfinite(self.acceleration).any():
+            taken["acceleration"] = ddq / self.acceleration
+        return taken | {"torque": torque / self.torque}

@@ -68,14 +68,7 @@ class TrajectoryDesign:
         """Fractions (N, n) of the limits used by q, q̇, q̈ (3, N, n); motor torques are with friction, quantities without limit are left
         out.
         """
-        q, dq, ddq = motion
-        limits = self.limits
-        half, middle = (limits.upper - limits.lower) / 2, (limits.upper + limits.lower) / 2
-        torque = np.einsum("jrn,r->nj", self.columns.write(motion), self.columns.base_values)
-        taken = {"position": (q - middle) / half, "velocity": dq / limits.velocity}
-        if np.isfinite(limits.acceleration).any():
-            taken["acceleration"] = ddq / limits.acceleration
-        return taken | {"torque": torque / limits.torque}
+        return self.limits.shares(motion, self.columns)
 
     def largest_shares(self) -> dict[str, float]:
         """Largest fraction of each limit over all trajectories, at instants 0.1 % of a period apart."""

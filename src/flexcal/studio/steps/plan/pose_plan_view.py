@@ -1,0 +1,130 @@
+"""A plan of poses: table, scene, predicted accuracy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexcal.studio.steps.plan.plan_results import plan_results
+from flexcal.studio.steps.plan.plan_view import PlanView
+from flexcal.studio.steps.plan.pose_checks import PoseChecks
+from flexcal.studio.window import ReportFigures, add_sections, add_verdict, paragraph, picked_rows
+from flexcal.units import DEGREE, MILLIMETRE
+
+if TYPE_CHECKING:
+    from flexcal.data.plans import PosePlan
+    from flexcal.model.robot import RobotModel
+    from flexcal.report.layout import Page
+    from flexcal.studio.window import Window
+
+_DRAWN_IN_SCENE = "figure-space"
+
+
+class PosePlanView(PlanView):
+    """Poses to measure: their order, whether they collide and are seen, and how accurate they let the robot become."""
+
+    def __init__(self, window: Window, model: RobotModel, name: str, plan: PosePlan):
+        super().__init__(window, model, name)
+        self.plan = plan
+        self._keys = [str(number) for number in plan.numbers]
+        self._checks = PoseChecks.of(model, plan.q)
+        self._results = plan_results(window.project.folder / name)
+        self._page = _page(model, plan, self._results)
+        self._table = None
+
+    def add(self) -> None:
+        """Add the verdict of the plan's page, what the checks say, and the selected pose."""
+        gui = self.window.gui
+        if self._page is not None:
+            add_verdict(gui, self._page)
+        else:
+            gui.add_html(
+                paragraph(
+                    f"{len(self.plan)} poses. What accuracy they allow stands in the page that is written beside a plan, which is missing "
+                    "or of another plan: plan again to know it.",
+                    "faint",
+                )
+            )
+        if "enough_poses" in self._results and self._page is not None:
+            gui.add_html(paragraph(_enough(len(self.plan), int(self._results["enough_poses"]))))
+        for sentence, tone in self._checks.sentences():
+            gui.add_html(paragraph(sentence, tone))
+        self._selected = gui.add_html("")
+        self.add_link()
+        if self._page is not None:
+            add_sections(gui, self._page)
+
+    def figures(self) -> Mapping[str, Callable[[], None]]:
+        """The table of poses, and the figures of the plan's page."""
+        shown = {"Poses": self._add_table}
+        if self._page is not None:
+            shown["Accuracy"] = self._add_figures
+        return shown
+
+    def refresh(self) -> None:
+        """Show the selected pose in the table and on the robot."""
+        key = self.window.selection.key
+        row = self._keys.index(key) if key in self._keys else None
+        if self._table is not None:
+            self._table.content = picked_rows(self._columns(), self._rows(), key, height="calc(100vh - 9em)")
+        if row is None:
+            self._selected.content = paragraph("Pick a pose in the table: the robot goes there.", "faint")
+            self._mark(set())
+            return
+        self.window.robot.pose(self.plan.q[row])
+        self._mark(self._checks.joints(row))
+        touching = "; ".join(f"{one} and {other}" for one, other in self._checks.touching(row))
+        if touching:
+            self._selected.content = paragraph(f"Pose {key}: {touching} touch.", "bad")
+        elif not self._checks.seen[row]:
+            self._selected.content = paragraph(f"Pose {key}: the instrument does not see the target.", "bad")
+        else:
+            self._selected.content = paragraph(f"Pose {key} of {len(self.plan)}.")
+
+    def close(self) -> None:
+        """Take marks off the robot."""
+        self._mark(set())
+
+    def _mark(self, joints: set[int]) -> None:
+        if self.window.robot.view is not None:
+            self.window.robot.view.mark(joints)
+
+    def _add_table(self) -> None:
+        self._table = self.window.gui.add_html("")
+        self.refresh()
+
+    def _add_figures(self) -> None:
+        assert self._page is not None
+        blocks = [block for block in self._page.figures if block.id != _DRAWN_IN_SCENE]
+        self._figures = ReportFigures(self.window.gui, blocks, dark=self.window.dark)
+
+    def _columns(self) -> tuple[str, ...]:
+        units = ["mm" if joint.kind == "prismatic" else "°" for joint in self.model.motor_joints]
+        return ("pose", "check", *(f"q{i} / {unit}" for i, unit in enumerate(units, 1)))
+
+    def _rows(self) -> dict[str, tuple[str, ...]]:
+        scale = np.array([MILLIMETRE if j.kind == "prismatic" else DEGREE for j in self.model.motor_joints])
+        return {
+            key: (f"pose {key}", self._checks.words(row), *(f"{x:.1f}" for x in self.plan.q[row] / scale))
+            for row, key in enumerate(self._keys)
+        }
+
+
+def _page(model: RobotModel, plan: PosePlan, results: dict) -> Page | None:
+    """The plan's page from its numbers; None where they are of another plan, or not as this version writes them."""
+    from flexcal.report.pages import PoseStudy, pose_page
+
+    if results.get("poses") != len(plan):
+        return None
+    try:
+        return pose_page(PoseStudy(model, plan.q, results))
+    except (KeyError, TypeError, ValueError, AttributeError):
+        return None
+
+
+def _enough(planned: int, enough: int) -> str:
+    if planned < enough:
+        return f"From {enough} poses on, further ones only average noise; these are {planned}, so {enough - planned} more still help."
+    return f"From {enough} poses on, further ones only average noise: four times as many halve the error."
