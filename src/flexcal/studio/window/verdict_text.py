@@ -21,7 +21,7 @@ def verdict_text(verdict: Verdict) -> str:
         f'<div style="display:flex;gap:1em;margin:0.4em 0.5em;">{facts}</div>'
         + paragraph(verdict.headline, _TONES[verdict.status])
         + paragraph(verdict.sentence)
-        + paragraph(f"{verdict.tally}.", "faint")
+        + (paragraph(f"{verdict.tally}.", "faint") if verdict.checks else "")
         + "".join(_check(check) for check in reserved)
     )
 

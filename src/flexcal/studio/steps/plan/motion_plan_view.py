@@ -18,6 +18,7 @@ from flexcal.studio.steps.plan.planned_motion import (
     limit_sentence,
     trajectory_motions,
 )
+from flexcal.studio.steps.plan.player import Player
 from flexcal.studio.window import ReportFigures, Tone, facts, paragraph
 
 if TYPE_CHECKING:
@@ -56,16 +57,14 @@ class MotionPlanView(PlanView):
         if len(labels) > 1:
             self._choice = gui.add_dropdown(self._word.capitalize(), labels, initial_value=self._label)
             self._choice.on_update(lambda _: window.post(self._choose))
-        motion = self._motions[self._label]
-        self._time = gui.add_slider("Time / s", 0.0, float(motion.time[-1]), float(motion.time[1]), 0.0)
-        self._time.on_update(lambda _: window.post(self._move))
+        self._player = Player(window, self._checker, repeat=True)
         known = self._known()
         if known:
             gui.add_html(facts(known))
         for remark in self._results.get("remarks", ()):
             gui.add_html(paragraph(f"{str(remark)[:1].upper()}{str(remark)[1:]}.", "faint"))
         self.add_link()
-        self._move()
+        self._load()
 
     def figures(self) -> Mapping[str, Callable[[], None]]:
         """Joints against their limits, and what the plan predicts."""
@@ -75,24 +74,22 @@ class MotionPlanView(PlanView):
             shown["Accuracy"] = lambda: self._add_figures(predicted)
         return shown
 
+    def tick(self) -> None:
+        """Move on what plays."""
+        self._player.tick()
+
     def close(self) -> None:
-        """Take marks off the robot."""
-        if self.window.robot.view is not None:
-            self.window.robot.view.mark(())
+        """Stand still."""
+        self._player.close()
 
     def _choose(self) -> None:
         self._label = self._choice.value
-        self._move()
+        self._load()
 
-    def _move(self) -> None:
+    def _load(self) -> None:
         motion = self._motions[self._label]
-        row = int(np.abs(motion.time - self._time.value).argmin())
-        self.window.robot.pose(motion.q[row])
-        view = self.window.robot.view
-        if view is not None:
-            touching = self._checker.colliding(motion.q[row]) if self._collides[self._label][row] else ()
-            carriers = {shape.name: shape.joint for shape in self._checker.shapes}
-            view.mark(carriers[name] for pair in touching for name in pair if name in carriers)
+        self._player.load(motion.time, motion.q)
+        self._player.show(0.0)
 
     def _headline(self) -> str:
         plan = self.plan

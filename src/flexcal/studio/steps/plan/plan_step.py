@@ -75,6 +75,7 @@ class PlanStep(Step):
             asked,
             plans,
             self._chosen(plans),
+            self.window.robot.view,
             _stamp(self, ".urdf", "robot.yaml", *plans),
             self.window.dark,
         )

@@ -50,11 +50,6 @@ class PoseChecks:
         """Names of the bodies that touch in one pose, in pairs."""
         return self.checker.colliding(self.q[row]) if self.collides[row] else ()
 
-    def joints(self, row: int) -> set[int]:
-        """Joints that carry the bodies that touch in one pose; −1 for the base."""
-        carriers = {shape.name: shape.joint for shape in self.checker.shapes}
-        return {carriers[name] for pair in self.touching(row) for name in pair if name in carriers}
-
     def words(self, row: int) -> str:
         """What is wrong with a pose, in a word or two; 'good' where nothing is."""
         wrong = [

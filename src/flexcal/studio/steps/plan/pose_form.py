@@ -8,7 +8,7 @@ import numpy as np
 
 from flexcal.studio.project import PLAN, pose_files
 from flexcal.studio.steps.plan.plan_form import PlanForm, option
-from flexcal.studio.steps.plan.working_box import WorkingBox
+from flexcal.studio.steps.plan.working_fields import WorkingFields
 
 _BOX = "a box"
 _TRACKER = "laser tracker"
@@ -48,7 +48,7 @@ class PoseForm(PlanForm):
             (self._default, _BOX, *tables),
             hint="Where the tool will work: there the predicted error counts. A table gives points x, y, z or poses.",
         )
-        self._box = WorkingBox(self.window, _start(self.model), self.changed)
+        self._box = WorkingFields(self.window, _start(self.model), self.changed)
         self._box.show(self._working.value == _BOX)
         self._measure = fields.choice(
             "measure",

@@ -9,7 +9,9 @@ import numpy as np
 
 from flexcal.studio.steps.plan.plan_results import plan_results
 from flexcal.studio.steps.plan.plan_view import PlanView
+from flexcal.studio.steps.plan.player import Player
 from flexcal.studio.steps.plan.pose_checks import PoseChecks
+from flexcal.studio.steps.plan.pose_scene import PoseScene
 from flexcal.studio.window import ReportFigures, add_sections, add_verdict, paragraph, picked_rows
 from flexcal.units import DEGREE, MILLIMETRE
 
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
     from flexcal.studio.window import Window
 
 _DRAWN_IN_SCENE = "figure-space"
+_LEAST = 0.1
+"""Seconds of the shortest move."""
 
 
 class PosePlanView(PlanView):
@@ -33,6 +37,8 @@ class PosePlanView(PlanView):
         self._results = plan_results(window.project.folder / name)
         self._page = _page(model, plan, self._results)
         self._table = None
+        self._row: int | None = None
+        self._scene = PoseScene(window, self._checks, self._working(), self._picked)
 
     def add(self) -> None:
         """Add the verdict of the plan's page, what the checks say, and the selected pose."""
@@ -52,6 +58,9 @@ class PosePlanView(PlanView):
         for sentence, tone in self._checks.sentences():
             gui.add_html(paragraph(sentence, tone))
         self._selected = gui.add_html("")
+        self._player = Player(self.window, self._checks.checker, repeat=False)
+        self._times = _times(self.model, self.plan.q)
+        self._player.load(self._times, self.plan.q)
         self.add_link()
         if self._page is not None:
             add_sections(gui, self._page)
@@ -67,14 +76,17 @@ class PosePlanView(PlanView):
         """Show the selected pose in the table and on the robot."""
         key = self.window.selection.key
         row = self._keys.index(key) if key in self._keys else None
+        self._scene.select(row)
         if self._table is not None:
             self._table.content = picked_rows(self._columns(), self._rows(), key, height="calc(100vh - 9em)")
         if row is None:
             self._selected.content = paragraph("Pick a pose in the table: the robot goes there.", "faint")
-            self._mark(set())
+            self._row = None
             return
-        self.window.robot.pose(self.plan.q[row])
-        self._mark(self._checks.joints(row))
+        if row != self._row:
+            self._row = row
+            self._player.pause()
+            self._player.show(float(self._times[row]))
         touching = "; ".join(f"{one} and {other}" for one, other in self._checks.touching(row))
         if touching:
             self._selected.content = paragraph(f"Pose {key}: {touching} touch.", "bad")
@@ -83,13 +95,25 @@ class PosePlanView(PlanView):
         else:
             self._selected.content = paragraph(f"Pose {key} of {len(self.plan)}.")
 
-    def close(self) -> None:
-        """Take marks off the robot."""
-        self._mark(set())
+    def tick(self) -> None:
+        """Move on what plays."""
+        self._player.tick()
 
-    def _mark(self, joints: set[int]) -> None:
-        if self.window.robot.view is not None:
-            self.window.robot.view.mark(joints)
+    def close(self) -> None:
+        """Stand still, and take targets and instrument out of the scene."""
+        self._player.close()
+        self._scene.close()
+
+    def _picked(self, row: int) -> None:
+        self.window.selection.pick(self._keys[row])
+
+    def _working(self) -> np.ndarray | None:
+        """Corners (2, 3), m, of the working volume that the plan is for, where its page tells them."""
+        try:
+            box = np.array(self._results["working"]["box_m"], dtype=float)
+        except (KeyError, TypeError, ValueError):
+            return None
+        return box if box.shape == (2, 3) else None
 
     def _add_table(self) -> None:
         self._table = self.window.gui.add_html("")
@@ -122,6 +146,14 @@ def _page(model: RobotModel, plan: PosePlan, results: dict) -> Page | None:
         return pose_page(PoseStudy(model, plan.q, results))
     except (KeyError, TypeError, ValueError, AttributeError):
         return None
+
+
+def _times(model: RobotModel, q: np.ndarray) -> np.ndarray:
+    """Times (N,), s, at which a robot is in each pose (N, n), moving from one to the next with no joint faster than its limit."""
+    velocity = np.array([joint.velocity for joint in model.motor_joints])
+    velocity = np.where((velocity > 0) & np.isfinite(velocity), velocity, 1.0)
+    moves = (np.abs(np.diff(q, axis=0)) / velocity).max(axis=1)
+    return np.concatenate([[0.0], np.cumsum(np.maximum(moves, _LEAST))])
 
 
 def _enough(planned: int, enough: int) -> str:
