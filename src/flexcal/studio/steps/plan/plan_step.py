@@ -110,9 +110,8 @@ class PlanStep(Step):
             if model is None:
                 return
             form = _FORMS[self._subject.value]
-            with window.gui.add_folder(
-                "New plan", expand_by_default=not plan_files(window.project, form.kind)
-            ):
+            planned = self._chosen(tuple(plan_files(window.project, form.kind)))
+            with window.gui.add_folder("New plan", expand_by_default=not planned):
                 self._form = form(window, model)
                 window.button(form.button, self._run, main=True)
 
