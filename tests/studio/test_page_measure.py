@@ -98,7 +98,7 @@ def test_a_guided_session_in_the_virtual_cell(page: Any, running: Any, cell: Any
     page.get_by_text(judgement.sentence).wait_for(timeout=WAIT)
     page.get_by_text(f": p90 predicted {session.outlook().p90[0] * 1e3:.3f} mm,").wait_for(timeout=WAIT)
 
-    text_field(page, "Reason to exclude").fill("the target shook")
+    text_field(page, "Reason").fill("the target shook")
     press(page, "Exclude the last row")
     page.get_by_text(f"pose {COUNT} is excluded: the target shook").first.wait_for(timeout=WAIT)
     assert [row["excluded"] for row in rows(folder)][-2:] == ["", "the target shook"]

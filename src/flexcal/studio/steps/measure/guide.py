@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -44,6 +44,12 @@ class Question:
     keys: tuple[RowKey, ...]
     request: PoseRequest | None
 
+    def is_same_as(self, other: Question) -> bool:
+        """Whether its answer is that of another one."""
+        mine = (self.model, self.plan, self.before, self.request)
+        others = (other.model, other.plan, other.before, other.request)
+        return self.keys == other.keys and all(a is b for a, b in zip(mine, others, strict=True))
+
 
 @dataclass(frozen=True, eq=False)
 class Answer:
@@ -58,6 +64,17 @@ class Answer:
     outlook: Outlook | None = None
     course: dict[int, float] = field(default_factory=dict)
     problem: Exception | None = None
+
+    def for_further(self, question: Question) -> Answer | None:
+        """What it tells of another question: the judgements of those rows that begin both; None where the robot or the plan differs."""
+        mine = self.question
+        if (
+            mine.model is not question.model
+            or mine.plan is not question.plan
+            or mine.before is not question.before
+        ):
+            return None
+        return Answer(question, self.judgements[: _begin_alike(mine.keys, question.keys)])
 
 
 class Guide:
@@ -145,11 +162,7 @@ class _Known:
         if not self._of or any(a is not b for a, b in zip(of, self._of, strict=True)):
             self.sessions = [GuidedSession(question.model, question.plan, question.before)]
             self.judgements, self._keys, self._of, self._errors = [], [], of, {}
-        same = 0
-        for mine, asked in zip(self._keys, question.keys, strict=False):
-            if mine != asked:
-                break
-            same += 1
+        same = _begin_alike(self._keys, question.keys)
         del self.sessions[same + 1 :], self.judgements[same:], self._keys[same:]
         self._errors = {count: error for count, error in self._errors.items() if count <= same}
 
@@ -194,3 +207,11 @@ class _Known:
             self._choice = (request, PoseChoice.of(question.model, request))
             self._errors = {}
         return replace(self.sessions[count], request=request, choice=self._choice[1])
+
+
+def _begin_alike(first: Sequence[RowKey], second: Sequence[RowKey]) -> int:
+    """Number of rows with which both begin."""
+    return next(
+        (k for k, (a, b) in enumerate(zip(first, second, strict=False)) if a != b),
+        min(len(first), len(second)),
+    )

@@ -1,6 +1,6 @@
 from .followed import FileSource, FolderSource
-from .row_source import Measuring, RowSource
+from .row_source import RowSource
 from .typed import TypedSource
 from .virtual import VirtualSource
 
-__all__ = ["FileSource", "FolderSource", "Measuring", "RowSource", "TypedSource", "VirtualSource"]
+__all__ = ["FileSource", "FolderSource", "RowSource", "TypedSource", "VirtualSource"]

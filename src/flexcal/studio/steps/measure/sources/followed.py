@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flexcal.errors import InputError
-from flexcal.studio.steps.measure.sources.row_source import Measuring, RowSource
+from flexcal.studio.steps.measure.sources.row_source import RowSource
 from flexcal.studio.window import paragraph
 
 if TYPE_CHECKING:
     from flexcal.jobs.guidance import FollowedFile
+    from flexcal.studio.steps.measure.measuring import Measuring
+    from flexcal.studio.window import Window
 
 _REFUSED = 3
 """Lines that were left out and are shown, the latest."""
@@ -24,8 +27,8 @@ class _Followed(RowSource):
     hint = ""
     example = ""
 
-    def __init__(self, measuring: Measuring):
-        super().__init__(measuring)
+    def __init__(self, window: Window, measuring: Measuring, refresh: Callable[[], None]):
+        super().__init__(window, measuring, refresh)
         self._files: dict[str, FollowedFile] = {}
         self._refused: list[str] = []
         self._shown = ""
@@ -69,8 +72,6 @@ class _Followed(RowSource):
             except InputError as problem:
                 self._files.pop(one, None)
                 problems.append(str(problem))
-                if problem.code == "E-STUDIO-031":
-                    continue
         waiting = (
             "waiting for the next line"
             if names
@@ -104,7 +105,7 @@ class _Followed(RowSource):
             except InputError as problem:
                 self._refuse(problem)
         if good:
-            self.measuring.take(good, Source(name, file.end))
+            self.take(good, Source(name, file.end))
 
     def _refuse(self, problem: InputError) -> None:
         self._refused = [*self._refused, f"left out: {problem}"][-_REFUSED:]

@@ -3,42 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, ClassVar
 
 if TYPE_CHECKING:
     from flexcal.jobs.guidance import Source
+    from flexcal.studio.steps.measure.measuring import Measuring
     from flexcal.studio.steps.measure.next_pose import NextPose
-    from flexcal.studio.steps.measure.series import Series
     from flexcal.studio.window import Window
-
-
-class Measuring(Protocol):
-    """The measurement that rows come to."""
-
-    @property
-    def window(self) -> Window:
-        """Where it is shown."""
-        ...
-
-    @property
-    def series(self) -> Series:
-        """Plan and rows now."""
-        ...
-
-    @property
-    def following(self) -> NextPose | None:
-        """The pose that is to be measured next; None where there is none, or it is not known yet."""
-        ...
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether no pose is left to measure."""
-        ...
-
-    def take(self, rows: Sequence[Mapping[str, str]], source: Source | None = None) -> None:
-        """Take rows, texts by column; raises `InputError` for those that do not fit."""
-        ...
 
 
 class RowSource(ABC):
@@ -46,15 +18,18 @@ class RowSource(ABC):
 
     Parameters
     ----------
+    window : Window
+        Where its elements are.
     measuring : Measuring
-        What they come to.
+        What the rows come to.
+    refresh : callable
+        Shows them.
     """
 
     title: ClassVar[str]
 
-    def __init__(self, measuring: Measuring):
-        self.measuring = measuring
-        self.window = measuring.window
+    def __init__(self, window: Window, measuring: Measuring, refresh: Callable[[], None]):
+        self.window, self.measuring, self._refresh = window, measuring, refresh
 
     @abstractmethod
     def add(self) -> None:
@@ -65,3 +40,17 @@ class RowSource(ABC):
 
     def measure_next(self) -> None:  # noqa: B027  another program measures
         """Measure the next pose."""
+
+    @property
+    def following(self) -> NextPose | None:
+        """The pose that is to be measured next; None where there is none, or it is not known yet."""
+        return self.measuring.following(self.window.selection.key)
+
+    def take(self, rows: Sequence[Mapping[str, str]], source: Source | None = None) -> None:
+        """Take rows, texts by column, and show them; raises `InputError` for those that do not fit."""
+        self.measuring.take(rows, source)
+        self.window.say("")
+        if self.window.selection.key is None:
+            self._refresh()
+        else:
+            self.window.selection.pick(None)  # which refreshes

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexcal.errors import InputError
-from flexcal.studio.steps.measure.sources.row_source import Measuring, RowSource
+from flexcal.studio.steps.measure.sources.row_source import RowSource
 from flexcal.units import MILLIMETRE
+
+if TYPE_CHECKING:
+    from flexcal.studio.steps.measure.measuring import Measuring
+    from flexcal.studio.window import Window
 
 
 class TypedSource(RowSource):
@@ -16,8 +22,8 @@ class TypedSource(RowSource):
 
     title = "typed"
 
-    def __init__(self, measuring: Measuring):
-        super().__init__(measuring)
+    def __init__(self, window: Window, measuring: Measuring, refresh: Callable[[], None]):
+        super().__init__(window, measuring, refresh)
         self._taken: tuple[float, ...] | None = None
 
     def add(self) -> None:
@@ -31,7 +37,7 @@ class TypedSource(RowSource):
         from flexcal.data.poses import DEFAULT_SIGMA, PoseSet
         from flexcal.jobs.guidance import cells_of
 
-        series, pose = self.measuring.series, self.measuring.following
+        series, pose = self.measuring.series, self.following
         values = tuple(float(field.value) for field in self._fields)
         if pose is None:
             raise InputError("E-STUDIO-091", "no pose is next, so the point is of none; choose a pose first.")
@@ -59,5 +65,5 @@ class TypedSource(RowSource):
                 sigma=last.sigma,
                 sigma_given=last.sigma_given,
             )
-        self.measuring.take(cells_of(poses))
+        self.take(cells_of(poses))
         self._taken = values

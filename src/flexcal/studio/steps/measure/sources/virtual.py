@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.studio.steps.measure.sources.row_source import Measuring, RowSource
+from flexcal.studio.steps.measure.sources.row_source import RowSource
 from flexcal.studio.window import paragraph
 
 if TYPE_CHECKING:
     from flexcal.data.plans import PosePlan
     from flexcal.data.poses import PoseSet
     from flexcal.model.robot import RobotModel
+    from flexcal.studio.steps.measure.measuring import Measuring
     from flexcal.studio.steps.measure.next_pose import NextPose
+    from flexcal.studio.window import Window
 
 _UNPLANNED = 1000
 """Added to the number of a pose outside the plan, for the seed of its noise."""
@@ -26,8 +29,8 @@ class VirtualSource(RowSource):
 
     title = "virtual cell"
 
-    def __init__(self, measuring: Measuring):
-        super().__init__(measuring)
+    def __init__(self, window: Window, measuring: Measuring, refresh: Callable[[], None]):
+        super().__init__(window, measuring, refresh)
         self._cell = _CellRows()
         self._is_measuring = False
         self._goes_on = False
@@ -37,14 +40,16 @@ class VirtualSource(RowSource):
         gui = self.window.gui
         choices = self.window.choices
         self._seed = gui.add_number("Seed of the hidden truth", choices.get("cell seed", 1), min=0, step=1)
-        self._seed.on_update(lambda _: choices.put("cell seed", int(self._seed.value)))
+        self._seed.on_update(
+            lambda _: self.window.post(lambda: choices.put("cell seed", int(self._seed.value)))
+        )
         self.window.button("Measure the next pose (N)", self.measure_next, main=True)
         self._all = self.window.button("Measure all that are left", self._toggle)
         self._told = gui.add_html("")
 
     def measure_next(self) -> None:
         """Measure the next pose; does nothing while one is being measured."""
-        pose, series = self.measuring.following, self.measuring.series
+        pose, series = self.following, self.measuring.series
         if self._is_measuring:
             return
         if pose is None:
@@ -63,7 +68,7 @@ class VirtualSource(RowSource):
         """Measure the next pose where all that are left are to be measured."""
         if self._goes_on and self.measuring.is_complete:
             self._toggle()
-        if self._goes_on and self.measuring.following is not None:
+        if self._goes_on and self.following is not None:
             self.measure_next()
 
     def _toggle(self) -> None:
@@ -88,11 +93,11 @@ class VirtualSource(RowSource):
         from flexcal.jobs.guidance import cells_of
 
         self._is_measuring = False
-        now = self.measuring.following
+        now = self.following
         if now is None or now.number != pose.number:
             return  # another one was chosen meanwhile
         self._told.content = ""
-        self.measuring.take(cells_of(replace(row, pose=np.array([pose.number]))))
+        self.take(cells_of(replace(row, pose=np.array([pose.number]))))
 
 
 class _CellRows:
