@@ -63,7 +63,9 @@ def test_killed_again_and_again_while_a_file_grows(tmp_path: Path) -> None:
         time.sleep(0.5)
     rows = list(csv.DictReader(table.read_text().splitlines()))
     assert [int(row["pose"]) for row in rows] == list(range(1, COUNT + 1))
-    there = [[float(row[name]) for name in ("q1", "q2", "q3", "q4", "q5", "q6", "x", "y", "z")] for row in rows]
+    there = [
+        [float(row[name]) for name in ("q1", "q2", "q3", "q4", "q5", "q6", "x", "y", "z")] for row in rows
+    ]
     assert there == values.tolist()
     assert sorted(seen) == seen and any(0 < count < COUNT for count in seen), seen
 

@@ -38,8 +38,10 @@ class FollowedFile:
         """Columns of the header; none before it is complete."""
         return self._columns
 
-    def new_rows(self) -> list[dict[str, str]]:
+    def new_rows(self, *, is_whole: bool = False) -> list[dict[str, str]]:
         """Rows, texts by column, of the lines that are complete now and were not before; none where there is no file.
+
+        Of a file that `is_whole` the last line is complete without an end of line.
 
         Raises `InputError` for a header that names other columns, a line with more or fewer values, and a file that has become shorter.
         """
@@ -59,7 +61,9 @@ class FollowedFile:
         except OSError as problem:
             raise unreadable(self.path, problem) from problem
         rows: list[dict[str, str]] = []
-        for raw in content[: content.rfind(b"\n") + 1].splitlines(keepends=True):
+        if not is_whole:
+            content = content[: content.rfind(b"\n") + 1]
+        for raw in content.splitlines(keepends=True):
             line = raw.decode("utf-8", "replace").lstrip("\ufeff").strip()
             cells = [] if not line or line.startswith("#") else split_line(line)
             if cells and not self._columns:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from abc import abstractmethod
 from collections.abc import Callable
 from pathlib import Path
@@ -16,6 +17,12 @@ if TYPE_CHECKING:
     from flexcal.studio.steps.measure.measuring import Measuring
     from flexcal.studio.window import Window
 
+_PATIENCE = 0.15
+"""Seconds for which rows are taken at one look, so that the window goes on."""
+_AT_REST = 1.0
+"""Seconds after which a file of a watched folder is whole."""
+_GOES_ON = ("E-STUDIO-030", "E-STUDIO-031")
+"""A file written anew, and a line that is left out: reading goes on after them."""
 _REFUSED = 3
 """Lines that were left out and are shown, the latest."""
 
@@ -33,6 +40,7 @@ class _Followed(RowSource):
         self._refused: list[str] = []
         self._shown = ""
         self._of: object = None
+        self._journal: tuple[object, dict[str, int]] = ((), {})
 
     def add(self) -> None:
         """Add the name, a button that begins or ends following it, and what has come."""
@@ -65,8 +73,10 @@ class _Followed(RowSource):
         if self._of is not series.model:
             self._files, self._of = {}, series.model
         problems: list[str] = []
-        names = self._names(name)
+        names, until = self._names(name), time.monotonic() + _PATIENCE
         for one in names:
+            if time.monotonic() > until:
+                break  # the others at the next look
             try:
                 self._read(one)
             except InputError as problem:
@@ -88,12 +98,12 @@ class _Followed(RowSource):
         series = self.measuring.series
         path = self.window.project.path(name)
         if name not in self._files:
-            self._files[name] = FollowedFile(path, series.model, series.table.taken().get(name, 0))
+            self._files[name] = FollowedFile(path, series.model, self._taken().get(name, 0))
         file = self._files[name]
         try:
-            rows = file.new_rows()
+            rows = file.new_rows(is_whole=self._is_whole(path))
         except InputError as problem:
-            if problem.code != "E-STUDIO-031":  # a line that is left out, and reading goes on after it
+            if problem.code not in _GOES_ON:
                 raise
             self._refuse(problem)
             return
@@ -107,8 +117,22 @@ class _Followed(RowSource):
         if good:
             self.take(good, Source(name, file.end))
 
+    def _taken(self) -> dict[str, int]:
+        """Bytes of every file that are taken."""
+        table = self.measuring.series.table
+        status = table.history.stat() if table.history.exists() else None
+        stamp = None if status is None else (status.st_mtime_ns, status.st_size)
+        if self._journal[0] != stamp:
+            self._journal = (stamp, table.taken())
+        return self._journal[1]
+
+    def _is_whole(self, path: Path) -> bool:
+        """Whether the last line of a file is complete without an end of line."""
+        return False
+
     def _refuse(self, problem: InputError) -> None:
-        self._refused = [*self._refused, f"left out: {problem}"][-_REFUSED:]
+        sentence = str(problem)
+        self._refused = [*(one for one in self._refused if one != sentence), sentence][-_REFUSED:]
 
     def _count(self) -> int:
         return len(self.measuring.series.rows)
@@ -161,5 +185,16 @@ class FolderSource(_Followed):
     def _names(self, name: str) -> list[str]:
         place = self.window.project.path(name)
         files = [path for path in place.glob("*.csv") if path.is_file() and not path.is_symlink()]
-        files.sort(key=lambda path: (path.stat().st_mtime_ns, path.name))
+        files.sort(key=lambda path: (_changed(path), path.name))
         return [f"{name}/{path.name}" for path in files]
+
+    def _is_whole(self, path: Path) -> bool:
+        return time.time() - _changed(path) > _AT_REST
+
+
+def _changed(path: Path) -> float:
+    """Time of the last change of a file, s; 0 of one that has gone."""
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        return 0.0
