@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 _PERIOD = 0.2
 """Seconds between looks at the folder and the command that runs."""
+_TICK = 0.1
+"""Seconds between looks at what arrives at the open step by itself."""
 _WIDTH = 400
 _DESCRIBING = (".yaml", ".yml", ".urdf", ".xacro")
 """Endings of the files that describe a robot."""
@@ -95,13 +97,16 @@ class Window:
 
     def run(self) -> None:
         """Carry out what clicks ask for, and watch the folder and the command that runs, until `stop`."""
-        watched = 0.0
+        watched = ticked = 0.0
         while not self._stopped.is_set():
             with suppress(queue.Empty):
-                self._carry_out(self._actions.get(timeout=_PERIOD))
-            if time.monotonic() - watched > _PERIOD:
-                self._carry_out(self._watch)
+                self._carry_out(self._actions.get(timeout=max(0.0, ticked + _TICK - time.monotonic())))
+            if time.monotonic() - ticked >= _TICK:
+                ticked = time.monotonic()
+                self._carry_out(self._tick)
+            if time.monotonic() - watched >= _PERIOD:
                 watched = time.monotonic()
+                self._carry_out(self._watch)
 
     def stop(self) -> None:
         """End `run`, and cancel the command that runs."""
@@ -195,12 +200,15 @@ class Window:
             self.robot.clear()
             self.robot.problem = str(problem)
 
+    def _tick(self) -> None:
+        if self._open is not None:
+            self._open.tick()
+
     def _watch(self) -> None:
         self.runner.settle()
         self._commands.refresh()
         if self._open is None:
             return
-        self._open.tick()
         stamp = self.project.stamp()
         if stamp != self._stamp:
             self._stamp = stamp
