@@ -4,9 +4,10 @@ from .measured_rows import MeasuredRow, MeasuredRows, Source
 from .outlook import Outlook
 from .pose_choice import PoseChoice
 from .row_cells import RowReader, cells_of
-from .session import GuidedSession
+from .session import DEFAULT_CHOICE, GuidedSession
 
 __all__ = [
+    "DEFAULT_CHOICE",
     "Finding",
     "FollowedFile",
     "GuidedSession",

@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
     from flexcal.studio.project import Choices, Project
 
-_CANDIDATES = 800
-"""Random poses among which the best one is chosen."""
-
 
 class Measuring:
     """A guided measurement in a project's folder, whose files are its only state.
@@ -209,6 +206,7 @@ class Measuring:
         """Where the next poses come from; kept while it is the same."""
         from flexcal.data.poses import PosePool
         from flexcal.jobs.experiments import PoseRequest
+        from flexcal.jobs.guidance import DEFAULT_CHOICE
 
         series, plan = self.series, self.series.plan
         if series.purpose.is_check:
@@ -216,7 +214,7 @@ class Measuring:
         pooled = plan is not None and self.order != "the best anywhere" and not self.is_complete
         key = (series.model, self.wanted, (plan, self.skipped) if pooled else None)
         if key != self._request[0]:
-            candidates: PosePool | int = _CANDIDATES
+            candidates = DEFAULT_CHOICE.candidates
             if pooled and plan is not None:
                 numbers, first = np.unique(plan.numbers, return_index=True)
                 kept = ~np.isin(numbers, list(self.skipped))
