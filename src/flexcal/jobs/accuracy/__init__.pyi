@@ -1,4 +1,5 @@
 from .certificate import Certificate, certify, certify_robot
+from .map_table import MapTable, worst_places
 from .motor_zeros import MotorZeros, ZerosVerdict, export_motor_zeros
 from .repeated_visits import Repeatability, repeatability, robot_repeatability
 from .verification import Verification, verify, verify_robot
@@ -7,6 +8,7 @@ from .volume_map import AccuracyMap, accuracy_map, map_accuracy
 __all__ = [
     "AccuracyMap",
     "Certificate",
+    "MapTable",
     "MotorZeros",
     "Repeatability",
     "Verification",
@@ -20,4 +22,5 @@ __all__ = [
     "robot_repeatability",
     "verify",
     "verify_robot",
+    "worst_places",
 ]

@@ -28,10 +28,10 @@ from flexcal.calibration.verification import (
 )
 from flexcal.data.plans import page_beside
 from flexcal.data.poses import PoseSet
-from flexcal.data.tables import write_table
 from flexcal.design.scene import CollisionChecker
 from flexcal.errors import FlexcalError, InputError, naming
 from flexcal.files.formats import provenance
+from flexcal.jobs.accuracy.map_table import MapTable, worst_places
 from flexcal.jobs.accuracy.registration_refit import proposed_refit, refit_remarks
 from flexcal.jobs.accuracy.verification import verification_poses
 from flexcal.jobs.calibration import fitted_files, fitted_points, outside_ranges
@@ -50,9 +50,6 @@ from flexcal.report.layout import Page
 from flexcal.report.pages import MapStudy, map_page
 from flexcal.units import MILLIMETRE
 
-_WORST = 5
-_APART = 0.1
-"""Least distance between the listed worst places, relative to the extent of all points."""
 _SOURCE_POSES = 200
 """Number of poses over which the sources of the error are averaged."""
 
@@ -288,7 +285,7 @@ def _checked_map(
         q = random_poses_in(reach, count, rng, box, progress)
     scale = None if check is None else check.scale
     predicted = predicted_accuracy(reach, q, progress=progress).scaled(error_scale_factor(scale))
-    worst = _worst(predicted)
+    worst = worst_places(predicted)
     some = q[rng.permutation(len(q))[:_SOURCE_POSES]]
     return AccuracyMap(
         model,
@@ -354,7 +351,7 @@ def map_accuracy(
     fitted = fitted_files(robot, verification) or accuracy.fitted
     result = replace(accuracy, fitted=fitted, record=RunRecord(origin, command))
     if out != page_beside(out):
-        _write_table(out, result)
+        MapTable(result.predicted, result.uncalibrated).write(out)
     result.report(page_beside(out))
     return result
 
@@ -382,28 +379,6 @@ class _Check:
             )
         before = uncalibrated_model(robot.nominal, poses).errors(poses)
         return cls(errors, before, error_scale(errors, covariance), fitted_points(robot, poses), sample)
-
-
-def _worst(predicted: PredictedAccuracy) -> np.ndarray:
-    """Rows of the worst places, apart from each other, the worst first."""
-    least = _APART * float(np.linalg.norm(np.ptp(predicted.position, axis=0)))
-    chosen: list[int] = []
-    for k in np.argsort(-predicted.p95, kind="stable"):
-        if all(np.linalg.norm(predicted.position[k] - predicted.position[c]) >= least for c in chosen):
-            chosen.append(int(k))
-        if len(chosen) == _WORST:
-            break
-    return np.array(chosen)
-
-
-def _write_table(out: Path, accuracy: AccuracyMap) -> None:
-    predicted = accuracy.predicted
-    columns = {name: predicted.position[:, i] for i, name in enumerate("xyz")}
-    columns |= {f"q{i + 1}": predicted.q[:, i] for i in range(predicted.q.shape[1])}
-    errors = {"mean_mm": predicted.mean / MILLIMETRE, "p95_mm": predicted.p95 / MILLIMETRE}
-    if accuracy.uncalibrated is not None:
-        errors["uncalibrated_mm"] = accuracy.uncalibrated / MILLIMETRE
-    write_table(out, columns | errors)
 
 
 def _quantiles(values: np.ndarray) -> dict[str, float]:

@@ -91,7 +91,7 @@ def tool_at_rest(
     Returns
     -------
     ToolAtRest
-        `kinematics.position` (N, 3), m, and `kinematics.rotation` (N, 3, 3) in the base frame, and the equilibrium `rest`.
+        `kinematics.position` (N, 3), m, and `kinematics.orientation` (N, 3, 3) in the base frame, and the equilibrium `rest`.
 
     Raises
     ------
