@@ -83,12 +83,18 @@ class CompensatedTargets(Part):
             self._point = gui.add_dropdown("Point", tuple(model.points))
             self._frame = gui.add_dropdown("Frame", (_BASE, *stations))
             self._position = gui.add_vector3("xyz / mm", self._kept("target position", _AT), step=0.001)
-            self._oriented = gui.add_checkbox("Turned, too", window.choices.get("target oriented", False))
+            self._oriented = gui.add_checkbox("Turned", window.choices.get("target oriented", False))
             self._rpy = gui.add_vector3(
                 "rpy / deg",
                 self._kept("target rpy", (180.0, 0.0, 0.0)),
                 step=0.001,
-                hint="roll, pitch, yaw of the point's frame, as in a URDF: turned about the fixed x, then y, then z",
+                visible=self._oriented.value,
+            )
+            self._convention = gui.add_html(
+                paragraph(
+                    "rpy: roll, pitch, yaw of the point's frame as in a URDF, turned about the fixed x, then y, then z.",
+                    "faint",
+                ),
                 visible=self._oriented.value,
             )
             self._start = gui.add_dropdown("Start", (_SAFE, _SHOWN), hint="of the inverse kinematics")
@@ -107,7 +113,7 @@ class CompensatedTargets(Part):
         return float(kept[0]), float(kept[1]), float(kept[2])
 
     def _orient(self) -> None:
-        self._rpy.visible = self._oriented.value
+        self._rpy.visible = self._convention.visible = self._oriented.value
         self.window.choices.put("target oriented", self._oriented.value)
 
     def _take(self) -> None:

@@ -66,7 +66,9 @@ class Exports(Part):
         )
         told = gui.add_html("")
         window.button(
-            "Export", lambda: window.command(offered[choice.value].arguments, self._tell_loss), main=True
+            "Export the robot",
+            lambda: window.command(offered[choice.value].arguments, self._tell_loss),
+            main=True,
         )
         gui.add_html(self._links())
         for each in self._formats:

@@ -68,7 +68,7 @@ class FreshPoses(Part):
             files.on_update(lambda _: window.post(lambda: window.choices.put("fresh", files.value)))
             again = " again" if (window.project.folder / VERIFICATION / RESULTS).is_file() else ""
             window.button(
-                f"Verify{again}",
+                f"Verify on these poses{again}",
                 lambda: window.command(self._arguments(files.value)),
                 hint="$ flexcal " + " ".join(self._arguments(files.value)),
                 main=True,
