@@ -87,6 +87,7 @@ def test_from_a_calibration_to_the_exported_robot(page: Any, tmp_path: Path) -> 
         page.get_by_text("was not written by flexcal").first.wait_for(timeout=WAIT)
         assert (folder / "calibrated.urdf").read_text() == "another program's"
         (folder / "calibrated.urdf").unlink()
+        page.get_by_role("link", name="open calibrated.urdf").wait_for(state="detached", timeout=WAIT)
         page.get_by_role("button", name="Export the robot").click()
         page.get_by_role("link", name="open calibrated.urdf").wait_for(timeout=WAIT)
         assert ElementTree.parse(folder / "calibrated.urdf").getroot().tag == "robot"
