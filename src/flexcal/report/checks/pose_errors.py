@@ -121,7 +121,11 @@ def check_error_budget(
         f"Standard deviation of a coordinate: {said}robot {robot:.3f}{with_}, model error {model:.3f} mm."
     )
     if is_implausible:
-        return Check(question, f"No: the data do not fit this robot. {answer}", "bad")
+        return Check(
+            question,
+            f"No: the data do not fit the robot as its files describe it; the remarks say what is implausible. {answer}",
+            "bad",
+        )
     if model > np.hypot(instrument or 0.0, robot):
         return Check(
             question,
