@@ -18,7 +18,17 @@ from flexcal.errors import FlexcalError, InputError, naming, unreadable
 from flexcal.files.structuring.faults import Failure, Fault, StructureError
 
 CODE = re.compile(r"E-([A-Z]+)-(\d{3})")
-CLASSES = {"FlexcalError", "InputError", "NotFinite", "OneFlank", "TooFewSamples", "Fault", "Failure"}
+CLASSES = {
+    "FlexcalError",
+    "InputError",
+    "AmbiguousArm",
+    "NotFinite",
+    "OneFlank",
+    "ReadingGoesOn",
+    "TooFewSamples",
+    "Fault",
+    "Failure",
+}
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-from .followed_file import FollowedFile
+from .followed_file import FollowedFile, ReadingGoesOn
 from .judgement import Finding, Judgement, JudgementCode
 from .measured_rows import MeasuredRow, MeasuredRows, Source
 from .outlook import Outlook
@@ -17,6 +17,7 @@ __all__ = [
     "MeasuredRows",
     "Outlook",
     "PoseChoice",
+    "ReadingGoesOn",
     "RowReader",
     "Source",
     "cells_of",

@@ -10,6 +10,10 @@ from flexcal.jobs.guidance.row_cells import RowReader
 from flexcal.model.robot import RobotModel
 
 
+class ReadingGoesOn(InputError):
+    """A file that was written anew, or a line that is left out: what follows can be read."""
+
+
 class FollowedFile:
     """Reads the rows that were appended to a CSV file since the last time, complete lines only.
 
@@ -50,7 +54,7 @@ class FollowedFile:
                 size = stream.seek(0, 2)
                 if size < self.end:
                     self._start, self._columns, self._skipped = 0, (), 0
-                    raise InputError(
+                    raise ReadingGoesOn(
                         "E-STUDIO-030",
                         f"{self.path} has become shorter: another program wrote it anew; the rows that it has now are read from its start.",
                     )
@@ -77,7 +81,7 @@ class FollowedFile:
                 return rows  # what is wrong with this line is said at the next call
             self._start += len(raw)
             if cells and len(cells) != len(self._columns) and self._start > self._skipped:
-                raise InputError(
+                raise ReadingGoesOn(
                     "E-STUDIO-031",
                     f"{self.path}: the line '{line[:60]}' has {len(cells)} values, but the header names {len(self._columns)} columns; it "
                     "is left out.",

@@ -1,8 +1,9 @@
 from .description import Description, Frame, locked_joints, read_urdf
 from .elements import Element, read_elements
-from .serial_arm import Arm, find_arm
+from .serial_arm import AmbiguousArm, Arm, find_arm
 
 __all__ = [
+    "AmbiguousArm",
     "Arm",
     "Description",
     "Element",

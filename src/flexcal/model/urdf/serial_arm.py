@@ -22,6 +22,10 @@ _FEW = 2
 """Largest number of joints of a branch that does not count as an arm beside one with more than twice as many."""
 
 
+class AmbiguousArm(InputError):
+    """A URDF in which the end of the arm has to be chosen."""
+
+
 @dataclass(frozen=True)
 class Arm:
     """Chain of a URDF that moves its tool.
@@ -128,7 +132,7 @@ def _only_chain(
     ends.pop((), None)
     longest = {c: link for c, link in ends.items() if not any(c == o[: len(c)] and c != o for o in ends)}
     if not longest:
-        raise InputError(
+        raise AmbiguousArm(
             "E-URDF-040",
             f"{path}: every movable joint looks like a gripper's ({', '.join(sorted(beside))}); say where the arm ends with --tip LINK.",
         )
@@ -136,7 +140,7 @@ def _only_chain(
     arms = [chain for chain in longest if len(chain) > _FEW or most <= 2 * _FEW]
     if len(arms) > 1:
         listed = ", ".join(f"{longest[chain]} ({len(chain)} joints)" for chain in arms)
-        raise InputError(
+        raise AmbiguousArm(
             "E-URDF-041",
             f"{path}: the URDF has several chains; say which is the arm, as --tip LINK: {listed}.",
         )

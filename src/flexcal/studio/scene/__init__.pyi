@@ -1,5 +1,5 @@
 from .accuracy_volume import AccuracyVolume
-from .colliding_links import colliding_links
+from .collisions import colliding_links
 from .colour_scale import ColourScale
 from .colours import BLOCKED, COLLIDING, GHOST, INSTRUMENT, LINE_OF_SIGHT, LINK, MEASURED, SELECTED, TARGET
 from .draggable_point import DraggablePoint

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from flexcal.errors import FlexcalError
 from flexcal.studio.commands import CommandRun, CommandRunner
-from flexcal.studio.project import Choices, Project
+from flexcal.studio.project import ROBOT, Choices, Project
 from flexcal.studio.window.command_box import CommandBox
 from flexcal.studio.window.figures_panel import FiguresPanel
 from flexcal.studio.window.markup import Tone, paragraph, step_links
@@ -31,8 +31,8 @@ _PERIOD = 0.2
 _TICK = 0.1
 """Seconds between looks at what arrives at the open step by itself."""
 _WIDTH = 400
-_DESCRIBING = (".yaml", ".yml", ".urdf", ".xacro")
-"""Endings of the files that describe a robot."""
+_DESCRIBING = (ROBOT, ".urdf")
+"""Endings of the files that describe the robot without its estimates; plans and measurements do not."""
 _PROGRAM_ERROR = "an error of the program, not of your files; the terminal has the details"
 
 

@@ -7,19 +7,16 @@ from typing import Any, cast
 
 from flexcal.errors import FlexcalError, InputError
 from flexcal.studio.steps.measure.accuracy_course import accuracy_course
+from flexcal.studio.steps.measure.followed_source import FileSource, FolderSource
 from flexcal.studio.steps.measure.guide import Answer
 from flexcal.studio.steps.measure.measuring import Measuring
 from flexcal.studio.steps.measure.next_pose import ORDERS
 from flexcal.studio.steps.measure.pose_list import pose_list, row_keys
+from flexcal.studio.steps.measure.row_source import RowSource
 from flexcal.studio.steps.measure.sentences import next_text, outlook_text, row_text
 from flexcal.studio.steps.measure.series import PURPOSES
-from flexcal.studio.steps.measure.sources import (
-    FileSource,
-    FolderSource,
-    RowSource,
-    TypedSource,
-    VirtualSource,
-)
+from flexcal.studio.steps.measure.typed_source import TypedSource
+from flexcal.studio.steps.measure.virtual_source import VirtualSource
 from flexcal.studio.window import Step, Window, paragraph
 
 _SOURCES: tuple[type[RowSource], ...] = (TypedSource, FileSource, FolderSource, VirtualSource)

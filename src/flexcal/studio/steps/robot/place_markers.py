@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from flexcal.model.urdf import Frame
-from flexcal.studio.scene import DraggablePoint, Instrument, RobotView
-from flexcal.studio.scene.colours import MEASURED, TARGET
+from flexcal.studio.scene import MEASURED, TARGET, DraggablePoint, Instrument, RobotView
 from flexcal.studio.steps.robot.places import BASE, Place, Triple
 from flexcal.studio.window import Window
 from flexcal.units import MILLIMETRE

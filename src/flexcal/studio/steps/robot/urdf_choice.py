@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flexcal.errors import InputError
-from flexcal.model.urdf import find_arm, read_elements
+from flexcal.model.urdf import AmbiguousArm, find_arm, read_elements
 from flexcal.studio.steps.robot.examples import examples_here
 from flexcal.studio.steps.robot.uploads import write_upload
 from flexcal.studio.window import Window
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
 _NONE = "none in the folder"
 _GUESSED = "the one long chain"
-_SEVERAL = ("E-URDF-040", "E-URDF-041")
-"""Errors of a URDF in which the end of the arm has to be chosen."""
 
 
 class UrdfChoice:
@@ -116,10 +114,12 @@ def arm_ends(urdf: Path) -> list[str]:
     """Links where the arm of a URDF may end, in the order of the file; none where it is clear, or the URDF cannot be read."""
     try:
         find_arm(urdf)
+    except AmbiguousArm:
+        pass
+    except InputError:
         return []
-    except InputError as problem:
-        if problem.code not in _SEVERAL:
-            return []
+    else:
+        return []
     root = read_elements(urdf)
     ends = {"parent": set[str](), "child": set[str]()}
     for joint in root.all("joint"):

@@ -53,7 +53,6 @@ class ExportFormat:
 def export_formats(project: Project) -> list[ExportFormat]:
     """All formats, those that do not apply with the reason; raises `FlexcalError` where the calibrated robot cannot be read."""
     from flexcal.jobs.deployment import identified_robot
-    from flexcal.jobs.deployment.actuator_export import identified_actuators
 
     robot = identified_robot(project.robot_file, project.folder / CALIBRATION)
 
@@ -63,7 +62,7 @@ def export_formats(project: Project) -> list[ExportFormat]:
         try:
             if name == "kinematics":
                 render(name, robot.probable, robot.nominal)
-            if name == "isaac" and identified_actuators(robot) is None:
+            if name == "isaac" and "actuators" not in robot.blocks:
                 return "no actuators were identified."
         except FlexcalError as problem:
             return str(problem)

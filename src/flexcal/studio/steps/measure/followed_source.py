@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flexcal.errors import InputError
-from flexcal.studio.steps.measure.sources.row_source import RowSource
+from flexcal.jobs.guidance import ReadingGoesOn
+from flexcal.studio.steps.measure.row_source import RowSource
 from flexcal.studio.window import paragraph
 
 if TYPE_CHECKING:
@@ -21,8 +22,6 @@ _PATIENCE = 0.15
 """Seconds for which rows are taken at one look, so that the window goes on."""
 _AT_REST = 1.0
 """Seconds after which a file of a watched folder is whole."""
-_GOES_ON = ("E-STUDIO-030", "E-STUDIO-031")
-"""A file written anew, and a line that is left out: reading goes on after them."""
 _REFUSED = 3
 """Lines that were left out and are shown, the latest."""
 
@@ -102,9 +101,7 @@ class _Followed(RowSource):
         file = self._files[name]
         try:
             rows = file.new_rows(is_whole=self._is_whole(path))
-        except InputError as problem:
-            if problem.code not in _GOES_ON:
-                raise
+        except ReadingGoesOn as problem:
             self._refuse(problem)
             return
         good = []

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.studio.steps.measure.sources.row_source import RowSource
+from flexcal.studio.steps.measure.row_source import RowSource
 from flexcal.studio.window import paragraph
 
 if TYPE_CHECKING:
