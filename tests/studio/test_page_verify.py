@@ -40,6 +40,7 @@ def test_from_a_calibration_to_the_exported_robot(page: Any, tmp_path: Path) -> 
 
         page.get_by_role("button", name="Verify on these poses", exact=True).click(timeout=WAIT)
         page.get_by_text("errors of the calibrated model have a P90 of").first.wait_for(timeout=WAIT)
+        page.get_by_role("link", name=re.compile("^pose ")).first.wait_for(timeout=WAIT)
         told = page.locator("body").inner_text()
         poses = read_poses(folder / "random.csv", robot.model)
         off = 1000 * np.linalg.norm(
@@ -51,8 +52,12 @@ def test_from_a_calibration_to_the_exported_robot(page: Any, tmp_path: Path) -> 
         assert row == [pytest.approx(off.max(), abs=0.0006)]
 
         page.get_by_role("button", name="Map", exact=True).click()
-        page.get_by_role("button", name="Compute the map").click(timeout=WAIT)
+        page.get_by_label("Where", exact=True).first.click(timeout=WAIT)
+        page.get_by_role("option", name="the poses of random.csv").click()
+        page.get_by_text("--working=random.csv").wait_for(timeout=WAIT)
+        page.get_by_role("button", name="Compute the map").click()
         page.get_by_text("the calibrated tool's mean error is").wait_for(timeout=WAIT)
+        page.get_by_text("worst places").wait_for(timeout=WAIT)
         told = page.locator("body").inner_text()
         table = pl.read_csv(folder / "map.csv")
         for label, column in (("before calibration", "uncalibrated_mm"), ("calibrated, mean", "mean_mm")):

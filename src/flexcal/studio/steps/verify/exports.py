@@ -16,10 +16,10 @@ from flexcal.studio.window import Window, command_text, paragraph
 
 _CUSTOMER = "customer.html"
 _PARTICULARS = {
-    "--instrument": "Instrument",
-    "--instrument-serial": "Its serial no.",
-    "--robot-serial": "Robot serial no.",
-    "--operator": "Operator",
+    "--instrument": "Device",
+    "--instrument-serial": "Its no.",
+    "--robot-serial": "Robot no.",
+    "--operator": "By",
     "--date": "Date",
 }
 
@@ -103,7 +103,8 @@ class Exports(Part):
         folder = VERIFICATION if (window.project.folder / VERIFICATION / RESULTS).is_file() else CALIBRATION
         gui.add_html(
             paragraph(
-                f"Two sheets of A4 from the folder {folder}: errors before and after, and their uncertainty. What is left empty is a line "
+                f"Two sheets of A4 from the folder {folder}: errors before and after, and their uncertainty. Measuring device and "
+                "robot have serial numbers. What is left empty is a line "
                 "to fill in by hand."
             )
         )
