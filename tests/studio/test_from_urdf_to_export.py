@@ -56,7 +56,7 @@ def test_from_urdf_and_poses_to_the_calibrated_urdf(page: Any, folder: Path) -> 
         open_step(page, "Calibrate")
         page.get_by_role("button", name="Calibrate: geometry").click(timeout=LONG)
         page.get_by_text("Can I trust it?").wait_for(timeout=LONG)
-        shown = page.get_by_text("How accurate is it?").locator("xpath=..").inner_text()
+        shown = page.get_by_text("How accurate is it?").inner_text()
         model = RobotModel.from_yaml(folder / "robot.yaml", estimates=False)
         expected = calibrate(model, read_poses(folder / "grid.csv", model))
         assert float(re.search(r"\d+\.\d+", shown)[0]) == pytest.approx(expected.errors.p90 * 1e3, abs=6e-4)  # type: ignore[index]
