@@ -68,7 +68,7 @@ def test_from_urdf_and_poses_to_the_calibrated_urdf(page: Any, folder: Path) -> 
         page.locator("td a[aria-current=true]").wait_for(timeout=LONG)
 
         open_step(page, "Verify")
-        page.get_by_role("button", name=re.compile("^Verify")).click(timeout=LONG)
+        page.get_by_role("button", name="Verify on these poses").click(timeout=LONG)
         page.get_by_text("Can I trust it?").wait_for(timeout=LONG)
         results = json.loads((folder / "verification" / "results.json").read_text())
         robot = expected.robot
@@ -76,8 +76,9 @@ def test_from_urdf_and_poses_to_the_calibrated_urdf(page: Any, folder: Path) -> 
         np.testing.assert_allclose(
             results["verification"]["measured"]["p90_mm"], by_library.errors.p90 * 1e3, rtol=1e-4
         )
-        page.get_by_role("button", name=re.compile("urdf", re.IGNORECASE)).first.click(timeout=LONG)
-        page.get_by_role("link", name=re.compile(r"\.urdf")).first.wait_for(timeout=LONG)
+        page.get_by_role("button", name="Export", exact=True).click(timeout=LONG)
+        page.get_by_role("button", name="Export the robot").click(timeout=LONG)
+        page.get_by_role("link", name=re.compile("calibrated.urdf")).first.wait_for(timeout=LONG)
     urdf = [path for path in folder.glob("*.urdf") if path.name != "ur5.urdf"]
     assert len(urdf) == 1
     assert "<robot" in urdf[0].read_text()

@@ -36,10 +36,11 @@ class MeshFolder:
         for candidate in self._candidates(name):
             try:
                 real = candidate.resolve()
-                if not real.is_relative_to(self.project.resolve()):
-                    outside = True
-                elif real.is_file():
+                if not real.is_file():
+                    continue
+                if real.is_relative_to(self.project.resolve()):
                     return real
+                outside = True
             except (OSError, ValueError, RuntimeError):  # too long, a NUL, a circle of links
                 continue
         return MeshNotDrawn(

@@ -13,6 +13,9 @@ _KINDS = {
     ".csv": PLAIN,
     ".yaml": PLAIN,
     ".urdf": PLAIN,
+    ".xml": PLAIN,
+    ".sdf": PLAIN,
+    ".h": PLAIN,
     ".json": "application/json",
     ".png": "image/png",
 }
@@ -27,7 +30,7 @@ _LARGEST = 1 << 26
 
 
 class ProjectFiles:
-    """The route to pages and results inside a folder, to be read only: .html, .csv, .yaml, .urdf, .json and .png.
+    """The route to pages and results inside a folder, to be read only: .html, .csv, .yaml, .urdf, .xml, .sdf, .h, .json and .png.
 
     Nothing outside is read, wherever links lead; folders are not listed, and hidden files and folders stay so.
     """
