@@ -34,7 +34,7 @@ def test_from_an_empty_folder_to_a_robot(page: Any, studio_url: str, tmp_path: P
         stream.truncate(LARGEST + 1_000_000)
     page.locator('input[type="file"]').first.set_input_files(large)
     page.get_by_text("large.urdf has 51 MB").wait_for(timeout=WAIT)
-    assert [p.name for p in folder.iterdir() if p.name != ".studio.json"] == []
+    assert [p.name for p in folder.iterdir() if not p.name.startswith(".studio.")] == []
 
     urdf = (EXAMPLES / "ur5_tracker" / "ur5.urdf").read_bytes()
     upload(page, "ur5.urdf", urdf)

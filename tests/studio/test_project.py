@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
 from refusals import refused
 
-from flexcal.studio.project import Choices, Project, pose_files
+from flexcal.errors import InputError
+from flexcal.studio.project import Choices, Project, pose_files, sole_studio
 
 
 @pytest.fixture
@@ -89,3 +91,28 @@ def test_choices_survive_and_a_damaged_file_is_no_obstacle(project: Project) -> 
 def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
     with refused("E-STUDIO-120"):
         Project.open(tmp_path / "nowhere")
+
+
+def test_a_folder_is_held_once(tmp_path: Path) -> None:
+    with (
+        sole_studio(tmp_path),
+        pytest.raises(InputError, match=f"process {os.getpid()}"),
+        sole_studio(tmp_path),
+    ):
+        pass
+    with sole_studio(tmp_path):
+        pass
+
+
+def test_what_a_link_leads_to_is_not_written(tmp_path: Path) -> None:
+    """A folder from somebody else may have one in place of the file that is locked."""
+    folder, precious = tmp_path / "project", tmp_path / "precious"
+    folder.mkdir()
+    precious.write_text("precious")
+    (folder / ".studio.lock").symlink_to(precious)
+    with sole_studio(folder):
+        assert precious.read_text() == "precious"
+    (folder / ".studio.lock").unlink()
+    (folder / ".studio.lock").hardlink_to(precious)
+    with sole_studio(folder):
+        assert precious.read_text() == "precious"

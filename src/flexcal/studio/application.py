@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from flexcal.studio.project import Project
     from flexcal.studio.server import StudioServer
 
 
@@ -30,14 +31,20 @@ def run_studio(folder: Path, host: str, port: int | None, ready: Callable[[Studi
     FlexcalError
         Without viser, and with one that cannot be protected.
     InputError
-        For a folder that is not there, and where nothing can listen at the address.
+        For a folder that is not there or that another studio has open, and where nothing can listen at the address.
     """
-    from flexcal.studio.project import Project
+    from flexcal.studio.project import Project, sole_studio
+
+    project = Project.open(folder)
+    with sole_studio(project.folder):
+        _serve(project, host, port, ready)
+
+
+def _serve(project: Project, host: str, port: int | None, ready: Callable[[StudioServer], None]) -> None:
     from flexcal.studio.server import NO_CONTENT, Answer, ProjectFiles, Route, StudioServer
     from flexcal.studio.steps import CalibrateStep, CompareStep, MeasureStep, PlanStep, RobotStep, VerifyStep
     from flexcal.studio.window import Window
 
-    project = Project.open(folder)
     routes: dict[str, Route] = {}
     server = StudioServer.start(host, port, routes, ProjectFiles(project.folder))
     try:

@@ -11,6 +11,7 @@ from .project import (
     VERIFICATION,
     Project,
 )
+from .sole_studio import sole_studio
 
 __all__ = [
     "CALIBRATION",
@@ -24,4 +25,5 @@ __all__ = [
     "Choices",
     "Project",
     "pose_files",
+    "sole_studio",
 ]

@@ -23,6 +23,8 @@ from flexcal.studio.window import (
 from flexcal.units import MILLIMETRE
 
 if TYPE_CHECKING:
+    import viser
+
     from flexcal.report.results import Comparison
 
 _LENGTH = 0.1
@@ -83,11 +85,21 @@ class CompareStep(Step):
             )
             return
         earlier = names[-2] if names[-1] == CALIBRATION else names[0]
-        self._first = gui.add_dropdown("Earlier", names, initial_value=earlier)
-        self._second = gui.add_dropdown(
-            "Later", names, initial_value=next(n for n in reversed(names) if n != earlier)
+        self._first = self._kept_choice("Earlier", names, earlier)
+        self._second = self._kept_choice(
+            "Later", names, next(n for n in reversed(names) if n != self._first.value)
         )
         self.window.button("Compare", self._compare, main=True)
+
+    def _kept_choice(self, label: str, names: tuple[str, ...], default: str) -> viser.GuiDropdownHandle[str]:
+        """A choice of a calibration that a restart keeps."""
+        name, choices = f"compare.{label}", self.window.choices
+        chosen = choices.get(name, default)
+        field = self.window.gui.add_dropdown(
+            label, names, initial_value=chosen if chosen in names else default
+        )
+        field.on_update(lambda _: self.window.post(lambda: choices.put(name, field.value)))
+        return field
 
     def _keep(self) -> None:
         self.window.say(f"kept as {keep_calibration(self.window.project)}", "good")
