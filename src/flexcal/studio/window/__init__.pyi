@@ -1,7 +1,9 @@
 from .command_box import CommandBox
 from .course_figure import error_course
 from .figures_panel import FiguresPanel
+from .links import file_link, heading, step_link
 from .markup import Tone, command_text, facts, paragraph, picked_rows, table
+from .place import Place
 from .report_figures import ReportFigures
 from .report_view import add_sections, add_verdict
 from .selection import Selection
@@ -11,6 +13,7 @@ from .window import Window
 __all__ = [
     "CommandBox",
     "FiguresPanel",
+    "Place",
     "ReportFigures",
     "Selection",
     "Step",
@@ -21,7 +24,10 @@ __all__ = [
     "command_text",
     "error_course",
     "facts",
+    "file_link",
+    "heading",
     "paragraph",
     "picked_rows",
+    "step_link",
     "table",
 ]

@@ -144,7 +144,7 @@ class Window:
 
     def _open_step(self, title: str) -> None:
         if self._open is not None:
-            self._open.close()
+            self._carry_out(self._open.close)
         self._place.remove()
         self.figures.clear()
         self.say("")

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
-
-from flexcal.errors import FlexcalError
 from flexcal.jobs.result_files import RESULTS
 from flexcal.studio.project import CALIBRATION, pose_files
 from flexcal.studio.steps.calibrate.stages import (
@@ -17,14 +13,8 @@ from flexcal.studio.steps.calibrate.stages import (
     use_estimates,
     used_estimates,
 )
-from flexcal.studio.steps.residuals import ResidualsView
-from flexcal.studio.window import ReportFigures, Step, Tone, Window, add_sections, add_verdict, paragraph
-
-if TYPE_CHECKING:
-    pass
-
-if TYPE_CHECKING:
-    from flexcal.report.layout import FigureBlock
+from flexcal.studio.steps.results import FolderResult
+from flexcal.studio.window import Place, Step, Tone, Window, paragraph
 
 _NONE = "none"
 _TONES: dict[State, Tone] = {"done": "good", "ready": "plain", "blocked": "faint"}
@@ -37,7 +27,6 @@ class CalibrateStep(Step):
 
     def __init__(self, window: Window):
         super().__init__(window)
-        self._residuals: ResidualsView | None = None
         self._shown: object = None
         self._stage = window.choices.get("stage", "Geometry")
 
@@ -53,8 +42,8 @@ class CalibrateStep(Step):
             initial_value=chosen if chosen in names else (names or [_NONE])[0],
         )
         self._measured.on_update(lambda _: window.post(self._choose))
-        self._place = gui.add_folder(None)
-        self._result = gui.add_folder(None)
+        self._place = Place(gui)
+        self._result = FolderResult(window)
 
     def refresh(self) -> None:
         """Show the stages as the folder has them; the result where it has changed."""
@@ -64,25 +53,20 @@ class CalibrateStep(Step):
         if (stamp, listed, self._stage, self.window.dark) != self._shown:
             self._shown = (stamp, listed, self._stage, self.window.dark)
             self._list(listed)
-            self._show_result()
-        if self._residuals is not None:
-            self._residuals.refresh()
+            folder = self._folder()
+            self._result.show(folder, lambda: self._add_choice(folder))
+        self._result.refresh()
 
     def close(self) -> None:
         """Remove the residual arrows."""
-        if self._residuals is not None:
-            self._residuals.close()
-            self._residuals = None
+        self._result.close()
 
     def _choose(self) -> None:
         self.window.choices.put("measured", self._measured.value)
         self.refresh()
 
     def _list(self, listed: list[Stage]) -> None:
-        order = self._place.order
-        self._place.remove()
-        self._place = self.window.gui.add_folder(None, order=order)
-        with self._place:
+        with self._place.anew():
             for stage in listed:
                 self.window.gui.add_html(paragraph(f"{stage.title}: {stage.sentence}", _TONES[stage.state]))
                 if stage.folder in (INERTIALS, STIFFNESS) and stage.state == "done":
@@ -113,43 +97,7 @@ class CalibrateStep(Step):
         self.window.choices.put("stage", stage.title)
         self.window.command(stage.arguments)
 
-    def _show_result(self) -> None:
-        from flexcal.jobs.pages import folder_page
-
-        window, order = self.window, self._result.order
-        self.close()
-        window.figures.clear()
-        self._result.remove()
-        self._result = window.gui.add_folder(None, order=order)
-        folder = self._folder()
-        if folder is None:
-            return
-        with self._result:
-            try:
-                page = folder_page(window.project.folder / folder)
-            except FlexcalError as problem:
-                window.gui.add_html(paragraph(str(problem), "bad"))
-                return
-            self._add_choice(folder)
-            window.gui.add_html(paragraph(page.subtitle))
-            add_verdict(window.gui, page)
-            if folder == CALIBRATION and (window.project.folder / folder / "points.csv").is_file():
-                with window.gui.add_folder("Residuals"):
-                    self._residuals = ResidualsView(window, window.project.folder / folder)
-            add_sections(window.gui, page)
-            window.gui.add_html(
-                f'<a href="files/{folder}/report.html" target="_blank" rel="noopener" style="margin:0.5em;font-size:0.85em;">'
-                "open the report</a>"
-            )
-        figures = {} if self._residuals is None else {"Poses": self._residuals.add_course}
-        if page.figures:
-            figures["Figures"] = lambda: self._add_figures(page.figures)
-        window.figures.show(figures)
-
-    def _add_figures(self, blocks: Sequence[FigureBlock]) -> None:
-        self._figures = ReportFigures(self.window.gui, blocks, dark=self.window.dark)
-
-    def _add_choice(self, folder: str) -> None:
+    def _add_choice(self, folder: str | None) -> None:
         """A choice of the stage whose result is shown, where there are several."""
         found = {stage.title: stage.folder for stage in self._with_results()}
         if len(found) < 2:

@@ -12,6 +12,7 @@ from flexcal.studio.project import CALIBRATION
 from flexcal.studio.scene import ResidualArrows
 from flexcal.studio.steps.compare.kept_calibrations import calibrations, keep_calibration
 from flexcal.studio.window import (
+    Place,
     ReportFigures,
     Step,
     Window,
@@ -46,8 +47,8 @@ class CompareStep(Step):
     def open(self) -> None:
         """Add the choice of two calibrations and the place of the result."""
         self._stamp, self._names = None, ()
-        self._place = self.window.gui.add_folder(None)
-        self._result = self.window.gui.add_folder(None)
+        self._place = Place(self.window.gui)
+        self._result = Place(self.window.gui)
 
     def refresh(self) -> None:
         """Offer the calibrations that are in the folder."""
@@ -55,9 +56,7 @@ class CompareStep(Step):
         if names == self._names and self._stamp is not None:
             return
         self._names, self._stamp = names, object()
-        self._place.remove()
-        self._place = self.window.gui.add_folder(None, order=self._result.order - 0.5)
-        with self._place:
+        with self._place.anew():
             self._add_choice(names)
 
     def close(self) -> None:
@@ -133,10 +132,8 @@ class CompareStep(Step):
         if self._arrows is not None:
             self._arrows.remove()
             self._arrows = None
-        page, order = comparison_page(comparison), self._result.order
-        self._result.remove()
-        self._result = window.gui.add_folder(None, order=order)
-        with self._result:
+        page = comparison_page(comparison)
+        with self._result.anew():
             if comparison.change is None:
                 window.gui.add_html(paragraph(comparison.no_change_why, "faint"))
             else:

@@ -12,10 +12,9 @@ from flexcal.studio.project import CALIBRATION
 from flexcal.studio.scene import TARGET, Points
 from flexcal.studio.steps.verify.corrected_command import CorrectedCommand, TypedTarget
 from flexcal.studio.steps.verify.part import Part
-from flexcal.studio.steps.verify.place import Place
 from flexcal.studio.steps.verify.target_file import TargetFile
 from flexcal.studio.steps.verify.target_files import target_files
-from flexcal.studio.window import Window, paragraph, table
+from flexcal.studio.window import Place, Window, paragraph, table
 from flexcal.units import DEGREE, MILLIMETRE
 
 _BASE = "the robot's base"

@@ -9,10 +9,8 @@ from flexcal.jobs.result_files import RESULTS
 from flexcal.studio.commands import CommandRun
 from flexcal.studio.project import CALIBRATION, VERIFICATION
 from flexcal.studio.steps.verify.export_formats import ExportFormat, export_formats
-from flexcal.studio.steps.verify.links import file_link
 from flexcal.studio.steps.verify.part import Part
-from flexcal.studio.steps.verify.place import Place
-from flexcal.studio.window import Window, command_text, paragraph
+from flexcal.studio.window import Place, Window, command_text, file_link, paragraph
 
 _CUSTOMER = "customer.html"
 _PARTICULARS = {

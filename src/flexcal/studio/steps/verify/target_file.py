@@ -7,8 +7,7 @@ from typing import Any
 
 from flexcal.studio.commands import CommandRun
 from flexcal.studio.project import CALIBRATION
-from flexcal.studio.steps.verify.links import file_link
-from flexcal.studio.window import Window, command_text, paragraph, table
+from flexcal.studio.window import Window, command_text, file_link, paragraph, table
 
 _OUT = "commands.csv"
 _LISTED = 50

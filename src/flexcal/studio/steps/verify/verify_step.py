@@ -6,11 +6,9 @@ from flexcal.studio.project import CALIBRATION
 from flexcal.studio.steps.verify.compensated_targets import CompensatedTargets
 from flexcal.studio.steps.verify.exports import Exports
 from flexcal.studio.steps.verify.fresh_poses import FreshPoses
-from flexcal.studio.steps.verify.links import heading, step_link
 from flexcal.studio.steps.verify.part import Part
-from flexcal.studio.steps.verify.place import Place
 from flexcal.studio.steps.verify.volume_accuracy import VolumeAccuracy
-from flexcal.studio.window import Step, Window, paragraph
+from flexcal.studio.window import Place, Step, Window, heading, paragraph, step_link
 
 _PARTS: tuple[type[Part], ...] = (FreshPoses, VolumeAccuracy, CompensatedTargets, Exports)
 

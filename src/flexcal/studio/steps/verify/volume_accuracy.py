@@ -10,12 +10,10 @@ from flexcal.jobs.calibration import outside_ranges
 from flexcal.jobs.inputs import CalibratedRobot
 from flexcal.studio.project import CALIBRATION, MAP
 from flexcal.studio.steps.verify.fresh_files import fresh_files
-from flexcal.studio.steps.verify.links import file_link
 from flexcal.studio.steps.verify.map_view import MapView
 from flexcal.studio.steps.verify.part import Part
-from flexcal.studio.steps.verify.place import Place
 from flexcal.studio.steps.verify.working_places import working_places
-from flexcal.studio.window import Window, command_text, paragraph
+from flexcal.studio.window import Place, Window, command_text, file_link, paragraph
 
 _TABLE = f"{MAP}.csv"
 _NONE = "nothing"

@@ -1,3 +1,0 @@
-from .residuals_view import ResidualsView
-
-__all__ = ["ResidualsView"]
