@@ -11,7 +11,7 @@ from .project import (
     VERIFICATION,
     Project,
 )
-from .sole_studio import sole_studio
+from .folder_lock import sole_studio
 
 __all__ = [
     "CALIBRATION",
