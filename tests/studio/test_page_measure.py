@@ -141,7 +141,11 @@ def test_a_file_that_grows(page: Any, running: Any, cell: Any) -> None:
 
 
 def test_a_typed_point(page: Any, running: Any, cell: Any) -> None:
+    """It is of the next pose, and of the station that is chosen once the instrument was moved."""
     (process, folder), (_, plan, _) = running, cell
+    robot_file = folder / "robot.yaml"
+    there = "{tracker: {xyz: [2.5, 0, 1], line_of_sight: true}"
+    robot_file.write_text(robot_file.read_text().replace(there, f"{there}, moved: {{xyz: [2.4, 0.3, 1]}}"))
     begin(page, process.url)
     press(page, "Take this point")
     page.get_by_text("type x, y and z of pose 1 first").wait_for(timeout=WAIT)
@@ -156,3 +160,12 @@ def test_a_typed_point(page: Any, running: Any, cell: Any) -> None:
         [float(row[axis]) for axis in "xyz"], [0.5348619, -0.5727086, 0.9013214], rtol=0, atol=1e-12
     )
     assert [float(row[f"q{i}"]) for i in range(1, 7)] == plan.q[0].tolist()
+    assert row["station"] == "tracker"
+
+    choose(page, "Station", "moved")
+    page.get_by_label("x / mm").fill("612.3456")
+    page.get_by_label("x / mm").press("Tab")
+    page.wait_for_timeout(300)
+    press(page, "Take this point")
+    page.get_by_text("Next: pose 3").wait_for(timeout=WAIT)
+    assert [row["station"] for row in rows(folder)] == ["tracker", "moved"]

@@ -39,7 +39,7 @@ class Finding:
         if self.kind == "moved":
             return (
                 f"the tracker or the robot's base moved before pose {self.pose}: a rigid motion of {size} explains the rows from there on "
-                f"({p}); give these another station name, or measure again from pose {self.pose}."
+                f"({p}); give these another station of robot.yaml, or measure again from pose {self.pose}."
             )
         return f"the points drift by {size} over the series ({p}); wait until robot and instrument are warm, and measure again."
 
@@ -97,7 +97,7 @@ def moved_far_text(pose: int) -> str:
     """Sentence on an instrument or a base that was moved by more than any error of the robot."""
     return (
         f"the points from pose {pose} on agree with each other, but not with those before: the tracker or the robot's base was moved by "
-        f"centimetres before pose {pose}; give the rows from there on another station name."
+        f"centimetres before pose {pose}; give the rows from there on another station of robot.yaml."
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
 
 RowKey = tuple[str, ...]
+_PAUSE = 0.3
+"""Seconds between judgements that are told while many rows are judged, so that the page is not drawn for each of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,10 +129,13 @@ class Guide:
         known = self._known
         known.begin(question)
         self._tell(Answer(question, tuple(known.judgements)))
+        told = time.monotonic()
         while known.judge_next(question):
             if self._latest is not question:
                 return
-            self._tell(Answer(question, tuple(known.judgements)))
+            if len(known.judgements) == len(question.keys) or time.monotonic() - told > _PAUSE:
+                self._tell(Answer(question, tuple(known.judgements)))
+                told = time.monotonic()
         if question.request is None:
             return
         findings, outlook = known.sessions[-1].findings, known.outlook(question)
