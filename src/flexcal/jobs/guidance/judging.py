@@ -162,6 +162,13 @@ class RowJudge:
         """Judgement of a row that cannot be where the robot was."""
         estimate, row = self.after.estimate, self._row
         assert estimate is not None
+        beside = int((self.after.rows.station == row.station[0]).sum())
+        if beside < FEWEST:
+            return Judgement(
+                "too_early",
+                f"pose {int(row.pose[0])} cannot be judged yet: {FEWEST} rows from the station {row.station[0]} that do not lie on a line "
+                f"tell roughly where it stands, and there are {beside}.",
+            )
         if self.after.used.sum() * 2 < len(self.after.rows) and len(self.after.rows) >= _MISFIT_ROWS:
             return self._misfit()
         if (since := self.after.consistent.moved) is not None:

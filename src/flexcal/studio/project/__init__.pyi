@@ -1,4 +1,5 @@
 from .choices import Choices
+from .folder_lock import sole_studio
 from .pose_tables import pose_files
 from .project import (
     CALIBRATION,
@@ -11,7 +12,6 @@ from .project import (
     VERIFICATION,
     Project,
 )
-from .folder_lock import sole_studio
 
 __all__ = [
     "CALIBRATION",
