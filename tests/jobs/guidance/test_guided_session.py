@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from refusals import refused
 from flexcal import PosePlan, RobotModel
 from flexcal.data.poses import PoseSet
 from flexcal.jobs.guidance import GuidedSession, Judgement
+from flexcal.model.robot import Stations
 
 CODES = {"clean": "good", "joints": "wrong_row", "swapped": "axes", "sign": "axes", "turned": "moved"}
 """Codes of faults that are not called as their code."""
@@ -111,6 +113,18 @@ def test_a_tracker_carried_elsewhere(ur5: RobotModel):
     session, judgements = judged(ur5, rows(q, points))
     assert judgements[17].code == "moved" and judgements[17].pose == 16
     assert session.findings[0].pose == 16
+
+
+def test_rows_of_another_station_are_not_outliers(ur5: RobotModel):
+    """Of a tracker that was carried elsewhere: the first ones are too few to tell where it stands, the next ones are judged."""
+    q, points, _ = series("clean", 5)
+    model = replace(ur5, stations=Stations.at_base(("tracker", "moved")))
+    measured = rows(q, np.vstack([points[:20], points[20:] + np.array([0.4, -0.2, 0.1])]))
+    there = np.where(np.arange(len(q)) < 20, "tracker", "moved")
+    _, judgements = judged(model, replace(measured, station=there))
+    assert [one.code for one in judgements[20:24]] == ["too_early"] * 4
+    assert "from the station moved" in judgements[20].sentence
+    assert {one.code for one in judgements[24:]} <= {"too_early", "good"} and judgements[-1].code == "good"
 
 
 def test_an_uncalibrated_robot_is_not_an_outlier(ur5: RobotModel):
