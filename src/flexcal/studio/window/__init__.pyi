@@ -1,6 +1,7 @@
 from .command_box import CommandBox
 from .course_figure import error_course
 from .figures_panel import FiguresPanel
+from .fold import add_fold
 from .links import file_link, heading, step_link
 from .markup import Tone, command_text, facts, paragraph, picked_rows, table
 from .place import Place
@@ -19,6 +20,7 @@ __all__ = [
     "Step",
     "Tone",
     "Window",
+    "add_fold",
     "add_sections",
     "add_verdict",
     "command_text",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flexcal.studio.window.markup import command_text, paragraph
+from flexcal.studio.window.markup import command_text, folded, paragraph
 
 if TYPE_CHECKING:
     import viser
@@ -36,6 +36,12 @@ class CommandBox:
             self._cancel = gui.add_button("Cancel", color="red")
         self._cancel.on_click(lambda _: runner.cancel())
 
+    def put_away(self) -> None:
+        """Hide a command that has ended."""
+        run = self._runner.current
+        if run is not None and run.status != "running":
+            self._folder.visible = False
+
     def refresh(self) -> None:
         """Show the present state of the latest command."""
         run = self._runner.current
@@ -61,4 +67,7 @@ def _ending(run: CommandRun) -> str:
     if run.status == "cancelled":
         return paragraph("cancelled; nothing was written.", "warning")
     told = [m for m in run.messages if not m.startswith("next: ")][-_MESSAGES:]
-    return paragraph(f"done in {run.seconds:.1f} s", "good") + "".join(paragraph(m, "faint") for m in told)
+    messages = "".join(paragraph(message, "faint") for message in told)
+    return paragraph(f"done in {run.seconds:.1f} s", "good") + (
+        folded("what it said", messages) if told else ""
+    )

@@ -10,6 +10,8 @@ if TYPE_CHECKING:
 
 _WIDTH = 380
 """Pixels: at 1280 the scene keeps a third."""
+_NARROW = 600
+"""Pixels beside the steps below which the figures begin folded, so that the scene is seen."""
 
 
 class FiguresPanel:
@@ -17,16 +19,17 @@ class FiguresPanel:
 
     Parameters
     ----------
-    gui : viser.GuiApi
-        Where it is added.
+    server : viser.ViserServer
+        Server that shows it.
     """
 
-    def __init__(self, gui: viser.GuiApi):
-        self._gui = gui
+    def __init__(self, server: viser.ViserServer):
+        self._server, self._gui = server, server.gui
         self._panel: viser.PanelHandle | None = None
 
     def show(self, figures: Mapping[str, Callable[[], object]]) -> None:
         """Show figures in place of those before: each function adds one, under its title, at the current place of the GUI."""
+        narrow = self._is_narrow()
         self.clear()
         if not figures:
             return
@@ -36,6 +39,14 @@ class FiguresPanel:
                 add()
         self._panel.dock_left()
         self._panel.set_width(_WIDTH)
+        if narrow:
+            self._panel.minimize()
+
+    def _is_narrow(self) -> bool:
+        """Whether the scene of a window is narrow."""
+        widths = [client.camera.image_width for client in self._server.get_clients().values()]
+        taken = 0 if self._panel is None else _WIDTH
+        return bool(widths) and min(widths) + taken < _NARROW
 
     def clear(self) -> None:
         """Remove the figures."""

@@ -59,6 +59,14 @@ def facts(values: Mapping[str, str]) -> str:
     return f'<table style="{_TEXT}border-spacing:0 0.1em;">{rows}</table>'
 
 
+def folded(title: str, content: str) -> str:
+    """HTML below a title that opens it."""
+    return (
+        '<details style="margin:0.2em 0.5em;border:1px solid rgba(128,128,128,0.35);border-radius:3px;">'
+        f'<summary style="cursor:pointer;padding:0.25em 0.5em;font-size:0.85em;">{escape(title)}</summary>{content}</details>'
+    )
+
+
 def table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, height: str = "16em") -> str:
     """A table of texts that scrolls past `height`."""
     return _scrolled(columns, "".join(f"<tr>{_cells(row)}</tr>" for row in rows), height)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flexcal.studio.window.markup import paragraph, table
+from flexcal.studio.window.markup import folded, paragraph, table
 from flexcal.studio.window.verdict_text import verdict_text
 
 if TYPE_CHECKING:
@@ -19,12 +19,12 @@ def add_verdict(gui: viser.GuiApi, page: Page) -> None:
 
 
 def add_sections(gui: viser.GuiApi, page: Page) -> None:
-    """Add the sections of a page, folded, at the current place; its figures are `ReportFigures`."""
-    for section in page.sections:
-        content = _section(section)
-        if content:
-            with gui.add_folder(section.title, expand_by_default=False):
-                gui.add_html(content)
+    """Add the sections of a page, folded, at the current place; its figures are `ReportFigures`.
+
+    They open by mouse and keyboard.
+    """
+    parts = {section.title: _section(section) for section in page.sections}
+    gui.add_html("".join(folded(title, content) for title, content in parts.items() if content))
 
 
 def _section(section: Section) -> str:

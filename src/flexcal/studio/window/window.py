@@ -87,7 +87,7 @@ class Window:
         self._message = server.gui.add_html("", visible=False)
         self._place = server.gui.add_folder(None)
         self._commands = CommandBox(server.gui, self.runner)
-        self.figures = FiguresPanel(server.gui)
+        self.figures = FiguresPanel(server)
         self._add_hotkeys(titles)
         self.selection.listen(self._selected)
         self._open: Step | None = None
@@ -147,6 +147,7 @@ class Window:
             self._carry_out(self._open.close)
         self._place.remove()
         self.figures.clear()
+        self._commands.put_away()
         self.say("")
         self._open = next(step for step in self._steps if step.title == title)
         self._show_robot()
@@ -160,8 +161,13 @@ class Window:
         self, label: str, action: Callable[[], None], *, hint: str = "", main: bool = False
     ) -> viser.GuiButtonHandle:
         """A button that has `action` carried out; `main` for the one that goes on."""
+
+        def pressed() -> None:
+            self.say("")  # what was said before is of something else
+            action()
+
         button = self.gui.add_button(label, hint=hint or None, color=None if main else "gray")
-        button.on_click(lambda _: self.post(action))
+        button.on_click(lambda _: self.post(pressed))
         return button
 
     def command(self, arguments: Sequence[str], then: Callable[[CommandRun], None] | None = None) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from flexcal.studio.steps.plan.plan_form import PlanForm, option
+from flexcal.studio.window import add_fold
 
 _PLANS = {
     "designed: poses and amplitudes for the springs": "designed",
@@ -42,7 +43,7 @@ class FrequencyForm(PlanForm):
             "std", "Stiffness known to / %", 0.0, least=0.0, step=0.5, hint="Standard deviation of every stiffness that realisations and "
             "periods are chosen for; 0: as the plan has them.",
         )  # fmt: skip
-        with gui.add_folder("More", expand_by_default=False):
+        with add_fold(gui, "More"):
             self._amplitude = fields.choice(
                 "amplitude",
                 "Amplitudes",

@@ -14,7 +14,7 @@ from flexcal.studio.steps.plan.pose_form import PoseForm
 from flexcal.studio.steps.plan.pose_plan_view import PosePlanView
 from flexcal.studio.steps.plan.trajectory_form import TrajectoryForm
 from flexcal.studio.steps.plan.verification_form import VerificationForm
-from flexcal.studio.window import Step, Window, paragraph
+from flexcal.studio.window import Step, Window, add_fold, paragraph
 
 if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
@@ -111,7 +111,7 @@ class PlanStep(Step):
                 return
             form = _FORMS[self._subject.value]
             planned = self._chosen(tuple(plan_files(window.project, form.kind)))
-            with window.gui.add_folder("New plan", expand_by_default=not planned):
+            with add_fold(window.gui, "New plan", is_open=not planned):
                 self._form = form(window, model)
                 window.button(form.button, self._run, main=True)
 

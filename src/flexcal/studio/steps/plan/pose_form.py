@@ -9,6 +9,7 @@ import numpy as np
 from flexcal.studio.project import PLAN, pose_files
 from flexcal.studio.steps.plan.plan_form import PlanForm, option
 from flexcal.studio.steps.plan.working_fields import WorkingFields
+from flexcal.studio.window import add_fold
 
 _BOX = "a box"
 _TRACKER = "laser tracker"
@@ -56,7 +57,7 @@ class PoseForm(PlanForm):
             (_TRACKER, _ORIENTATIONS, *config.measurements),
             hint="A name is an instrument of robot.yaml that says where it stands.",
         )
-        with gui.add_folder("More", expand_by_default=False):
+        with add_fold(gui, "More"):
             self._wanted = fields.number(
                 "wanted",
                 "Stop at error / mm",

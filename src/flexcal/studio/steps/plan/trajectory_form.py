@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from flexcal.studio.steps.plan.plan_files import plan_files
 from flexcal.studio.steps.plan.plan_form import PlanForm, option
+from flexcal.studio.window import add_fold
 
 _CRITERIA = {
     "compound: prior and condition number": "compound",
@@ -56,7 +57,7 @@ class TrajectoryForm(PlanForm):
         self._share = fields.number(
             "share", "Use of the limits / %", 80.0, least=5.0, most=100.0, step=5.0, hint="The controller needs the rest."
         )  # fmt: skip
-        with gui.add_folder("More", expand_by_default=False):
+        with add_fold(gui, "More"):
             self._criterion = fields.choice(
                 "criterion", "Criterion", tuple(_CRITERIA), hint="What is made small."
             )

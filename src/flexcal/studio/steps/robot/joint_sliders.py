@@ -8,7 +8,7 @@ import numpy as np
 
 from flexcal.model.parts import Joint
 from flexcal.model.robot import RobotModel
-from flexcal.studio.window import Window, table
+from flexcal.studio.window import Window, add_fold, table
 from flexcal.units import DEGREE, MILLIMETRE
 
 _FREE_TURN, _FREE_WAY = 180.0, 1000.0
@@ -45,7 +45,7 @@ class JointSliders:
             slider.on_update(lambda _: window.post(self._moved))
             self._sliders.append(slider)
         window.button("All joints to zero", self._zero, hint="or to the limit nearest to zero")
-        with gui.add_folder("Limits in the URDF", expand_by_default=False):
+        with add_fold(gui, "Limits in the URDF"):
             gui.add_html(limits_table(model))
 
     def follow(self) -> None:

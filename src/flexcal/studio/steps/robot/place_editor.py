@@ -12,7 +12,7 @@ from flexcal.model.urdf import read_urdf
 from flexcal.studio.steps.robot.place_markers import PlaceMarkers
 from flexcal.studio.steps.robot.places import BASE, Place, Triple, places_of
 from flexcal.studio.steps.robot.robot_file import RobotFile
-from flexcal.studio.window import Window, paragraph, table
+from flexcal.studio.window import Window, add_fold, paragraph, table
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}")
 _FARTHEST, _HEAVIEST = 99_999.999, 9_999.999
@@ -52,7 +52,7 @@ class PlaceEditor:
         self._fields = gui.add_folder(None)
         if file.last_change is not None:
             window.button("Take the last change back", file.take_back, hint=file.last_change)
-        with gui.add_folder("Add a point, payload or instrument", expand_by_default=not self.places):
+        with add_fold(gui, "Add a point, payload or instrument", is_open=not self.places):
             self._kind = gui.add_dropdown("What", self._kinds())
             self._name = gui.add_text("Name", "", hint="letters, digits and _; the columns of files have it")
             window.button("Add to robot.yaml", self._add)

@@ -20,7 +20,7 @@ from flexcal.studio.steps.robot.problem_listing import problem_listing
 from flexcal.studio.steps.robot.robot_file import RobotFile
 from flexcal.studio.steps.robot.uploads import LARGEST, require_size
 from flexcal.studio.steps.robot.urdf_choice import UrdfChoice
-from flexcal.studio.window import Step, Window, facts, paragraph
+from flexcal.studio.window import Step, Window, add_fold, facts, paragraph
 
 if TYPE_CHECKING:
     from flexcal.studio.scene import MeshNotDrawn
@@ -158,7 +158,7 @@ class RobotStep(Step):
             self._sliders = JointSliders(window, model)
 
     def _show_files(self) -> None:
-        with self.window.gui.add_folder("Files", expand_by_default=False):
+        with add_fold(self.window.gui, "Files"):
             UrdfChoice(self.window, described=True, changed=self.refresh)
 
 
