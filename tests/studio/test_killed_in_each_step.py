@@ -41,7 +41,8 @@ def unfold(page: Any, title: str, button: str) -> None:
     see(page, title)
     page.wait_for_timeout(500)
     if not page.get_by_role("button", name=button, exact=True).is_visible():
-        page.get_by_text(title, exact=True).click()
+        row = page.get_by_text(title, exact=True).locator("xpath=ancestor::*[.//input[@type='checkbox']][1]")
+        row.locator("input[type=checkbox]").click()
 
 
 def stages(folder: Path) -> list[Path]:
