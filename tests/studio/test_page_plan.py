@@ -14,6 +14,8 @@ from browser import studio
 from flexcal.data.plans import FourierPaths, PosePlan, TrajectoryPlan, write_plan
 from flexcal.model.robot import RobotModel
 from flexcal.studio.project import Project
+from flexcal.studio.steps.measure.next_pose import NextPose
+from flexcal.studio.steps.measure.pose_card import pose_card
 from flexcal.studio.steps.plan.plan_files import plan_files
 from flexcal.studio.steps.plan.planned_motion import MotionJudge, limit_sentence, trajectory_motions
 from flexcal.studio.steps.plan.pose_checks import PoseChecks
@@ -26,6 +28,13 @@ STRETCHED = np.array([0.0, 0.4, 0.6, 0.0, 0.5, 0.0])
 @pytest.fixture(scope="module")
 def model() -> RobotModel:
     return RobotModel.from_yaml(EXAMPLE / "robot.yaml", estimates=False)
+
+
+def _without_shapes(folder: Path) -> RobotModel:
+    shutil.copytree(EXAMPLE, folder / "bare")
+    urdf = folder / "bare" / "tx90l.urdf"
+    urdf.write_text(re.sub(r"<collision.*?</collision>", "", urdf.read_text(), flags=re.DOTALL))
+    return RobotModel.from_yaml(folder / "bare" / "robot.yaml", estimates=False)
 
 
 def plan_of(amplitude: float) -> TrajectoryPlan:
@@ -68,6 +77,35 @@ def test_colliding_pose_is_named(model: RobotModel) -> None:
     assert checks.collides.tolist() == [False, True] and checks.touching(1) and not checks.touching(0)
     assert checks.words(1).startswith("collides")
     assert "Pose 2" in checks.sentences()[0][0]
+
+
+def test_poses_of_a_robot_without_collision_shapes_are_not_called_good(tmp_path: Path) -> None:
+    """Folded onto its base, and with the tool below it: told from the capsules that are drawn, and from heights by Pinocchio."""
+    import pinocchio as pin
+
+    model = _without_shapes(tmp_path)
+    low = np.array([0.0, 1.9, 0.6, 0.0, 0.0, 0.0])
+    folded = np.array([0.0, -2.5, -2.5, 0.0, 0.5, 0.0])
+    checks = PoseChecks.of(model, np.array([STRETCHED, low, folded]))
+    robot: Any = pin.buildModelFromUrdf(str(model.urdf))
+    data = robot.createData()
+    for row, q in enumerate(checks.q):
+        pin.forwardKinematics(robot, data, q)
+        lowest = min(float(data.oMi[k].translation[2]) for k in range(1, 7))
+        assert checks.below[row] == (min(lowest, checks.targets[row, 2]) < 0)
+    assert not checks.collides.any() and checks.words(0) == "not checked"
+    assert checks.below.tolist()[:2] == [False, True] and "below the base plane" in checks.words(1)
+    assert re.search("not checked; look: links of base and joint_4 close", checks.words(2))
+    assert "not checked" in checks.sentences()[0][0]
+    shown = pose_card(model, NextPose(2, low), "")
+    assert "Collisions are not checked" in shown and "below the base plane" in shown
+    assert "below the base plane" not in pose_card(model, NextPose(1, STRETCHED), "")
+
+
+def test_robot_with_collision_shapes_gets_no_reserve(model: RobotModel) -> None:
+    checks = PoseChecks.of(model, STRETCHED[None])
+    assert checks.words(0) == "good" and not checks.looks(0)
+    assert "not checked" not in pose_card(model, NextPose(1, STRETCHED), "")
 
 
 def test_plans_are_found_by_kind(tmp_path: Path) -> None:

@@ -55,7 +55,7 @@ class CollisionChecker:
 
         self.model = model
         self.margin = margin
-        self.floor = None if floor is None or _hangs(model, floor) else floor
+        self.floor = None if floor is None or is_hanging(model, floor) else floor
         whole = pin.buildModelFromXML(read_elements(model.urdf).text())
         shapes = _shapes(whole, model.urdf)
         self.kinematics: Any
@@ -190,8 +190,8 @@ class CollisionChecker:
         return result
 
 
-def _hangs(model: RobotModel, floor: float) -> bool:
-    """Whether the first target is above the height `floor` in hardly any configuration."""
+def is_hanging(model: RobotModel, floor: float = 0.0) -> bool:
+    """Whether the first target is above the height `floor`, m, in hardly any configuration, as of a robot below a ceiling."""
     if not model.points:
         return False
     q = low_discrepancy_configurations(model, _SAMPLES)

@@ -3,7 +3,7 @@ from .forward import PointKinematics, joint_batch, motor_motion, point_kinematic
 from .inverse import damped_step, reach_points
 from .joint_space import joint_limits, joint_ranges, low_discrepancy_configurations, random_configurations
 from .link_poses import joint_origins, link_frames
-from .link_surface import LinkSurface, link_capsules
+from .link_surface import LinkSurface, capsule_axes, link_capsules
 from .placements import bearing_placement, found_xyz, joint_placement, link_placement, point_placement
 from .relative import carrier_kinematics, relative_kinematics, relative_motion
 from .tool_rotations import rotation_freedom
@@ -15,6 +15,7 @@ __all__ = [
     "PointKinematics",
     "bearing_placement",
     "box",
+    "capsule_axes",
     "carrier_kinematics",
     "cylinder",
     "damped_step",

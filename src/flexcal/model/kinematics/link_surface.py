@@ -105,19 +105,27 @@ def link_capsules(model: RobotModel) -> list[tuple[int, np.ndarray, np.ndarray]]
 
     (joint or −1 for the base, vertices (V, 3) m in its link, triangles (F, 3)) of each.
     """
-    ends = [(model.joints[k].parent, joint_placement(model, k)[0]) for k in range(len(model.joints))]
-    ends += [point_placement(model, name)[:2] for name in list(model.points)[:1]]
-    radius = _SLENDER * sum(float(np.linalg.norm(end)) for _, end in ends)
     parts = []
-    for owner, end in ends:
+    for owner, end, radius in capsule_axes(model):
         length = float(np.linalg.norm(end))
-        if length < 1e-6:
-            continue
-        vertices, triangles = capsule(min(radius, 0.6 * length), length / 2)
+        vertices, triangles = capsule(radius, length / 2)
         parts.append(
             (owner, (vertices + np.array([0.0, 0.0, length / 2])) @ _towards(end / length).T, triangles)
         )
     return parts
+
+
+def capsule_axes(model: RobotModel) -> list[tuple[int, np.ndarray, float]]:
+    """Axes of `link_capsules`, from the origin of their link: (joint or −1 for the base, end (3,) m in its link, radius m) of each."""
+    ends = [(model.joints[k].parent, joint_placement(model, k)[0]) for k in range(len(model.joints))]
+    ends += [point_placement(model, name)[:2] for name in list(model.points)[:1]]
+    lengths = [float(np.linalg.norm(end)) for _, end in ends]
+    radius = _SLENDER * sum(lengths)
+    return [
+        (owner, end, min(radius, 0.6 * length))
+        for (owner, end), length in zip(ends, lengths, strict=True)
+        if length >= 1e-6
+    ]
 
 
 def _towards(direction: np.ndarray) -> np.ndarray:

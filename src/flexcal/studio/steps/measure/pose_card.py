@@ -25,12 +25,25 @@ def pose_card(model: RobotModel, pose: NextPose, place: str) -> str:
         for joint, value in zip(model.motor_joints, pose.q, strict=True)
     )
     payload = "" if pose.payload is None else paragraph(f"payload {pose.payload:g} kg")
+    reserve = _reserve(model, pose.q)
     return (
         f'<div style="margin:0.2em 0.5em;font-size:1.15em;font-weight:700;">Next: pose {pose.number}'
         f'<span style="font-weight:400;font-size:0.75em;opacity:0.8;"> · {escape(place)}</span></div>'
         '<div role="group" aria-label="joint positions of the next pose" style="display:grid;grid-template-columns:1fr 1fr;'
         f'gap:0.1em 0.6em;margin:0 0.5em 0.3em;">{cells}</div>{payload}'
+        + (paragraph(reserve, "warning") if reserve else "")
     )
+
+
+def _reserve(model: RobotModel, q: np.ndarray) -> str:
+    """What is not known of a pose (n,) of a robot without collision shapes; empty for others."""
+    from flexcal.design.scene import below_base, has_collision_shapes, is_hanging
+
+    if has_collision_shapes(model):
+        return ""
+    below = not is_hanging(model) and bool(below_base(model, q[None])[0])
+    low = " A joint or the point is below the base plane." if below else ""
+    return f"Collisions are not checked: the URDF has no collision shapes; move there slowly and look.{low}"
 
 
 def _joint(name: str, slides: bool, value: float) -> str:

@@ -92,6 +92,10 @@ class PosePlanView(PlanView):
             self._selected.content = paragraph(f"Pose {key}: {touching} touch.", "bad")
         elif not self._checks.seen[row]:
             self._selected.content = paragraph(f"Pose {key}: the instrument does not see the target.", "bad")
+        elif looks := self._checks.looks(row):
+            self._selected.content = paragraph(
+                f"Pose {key}: collisions are not checked; look: {', '.join(looks)}.", "warning"
+            )
         else:
             self._selected.content = paragraph(f"Pose {key} of {len(self.plan)}.")
 
