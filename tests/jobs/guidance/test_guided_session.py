@@ -14,7 +14,6 @@ from refusals import refused
 from flexcal import PosePlan, RobotModel
 from flexcal.data.poses import PoseSet
 from flexcal.jobs.guidance import GuidedSession, Judgement
-from flexcal.model.robot import Stations
 
 CODES = {"clean": "good", "joints": "wrong_row", "swapped": "axes", "sign": "axes", "turned": "moved"}
 """Codes of faults that are not called as their code."""
@@ -115,16 +114,32 @@ def test_a_tracker_carried_elsewhere(ur5: RobotModel):
     assert session.findings[0].pose == 16
 
 
-def test_rows_of_another_station_are_not_outliers(ur5: RobotModel):
-    """Of a tracker that was carried elsewhere: the first ones are too few to tell where it stands, the next ones are judged."""
-    q, points, _ = series("clean", 5)
-    model = replace(ur5, stations=Stations.at_base(("tracker", "moved")))
-    measured = rows(q, np.vstack([points[:20], points[20:] + np.array([0.4, -0.2, 0.1])]))
-    there = np.where(np.arange(len(q)) < 20, "tracker", "moved")
-    _, judgements = judged(model, replace(measured, station=there))
-    assert [one.code for one in judgements[20:24]] == ["too_early"] * 4
-    assert "from the station moved" in judgements[20].sentence
-    assert {one.code for one in judgements[24:]} <= {"too_early", "good"} and judgements[-1].code == "good"
+def test_rows_of_a_new_station_are_judged_once_its_place_is_known(ur5: RobotModel):
+    q, points, _ = series("clean", 7)
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    points[20:] = points[20:] @ turn.T + [2.0, 0.7, 0.1]
+    points[32, 0] += 0.004
+    measured = rows(q, points)
+    measured = replace(measured, station=np.array(["tracker"] * 20 + ["tracker2"] * (len(q) - 20)))
+    session, judgements = judged(ur5.with_stations(["tracker", "tracker2"]), measured)
+    for count, one in enumerate(judgements[20:24], start=1):
+        assert one.code == "too_early" and one.error is None
+        assert "cannot be judged yet" in one.sentence and "'tracker2'" in one.sentence
+        assert one.sentence.endswith(f" {count}.")
+    assert all(one.is_good for one in [*judgements[24:32], *judgements[33:]])
+    assert all(one.error is not None for one in judgements[24:])
+    assert judgements[32].code == "outlier" and judgements[32].error == pytest.approx(0.004, rel=0.2)
+    assert [(one.kind, one.row, one.pose) for one in session.findings] == [("outlier", 32, 33)]
+
+
+def test_a_row_that_came_too_early_to_be_judged_is_found_later(ur5: RobotModel):
+    q, points, _ = series("clean", 7)
+    points[2] += [0.0, 0.5, 0.0]
+    session, judgements = judged(ur5, rows(q, points).subset(slice(0, 20)))
+    assert judgements[2].code == "too_early"
+    (finding,) = session.findings
+    assert (finding.kind, finding.pose) == ("outlier", 3) and finding.size == pytest.approx(0.5, abs=0.01)
+    assert "exclude it" in finding.sentence
 
 
 def test_an_uncalibrated_robot_is_not_an_outlier(ur5: RobotModel):

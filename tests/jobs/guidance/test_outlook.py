@@ -55,7 +55,13 @@ def test_next_poses_can_be_taken_and_come_soon(tx90l: RobotModel):
     assert (np.diff(outlook.p90) < 0).all() and outlook.is_known
     # none of those is a pose that was measured
     assert np.abs(outlook.q[:, None] - first[None]).max(axis=2).min() > 0.01
-    assert "more poses bring" in outlook.sentence and "anywhere in the workspace" in outlook.sentence
+    now, then, alone = (
+        f"{1e3 * value:.3f} mm" for value in (outlook.p90[0], outlook.p90[-1], outlook.scatter)
+    )
+    assert outlook.sentence == (
+        f"go on: p90 predicted {now} anywhere in the workspace, with 10 more poses about {then}; "
+        f"the scatter of robot and instrument alone is {alone}."
+    )
 
 
 def test_the_desired_error(tx90l: RobotModel):

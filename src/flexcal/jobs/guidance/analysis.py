@@ -65,6 +65,22 @@ class Analysis:
         """Indices (M,) of the used rows."""
         return np.flatnonzero(self.used)
 
+    @cached_property
+    def far_off(self) -> dict[int, float]:
+        """Distances, m, by row, of points too far from where the robot was for any estimate, where most rows of their station are not."""
+        if self.estimate is None:
+            return {}
+        far: list[int] = []
+        for station in self.rows.stations:
+            own = np.flatnonzero(self.rows.station == station)
+            if self.used[own].sum() * 2 > len(own):
+                far += own[~self.used[own]].tolist()
+        if not far:
+            return {}
+        rows = self.rows.subset(far)
+        off = np.linalg.norm(rows.position - self.estimate.predicted(rows)[0], axis=1)
+        return dict(zip(far, off.tolist(), strict=True))
+
     def pose_of(self, item: Disturbance) -> int:
         """Number of the pose at which a disturbance is, or begins."""
         return int(self.rows.pose[self.index[item.row]])

@@ -23,30 +23,31 @@ class ConsistentRows:
     """Largest consistent set of rows of every station: `used` (N,).
 
     `moved` is the row before which the instrument or the base was moved far: the rows on its two sides are consistent among themselves.
-    `mirrored` says that the points fit only after a reflection.
+    `mirrored` are the stations whose points fit only after a reflection.
     """
 
     used: np.ndarray
     moved: int | None = None
-    mirrored: bool = False
+    mirrored: frozenset[str] = frozenset()
 
     @classmethod
     def of(cls, predicted: np.ndarray, rows: PoseSet) -> ConsistentRows:
         """Consistent rows of points `predicted` (N, 3), m, for the robot as described."""
-        used, moved, mirrored = np.zeros(len(rows), bool), None, False
+        used, moved, mirrored = np.zeros(len(rows), bool), None, set[str]()
         for station in rows.stations:
             index = np.flatnonzero(rows.station == station)
             expected, measured = predicted[index], rows.position[index]
             own = _largest_consistent(expected, measured)
             if own.sum() < max(FEWEST, 0.8 * len(own)) and _extents(expected)[2] > _EXTENT:
                 flipped = _largest_consistent(expected, measured * [1, 1, -1.0])
-                mirrored |= bool(flipped.sum() >= max(FEWEST, 0.8 * len(own)))
+                if flipped.sum() >= max(FEWEST, 0.8 * len(own)):
+                    mirrored.add(station)
             if own.sum() < FEWEST or _extents(expected[own])[1] < _EXTENT:
                 continue
             used[index[own]] = True
             since = _moved_since(expected, measured, own)
             moved = moved if since is None else int(index[since])
-        return cls(used, moved, mirrored)
+        return cls(used, moved, frozenset(mirrored))
 
 
 def length_ratio(predicted: np.ndarray, rows: PoseSet) -> float | None:

@@ -20,10 +20,11 @@ BEYOND = 0.05
 
 @dataclass(frozen=True)
 class Finding:
-    """Disturbance of the series: its kind, the number of the pose at which it is or begins, its size, m, and its p-value; None where it
-    needs none."""
+    """Disturbance of the series: its kind, the row of the session and the number of the pose at which it is or begins, its size, m, and
+    its p-value; None where it is farther off than any error of a robot."""
 
     kind: DisturbanceKind
+    row: int
     pose: int
     size: float
     p: float | None
@@ -31,8 +32,10 @@ class Finding:
     @property
     def sentence(self) -> str:
         """The finding in words."""
-        if self.p is None:
+        if self.p is None and self.kind == "moved":
             return moved_far_text(self.pose)
+        if self.p is None:
+            return f"pose {self.pose} is {self.size / MILLIMETRE:.0f} mm from where the robot was; exclude it, or measure it again."
         size, p = f"{self.size / MILLIMETRE:.2g} mm", p_text(self.p)
         if self.kind == "outlier":
             return f"pose {self.pose} is {size} off ({p}); exclude it, or measure it again."
@@ -52,7 +55,7 @@ class Finding:
         else:
             size = float(np.linalg.norm(shift[item.row :], axis=1).mean()) if item.kind == "moved" else 0.0
             size = float(np.linalg.norm(shift[item.row])) if item.kind == "outlier" else size
-        return cls(item.kind, analysis.pose_of(item), size, item.p)
+        return cls(item.kind, int(analysis.index[item.row]), analysis.pose_of(item), size, item.p)
 
 
 @dataclass(frozen=True)

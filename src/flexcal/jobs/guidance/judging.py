@@ -50,6 +50,8 @@ class RowJudge:
         if since is not None and (self.before is None or self.before.consistent.moved != since):
             pose = int(self.after.rows.pose[since])
             return Judgement("moved", moved_far_text(pose), pose=pose)
+        if not self.after.used[self._station].any():
+            return self._unjudged()
         if not self.after.used[-1]:
             return self._gross()
         known = (
@@ -70,6 +72,11 @@ class RowJudge:
     @property
     def _row(self) -> PoseSet:
         return self.after.rows.subset([len(self.after.rows) - 1])
+
+    @property
+    def _station(self) -> np.ndarray:
+        """Mask (N,) of the rows of the same station."""
+        return self.after.rows.station == self.after.rows.station[-1]
 
     def _is_last(self, item: Disturbance) -> bool:
         return int(self.after.index[item.row]) == len(self.after.rows) - 1
@@ -162,14 +169,7 @@ class RowJudge:
         """Judgement of a row that cannot be where the robot was."""
         estimate, row = self.after.estimate, self._row
         assert estimate is not None
-        beside = int((self.after.rows.station == row.station[0]).sum())
-        if beside < FEWEST:
-            return Judgement(
-                "too_early",
-                f"pose {int(row.pose[0])} cannot be judged yet: {FEWEST} rows from the station {row.station[0]} that do not lie on a line "
-                f"tell roughly where it stands, and there are {beside}.",
-            )
-        if self.after.used.sum() * 2 < len(self.after.rows) and len(self.after.rows) >= _MISFIT_ROWS:
+        if self._is_misfit:
             return self._misfit()
         if (since := self.after.consistent.moved) is not None:
             pose = int(self.after.rows.pose[since])
@@ -221,15 +221,16 @@ class RowJudge:
         return replace(other, words=f"{other.words}, and {planned.words}")
 
     def _unjudged(self) -> Judgement:
-        """Judgement where there is no estimate yet."""
-        rows = self.after.rows
-        if self.after.consistent.mirrored:
+        """Judgement where it is not known yet where the row's station stands."""
+        own = self.after.rows.subset(self._station)
+        station = str(own.station[0])
+        if station in self.after.consistent.mirrored:
             return Judgement(
                 "axes",
-                f"the points of all {len(rows)} rows fit the robot only in a mirror: one of x, y, z has the wrong sign, or two of them are "
+                f"the points of all {len(own)} rows fit the robot only in a mirror: one of x, y, z has the wrong sign, or two of them are "
                 "swapped.",
             )
-        ratio = length_ratio(predict_measurements(self.model, rows).located, rows)
+        ratio = length_ratio(predict_measurements(self.model, own).located, own)
         if ratio is not None:
             for factor, words in (
                 (1e3, "mm given as m"),
@@ -240,19 +241,25 @@ class RowJudge:
                     return Judgement(
                         "unit", f"the points are {ratio:.4g} times as far apart as the robot's: {words}."
                     )
-        if len(rows) >= _MISFIT_ROWS and self.after.used.sum() * 2 < len(rows):
+        if self._is_misfit:
             return self._misfit()
+        name = "the instrument" if self._station.all() else f"'{station}'"
         return Judgement(
             "too_early",
-            f"pose {int(self._row.pose[0])} cannot be judged yet: {FEWEST} rows that do not lie on a line tell roughly where the "
-            f"instrument stands, and there are {len(rows)}.",
+            f"pose {int(self._row.pose[0])} cannot be judged yet: {FEWEST} rows that do not lie on a line tell roughly where {name} "
+            f"stands, and there {'is' if len(own) == 1 else 'are'} {len(own)}.",
         )
 
+    @property
+    def _is_misfit(self) -> bool:
+        own = self.after.used[self._station]
+        return len(own) >= _MISFIT_ROWS and own.sum() * 2 < len(own)
+
     def _misfit(self) -> Judgement:
-        rows = self.after.rows
+        own = self.after.used[self._station]
         return Judgement(
             "misfit",
-            f"the points of {int((~self.after.used).sum())} of {len(rows)} rows are not where this robot can have been: check the order, "
+            f"the points of {int((~own).sum())} of {len(own)} rows are not where this robot can have been: check the order, "
             "signs and units of the joint values and of x, y, z; 'flexcal import' tells them of a whole file.",
         )
 

@@ -82,11 +82,9 @@ class Outlook:
         more = f"{len(self.q)} more poses"
         if not self.is_known:
             return f"go on: too few rows yet to say how accurate the robot will be; {more} predict a p90 of {then:.3f} mm."
-        floor = (
-            f", of which {self.scatter / MILLIMETRE:.3f} mm is scatter, which more poses do not remove"
-            if self.scatter > 0
-            else ""
-        )
+        floor = ""
+        if self.scatter > 0:
+            floor = f"; the scatter of robot and instrument alone is {self.scatter / MILLIMETRE:.3f} mm"
         where = " anywhere in the workspace" if self.anywhere else " in the working volume"
         if self.desired is not None and not self.is_enough:
             wanted = np.flatnonzero(self.p90 <= self.desired)
@@ -94,8 +92,9 @@ class Outlook:
                 f"in {int(wanted[0])} more poses" if len(wanted) else f"not yet with {more} ({then:.3f} mm)"
             )
             return f"go on: p90 predicted {now:.3f} mm{where}, {self.desired / MILLIMETRE:.3f} mm are reached {reach}{floor}."
-        word = "stop" if self.is_enough else "go on"
-        return f"{word}: p90 predicted {now:.3f} mm{where}, {more} bring {now - then:.3f} mm{floor}."
+        if self.is_enough:
+            return f"stop: p90 predicted {now:.3f} mm{where}, {more} bring {now - then:.3f} mm{floor}."
+        return f"go on: p90 predicted {now:.3f} mm{where}, with {more} about {then:.3f} mm{floor}."
 
 
 @dataclass(frozen=True, eq=False)

@@ -64,7 +64,12 @@ class GuidedSession:
         if analysis is None:
             return ()
         far = analysis.consistent.moved
-        found = [] if far is None else [Finding("moved", int(analysis.rows.pose[far]), np.inf, None)]
+        found = [] if far is None else [Finding("moved", far, int(analysis.rows.pose[far]), np.inf, None)]
+        found += [
+            Finding("outlier", row, int(analysis.rows.pose[row]), off, None)
+            for row, off in analysis.far_off.items()
+            if far is None or row < far
+        ]
         return (*found, *(Finding.of(analysis, item) for item in analysis.disturbances))
 
     def judge(self, row: PoseSet) -> Judgement:
