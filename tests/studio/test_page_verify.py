@@ -18,6 +18,7 @@ from flexcal.calibration.measurement import predict_measurements
 from flexcal.jobs.deployment import compensate
 from flexcal.jobs.inputs import CalibratedRobot
 from flexcal.model.statics import tool_at_rest
+from flexcal.studio.steps.results import ResultSource
 
 WAIT = 30_000
 
@@ -50,6 +51,22 @@ def test_from_a_calibration_to_the_exported_robot(page: Any, tmp_path: Path) -> 
         np.testing.assert_allclose(shown, [np.quantile(off, 0.9), off.max()], atol=0.0006)
         row = numbers(rf"pose {poses.pose[off.argmax()]}\s+([\d.]+)", told)
         assert row == [pytest.approx(off.max(), abs=0.0006)]
+
+        page.get_by_text("verification of random.csv, ").first.wait_for(timeout=WAIT)
+
+        lines = (folder / "random.csv").read_text().splitlines(keepends=True)
+        (folder / "half.csv").write_text("".join(lines[: len(lines) // 2]))
+        page.get_by_label("Fresh poses", exact=True).first.click(timeout=WAIT)
+        page.get_by_role("option", name="half.csv").click(timeout=WAIT)
+        page.get_by_text("result below is of random.csv; half.csv has not been verified").wait_for(
+            timeout=WAIT
+        )
+        page.get_by_role("button", name="Verify on these poses", exact=True).click(timeout=WAIT)
+        page.get_by_role("button", name="Replace the verification of random.csv").wait_for(timeout=WAIT)
+        assert "random.csv" in ResultSource.read(folder / "verification").tables
+        page.get_by_role("button", name="Replace the verification of random.csv").click()
+        page.get_by_text("verification of half.csv, ").first.wait_for(timeout=WAIT)
+        (folder / "half.csv").unlink()
 
         page.get_by_role("button", name="Map", exact=True).click()
         page.get_by_label("Where", exact=True).first.click(timeout=WAIT)

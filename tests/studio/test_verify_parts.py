@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import calibrated_ur5
@@ -17,6 +18,7 @@ from flexcal.jobs.result_files import read_arm
 from flexcal.model.kinematics import point_kinematics
 from flexcal.studio.project import Project
 from flexcal.studio.scene import ColourScale
+from flexcal.studio.steps.results import ResultSource
 from flexcal.studio.steps.verify.corrected_command import CorrectedCommand, TypedTarget
 from flexcal.studio.steps.verify.export_formats import export_formats
 from flexcal.studio.steps.verify.fresh_files import fresh_files
@@ -37,6 +39,29 @@ def robot(folder: Path) -> CalibratedRobot:
 
 def test_fresh_poses_are_those_that_the_calibration_did_not_read(folder: Path) -> None:
     assert fresh_files(Project.open(folder)) == ["random.csv"]
+
+
+def test_a_table_with_rows_of_the_calibration_is_not_fresh(folder: Path, tmp_path: Path) -> None:
+    """Whatever it is called and whichever columns it has; the same joint positions measured anew are fresh."""
+    shutil.copytree(folder, tmp_path / "ur5")
+    grid = pl.read_csv(tmp_path / "ur5" / "grid.csv", infer_schema_length=None)
+    grid.tail(3).with_columns(note=pl.lit("again")).write_csv(tmp_path / "ur5" / "tracker.csv")
+    grid.with_columns(pl.col("x") + 0.001).write_csv(tmp_path / "ur5" / "anew.csv")
+    names = fresh_files(Project.open(tmp_path / "ur5"))
+    assert "tracker.csv" not in names
+    assert sorted(names) == ["anew.csv", "random.csv"]
+
+
+def test_a_result_names_the_table_that_it_is_of(folder: Path, tmp_path: Path) -> None:
+    """Not another one that is chosen; a table of the same name with other rows has changed."""
+    source = ResultSource.read(folder / "calibration")
+    assert source is not None and source.title.startswith("calibration of grid.csv, ")
+    assert source.difference(folder, "grid.csv") == ""
+    told = source.difference(folder, "random.csv")
+    assert told == "The result below is of grid.csv; random.csv has not been used."
+    (tmp_path / "grid.csv").write_text("pose\n1\n")
+    assert "has changed since" in source.difference(tmp_path, "grid.csv")
+    assert ResultSource.read(tmp_path) is None
 
 
 def test_the_box_of_a_map_encloses_the_measured_points(folder: Path) -> None:

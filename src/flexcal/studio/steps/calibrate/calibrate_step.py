@@ -54,7 +54,10 @@ class CalibrateStep(Step):
             self._shown = (stamp, listed, self._stage, self.window.dark)
             self._list(listed)
             folder = self._folder()
-            self._result.show(folder, lambda: self._add_choice(folder))
+            chosen = self._measured.value if folder == CALIBRATION else ""
+            self._result.show(
+                folder, lambda: self._add_choice(folder), chosen="" if chosen == _NONE else chosen
+            )
         self._result.refresh()
 
     def close(self) -> None:

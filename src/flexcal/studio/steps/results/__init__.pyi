@@ -1,4 +1,5 @@
 from .folder_result import FolderResult
 from .residuals_view import ResidualsView
+from .result_source import ResultSource
 
-__all__ = ["FolderResult", "ResidualsView"]
+__all__ = ["FolderResult", "ResidualsView", "ResultSource"]

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from flexcal.errors import FlexcalError
 from flexcal.jobs.result_files import RESULTS
 from flexcal.studio.steps.results.residuals_view import ResidualsView
+from flexcal.studio.steps.results.result_source import ResultSource
 from flexcal.studio.window import (
     Place,
     ReportFigures,
@@ -14,6 +15,7 @@ from flexcal.studio.window import (
     add_sections,
     add_verdict,
     file_link,
+    heading,
     paragraph,
 )
 
@@ -32,8 +34,11 @@ class FolderResult:
         self._place = Place(window.gui)
         self._residuals: ResidualsView | None = None
 
-    def show(self, name: str | None, add_note: Callable[[], None] | None = None) -> None:
-        """Show the result in the project's folder `name`, if there is one, in place of that before; `add_note` adds what stands above."""
+    def show(self, name: str | None, add_note: Callable[[], None] | None = None, *, chosen: str = "") -> None:
+        """Show the result in the project's folder `name`, if there is one, in place of that before.
+
+        `add_note` adds what stands above. Where the result is not of the table `chosen`, a warning says so.
+        """
         from flexcal.jobs.pages import folder_page
 
         window = self._window
@@ -50,6 +55,12 @@ class FolderResult:
                 return
             if add_note is not None:
                 add_note()
+            source = ResultSource.read(folder)
+            if source is not None:
+                window.gui.add_html(heading(source.title))
+                difference = source.difference(window.project.folder, chosen) if chosen else ""
+                if difference:
+                    window.gui.add_html(paragraph(difference, "warning"))
             window.gui.add_html(paragraph(page.subtitle))
             add_verdict(window.gui, page)
             if (folder / "points.csv").is_file():

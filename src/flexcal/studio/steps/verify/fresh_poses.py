@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from flexcal.jobs.result_files import RESULTS
 from flexcal.studio.project import CALIBRATION, CHECKED, VERIFICATION
-from flexcal.studio.steps.results import FolderResult
+from flexcal.studio.steps.results import FolderResult, ResultSource
 from flexcal.studio.steps.verify.fresh_files import fresh_files
 from flexcal.studio.steps.verify.part import Part
 from flexcal.studio.window import (
@@ -13,8 +13,6 @@ from flexcal.studio.window import (
     paragraph,
     step_link,
 )
-
-_NONE = "none"
 
 
 class FreshPoses(Part):
@@ -25,6 +23,7 @@ class FreshPoses(Part):
     def __init__(self, window: Window):
         super().__init__(window)
         self._shown: object = None
+        self._file = ""
 
     def open(self) -> None:
         """Add the choice of the poses, the button, and the place of the result."""
@@ -38,7 +37,7 @@ class FreshPoses(Part):
         if stamp != self._shown:
             self._shown = stamp
             self._show_choice()
-            self._result.show(VERIFICATION, self._add_note)
+            self._show_result()
         self._result.refresh()
 
     def close(self) -> None:
@@ -47,7 +46,7 @@ class FreshPoses(Part):
 
     def _show_choice(self) -> None:
         window = self.window
-        names = fresh_files(window.project)
+        names, self._file = fresh_files(window.project), ""
         with self._choice.anew():
             if not names:
                 window.gui.add_html(
@@ -60,20 +59,63 @@ class FreshPoses(Part):
                 )
                 return
             chosen = window.choices.get("fresh", names[0])
-            files = window.gui.add_dropdown(
-                "Fresh poses", names, initial_value=chosen if chosen in names else names[0]
-            )
-            files.on_update(lambda _: window.post(lambda: window.choices.put("fresh", files.value)))
-            again = " again" if (window.project.folder / VERIFICATION / RESULTS).is_file() else ""
+            self._file = chosen if chosen in names else names[0]
+            files = window.gui.add_dropdown("Fresh poses", names, initial_value=self._file)
+            files.on_update(lambda _: window.post(lambda: self._choose(files.value)))
+            self._buttons = Place(window.gui)
+            self._add_button()
+
+    def _choose(self, file: str) -> None:
+        self._file = file
+        self.window.choices.put("fresh", file)
+        self._add_button()
+        self._show_result()
+
+    def _show_result(self) -> None:
+        self._result.show(VERIFICATION, self._add_note, chosen=self._file)
+
+    def _add_button(self) -> None:
+        window = self.window
+        again = " again" if (window.project.folder / VERIFICATION / RESULTS).is_file() else ""
+        source = self._other_source()
+        with self._buttons.anew():
             window.button(
-                f"Verify on these poses{again}",
-                lambda: window.command(self._arguments(files.value)),
-                hint="$ flexcal " + " ".join(self._arguments(files.value)),
+                "Verify on these poses" + ("" if source is not None else again),
+                self._verify if source is None else self._ask,
+                hint="$ flexcal " + " ".join(self._arguments()),
                 main=True,
             )
 
-    def _arguments(self, file: str) -> tuple[str, ...]:
-        return ("verify", "robot.yaml", file, "--estimates", CALIBRATION, "--out", VERIFICATION)
+    def _other_source(self) -> ResultSource | None:
+        """What the present verification is of, where that is another table."""
+        source = ResultSource.read(self.window.project.folder / VERIFICATION)
+        name = self._file.rpartition("/")[2]
+        if source is None or name in {table.rpartition("/")[2] for table in source.tables}:
+            return None
+        return None if source.is_of(self.window.project.folder / self._file) else source
+
+    def _ask(self) -> None:
+        """Have the replacement of a verification of another table confirmed."""
+        source = self._other_source()
+        if source is None:
+            self._verify()
+            return
+        with self._buttons.anew():
+            self.window.gui.add_html(
+                paragraph(
+                    f"The folder {VERIFICATION} holds the {source.title}. Verifying on {self._file} replaces it; rename the folder to "
+                    "keep both.",
+                    "warning",
+                )
+            )
+            self.window.button(f"Replace the verification of {source.names}", self._verify, main=True)
+            self.window.button("Keep it", self._add_button)
+
+    def _verify(self) -> None:
+        self.window.command(self._arguments())
+
+    def _arguments(self) -> tuple[str, ...]:
+        return ("verify", "robot.yaml", self._file, "--estimates", CALIBRATION, "--out", VERIFICATION)
 
     def _add_note(self) -> None:
         """That the verification is of an earlier calibration, where it is."""
