@@ -68,6 +68,28 @@ def test_undo_takes_back_one_change_at_a_time(tmp_path: Path, cells: list[dict[s
     assert cells[2]["x"] in rows.history.read_text()
     rows.append(cells[:1])
     assert rows.undo() == "1 row taken out"
+    rows.append(cells[:2], Source("a.csv", 10))
+    rows.append(cells[2:3], Source("b.csv", 5))
+    rows.append(cells[3:4], Source("a.csv", 20))
+    assert rows.count_taken() == {"a.csv": 3, "b.csv": 1}
+
+
+def test_a_new_station_and_its_undo(tmp_path: Path, cells: list[dict[str, str]]):
+    rows = MeasuredRows(tmp_path)
+    rows.append(cells[:5])
+    rows.exclude(1, "bumped")
+    before = rows.path.read_bytes()
+    rows.move_station(3, "tracker2", "tracker")
+    once = rows.rows()
+    assert [one.cells["station"] for one in once] == ["tracker"] * 3 + ["tracker2"] * 2
+    assert once[1].excluded == "bumped" and {**once[4].cells} == {**cells[4], "station": "tracker2"}
+    # only those of the same station as the row are moved
+    rows.move_station(1, "tracker3", "tracker")
+    assert [one.cells["station"] for one in rows.rows()] == ["tracker", "tracker3", "tracker3"] + [
+        "tracker2"
+    ] * 2
+    assert rows.undo() is not None and rows.rows() == once
+    assert rows.undo() is not None and rows.path.read_bytes() == before
 
 
 def test_changes_of_another_program_are_not_taken_back(tmp_path: Path, cells: list[dict[str, str]]):

@@ -14,7 +14,7 @@ from flexcal.errors import InputError, unreadable
 from flexcal.files.transaction import atomic_paths, current_path
 from flexcal.jobs.guidance.row_cells import EXCLUDED
 
-ROWS = "poses.csv"
+ROWS, STATION = "poses.csv", "station"
 
 
 @dataclass(frozen=True)
@@ -86,6 +86,31 @@ class MeasuredRows:
         """Bytes of every source that are taken, by its name; those of rows that an undo took out too."""
         return {str(one["from"]): int(one["end"]) for one in self._entries() if "from" in one}
 
+    def move_station(self, row: int, name: str, first: str) -> None:
+        """Let the rows from one on, counted from 0, that are of its station be of another one, `name`; beyond the last row none are.
+
+        A table without a column of stations gets it: the rows before are of the station `first`.
+        """
+        table = self._table()
+        rows = [MeasuredRow({STATION: first} | dict(one.cells), one.excluded) for one in table.rows]
+        moved = rows[row].cells[STATION] if row < len(rows) else ""
+        for k in range(row, len(rows)):
+            if rows[k].cells[STATION] == moved:
+                rows[k] = MeasuredRow({**rows[k].cells, STATION: name}, rows[k].excluded)
+        entry: dict[str, Any] = {"do": "station", "row": row, "after": [one.cells[STATION] for one in rows]}
+        entry["before"] = [one.cells.get(STATION) for one in table.rows]
+        columns = table.columns if STATION in table.columns else (*table.columns, STATION)
+        entry["new"] = columns != table.columns
+        self._write(_Table(columns, tuple(rows), table.head), entry)
+
+    def count_taken(self) -> dict[str, int]:
+        """Number of rows that were taken from every source, by its name; those that an undo took out too."""
+        counts: dict[str, int] = {}
+        for one in self._entries():
+            if "from" in one:
+                counts[str(one["from"])] = counts.get(str(one["from"]), 0) + len(one["cells"])
+        return counts
+
     def exclude(self, row: int, reason: str) -> None:
         """Exclude a row, counted from 0; raises `InputError` without a reason, and for a row that is not there."""
         if not reason.strip():
@@ -110,8 +135,20 @@ class MeasuredRows:
         if not done:
             return None
         table, last = self._table(), done[-1]
-        row, rows = int(last["row"]), list(table.rows)
-        if last["do"] == "append":
+        row, rows, columns = int(last["row"]), list(table.rows), table.columns
+        if last["do"] == "station":
+            if [one.cells.get(STATION) for one in rows] != last["after"]:
+                raise self._changed()
+            for k, station in enumerate(last["before"]):
+                others = {
+                    name: cell for name, cell in rows[k].cells.items() if name != STATION or not last["new"]
+                }
+                rows[k] = MeasuredRow(
+                    others if last["new"] else {**others, STATION: station}, rows[k].excluded
+                )
+            columns = tuple(name for name in columns if name != STATION or not last["new"])
+            words = f"the rows from row {row + 1} on are of the station before"
+        elif last["do"] == "append":
             count = len(last["cells"])
             if [dict(one.cells) for one in rows[row : row + count]] != last["cells"]:
                 raise self._changed()
@@ -122,7 +159,7 @@ class MeasuredRows:
                 raise self._changed()
             rows[row] = MeasuredRow(rows[row].cells, last["before"])
             words = f"row {row + 1} {'excluded' if last['before'] else 'used'} again"
-        self._write(_Table(table.columns, tuple(rows), table.head), {"do": "undo"})
+        self._write(_Table(columns, tuple(rows), table.head), {"do": "undo"})
         return words
 
     def _mark(self, row: int, reason: str) -> None:

@@ -39,7 +39,7 @@ class _Followed(RowSource):
         self._refused: list[str] = []
         self._shown = ""
         self._of: object = None
-        self._journal: tuple[object, dict[str, int]] = ((), {})
+        self._journal: tuple[object, dict[str, int], dict[str, int]] = ((), {}, {})
 
     def add(self) -> None:
         """Add the name, a button that begins or ends following it, and what has come."""
@@ -86,7 +86,7 @@ class _Followed(RowSource):
             if names
             else f"waiting for it to come into {self.window.project.name}"
         )
-        text = paragraph(f"following {name}: {self._count()} rows taken so far, {waiting}.", "faint")
+        text = paragraph(f"following {name}: {self._count(names)} rows taken so far, {waiting}.", "faint")
         text += "".join(paragraph(problem, "bad") for problem in [*problems, *self._refused])
         if text != self._shown:
             self._shown = self._state.content = text
@@ -120,7 +120,7 @@ class _Followed(RowSource):
         status = table.history.stat() if table.history.exists() else None
         stamp = None if status is None else (status.st_mtime_ns, status.st_size)
         if self._journal[0] != stamp:
-            self._journal = (stamp, table.taken())
+            self._journal = (stamp, table.taken(), table.count_taken())
         return self._journal[1]
 
     def _is_whole(self, path: Path) -> bool:
@@ -131,8 +131,9 @@ class _Followed(RowSource):
         sentence = str(problem)
         self._refused = [*(one for one in self._refused if one != sentence), sentence][-_REFUSED:]
 
-    def _count(self) -> int:
-        return len(self.measuring.series.rows)
+    def _count(self, names: list[str]) -> int:
+        self._taken()
+        return sum(self._journal[2].get(name, 0) for name in names)
 
     def _toggle(self) -> None:
         name = "" if self.followed else self._name.value.strip()

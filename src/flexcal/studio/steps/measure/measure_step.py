@@ -32,6 +32,8 @@ class MeasureStep(Step):
         self._measuring: Measuring | None = None
         self._source: RowSource | None = None
         self._is_open = False
+        self._stations: tuple[str, ...] = ()
+        self._station: Any = None
         self._hotkeys: list[Any] = []
 
     def open(self) -> None:
@@ -47,7 +49,7 @@ class MeasureStep(Step):
                 lambda: window.model(estimates=False),
                 lambda answer: window.post(lambda: self._answered(answer)),
             )
-        self._is_open, self._source = True, None
+        self._is_open, self._source, self._stations = True, None, ()
         self._problem = gui.add_html("", visible=False)
         self._body = gui.add_folder(None)
         with self._body:
@@ -56,6 +58,12 @@ class MeasureStep(Step):
             self._outlook = gui.add_html("")
             self._add_choice("Rows come from", "row source", [one.title for one in _SOURCES])
             self._place = gui.add_folder(None)
+            self._station_place = gui.add_folder(None)
+            self._station_button = window.button(
+                "",
+                self._move_station,
+                hint="after the instrument or the base was moved: the rows from there on stand for themselves",
+            )
             self._reason = gui.add_text("Reason", "", hint="why a row is excluded; empty: as it is judged")
             self._exclude_button = window.button("Exclude the last row (X)", self._exclude)
             window.button("Undo (U)", self._undo)
@@ -140,6 +148,7 @@ class MeasureStep(Step):
         listed = pose_list(series, measuring.judgements, following, measuring.skipped, chosen, height="60vh")
         _set(self._list, listed)
         self._show_course()
+        self._show_station()
         key = row_keys(series)[row] if row >= 0 else ""
         label = "Exclude the last row (X)" if row == len(series.rows) - 1 else f"Exclude pose {key} (X)"
         if row >= 0 and series.rows[row].excluded:
@@ -154,6 +163,39 @@ class MeasureStep(Step):
         elif answer is not None and outlook is not None:
             ahead = outlook.p90.tolist() if outlook.is_known else []
             _set(self._course, accuracy_course(answer.course, ahead, outlook.measured, outlook.desired))
+
+    def _show_station(self) -> None:
+        measuring, names = self.measuring, self.measuring.series.model.stations.names
+        if names != self._stations:
+            order, self._stations = self._station_place.order, names
+            self._station_place.remove()
+            with self._body:
+                self._station_place = self.window.gui.add_folder(None, order=order)
+            with self._station_place:
+                self._station = self.window.gui.add_dropdown(
+                    "Station",
+                    names,
+                    initial_value=measuring.station,
+                    hint="of the rows to come that name none",
+                )
+            self._station.on_update(lambda _: self.window.post(self._station_chosen))
+            self._station_place.visible = len(names) > 1
+        if self._station.value != measuring.station:
+            self._station.value = measuring.station
+        row, count = self._station_row(), len(measuring.series.rows)
+        label = "New station for the rows to come"
+        if row < count:
+            label = f"New station from pose {row_keys(measuring.series)[row]} on"
+        if self._station_button.label != label:
+            self._station_button.label = label
+
+    def _station_row(self) -> int:
+        """The row from which a new station would be: the selected one, that before which the instrument moved, or the one to come."""
+        measuring, chosen = self.measuring, self.window.selection.key
+        keys = row_keys(measuring.series)
+        if chosen in keys:
+            return keys.index(chosen)
+        return len(keys) if measuring.moved is None else measuring.moved
 
     def _row(self) -> int:
         """The selected row, else the last one; −1 for none."""
@@ -200,6 +242,19 @@ class MeasureStep(Step):
     def _undo(self) -> None:
         words = self.measuring.undo()
         self.window.say("nothing to undo." if words is None else f"undone: {words}.")
+        self.refresh()
+
+    def _station_chosen(self) -> None:
+        if self._station.value != self.measuring.station:
+            self.window.choices.put("station", self._station.value)
+            self.refresh()
+
+    def _move_station(self) -> None:
+        row = self._station_row()
+        keys = row_keys(self.measuring.series)
+        name = self.measuring.move_station(row)
+        since = f"pose {keys[row]} on" if row < len(keys) else "the next row on"
+        self.window.say(f"the rows from {since} are of the station '{name}', which robot.yaml has.")
         self.refresh()
 
     def _exclude(self) -> None:

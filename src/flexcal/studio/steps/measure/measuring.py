@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -11,6 +11,7 @@ from flexcal.errors import InputError
 from flexcal.studio.steps.measure.guide import Answer, Guide, Question
 from flexcal.studio.steps.measure.next_pose import ORDERS, NextPose, Order, next_pose, orders
 from flexcal.studio.steps.measure.series import PURPOSES, Purpose, Series, read_pose_plan, stamp
+from flexcal.studio.steps.measure.stations import current_station, declare_stations, new_station, with_station
 from flexcal.units import MILLIMETRE
 
 if TYPE_CHECKING:
@@ -113,6 +114,13 @@ class Measuring:
         return () if self.answer is None else self.answer.findings
 
     @property
+    def moved(self) -> int | None:
+        """Row before which the instrument or the base was moved, as far as it is known."""
+        used = np.flatnonzero(self.series.used)
+        rows = [int(used[one.row]) for one in self.findings if one.kind == "moved" and one.row < len(used)]
+        return min(rows, default=None)
+
+    @property
     def problem(self) -> Exception | None:
         """Why no more is known of the rows."""
         return None if self.answer is None else self.answer.problem
@@ -146,10 +154,39 @@ class Measuring:
         self._answer = answer
         return True
 
-    def take(self, rows: Sequence[Mapping[str, str]], source: Source | None = None) -> None:
-        """Append rows, texts by column, and how far their source is read; raises `InputError` for those that do not fit."""
-        self.series.append(rows, source)
+    @property
+    def station(self) -> str:
+        """Station of the rows to come that do not say theirs."""
+        return current_station(self.series, self.choices.get("station", ""))
+
+    def take(self, rows: Sequence[Mapping[str, str]], source: Source | None = None) -> list[str]:
+        """Append rows, texts by column, and how far their source is read; return stations that are new in robot.yaml.
+
+        Raises `InputError` for rows that do not fit.
+        """
+        series, first = self.series, self.series.model.stations.names[0]
+        series.check(rows)
+        new = self._declare(cells["station"] for cells in rows if cells.get("station"))
+        self.series.table.append(with_station(series.table, rows, self.station, first), source)
         self.load()
+        return new
+
+    def move_station(self, row: int) -> str:
+        """A new station for the rows from one on, or for those to come where `row` is beyond the last; return its name."""
+        series = self.series
+        name = new_station(series, row, self.project.robot_file, self.station)
+        self._declare([name])
+        if row < len(series.rows):
+            series.table.move_station(row, name, series.model.stations.names[0])
+        self.choices.put("station", "" if row < len(series.rows) else name)
+        self.load()
+        return name
+
+    def _declare(self, names: Iterable[str]) -> list[str]:
+        new = declare_stations(self.project.robot_file, self.series.model, names)
+        if new:
+            self.load()
+        return new
 
     def undo(self) -> str | None:
         """Take back the last change of the rows, and say it in words; None where there is none."""

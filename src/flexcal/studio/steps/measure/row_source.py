@@ -48,8 +48,9 @@ class RowSource(ABC):
 
     def take(self, rows: Sequence[Mapping[str, str]], source: Source | None = None) -> None:
         """Take rows, texts by column, and show them; raises `InputError` for those that do not fit."""
-        self.measuring.take(rows, source)
-        self.window.say("")
+        new = self.measuring.take(rows, source)
+        names = ", ".join(f"'{name}'" for name in new)
+        self.window.say(f"{names} is new, and was added to the stations of robot.yaml." if new else "")
         if self.window.selection.key is None:
             self._refresh()
         else:

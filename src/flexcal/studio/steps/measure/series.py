@@ -15,7 +15,7 @@ from flexcal.studio.project import CHECK_PLAN, CHECKED, MEASURED, PLAN, Project
 if TYPE_CHECKING:
     from flexcal.data.plans import PosePlan
     from flexcal.data.poses import PoseSet
-    from flexcal.jobs.guidance import MeasuredRow, MeasuredRows, Source
+    from flexcal.jobs.guidance import MeasuredRow, MeasuredRows
     from flexcal.model.robot import RobotModel
 
 _SAME = 0.01
@@ -94,13 +94,11 @@ class Series:
         planned = [] if self.plan is None else self.plan.numbers.tolist()
         return max([*planned, *self.numbers.tolist()], default=0) + 1
 
-    def append(self, rows: Sequence[Mapping[str, str]], source: Source | None = None) -> None:
-        """Append rows, texts by column; raises `InputError` for cells that are no numbers, and other columns than those before."""
+    def check(self, rows: Sequence[Mapping[str, str]]) -> None:
+        """Raise `InputError` for rows, texts by column, with cells that are no numbers, and without the columns that are needed."""
         from flexcal.jobs.guidance import RowReader
 
-        reader = RowReader(self.table.path, tuple(rows[0]), self.model)
-        reader.poses(rows)
-        self.table.append(rows, source)
+        RowReader(self.table.path, tuple(rows[0]), self.model).poses(rows)
 
 
 def read_pose_plan(project: Project, purpose: Purpose, model: RobotModel) -> PosePlan | None:

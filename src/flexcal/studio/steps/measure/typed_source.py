@@ -28,19 +28,8 @@ class TypedSource(RowSource):
 
     def add(self) -> None:
         """Add a field a coordinate, and the button that takes them."""
-        gui, series = self.window.gui, self.measuring.series
+        gui = self.window.gui
         self._fields = [gui.add_number(f"{axis} / mm", 0.0, step=0.0001) for axis in "xyz"]
-        self._station = None
-        names, last = series.model.stations.names, series.poses
-        if len(names) > 1:
-            chosen = self.window.choices.get("station", names[0] if last is None else str(last.station[-1]))
-            self._station = gui.add_dropdown(
-                "Station",
-                names,
-                initial_value=chosen if chosen in names else names[0],
-                hint="where the instrument stands; another one once it was moved",
-            )
-            self._station.on_update(lambda _: self.window.post(self._moved))
         self.window.button("Take this point (N)", self.measure_next, main=True)
 
     def measure_next(self) -> None:
@@ -63,7 +52,7 @@ class TypedSource(RowSource):
             torque=None,
             payload=None if pose.payload is None else np.array([pose.payload]),
             target=np.array([model.point().name]),
-            station=np.array([model.stations.names[0] if self._station is None else self._station.value]),
+            station=np.array([self.measuring.station]),
             temperature=None,
             pose=np.array([pose.number]),
             sigma_given=False,
@@ -77,7 +66,3 @@ class TypedSource(RowSource):
             )
         self.take(cells_of(poses))
         self._taken = values
-
-    def _moved(self) -> None:
-        if self._station is not None:
-            self.window.choices.put("station", self._station.value)
