@@ -319,9 +319,10 @@ def test_connections_that_say_nothing_hinder_nobody(target: Target) -> None:
         silent = [stack.enter_context(target.connect()) for _ in range(200)]
         for connection in silent[::2]:
             connection.sendall(f"GET /{target.token}/ HTTP/1.1\r\nHost: ".encode())
-        begin = time.monotonic()
         assert target.ask(f"/{target.token}/").status == 200
-        assert time.monotonic() - begin < 2
+        silent[0].setblocking(False)
+        with pytest.raises(BlockingIOError):  # that was answered while these were still waited for
+            silent[0].recv(1)
         silent[0].settimeout(30)
         assert silent[0].recv(1) == b""  # these are closed by and by
 
