@@ -95,6 +95,11 @@ class Judgement:
         """Whether nothing speaks against the row."""
         return self.code in ("good", "repeat", "too_early")
 
+    @property
+    def is_wrong(self) -> bool:
+        """Whether the row itself is wrong, not the series."""
+        return self.code in ("wrong_row", "axes", "unit", "outlier", "misfit")
+
 
 def moved_far_text(pose: int) -> str:
     """Sentence on an instrument or a base that was moved by more than any error of the robot."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -99,9 +100,35 @@ class Measuring:
 
     @property
     def judgements(self) -> dict[int, Judgement]:
-        """Judgements so far, by row."""
-        known = () if self.answer is None else self.answer.judgements
-        return dict(zip(np.flatnonzero(self.series.used).tolist(), known, strict=False))
+        """Judgements so far, by row: of each as it came, or as the rows after it tell."""
+        known, series = () if self.answer is None else self.answer.judgements, self.series
+        used = np.flatnonzero(series.used).tolist()
+        judged = dict(zip(used, known, strict=False))
+        for one in self.findings:
+            row = used[one.row] if one.row < len(used) else -1
+            if (one.kind == "outlier" and row in judged and judged[row].is_good) or (
+                one.kind == "moved" and row in judged and judged[row].code == "outlier"
+            ):
+                size = one.size if np.isfinite(one.size) else None
+                judged[row] = replace(
+                    judged[row], code=one.kind, sentence=one.sentence, error=size, expected=None, p=one.p
+                )
+        if judged and series.poses is not None:
+            last = max(judged)
+            whole = judged[last]
+            if whole.is_wrong and whole.error is None:  # of all rows of the station, those before it too
+                early = [row for row, one in judged.items() if one.code == "too_early" and one.error is None]
+                station = series.poses.station
+                judged |= {row: whole for row in early if station[row] == station[last]}
+        return judged
+
+    @property
+    def reached(self) -> int:
+        """Number of planned poses with a row in use, at their joint positions, that is not judged wrong."""
+        series, judged = self.series, self.judgements
+        good = series.used & series.at_plan
+        good[[row for row, one in judged.items() if one.is_wrong]] = False
+        return len({*series.numbers[good].tolist()})
 
     @property
     def outlook(self) -> Outlook | None:

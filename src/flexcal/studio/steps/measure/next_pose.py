@@ -42,7 +42,7 @@ def next_pose(
     """
     plan = series.plan
     if plan is not None:
-        done = set(series.numbers[series.used].tolist())
+        done = set(series.numbers[series.used & series.at_plan].tolist())
         for k, number in enumerate(plan.numbers.tolist()):
             if str(number) == wanted and number not in done:
                 return planned(series, k)

@@ -59,6 +59,8 @@ def pose_list(
     if following is not None:
         key = str(following.number)
         before = series.rows[keys.index(key)].excluded if key in keys else ""
+        if key in keys and not series.at_plan[keys.index(key)] and following.planned:
+            before = f"the row of number {key} has other joint values"
         lines[key] = (f"pose {key}", "→ next", before)
     for row in reversed(range(len(keys))):
         lines.setdefault(keys[row], (f"pose {keys[row]}", *_state(series, row, judgements.get(row))))

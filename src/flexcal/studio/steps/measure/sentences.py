@@ -21,7 +21,9 @@ def next_text(measuring: Measuring, following: NextPose | None) -> str:
     if series.plan is None:
         place = f"the best one after {len(series.rows)} rows; there is no {series.purpose.plan}"
     else:
-        place = f"{len(series.plan) - len(series.open_poses)} of {len(series.plan)} planned poses measured"
+        place = f"{measuring.reached} of {len({*series.plan.numbers.tolist()})} planned poses measured"
+        if series.rows and not series.at_plan.any():
+            place = f"{len(series.rows)} rows, none at a planned pose"
     return pose_card(series.model, following, place)
 
 
@@ -49,9 +51,14 @@ def outlook_text(measuring: Measuring) -> str | None:
     answer, outlook = measuring.answer, measuring.outlook
     if answer is None or outlook is None:
         return None
-    said = {judgement.sentence for judgement in answer.judgements[-1:]}
+    last, judged = len(answer.judgements) - 1, list(measuring.judgements.values())
+    said = {judgement.sentence for judgement in judged[-1:]}
     told = _large(paragraph(outlook.sentence, "good" if outlook.is_enough else "plain"))
-    found = [finding.sentence for finding in answer.findings if finding.sentence not in said]
+    found = [
+        finding.sentence
+        for finding in answer.findings
+        if finding.sentence not in said and (finding.kind, finding.row) != ("outlier", last)
+    ]
     return told + "".join(paragraph(sentence, "warning") for sentence in found)
 
 
@@ -60,14 +67,33 @@ def _without_next(measuring: Measuring) -> str:
     if series.plan is None and series.purpose.is_check:
         return paragraph(f"no {series.purpose.plan} yet: plan poses to verify on in step 2.", "warning")
     if measuring.is_complete:
-        step = "5, Verify" if series.purpose.is_check else "4, Calibrate"
-        more = "" if series.purpose.is_check else ", or choose the order 'the best anywhere' for more poses"
-        return paragraph(
-            f"all {len(series.plan or ())} planned poses are measured: go on with step {step}{more}.", "good"
-        )
+        return _complete(measuring)
     if measuring.problem is not None:
         return paragraph(str(measuring.problem), "bad")
     return paragraph("choosing the next pose …")
+
+
+def _complete(measuring: Measuring) -> str:
+    """HTML where no planned pose is left to measure: how many have a row that can be used."""
+    series = measuring.series
+    count = 0 if series.plan is None else len({*series.plan.numbers.tolist()})
+    reached, skipped = measuring.reached, len(measuring.skipped)
+    step = "5, Verify" if series.purpose.is_check else "4, Calibrate"
+    more = "" if series.purpose.is_check else ", or choose the order 'the best anywhere' for more poses"
+    if reached == count:
+        return paragraph(f"all {count} planned poses are measured: go on with step {step}{more}.", "good")
+    if not reached:
+        return paragraph(
+            f"{len(series.rows)} rows, none of them a good one at a planned pose: see what is said of them before step {step}.",
+            "bad",
+        )
+    left = f"{count - reached} are excluded, judged wrong or skipped"
+    wrong = reached + skipped < count
+    again = "; pick one of them in the list to measure it again" if wrong else ""
+    return paragraph(
+        f"{reached} of {count} planned poses are measured, {left}{again}: go on with step {step}{more}.",
+        "warning" if wrong else "good",
+    )
 
 
 def _large(html: str) -> str:

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 _SAME = 0.01
 """Largest difference, rad or m, of a pose as measured from the planned one where the rows have no numbers of poses."""
+_NEAR = 0.02
+"""Largest difference, rad or m, of a pose as measured from the planned one of its number."""
 
 
 @dataclass(frozen=True)
@@ -82,11 +84,21 @@ class Series:
         return np.array([not row.excluded for row in self.rows], dtype=bool)
 
     @property
+    def at_plan(self) -> np.ndarray:
+        """Rows (N,) whose joint positions are those of the planned pose of their number."""
+        plan, poses = self.plan, self.poses
+        if plan is None or poses is None:
+            return np.zeros(len(self.rows), dtype=bool)
+        apart = np.abs(plan.q[None] - poses.q[:, None]).max(axis=2)
+        same = plan.numbers[None] == self.numbers[:, None]
+        return np.any(same & (apart < _NEAR), axis=1)
+
+    @property
     def open_poses(self) -> np.ndarray:
-        """Indices of the planned poses that have no row yet, not even one that is excluded."""
+        """Indices of the planned poses that have no row there yet, not even one that is excluded."""
         if self.plan is None:
             return np.zeros(0, dtype=int)
-        return np.flatnonzero(~np.isin(self.plan.numbers, self.numbers))
+        return np.flatnonzero(~np.isin(self.plan.numbers, self.numbers[self.at_plan]))
 
     @property
     def free_number(self) -> int:
