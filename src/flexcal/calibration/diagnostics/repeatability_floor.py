@@ -47,8 +47,9 @@ class RepeatabilityFloor:
             "the arm does not repeat better" if self.apart else "arm and instrument together repeat no better"
         )
         return (
-            f"{self.distance / MILLIMETRE:.1f} mm (rms) of scatter from pose to pose remain beside the geometry, as of "
-            f"{self.joint_degrees:.1f}° of play in every joint (1σ): {whose}, and no calibration goes much below that"
+            f"{self.distance / MILLIMETRE:.1f} mm (rms) of scatter from pose to pose remain beside the geometry, as if every "
+            f"joint had {self.joint_degrees:.1f}° of play (1σ), or something moved between the poses: if nothing did, {whose}, "
+            "and no calibration goes much below that"
         )
 
     def document(self) -> dict[str, Any]:

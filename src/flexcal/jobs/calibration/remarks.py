@@ -367,10 +367,11 @@ def floor_remark(fit: GeometricFit, before: np.ndarray | None) -> tuple[str, ...
         return own
     if fit.errors.mean < _GAIN * float(np.linalg.norm(before, axis=1).mean()):
         return own
-    play = "" if floor is None else f", as of {floor.joint_degrees:.1f}° of play in every joint,"
+    play = "" if floor is None else f", as if every joint had {floor.joint_degrees:.1f}° of play,"
     return (
-        f"the scatter from pose to pose, {robot:.2f} mm per coordinate (1σ){play or ','} is the floor: model errors of {model:.2f} mm and "
-        f"parameters known to {parameters:.2f} mm at these poses add little to it, so neither further terms nor more poses will make this "
+        f"the scatter from pose to pose, {robot:.2f} mm per coordinate (1σ){play or ','} is the floor, if nothing moved between the "
+        f"poses: model errors of {model:.2f} mm and parameters known to {parameters:.2f} mm at these "
+        "poses add little to it, so neither further terms nor more poses will make this "
         "robot much more accurate. Visits to the same poses tell how much of it is the robot's repeatability (flexcal repeatability)",
     )
 
