@@ -17,7 +17,7 @@ from flexcal.studio.steps.results import FolderResult
 from flexcal.studio.window import Place, Step, Tone, Window, paragraph
 
 _NONE = "none"
-_TONES: dict[State, Tone] = {"done": "good", "ready": "plain", "blocked": "faint"}
+_TONES: dict[State, Tone] = {"done": "good", "outdated": "warning", "ready": "plain", "blocked": "faint"}
 
 
 class CalibrateStep(Step):
@@ -75,7 +75,7 @@ class CalibrateStep(Step):
                 if stage.folder in (INERTIALS, STIFFNESS) and stage.state == "done":
                     self._add_use(stage)
                 if stage.state != "blocked":
-                    again = " again" if stage.state == "done" else ""
+                    again = " again" if stage.state in ("done", "outdated") else ""
                     self.window.button(
                         f"{'Calibrate' if stage.folder == CALIBRATION else 'Identify'}{again}: {stage.title.lower()}",
                         lambda stage=stage: self._run(stage),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
 from typing import Literal
 
 from flexcal.errors import FlexcalError, InputError
@@ -11,7 +13,7 @@ from flexcal.studio.project import CALIBRATION, MEASURED, Project
 
 INERTIALS, RESPONSES, STIFFNESS = "inertials", "responses", "stiffness"
 """Folders of results."""
-State = Literal["done", "ready", "blocked"]
+State = Literal["done", "outdated", "ready", "blocked"]
 
 
 @dataclass(frozen=True)
@@ -22,8 +24,8 @@ class Stage:
     ----------
     title : str
         Its name on the button.
-    state : {"done", "ready", "blocked"}
-        Whether it has a result, can be run, or has no data.
+    state : {"done", "outdated", "ready", "blocked"}
+        Whether it has a result, one of other data than the chosen ones, none but can be run, or has no data.
     sentence : str
         What it tells, or why it is blocked and what to do.
     arguments : tuple of str
@@ -51,7 +53,8 @@ def stages(project: Project, measured: str) -> list[Stage]:
             excitation,
             ("identify", "inertials", "robot.yaml", excitation or "", "--out", INERTIALS),
             INERTIALS,
-            "no recordings of an exciting trajectory in the folder. Masses stay as the URDF has them, which suffices for most robots",
+            "no recordings of an exciting trajectory in the folder. How the arm sags under gravity is then predicted from the "
+            "masses of the URDF, usually from CAD",
         ),
         _stage(
             project,
@@ -59,8 +62,8 @@ def stages(project: Project, measured: str) -> list[Stage]:
             frequency,
             ("identify", "response", "robot.yaml", frequency or "", "--out", RESPONSES),
             RESPONSES,
-            "no recordings of a frequency experiment in the folder. The robot is then calibrated as rigid, with compliance under "
-            "gravity where the poses show it",
+            "no recordings of a frequency experiment in the folder. A compliance of the joints under gravity is then estimated from the "
+            "measured poses, where they show it; under other loads and in motion it is not known so well",
         ),
         _stage(
             project,
@@ -70,7 +73,7 @@ def stages(project: Project, measured: str) -> list[Stage]:
             STIFFNESS,
             "no frequency responses yet"
             if frequency
-            else "no frequency experiment, hence no frequency responses",
+            else "no frequency experiment, hence no frequency responses. Stiffness is then known only as far as the measured poses show it",
         ),
         _stage(
             project,
@@ -106,11 +109,47 @@ def _stage(
 ) -> Stage:
     done = (project.folder / folder / RESULTS).is_file()
     if not project.robot_file.is_file():
-        return Stage(title, "blocked", "blocked: no robot.yaml yet (step 1).", arguments, folder)
+        return Stage(title, "blocked", "not yet: there is no robot.yaml (step 1, Robot).", arguments, folder)
+    lacking = "no data" if folder == CALIBRATION else "optional, no data"
     if data is None:
-        sentence = f"done, from data that are no longer here: {folder}" if done else f"blocked: {reason}."
+        sentence = f"done, from data that are no longer here: {folder}" if done else f"{lacking}: {reason}."
         return Stage(title, "done" if done else "blocked", sentence, arguments, folder)
-    return Stage(title, "done" if done else "ready", f"from {data}", arguments, folder)
+    if not done:
+        return Stage(title, "ready", f"from {data}", arguments, folder)
+    other = _difference(project, data) if folder == CALIBRATION else ""
+    return Stage(title, "outdated" if other else "done", other or f"from {data}", arguments, folder)
+
+
+def _difference(project: Project, measured: str) -> str:
+    """How the measured poses of the result differ from a file of them; empty where it is fitted to that file as it is now."""
+    from flexcal.files.formats import sha256_of
+
+    file, estimates = project.folder / measured, project.folder / CALIBRATION / "estimates.yaml"
+    try:
+        written = estimates.stat()
+        inputs = _inputs(estimates, written.st_mtime_ns, written.st_size)
+        digest = sha256_of(file)
+    except (OSError, FlexcalError):
+        return "has a result, but of which poses cannot be read"
+    if digest in inputs.values():
+        return ""
+    if file.name in [Path(name).name for name in inputs]:
+        return f"calibrated from {measured} as it was; it has changed since"
+    return f"calibrated from {', '.join(inputs) or 'other poses'}; {measured} is not in it"
+
+
+@lru_cache(maxsize=4)
+def _inputs(estimates: Path, changed: int, size: int) -> dict[str, str]:
+    """SHA-256 of the tables of poses, by name, that a calibration is fitted to; `changed` and `size` tell versions of the file apart."""
+    from flexcal.files.formats import read_estimates
+
+    block = read_estimates(estimates).get("calibration")
+    origin = {} if block is None else block.provenance
+    return {
+        key.removeprefix("input."): digest
+        for key, digest in origin.items()
+        if key.startswith("input.") and Path(key).suffix in (".csv", ".parquet")
+    }
 
 
 def _plans(project: Project) -> dict[str, str]:
