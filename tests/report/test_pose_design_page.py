@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import re
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -43,6 +47,23 @@ def test_what_it_warns_of(positive: int, blocked: list, reached: float, statuses
     checks = pose_checks(_results(positive, blocked, reached))
     assert [check.status for check in checks] == statuses
     assert ("from 3 to 4" in checks[-1].answer) == bool(blocked)
+
+
+def test_without_collision_shapes_nothing_is_said_to_be_free_of_collisions(
+    tx90l: RobotModel, tmp_path: Path, rng: np.random.Generator
+) -> None:
+    shutil.copytree(tx90l.path.parent, tmp_path / "bare")
+    urdf = tmp_path / "bare" / tx90l.urdf.name
+    urdf.write_text(re.sub(r"<collision.*?</collision>", "", urdf.read_text(), flags=re.DOTALL))
+    bare = RobotModel.from_yaml(tmp_path / "bare" / tx90l.path.name, estimates=False)
+    q = rng.uniform(-1, 1, (20, 6))
+    moves = pose_page(PoseStudy(bare, q, _results(9, [], 1.0))).verdict.checks[-1]
+    assert moves.status == "unknown" and moves.answer.startswith("Not checked")
+    low = pose_page(PoseStudy(bare, q, _results(9, [[3, 4]], 1.0))).verdict.checks[-1]
+    assert low.status == "care" and "below the base plane" in low.answer and "not checked" in low.answer
+    drawn = {"plan": "r.yaml", "seed": 1, "poses": 20, **ORIGIN}
+    assert "collisions are not checked" in pose_page(PoseStudy(bare, q, drawn)).verdict.sentence
+    assert "free of collisions" in pose_page(PoseStudy(tx90l, q, drawn)).verdict.sentence
 
 
 def test_first_screen_and_figures(tx90l: RobotModel, rng: np.random.Generator) -> None:

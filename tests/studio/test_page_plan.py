@@ -135,3 +135,24 @@ def test_page_shows_collisions_and_runs_the_verb(page: Any, tmp_path: Path) -> N
         page.get_by_role("button", name="Draw random poses").click()
         page.get_by_text("20 random poses, for a verification").wait_for(timeout=60_000)
     assert (folder / "others.yaml").is_file()
+
+
+def test_empty_number_is_told_and_a_plan_has_no_tally(page: Any, tmp_path: Path) -> None:
+    """An emptied field plans its last number, which is said; of the plan no count of good checks is shown, nor that collisions are none."""
+    pytest.importorskip("viser", reason="viser is absent: pip install 'flexcal[studio]'")
+    _without_shapes(tmp_path)
+    folder = tmp_path / "bare"
+    with studio(folder) as running:
+        page.goto(running.url)
+        page.get_by_text("2 Plan").click(timeout=20_000)
+        number = page.get_by_label("Number of poses").last
+        number.fill("12", timeout=20_000)
+        page.get_by_text("Plans 12 poses, also where the field is left empty.").wait_for(timeout=10_000)
+        number.fill("")
+        page.get_by_role("button", name="Plan poses").click()
+        page.get_by_text("12 poses to measure").wait_for(timeout=90_000)
+        shown = page.locator("body").inner_text()
+        assert "checks are good" not in shown and "There are" not in shown
+        assert "Collisions are not checked: the URDF has no collision shapes." in shown
+        page.get_by_text("pose 1", exact=True).wait_for()
+        assert "not checked" in page.locator("body").inner_text()

@@ -116,3 +116,11 @@ def test_what_a_link_leads_to_is_not_written(tmp_path: Path) -> None:
     (folder / ".studio.lock").hardlink_to(precious)
     with sole_studio(folder):
         assert precious.read_text() == "precious"
+
+
+def test_sentences_name_files_relative_to_the_folder(tmp_path: Path) -> None:
+    folder = tmp_path / "arm"
+    folder.mkdir()
+    project = Project.open(folder)
+    told = project.told(f"{folder}/robot.yaml line 19: see {folder}/sub/a.urdf, not {folder}2/b.urdf.")
+    assert told == f"robot.yaml line 19: see sub/a.urdf, not {folder}2/b.urdf."

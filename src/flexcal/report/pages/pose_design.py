@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.design.scene import station_position
+from flexcal.design.scene import has_collision_shapes, station_position
 from flexcal.model.kinematics import joint_origins
 from flexcal.model.robot import RobotModel
 from flexcal.report.figures import joint_positions, links_at, plan_space, pose_numbers
@@ -43,15 +43,13 @@ class PoseStudy:
 def pose_page(study: PoseStudy) -> Page:
     """The page before it becomes HTML."""
     results = study.results
-    checks = pose_checks(results)
+    checks = pose_checks(results, has_shapes=has_collision_shapes(study.model))
     status = worst(checks)
     chosen = "tool_error_mm" in results
     verdict = Verdict(
         status,
         f"{len(study.q)} poses to measure" if chosen else f"{len(study.q)} random poses, for a verification",
-        _sentence(results)
-        if chosen
-        else "They cover the joint ranges, are free of collisions and visible to the instrument.",
+        _sentence(results) if chosen else _random_sentence(study.model),
         _facts(results) if chosen else (),
         (),
         "",
@@ -72,8 +70,8 @@ def pose_page(study: PoseStudy) -> Page:
     )
 
 
-def pose_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
-    """Checks of a plan before measuring."""
+def pose_checks(results: Mapping[str, Any], *, has_shapes: bool = True) -> tuple[Check, ...]:
+    """Checks of a plan before measuring; without collision shapes (`has_shapes`), collisions of moves cannot be judged."""
     checks = []
     for joint, sides in results.get("flanks", {}).items():
         least, total = min(sides.values()), sum(sides.values())
@@ -95,15 +93,24 @@ def pose_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
         ways = ", ".join(f"{a} to {b}" for a, b in blocked)
         answer = (
             f"There are collisions on the straight joint motion from {ways}: go round there."
+            if blocked and has_shapes
+            else f"The target goes below the base plane on the straight joint motion from {ways}; collisions are not checked."
             if blocked
             else "There are no collisions on them."
+            if has_shapes
+            else "Not checked: the URDF has no collision shapes."
         )
-        checks.append(
-            Check(
-                "Are the moves between the poses free of collisions?", answer, "care" if blocked else "good"
-            )
-        )
+        status = "care" if blocked else "good" if has_shapes else "unknown"
+        checks.append(Check("Are the moves between the poses free of collisions?", answer, status))
     return tuple(checks)
+
+
+def _random_sentence(model: RobotModel) -> str:
+    """What random poses are; only what was checked."""
+    if not has_collision_shapes(model):
+        return "They cover the joint ranges; collisions are not checked, as the URDF has no collision shapes. Move there slowly and look."
+    sight = "" if station_position(model) is None else " and visible to the instrument"
+    return f"They cover the joint ranges and are free of collisions{sight}."
 
 
 def _sentence(results: Mapping[str, Any]) -> str:

@@ -72,6 +72,10 @@ class Project:
         """File that describes the robot and its cell, whether it is there or not."""
         return self.folder / ROBOT
 
+    def told(self, sentence: str) -> str:
+        """A sentence with the names of the project's files relative to its folder."""
+        return sentence.replace(f"{self.folder}{os.sep}", "")
+
     def path(self, name: str) -> Path:
         """Path of a file or folder by its name relative to the project; it need not exist.
 

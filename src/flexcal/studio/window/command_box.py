@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     import viser
 
     from flexcal.studio.commands import CommandRun, CommandRunner
+    from flexcal.studio.project import Project
 
 _MESSAGES = 12
 """Messages that are shown, the latest."""
@@ -24,10 +25,12 @@ class CommandBox:
         Where it is added.
     runner : CommandRunner
         The commands.
+    project : Project
+        The folder that they run in.
     """
 
-    def __init__(self, gui: viser.GuiApi, runner: CommandRunner):
-        self._runner = runner
+    def __init__(self, gui: viser.GuiApi, runner: CommandRunner, project: Project):
+        self._runner, self._project = runner, project
         self._shown: tuple[object, ...] = ()
         self._folder = gui.add_folder("Command", visible=False)
         with self._folder:
@@ -52,22 +55,22 @@ class CommandBox:
             return
         self._shown = state
         running = run.status == "running"
-        self._text.content = command_text(f"$ {run.line}") + _ending(run)
+        self._text.content = command_text(f"$ {run.line}") + _ending(run, self._project)
         self._bar.value = 100.0 * (run.stage[1] if run.stage else 0.0)
         for element, visible in ((self._bar, running), (self._cancel, running), (self._folder, True)):
             if element.visible != visible:
                 element.visible = visible
 
 
-def _ending(run: CommandRun) -> str:
+def _ending(run: CommandRun, project: Project) -> str:
     if run.status == "running":
         return paragraph(f"{run.stage[0]} …" if run.stage else "starting …")
     if run.status == "failed":
-        return paragraph(run.error, "bad")
+        return paragraph(project.told(run.error), "bad")
     if run.status == "cancelled":
         return paragraph("cancelled; nothing was written.", "warning")
     told = [m for m in run.messages if not m.startswith("next: ")][-_MESSAGES:]
-    messages = "".join(paragraph(message, "faint") for message in told)
+    messages = "".join(paragraph(project.told(message), "faint") for message in told)
     return paragraph(f"done in {run.seconds:.1f} s", "good") + (
         folded("what it said", messages) if told else ""
     )

@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from flexcal.report.layout import Page, Section, Table
 
 
-def add_verdict(gui: viser.GuiApi, page: Page) -> None:
-    """Add the verdict of a page at the current place."""
-    gui.add_html(verdict_text(page.verdict))
+def add_verdict(gui: viser.GuiApi, page: Page, *, tally: bool = True) -> None:
+    """Add the verdict of a page at the current place, with `tally` how many checks are good."""
+    gui.add_html(verdict_text(page.verdict, tally=tally))
 
 
 def add_sections(gui: viser.GuiApi, page: Page) -> None:

@@ -13,15 +13,15 @@ if TYPE_CHECKING:
 _TONES: dict[str, Tone] = {"good": "good", "care": "warning", "bad": "bad", "unknown": "faint"}
 
 
-def verdict_text(verdict: Verdict) -> str:
-    """HTML of a verdict: its facts, its sentence, and those checks that are not good."""
+def verdict_text(verdict: Verdict, *, tally: bool = True) -> str:
+    """HTML of a verdict: its facts, its sentence, with `tally` how many checks are good, and those that are not."""
     facts = "".join(_fact(fact) for fact in verdict.facts)
     reserved = [check for check in verdict.checks if check.status != "good"]
     return (
         f'<div style="display:flex;gap:1em;margin:0.4em 0.5em;">{facts}</div>'
         + paragraph(verdict.headline, _TONES[verdict.status])
         + paragraph(verdict.sentence)
-        + (paragraph(f"{verdict.tally}.", "faint") if verdict.checks else "")
+        + (paragraph(f"{verdict.tally}.", "faint") if verdict.checks and tally else "")
         + "".join(_check(check) for check in reserved)
     )
 

@@ -86,7 +86,7 @@ class Window:
         self._heading = server.gui.add_html("")
         self._message = server.gui.add_html("", visible=False)
         self._place = server.gui.add_folder(None)
-        self._commands = CommandBox(server.gui, self.runner)
+        self._commands = CommandBox(server.gui, self.runner, project)
         self.figures = FiguresPanel(server)
         self._add_hotkeys(titles)
         self.selection.listen(self._selected)
@@ -133,8 +133,8 @@ class Window:
             self._open_step(title)
 
     def say(self, text: str, tone: Tone = "plain") -> None:
-        """Show a sentence above the step; an empty one removes it."""
-        self._message.content = paragraph(text, tone) if text else ""
+        """Show a sentence above the step, names of files relative to the folder; an empty one removes it."""
+        self._message.content = paragraph(self.project.told(text), tone) if text else ""
         self._message.visible = bool(text)
 
     def go_to(self, title: str) -> None:
@@ -204,7 +204,7 @@ class Window:
             self.robot.show(self.model(estimates=False))
         except FlexcalError as problem:
             self.robot.clear()
-            self.robot.problem = str(problem)
+            self.robot.problem = self.project.told(str(problem))
 
     def _tick(self) -> None:
         if self._open is not None:

@@ -64,6 +64,11 @@ class PlanForm(ABC):
         """Options of the command line that the fields stand for; those at their defaults are left out."""
 
     @property
+    def note(self) -> str:
+        """What the fields mean, in a sentence; empty where they speak for themselves."""
+        return ""
+
+    @property
     def out(self) -> str:
         """Name of the plan's file.
 
@@ -99,10 +104,12 @@ class PlanForm(ABC):
         try:
             line = shlex.join(["flexcal", *self.arguments])
         except InputError as problem:
-            self._line.content = paragraph(str(problem), "bad")
+            self._line.content = paragraph(self.window.project.told(str(problem)), "bad")
             return
+        note = paragraph(self.note, "faint") if self.note else ""
         replaced = self.window.project.path(self.out).exists()
-        note = paragraph(f"{self.out} is there, and is replaced by a new plan.", "faint") if replaced else ""
+        if replaced:
+            note += paragraph(f"{self.out} is there, and is replaced by a new plan.", "faint")
         self._line.content = command_text(f"$ {line}") + note
 
 

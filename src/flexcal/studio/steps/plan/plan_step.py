@@ -123,7 +123,7 @@ class PlanStep(Step):
         try:
             return self.window.model(estimates=False)
         except FlexcalError as problem:
-            gui.add_html(paragraph(f"{problem} Step 1, Robot, shows it at its line.", "bad"))
+            gui.add_html(paragraph(project.told(f"{problem} Step 1, Robot, shows it at its line."), "bad"))
             return None
 
     def _run(self) -> None:
@@ -169,7 +169,7 @@ class PlanStep(Step):
                     self._view.add()
             except FlexcalError as problem:
                 self._view = None
-                window.gui.add_html(paragraph(str(problem), "bad"))
+                window.gui.add_html(paragraph(window.project.told(str(problem)), "bad"))
         if self._view is not None:
             window.figures.show(self._view.figures())
 

@@ -92,6 +92,11 @@ class PoseForm(PlanForm):
                 "seed", "Seed", 0, least=0, step=1, hint="Another seed draws other candidates."
             )
 
+    @property
+    def note(self) -> str:
+        """How many poses are planned: a field that is empty keeps its last number."""
+        return f"Plans {int(self._count.value)} poses, also where the field is left empty."
+
     def options(self) -> tuple[str, ...]:
         """As `PlanForm.options`."""
         working = self._working.value

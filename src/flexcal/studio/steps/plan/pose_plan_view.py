@@ -44,7 +44,7 @@ class PosePlanView(PlanView):
         """Add the verdict of the plan's page, what the checks say, and the selected pose."""
         gui = self.window.gui
         if self._page is not None:
-            add_verdict(gui, self._page)
+            add_verdict(gui, self._page, tally=False)
         else:
             gui.add_html(
                 paragraph(

@@ -33,6 +33,11 @@ class VerificationForm(PlanForm):
             "seed", "Seed", _SEED, least=0, step=1, hint="Another seed draws other poses."
         )
 
+    @property
+    def note(self) -> str:
+        """How many poses are planned: a field that is empty keeps its last number."""
+        return f"Plans {int(self._count.value)} poses, also where the field is left empty."
+
     def options(self) -> tuple[str, ...]:
         """As `PlanForm.options`."""
         return (

@@ -51,7 +51,7 @@ class FolderResult:
             try:
                 page = folder_page(folder)
             except FlexcalError as problem:
-                window.gui.add_html(paragraph(str(problem), "bad"))
+                window.gui.add_html(paragraph(window.project.told(str(problem)), "bad"))
                 return
             if add_note is not None:
                 add_note()

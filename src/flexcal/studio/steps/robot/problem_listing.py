@@ -30,7 +30,7 @@ def _problem(problem: FileProblem, lines: Sequence[str], folder: Path) -> str:
     path = problem.path.absolute()
     name = path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.name
     place = f"{name}, line {problem.line}, column {problem.column}"
-    told = paragraph(f"{place}: {problem.sentence} [{problem.code}]", "bad")
+    told = paragraph(f"{place}: {problem.sentence.replace(f'{folder}/', '')} [{problem.code}]", "bad")
     first, last = max(1, problem.line - _AROUND), min(len(lines), problem.line + _AROUND)
     shown = [_line(number, lines[number - 1], problem) for number in range(first, last + 1)]
     return told + (

@@ -96,7 +96,7 @@ class RobotStep(Step):
         try:
             model = urdf_robot(window.project.folder / choice.urdf, choice.tip)
         except FlexcalError as problem:
-            said.content = paragraph(f"{problem} [{problem.code}]", "bad")
+            said.content = paragraph(window.project.told(f"{problem} [{problem.code}]"), "bad")
             return
         said.content = paragraph(
             "Look at the robot and move its joints. If it is the right one, create robot.yaml: the file that says what is measured, "

@@ -75,7 +75,7 @@ class CompensatedTargets(Part):
                     window.project.robot_file, window.project.folder / CALIBRATION
                 )
             except FlexcalError as problem:
-                gui.add_html(paragraph(str(problem), "bad"))
+                gui.add_html(paragraph(self.window.project.told(str(problem)), "bad"))
                 return
             model = self._robot.model
             stations = [name for name in model.stations.names if is_station_identified(model, name)]
@@ -145,7 +145,7 @@ class CompensatedTargets(Part):
             try:
                 found = CorrectedCommand.of(self._robot, target, start)
             except FlexcalError as problem:
-                window.gui.add_html(paragraph(f"{problem} [{problem.code}]", "bad"))
+                window.gui.add_html(paragraph(window.project.told(f"{problem} [{problem.code}]"), "bad"))
                 return
             self._tell(found)
         window.robot.pose(found.q)

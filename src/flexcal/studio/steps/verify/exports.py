@@ -46,7 +46,7 @@ class Exports(Part):
             try:
                 self._formats = export_formats(self.window.project)
             except FlexcalError as problem:
-                self.window.gui.add_html(paragraph(str(problem), "bad"))
+                self.window.gui.add_html(paragraph(self.window.project.told(str(problem)), "bad"))
                 return
             self._add_formats()
             with self.window.gui.add_folder("Report for the customer"):

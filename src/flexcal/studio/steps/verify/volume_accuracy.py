@@ -100,7 +100,7 @@ class VolumeAccuracy(Part):
                 robot = CalibratedRobot.from_yaml(window.project.robot_file, estimates)
                 remark = outside_ranges(robot, table.predicted.q)
             except FlexcalError as problem:
-                window.gui.add_html(paragraph(str(problem), "bad"))
+                window.gui.add_html(paragraph(window.project.told(str(problem)), "bad"))
                 return
             if estimates.stat().st_mtime_ns > path.stat().st_mtime_ns:
                 window.gui.add_html(
