@@ -35,6 +35,8 @@ def test_from_a_calibration_to_the_exported_robot(page: Any, tmp_path: Path) -> 
     pytest.importorskip("viser", reason="viser is absent: pip install 'flexcal[studio]'")
     folder = calibrated_ur5.make(tmp_path / "ur5")
     robot = CalibratedRobot.from_yaml(folder / "robot.yaml", folder / "calibration")
+    lines = (folder / "random.csv").read_text().splitlines(keepends=True)
+    (folder / "half.csv").write_text("".join(lines[: len(lines) // 2]))
     with studio(folder) as running:
         page.goto(running.url)
         page.get_by_role("link", name="5 Verify").click(timeout=WAIT)
@@ -54,8 +56,6 @@ def test_from_a_calibration_to_the_exported_robot(page: Any, tmp_path: Path) -> 
 
         page.get_by_text("verification of random.csv, ").first.wait_for(timeout=WAIT)
 
-        lines = (folder / "random.csv").read_text().splitlines(keepends=True)
-        (folder / "half.csv").write_text("".join(lines[: len(lines) // 2]))
         page.get_by_label("Fresh poses", exact=True).first.click(timeout=WAIT)
         page.get_by_role("option", name="half.csv").click(timeout=WAIT)
         page.get_by_text("result below is of random.csv; half.csv has not been verified").wait_for(
@@ -66,7 +66,7 @@ def test_from_a_calibration_to_the_exported_robot(page: Any, tmp_path: Path) -> 
         assert "random.csv" in ResultSource.read(folder / "verification").tables
         page.get_by_role("button", name="Replace the verification of random.csv").click()
         page.get_by_text("verification of half.csv, ").first.wait_for(timeout=WAIT)
-        (folder / "half.csv").unlink()
+        page.get_by_role("button", name="● Verify", exact=True).wait_for(timeout=WAIT)
 
         page.get_by_role("button", name="Map", exact=True).click()
         page.get_by_label("Where", exact=True).first.click(timeout=WAIT)

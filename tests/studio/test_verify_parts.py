@@ -13,6 +13,7 @@ import pytest
 from flexcal.calibration.accuracy import PredictedAccuracy, distance_to_nominal
 from flexcal.errors import FlexcalError, InputError
 from flexcal.jobs.accuracy import MapTable
+from flexcal.jobs.deployment import export_robot
 from flexcal.jobs.inputs import CalibratedRobot
 from flexcal.jobs.result_files import read_arm
 from flexcal.model.kinematics import point_kinematics
@@ -20,11 +21,12 @@ from flexcal.studio.project import Project
 from flexcal.studio.scene import ColourScale
 from flexcal.studio.steps.results import ResultSource
 from flexcal.studio.steps.verify.corrected_command import CorrectedCommand, TypedTarget
-from flexcal.studio.steps.verify.export_formats import export_formats
+from flexcal.studio.steps.verify.export_formats import complete_formats, export_formats
 from flexcal.studio.steps.verify.fresh_files import fresh_files
 from flexcal.studio.steps.verify.legend import legend
 from flexcal.studio.steps.verify.target_files import target_files
 from flexcal.studio.steps.verify.working_places import working_places
+from flexcal.studio.window import Selection
 
 
 @pytest.fixture(scope="module")
@@ -158,3 +160,32 @@ def test_the_legend_tells_its_ends(robot: CalibratedRobot) -> None:
     text = legend(ColourScale(2.0), "error <of> tool", "mm")
     assert "<span>0</span><span>0.5</span><span>1</span><span>1.5</span><span>≥ 2</span>" in text
     assert "&lt;of&gt;" in text and "<of>" not in text
+
+
+def test_a_scale_that_is_fitted_shows_small_differences() -> None:
+    """The ends of the values have the first and the last colour, in place of all the last one."""
+    values = np.linspace(0.11, 0.13, 201)
+    fitted = ColourScale.fitted(values)
+    assert fitted.share(np.array([0.0, 0.11, 0.12, 0.13])) == pytest.approx([0, 0, 0.5, 1], abs=0.01)
+    assert "<span>≤ 0.11</span>" in legend(fitted, "error", "mm")
+    assert np.isfinite(ColourScale.fitted(np.full(3, 0.2)).colours(values)).all()
+
+
+def test_formats_that_carry_the_calibrated_robot_lose_nothing(folder: Path, tmp_path: Path) -> None:
+    """Each that is recommended, by the error of its file."""
+    robot = CalibratedRobot.from_yaml(folder / "robot.yaml", folder / "calibration")
+    names = complete_formats(Project.open(folder))
+    assert {"json", "runtime"} <= set(names)
+    for name in names:
+        error = export_robot(robot, tmp_path / name, name).document()["tool_error"]
+        assert error["max_mm"] < 1e-6
+
+
+def test_a_pose_of_another_table_is_deselected() -> None:
+    selection = Selection()
+    selection.of("poses")
+    selection.pick("12")
+    selection.of("poses")
+    assert selection.key == "12"
+    selection.of("others")
+    assert selection.key is None

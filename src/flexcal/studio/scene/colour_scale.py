@@ -28,12 +28,13 @@ _TO_LAB = np.array(
 
 @dataclass(frozen=True)
 class ColourScale:
-    """Colours of values from 0 to `largest`, in any unit; larger ones have the last colour.
+    """Colours of values from `smallest` to `largest`, in any unit; those beyond have the first and the last colour.
 
     Colours are interpolated in Oklab (Ottosson 2020), in which equal distances look equal.
     """
 
     largest: float
+    smallest: float = 0.0
 
     @classmethod
     def shared(cls, *values: np.ndarray) -> ColourScale:
@@ -42,10 +43,20 @@ class ColourScale:
         finite = joined[np.isfinite(joined)]
         return cls(float(np.quantile(finite, 0.995)) if len(finite) else 1.0)
 
+    @classmethod
+    def fitted(cls, values: np.ndarray) -> ColourScale:
+        """The scale that 99 % of the finite values are within, in which small differences of one set can be seen."""
+        finite = values[np.isfinite(values)]
+        if not len(finite):
+            return cls(1.0)
+        low, high = np.quantile(finite, [0.005, 0.995])
+        return cls(float(high), float(low)) if high > low else cls(float(high))
+
     def share(self, values: np.ndarray) -> np.ndarray:
         """Place of `values` on the scale, from 0 to 1."""
-        largest = self.largest if self.largest > 0 else 1.0
-        return np.clip(np.nan_to_num(np.asarray(values, dtype=float) / largest, nan=0.0), 0.0, 1.0)
+        span = self.largest - self.smallest
+        place = (np.asarray(values, dtype=float) - self.smallest) / (span if span > 0 else 1.0)
+        return np.clip(np.nan_to_num(place, nan=0.0), 0.0, 1.0)
 
     def colours(self, values: np.ndarray) -> np.ndarray:
         """Red, green and blue (N, 3), 0 to 255, of `values` (N,)."""

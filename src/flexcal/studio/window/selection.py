@@ -12,15 +12,26 @@ class Selection:
     ----------
     key : str or None
         The selected pose; None for none.
+    table : str
+        Name, without ending, of the plan or table that the pose is of; empty where it was not said.
     """
 
     def __init__(self) -> None:
         self.key: str | None = None
+        self.table = ""
         self._listeners: list[Callable[[], None]] = []
 
     def listen(self, listener: Callable[[], None]) -> None:
         """Call `listener` after each change."""
         self._listeners.append(listener)
+
+    def of(self, table: str) -> None:
+        """Say which plan or table, by its name without ending, the shown poses are of; a pose of another one is deselected.
+
+        Those of a plan and of the table measured after it have the same numbers, and the same name.
+        """
+        if table != self.table:
+            self.table, self.key = table, None
 
     def pick(self, key: str | None) -> None:
         """Select a pose; the same one again deselects it."""

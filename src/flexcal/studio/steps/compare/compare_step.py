@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexcal.errors import FlexcalError
+from flexcal.jobs.result_files import RESULTS
 from flexcal.studio.project import CALIBRATION
 from flexcal.studio.scene import ResidualArrows
 from flexcal.studio.steps.compare.kept_calibrations import calibrations, keep_calibration
@@ -19,7 +20,9 @@ from flexcal.studio.window import (
     add_sections,
     add_verdict,
     command_text,
+    heading,
     paragraph,
+    step_link,
 )
 from flexcal.units import MILLIMETRE
 
@@ -32,6 +35,11 @@ _LENGTH = 0.1
 """Length, m, of the larger arrows at first."""
 
 
+_UNCHANGED = (
+    "Next: nothing has to be done; the earlier calibration still holds. A few fresh poses would verify it."
+)
+
+
 class CompareStep(Step):
     """Comparison of two calibrations of one robot, such as last year's and today's, or before and after a crash."""
 
@@ -42,7 +50,7 @@ class CompareStep(Step):
         self._arrows: ResidualArrows | None = None
         self._names: tuple[str, ...] = ()
         self._stamp: object = None
-        self._shown: Comparison | None = None
+        self._kept: tuple[object, Comparison] | None = None
 
     def open(self) -> None:
         """Add the choice of two calibrations and the place of the result."""
@@ -58,13 +66,12 @@ class CompareStep(Step):
         self._names, self._stamp = names, object()
         with self._place.anew():
             self._add_choice(names)
+        self._show_again()
 
     def close(self) -> None:
         """Remove the arrows from the scene."""
         self._stamp = None
-        if self._arrows is not None:
-            self._arrows.remove()
-            self._arrows = None
+        self._remove_arrows()
 
     def _add_choice(self, names: tuple[str, ...]) -> None:
         gui = self.window.gui
@@ -97,8 +104,43 @@ class CompareStep(Step):
         field = self.window.gui.add_dropdown(
             label, names, initial_value=chosen if chosen in names else default
         )
-        field.on_update(lambda _: self.window.post(lambda: choices.put(name, field.value)))
+
+        def chosen_another() -> None:
+            choices.put(name, field.value)
+            self._clear()
+
+        field.on_update(lambda _: self.window.post(chosen_another))
         return field
+
+    def _pair(self) -> tuple[object, ...]:
+        """The two calibrations, and when they were written."""
+        folder, names = self.window.project.folder, (self._first.value, self._second.value)
+        return tuple((name, (folder / name / RESULTS).stat().st_mtime_ns) for name in names)
+
+    def _show_again(self) -> None:
+        """The comparison that was made last, where both calibrations are still there; computed anew where they have changed."""
+        if len(self._names) < 2 or self._chosen() != self.window.choices.get("compared", [""]):
+            return
+        if self._kept is not None and self._kept[0] == self._pair():
+            self._show(self._kept[1])
+        else:
+            self._compare()
+
+    def _chosen(self) -> list[str]:
+        return [self._first.value, self._second.value]
+
+    def _clear(self) -> None:
+        """Remove a comparison that is not of the two that are chosen."""
+        self._remove_arrows()
+        self.window.choices.put("compared", [""])
+        self.window.figures.clear()
+        with self._result.anew():
+            pass
+
+    def _remove_arrows(self) -> None:
+        if self._arrows is not None:
+            self._arrows.remove()
+            self._arrows = None
 
     def _keep(self) -> None:
         self.window.say(f"kept as {keep_calibration(self.window.project)}", "good")
@@ -110,7 +152,7 @@ class CompareStep(Step):
 
         folder = self.window.project.folder
         first, second = folder / self._first.value, folder / self._second.value
-        stamp = self._stamp
+        stamp, pair = self._stamp, self._pair()
 
         def work() -> None:
             try:
@@ -119,7 +161,13 @@ class CompareStep(Step):
                 sentence = f"{problem} [{problem.code}]"
                 self.window.post(lambda: self.window.say(sentence, "bad"))
                 return
-            self.window.post(lambda: self._show(comparison) if stamp is self._stamp else None)
+            self.window.post(lambda: compared(comparison))
+
+        def compared(comparison: Comparison) -> None:
+            self._kept = pair, comparison
+            if stamp is self._stamp and pair == self._pair():
+                self.window.choices.put("compared", self._chosen())
+                self._show(comparison)
 
         self.window.say("comparing …")
         threading.Thread(target=work, daemon=True).start()
@@ -129,18 +177,21 @@ class CompareStep(Step):
 
         window = self.window
         window.say("")
-        if self._arrows is not None:
-            self._arrows.remove()
-            self._arrows = None
+        self._remove_arrows()
         page = comparison_page(comparison)
         with self._result.anew():
+            window.gui.add_html(heading(page.title))
             if comparison.change is None:
                 window.gui.add_html(paragraph(comparison.no_change_why, "faint"))
+                add_verdict(window.gui, page)
             else:
-                tone = "warning" if comparison.change.changed else "good"
-                window.gui.add_html(paragraph(comparison.verdict, tone))
+                changed = comparison.change.changed
+                window.gui.add_html(paragraph(comparison.verdict, "warning" if changed else "good"))
+                window.gui.add_html(paragraph(_next(comparison.second.name) if changed else _UNCHANGED))
+                window.gui.add_html(step_link("Verify", "verify with fresh poses"))
                 self._add_displacement(comparison)
-            add_verdict(window.gui, page)
+                with window.gui.add_folder("Which calibration is more accurate", expand_by_default=False):
+                    add_verdict(window.gui, page)
             add_sections(window.gui, page)
             line = f"$ flexcal report {comparison.first.name} --compare {comparison.second.name}"
             window.gui.add_html(paragraph("the same as a page:", "faint") + command_text(line))
@@ -172,3 +223,10 @@ class CompareStep(Step):
                 self._arrows.exaggeration = factor.value
 
         factor.on_update(lambda _: self.window.post(stretch))
+
+
+def _next(later: str) -> str:
+    return (
+        f"Next: go on with {later}, or measure and calibrate anew; verify with fresh poses, and export the robot "
+        "and correct the commands again: those of the earlier calibration are of the robot as it was."
+    )

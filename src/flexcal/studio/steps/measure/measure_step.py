@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import PurePath
 from typing import Any, cast
 
 from flexcal.errors import FlexcalError, InputError
@@ -135,6 +136,7 @@ class MeasureStep(Step):
 
     def _show(self) -> None:
         window, measuring = self.window, self.measuring
+        window.selection.of(PurePath(measuring.purpose.rows).stem)
         series, chosen = measuring.series, window.selection.key
         following, row = measuring.following(chosen), self._row()
         _set(self._next, next_text(measuring, following))

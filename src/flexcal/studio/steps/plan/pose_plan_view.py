@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -74,6 +75,7 @@ class PosePlanView(PlanView):
 
     def refresh(self) -> None:
         """Show the selected pose in the table and on the robot."""
+        self.window.selection.of(PurePath(self.name).stem)
         key = self.window.selection.key
         row = self._keys.index(key) if key in self._keys else None
         self._scene.select(row)

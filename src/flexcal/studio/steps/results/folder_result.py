@@ -65,7 +65,9 @@ class FolderResult:
             add_verdict(window.gui, page)
             if (folder / "points.csv").is_file():
                 with window.gui.add_folder("Residuals"):
-                    self._residuals = ResidualsView(window, folder)
+                    self._residuals = ResidualsView(
+                        window, folder, source.stem if source is not None else name
+                    )
             add_sections(window.gui, page)
             window.gui.add_html(file_link(f"{name}/report.html", "open the report"))
         figures: dict[str, Callable[[], object]] = {}

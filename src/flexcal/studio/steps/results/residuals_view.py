@@ -9,11 +9,13 @@ import numpy as np
 from flexcal.calibration.verification import CALIBRATED
 from flexcal.data.poses import DEFAULT_SIGMA
 from flexcal.studio.scene import ResidualArrows
-from flexcal.studio.window import Window, error_course, picked_rows
+from flexcal.studio.window import Window, error_course, paragraph, picked_rows
 from flexcal.units import MILLIMETRE
 
 _ROWS = 150
 """Rows of the table, the largest errors."""
+_COLUMNS = ("pose", "error / mm", "x / mm", "y / mm", "z / mm")
+_FRAME = paragraph("x, y, z: measured minus predicted, in the instrument's frame.", "faint")
 _LENGTH = 0.1
 """Length, m, of the larger arrows at first."""
 _MODELS = {
@@ -34,12 +36,14 @@ class ResidualsView:
         Where they are shown; the table at the current place of its GUI.
     folder : Path
         A folder with points.csv and arm.npz.
+    table : str
+        Name of the table that the poses were measured in, without ending.
     """
 
-    def __init__(self, window: Window, folder: Path):
+    def __init__(self, window: Window, folder: Path, table: str):
         from flexcal.jobs.result_files import read_arm, read_points
 
-        self._window = window
+        self._window, self._of = window, table
         self._poses = read_points(folder, sigma=DEFAULT_SIGMA).poses
         points, self._arm = read_points(folder, sigma=DEFAULT_SIGMA), read_arm(folder)
         self._errors = points.errors
@@ -64,6 +68,7 @@ class ResidualsView:
 
     def refresh(self) -> None:
         """Show the selected pose everywhere."""
+        self._window.selection.of(self._of)
         errors, chosen = (
             self._errors[self._labels[self._model.value]] / MILLIMETRE,
             self._window.selection.key,
@@ -84,7 +89,7 @@ class ResidualsView:
             self._keys[i]: (f"pose {self._keys[i]}", f"{sizes[i]:.3f}", *(f"{e:+.3f}" for e in errors[i]))
             for i in largest
         }
-        self._table.content = picked_rows(("pose", "error / mm", "x", "y", "z"), rows, chosen, height="11em")
+        self._table.content = picked_rows(_COLUMNS, rows, chosen, height="11em") + _FRAME
 
     def close(self) -> None:
         """Remove the arrows from the scene."""

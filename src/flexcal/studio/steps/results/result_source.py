@@ -56,6 +56,11 @@ class ResultSource:
         return ", ".join(self.tables) or "other files"
 
     @property
+    def stem(self) -> str:
+        """Names of the tables without ending."""
+        return ", ".join(PurePosixPath(name).stem for name in self.tables)
+
+    @property
     def title(self) -> str:
         """What the result is, such as 'verification of others.csv, 26 Nov 09:12'."""
         of = f" of {self.names}" if self.tables else ""

@@ -19,6 +19,10 @@ from flexcal.units import DEGREE, MILLIMETRE
 
 _BASE = "the robot's base"
 _SAFE, _SHOWN = "far from singular", "as the arm is shown"
+_BASE_TOLD = (
+    "The base is the nominal robot's, best-fit to the measured points; it is not where a drawing of the cell has it. For a fixture in the "
+    "cell choose the instrument's frame, or measure the fixture as a work object ($ flexcal identify frame)."
+)
 _AT = (400.0, 200.0, 300.0)
 
 
@@ -81,6 +85,8 @@ class CompensatedTargets(Part):
             stations = [name for name in model.stations.names if is_station_identified(model, name)]
             self._point = gui.add_dropdown("Point", tuple(model.points))
             self._frame = gui.add_dropdown("Frame", (_BASE, *stations))
+            self._told_frame = gui.add_html(paragraph(_BASE_TOLD, "faint"))
+            self._frame.on_update(lambda _: window.post(self._tell_frame))
             self._position = gui.add_vector3("xyz / mm", self._kept("target position", _AT), step=0.001)
             self._oriented = gui.add_checkbox("Turned", window.choices.get("target oriented", False))
             self._rpy = gui.add_vector3(
@@ -111,6 +117,9 @@ class CompensatedTargets(Part):
             return default
         return float(kept[0]), float(kept[1]), float(kept[2])
 
+    def _tell_frame(self) -> None:
+        self._told_frame.visible = self._frame.value == _BASE
+
     def _orient(self) -> None:
         self._rpy.visible = self._convention.visible = self._oriented.value
         self.window.choices.put("target oriented", self._oriented.value)
@@ -126,6 +135,7 @@ class CompensatedTargets(Part):
         self._position.value = _rounded(target.position / MILLIMETRE)
         self._rpy.value = _rounded(target.rpy / DEGREE)
         self._oriented.value, self._frame.value, self._start.value = True, _BASE, _SHOWN
+        self._tell_frame()
         self._orient()
 
     def _correct(self) -> None:
@@ -147,12 +157,12 @@ class CompensatedTargets(Part):
             except FlexcalError as problem:
                 window.gui.add_html(paragraph(window.project.told(f"{problem} [{problem.code}]"), "bad"))
                 return
-            self._tell(found)
+            self._tell(found, based=not target.station)
         window.robot.pose(found.q)
         window.robot.ghost(found.nominal)
         self._mark = Points(window.scene, found.position[None], TARGET, name="/target", size=0.03)
 
-    def _tell(self, found: CorrectedCommand) -> None:
+    def _tell(self, found: CorrectedCommand, *, based: bool) -> None:
         assert self._robot is not None
         gui, joints = self.window.gui, self._robot.model.motor_joints
         rows = []
@@ -176,7 +186,8 @@ class CompensatedTargets(Part):
             gui.add_html(
                 paragraph(
                     f"With the corrected one its predicted error is {found.mean / MILLIMETRE:.3f} mm on average, "
-                    f"{found.p95 / MILLIMETRE:.3f} mm in 95 of 100 cases, from the uncertainty of the calibration.",
+                    f"{found.p95 / MILLIMETRE:.3f} mm in 95 of 100 cases, from the uncertainty of the calibration"
+                    + (", in the base as it is fitted to the measured points." if based else "."),
                     "good",
                 )
             )

@@ -10,6 +10,8 @@ from flexcal.export import FORMATS
 from flexcal.studio.project import CALIBRATION, Project
 
 XACRO = "xacro"
+_COMPLETE = ("json", "runtime")
+"""Formats of flexcal's own, which carry every model."""
 
 
 @dataclass(frozen=True)
@@ -75,3 +77,13 @@ def export_formats(project: Project) -> list[ExportFormat]:
         *(ExportFormat(each.name, each.summary, each.example, refusal(each.name)) for each in FORMATS),
         xacro,
     ]
+
+
+def complete_formats(project: Project) -> list[str]:
+    """Names of the formats that carry all that was calibrated; raises `FlexcalError` where the calibrated robot cannot be read."""
+    from flexcal.export import render
+    from flexcal.jobs.deployment import identified_robot
+
+    robot = identified_robot(project.robot_file, project.folder / CALIBRATION)
+    mjcf = render("mjcf", robot.probable, robot.nominal)
+    return [*_COMPLETE, *(() if mjcf.unrepresented else ("mjcf",))]

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import shlex
+from typing import Any
 
 from flexcal.errors import FlexcalError
 from flexcal.jobs.result_files import RESULTS
 from flexcal.studio.commands import CommandRun
 from flexcal.studio.project import CALIBRATION, VERIFICATION
-from flexcal.studio.steps.verify.export_formats import ExportFormat, export_formats
+from flexcal.studio.steps.verify.export_formats import ExportFormat, complete_formats, export_formats
 from flexcal.studio.steps.verify.part import Part
 from flexcal.studio.window import Place, Window, command_text, file_link, paragraph
 
+_SMALL = 0.01
+"""Error, mm, that an exported file may have without a warning."""
 _CUSTOMER = "customer.html"
 _PARTICULARS = {
     "--instrument": "Device",
@@ -30,6 +33,7 @@ class Exports(Part):
     def __init__(self, window: Window):
         super().__init__(window)
         self._formats: list[ExportFormat] = []
+        self._told = ""
         self._shown: object = None
 
     def open(self) -> None:
@@ -68,6 +72,7 @@ class Exports(Part):
             lambda: window.command(offered[choice.value].arguments, self._tell_loss),
             main=True,
         )
+        self._outcome = gui.add_html(self._told)
         gui.add_html(self._links())
         for each in self._formats:
             if each.refusal:
@@ -83,13 +88,8 @@ class Exports(Part):
 
     def _tell_loss(self, run: CommandRun) -> None:
         """What the file does not carry, as the command's document says."""
-        error = run.document.get("tool_error")
-        if error:
-            self.window.say(
-                f"With this file the tool is {error['mean_mm']:.3f} mm off on average and {error['max_mm']:.3f} mm at most, because the "
-                f"format cannot carry {', '.join(term['term'] for term in run.document.get('lost', []))}.",
-                "warning" if error["max_mm"] >= 0.01 else "plain",
-            )
+        self._told = _loss(run.document, complete_formats(self.window.project))
+        self._outcome.content = self._told
 
     def _links(self) -> str:
         folder = self.window.project.folder
@@ -131,3 +131,19 @@ class Exports(Part):
 
 def _line(arguments: tuple[str, ...]) -> str:
     return command_text("$ flexcal " + shlex.join(arguments))
+
+
+def _loss(document: dict[str, Any], complete: list[str]) -> str:
+    """What the tool is off with an exported file, and which formats would carry what it cannot."""
+    error = document.get("tool_error")
+    if not error:
+        return ""
+    off = f"With this file the tool is {error['mean_mm']:.3f} mm off on average and {error['max_mm']:.3f} mm at most"
+    if error["max_mm"] < _SMALL:
+        return paragraph(f"{off}: the format carries the calibrated robot.", "good")
+    lost = ", ".join(term["term"] for term in document.get("lost", []))
+    return paragraph(
+        f"{off}, because the format cannot carry: {lost or 'all of the geometry'}. Formats that can: {', '.join(complete)}. Or keep "
+        "this file and correct the commands (Compensate).",
+        "warning",
+    )

@@ -23,7 +23,8 @@ _STEP = 5
 class MapView:
     """An accuracy map as a coloured volume, a legend, the numbers and the worst places.
 
-    Errors before and after calibration have one scale of colours.
+    Colours are fitted to the errors that are shown, or to those before and after calibration together. The volume is cut open, so that the
+    robot in it is seen.
 
     Parameters
     ----------
@@ -46,21 +47,28 @@ class MapView:
         shown = window.choices.get("map error", _MEAN)
         self._error = gui.add_dropdown("Colours", names, initial_value=shown if shown in names else _MEAN)
         self._legend = gui.add_html("")
-        self._axis = gui.add_dropdown("Cut along", (_NO_CUT, "x", "y", "z"), initial_value=_NO_CUT)
+        self._shared = gui.add_checkbox(
+            "Same colours",
+            window.choices.get("map same colours", False),
+            hint="one scale of colours for the errors before and after calibration",
+            visible=_BEFORE in self._errors,
+        )
+        cuts = (_NO_CUT, "x", "y", "z")
+        cut = window.choices.get("map cut", "y")
+        self._axis = gui.add_dropdown("Cut along", cuts, initial_value=cut if cut in cuts else "y")
         self._position = gui.add_slider(
             "Plane / mm", min=-1, max=1, step=_STEP, initial_value=0, visible=False
         )
-        self._flipped = gui.add_checkbox("Other side", False, visible=False)
+        self._flipped = gui.add_checkbox("Other side", True, visible=False)
         self._table = gui.add_html("")
-        self._scale = ColourScale.shared(*self._errors.values())
-        self._volume = AccuracyVolume(
-            window.scene, predicted.position, self._errors[self._error.value], scale=self._scale
-        )
-        self._error.on_update(lambda _: window.post(self._recolour))
+        self._volume = AccuracyVolume(window.scene, predicted.position, self._errors[self._error.value])
+        for choice in (self._error, self._shared):
+            choice.on_update(lambda _: window.post(self._recolour))
         self._axis.on_update(lambda _: window.post(self._turn))
         for handle in (self._position, self._flipped):
             handle.on_update(lambda _: window.post(self._cut))
         self._recolour()
+        self._turn()
 
     def refresh(self) -> None:
         """Show the selected pose of the map on the robot."""
@@ -80,11 +88,17 @@ class MapView:
 
     def _recolour(self) -> None:
         self._window.choices.put("map error", self._error.value)
-        self._volume.show(self._errors[self._error.value])
-        self._legend.content = legend(self._scale, f"error {self._error.value}", "mm")
+        self._window.choices.put("map same colours", self._shared.value)
+        errors = self._errors[self._error.value]
+        scale = (
+            ColourScale.shared(*self._errors.values()) if self._shared.value else ColourScale.fitted(errors)
+        )
+        self._volume.show(errors, scale)
+        self._legend.content = legend(scale, f"error {self._error.value}", "mm")
 
     def _turn(self) -> None:
         """A plane across another axis, in the middle of the volume."""
+        self._window.choices.put("map cut", self._axis.value)
         cut = self._axis.value != _NO_CUT
         self._position.visible = self._flipped.visible = cut
         if not cut:

@@ -11,6 +11,7 @@ from flexcal.studio.steps.verify.volume_accuracy import VolumeAccuracy
 from flexcal.studio.window import Place, Step, Window, heading, paragraph, step_link
 
 _PARTS: tuple[type[Part], ...] = (FreshPoses, VolumeAccuracy, CompensatedTargets, Exports)
+_OPEN = "● "
 
 
 class VerifyStep(Step):
@@ -25,8 +26,7 @@ class VerifyStep(Step):
     def open(self) -> None:
         """Add the choice of the part, and the part that was chosen last."""
         gui = self.window.gui
-        choice = gui.add_button_group("Show", tuple(part.title for part in _PARTS))
-        choice.on_click(lambda _: self.window.post(lambda: self._go_to(choice.value)))
+        self._choice = Place(gui)
         self._missing = gui.add_html("", visible=False)
         self._place = Place(gui)
         self._go_to(self.window.choices.get("part", _PARTS[0].title))
@@ -58,8 +58,16 @@ class VerifyStep(Step):
         self.window.figures.clear()
         chosen = next((part for part in _PARTS if part.title == title), _PARTS[0])
         self.window.choices.put("part", chosen.title)
+        with self._choice.anew():
+            self._add_choice(chosen)
         with self._place.anew():
             self.window.gui.add_html(heading(chosen.title))
             self._part = chosen(self.window)
             self._part.open()
         self.refresh()
+
+    def _add_choice(self, chosen: type[Part]) -> None:
+        """A button a part; the one that is open is marked."""
+        parts = {(_OPEN if part is chosen else "") + part.title: part.title for part in _PARTS}
+        choice = self.window.gui.add_button_group("Show", tuple(parts))
+        choice.on_click(lambda _: self.window.post(lambda: self._go_to(parts[choice.value])))
