@@ -57,6 +57,8 @@ class MeasureStep(Step):
             self._next = gui.add_html("")
             self._verdict = gui.add_html("")
             self._outlook = gui.add_html("")
+            self._moved_button = window.button("", self._move_station)
+            self._moved_button.visible = False
             self._add_choice("Rows come from", "row source", [one.title for one in _SOURCES])
             self._place = gui.add_folder(None)
             self._station_place = gui.add_folder(None)
@@ -188,8 +190,11 @@ class MeasureStep(Step):
         label = "New station for the rows to come"
         if row < count:
             label = f"New station from pose {row_keys(measuring.series)[row]} on"
-        if self._station_button.label != label:
-            self._station_button.label = label
+        for button in (self._station_button, self._moved_button):
+            if button.label != label:
+                button.label = label
+        is_moved = measuring.moved is not None  # then the button is beside the sentence that says so
+        self._moved_button.visible, self._station_button.visible = is_moved, not is_moved
 
     def _station_row(self) -> int:
         """The row from which a new station would be: the selected one, that before which the instrument moved, or the one to come."""
