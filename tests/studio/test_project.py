@@ -28,7 +28,7 @@ def test_paths_outside_the_folder_are_refused(project: Project, name: str) -> No
     secret.mkdir()
     (secret / "secret.csv").write_text("q1\n")
     (project.folder / "link").symlink_to(secret)
-    with refused("E-STUDIO-121"):
+    with refused("E-STUDIO-041"):
         project.path(name)
 
 
@@ -89,7 +89,7 @@ def test_choices_survive_and_a_damaged_file_is_no_obstacle(project: Project) -> 
 
 
 def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
-    with refused("E-STUDIO-120"):
+    with refused("E-STUDIO-040"):
         Project.open(tmp_path / "nowhere")
 
 

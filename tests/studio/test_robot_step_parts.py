@@ -55,25 +55,25 @@ def test_uploaded_urdf_is_in_the_folder(project: Project) -> None:
 @pytest.mark.parametrize(
     ("name", "content", "code"),
     [
-        ("../../x.urdf", URDF, "E-STUDIO-070"),
-        ("sub/x.urdf", URDF, "E-STUDIO-070"),
-        ("..\\x.urdf", URDF, "E-STUDIO-070"),
-        ("a<b>.urdf", URDF, "E-STUDIO-070"),
-        (".urdf", URDF, "E-STUDIO-070"),
-        (".hidden.urdf", URDF, "E-STUDIO-070"),
-        ("x\0.urdf", URDF, "E-STUDIO-070"),
-        ("a\n.urdf", URDF, "E-STUDIO-070"),
-        ("x" * 200 + ".urdf", URDF, "E-STUDIO-070"),
-        ("", URDF, "E-STUDIO-070"),
-        ("x.urdf", b"", "E-STUDIO-071"),
-        ("x.urdf.xacro", URDF, "E-STUDIO-072"),
-        ("robot.yaml", b"robot: x.urdf", "E-STUDIO-073"),
-        ("x.urdf", bytes(LARGEST + 1), "E-STUDIO-075"),
-        ("x.urdf", b"<svg/>", "E-STUDIO-076"),
-        ("x.urdf", b"<robot/>", "E-STUDIO-076"),
+        ("../../x.urdf", URDF, "E-STUDIO-020"),
+        ("sub/x.urdf", URDF, "E-STUDIO-020"),
+        ("..\\x.urdf", URDF, "E-STUDIO-020"),
+        ("a<b>.urdf", URDF, "E-STUDIO-020"),
+        (".urdf", URDF, "E-STUDIO-020"),
+        (".hidden.urdf", URDF, "E-STUDIO-020"),
+        ("x\0.urdf", URDF, "E-STUDIO-020"),
+        ("a\n.urdf", URDF, "E-STUDIO-020"),
+        ("x" * 200 + ".urdf", URDF, "E-STUDIO-020"),
+        ("", URDF, "E-STUDIO-020"),
+        ("x.urdf", b"", "E-STUDIO-021"),
+        ("x.urdf.xacro", URDF, "E-STUDIO-022"),
+        ("robot.yaml", b"robot: x.urdf", "E-STUDIO-023"),
+        ("x.urdf", bytes(LARGEST + 1), "E-STUDIO-025"),
+        ("x.urdf", b"<svg/>", "E-STUDIO-026"),
+        ("x.urdf", b"<robot/>", "E-STUDIO-026"),
         ("x.urdf", b"\x89PNG\r\n", "E-URDF-030"),
         ("x.urdf", b"<robot><link></robot>", "E-URDF-031"),
-        ("base.stl", b"solid", "E-STUDIO-078"),
+        ("base.stl", b"solid", "E-STUDIO-028"),
     ],
 )
 def test_bad_uploads_write_nothing(project: Project, name: str, content: bytes, code: str) -> None:
@@ -86,7 +86,7 @@ def test_a_file_is_replaced_only_when_told(project: Project) -> None:
     write_upload(project, "arm.urdf", URDF, replace=False)
     write_upload(project, "arm.urdf", URDF, replace=False)
     other = URDF + b"<!-- newer -->"
-    with refused("E-STUDIO-074", "arm.urdf"):
+    with refused("E-STUDIO-024", "arm.urdf"):
         write_upload(project, "arm.urdf", other, replace=False)
     assert contents(project) == {"project/arm.urdf": URDF}
     write_upload(project, "arm.urdf", other, replace=True)
@@ -104,7 +104,7 @@ def test_meshes_go_where_the_urdf_looks_for_them(project: Project) -> None:
         write_upload(project, "base.stl", b"solid", replace=False) == project.folder / "arm/meshes/base.stl"
     )
     for name in ("x.obj", "outside.stl", "other.dae"):  # two places, outside the folder, none
-        with refused("E-STUDIO-078", name):
+        with refused("E-STUDIO-028", name):
             write_upload(project, name, b"solid", replace=False)
     assert set(contents(project)) == {"project/r.urdf", "project/arm/meshes/base.stl"}
 
@@ -113,7 +113,7 @@ def test_links_lead_no_upload_outside(project: Project) -> None:
     (project.folder.parent / "elsewhere").mkdir()
     write_upload(project, "r.urdf", MESHED, replace=False)
     (project.folder / "arm").symlink_to(project.folder.parent / "elsewhere")
-    with refused("E-STUDIO-078"):
+    with refused("E-STUDIO-028"):
         write_upload(project, "base.stl", b"solid", replace=False)
     assert set(contents(project)) == {"project/r.urdf"}
 
@@ -121,7 +121,7 @@ def test_links_lead_no_upload_outside(project: Project) -> None:
 def test_example_is_copied_whole_or_not_at_all(project: Project) -> None:
     example = next(e for e in examples_here() if e.title.startswith("UR5"))
     (project.folder / "grid.csv").write_text("mine")
-    with refused("E-STUDIO-077", "grid.csv"):
+    with refused("E-STUDIO-027", "grid.csv"):
         example.copy_to(project)
     assert contents(project) == {"project/grid.csv": b"mine"}
     (project.folder / "grid.csv").unlink()

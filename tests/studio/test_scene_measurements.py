@@ -204,7 +204,7 @@ def test_a_motion_passes_its_positions_and_ends(scene: viser.SceneApi, robot: Ro
 def test_times_that_do_not_increase_are_refused(scene: viser.SceneApi, robot: RobotModel) -> None:
     view = RobotView(scene, robot, name="/still")
     for times in ([0.0, 1.0], [0.0, 1.0, 1.0], [0.0, np.nan, 2.0]):
-        with refused("E-STUDIO-040", "3", str(len(times))):
+        with refused("E-STUDIO-018", "3", str(len(times))):
             Motion(view, np.array(times), np.zeros((3, 6)))
 
 

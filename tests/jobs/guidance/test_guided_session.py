@@ -160,7 +160,7 @@ def test_a_row_after_a_hundred(ur5: RobotModel):
 
 def test_one_row_at_a_time(ur5: RobotModel):
     q, points, _ = series("clean", 1)
-    with refused("E-STUDIO-020", "2"):
+    with refused("E-STUDIO-006", "2"):
         GuidedSession(ur5).judge(rows(q[:2], points[:2]))
 
 

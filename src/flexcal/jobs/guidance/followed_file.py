@@ -55,7 +55,7 @@ class FollowedFile:
                 if size < self.end:
                     self._start, self._columns, self._skipped = 0, (), 0
                     raise ReadingGoesOn(
-                        "E-STUDIO-030",
+                        "E-STUDIO-016",
                         f"{self.path} has become shorter: another program wrote it anew; the rows that it has now are read from its start.",
                     )
                 stream.seek(self._start)
@@ -82,7 +82,7 @@ class FollowedFile:
             self._start += len(raw)
             if cells and len(cells) != len(self._columns) and self._start > self._skipped:
                 raise ReadingGoesOn(
-                    "E-STUDIO-031",
+                    "E-STUDIO-017",
                     f"{self.path}: the line '{line[:60]}' has {len(cells)} values, but the header names {len(self._columns)} columns; it "
                     "is left out.",
                 )

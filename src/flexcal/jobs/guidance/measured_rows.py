@@ -73,7 +73,7 @@ class MeasuredRows:
         for cells in rows:
             if odd := {*cells} ^ {*columns} - {EXCLUDED}:
                 raise InputError(
-                    "E-STUDIO-024",
+                    "E-STUDIO-010",
                     f"the new row and {self.path} do not have the same columns ({', '.join(sorted(odd))} only in one); name all alike.",
                 )
         added = tuple(MeasuredRow(dict(cells)) for cells in rows)
@@ -114,7 +114,7 @@ class MeasuredRows:
     def exclude(self, row: int, reason: str) -> None:
         """Exclude a row, counted from 0; raises `InputError` without a reason, and for a row that is not there."""
         if not reason.strip():
-            raise InputError("E-STUDIO-025", "a row is excluded for a reason that is kept with it; say why.")
+            raise InputError("E-STUDIO-011", "a row is excluded for a reason that is kept with it; say why.")
         self._mark(row, " ".join(reason.split()))
 
     def include(self, row: int) -> None:
@@ -166,7 +166,7 @@ class MeasuredRows:
         table = self._table()
         if not 0 <= row < len(table.rows):
             raise InputError(
-                "E-STUDIO-026", f"{self.path} has {len(table.rows)} rows, and none of number {row + 1}."
+                "E-STUDIO-012", f"{self.path} has {len(table.rows)} rows, and none of number {row + 1}."
             )
         rows, before = list(table.rows), table.rows[row].excluded
         rows[row] = MeasuredRow(rows[row].cells, reason)
@@ -185,7 +185,7 @@ class MeasuredRows:
             return [json.loads(line) for line in text.splitlines() if line.strip()]
         except ValueError as problem:
             raise InputError(
-                "E-STUDIO-027",
+                "E-STUDIO-013",
                 f"{self.history} is not the journal of {self.name} ({problem}); move it away, and go on without undo.",
             ) from problem
 
@@ -194,7 +194,7 @@ class MeasuredRows:
 
     def _changed(self) -> InputError:
         return InputError(
-            "E-STUDIO-028",
+            "E-STUDIO-014",
             f"{self.path} was changed by another program since, so the last change cannot be taken back.",
         )
 
@@ -221,7 +221,7 @@ class _Table:
             cells = split_line(line)
             if len(cells) != len(columns):
                 raise InputError(
-                    "E-STUDIO-029",
+                    "E-STUDIO-015",
                     f"{path} line {number}: there are {len(cells)} values, but the header names {len(columns)} columns; correct the line.",
                 )
             named = dict(zip(columns, cells, strict=True))

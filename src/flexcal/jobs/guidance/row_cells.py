@@ -33,7 +33,7 @@ class RowReader:
             other = mapped[quantity].columns if quantity in mapped else own
             if not {*own} <= {*self.columns} and not {*other} <= {*self.columns}:
                 raise InputError(
-                    "E-STUDIO-022",
+                    "E-STUDIO-008",
                     f"{self.path} has no columns {', '.join(own)}; let 'flexcal import' read it once, which writes what the columns are.",
                 )
 
@@ -96,6 +96,6 @@ def _number(path: Path, row: int, column: str, cell: str) -> float:
         value = np.nan
     if not np.isfinite(value):
         raise InputError(
-            "E-STUDIO-023", f"{path}, row {row + 1}, column {column}: '{cell}' is not a number; correct it."
+            "E-STUDIO-009", f"{path}, row {row + 1}, column {column}: '{cell}' is not a number; correct it."
         )
     return value

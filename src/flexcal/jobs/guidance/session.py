@@ -83,7 +83,7 @@ class GuidedSession:
         """Judgement of the next row, and the session with it; raises `InputError` as `judge` does."""
         if len(row) != 1:
             raise InputError(
-                "E-STUDIO-020", f"{len(row)} rows are given to be judged; judge them one by one."
+                "E-STUDIO-006", f"{len(row)} rows are given to be judged; judge them one by one."
             )
         session = self.with_rows(row)
         analysis = session.analysis
@@ -124,6 +124,6 @@ def _joined(before: PoseSet, further: PoseSet) -> PoseSet:
 def _require_points(rows: PoseSet) -> None:
     if not rows.located.all():
         raise InputError(
-            "E-STUDIO-021",
+            "E-STUDIO-007",
             "only points x, y, z of an instrument are judged while they are measured; calibrate other measurements when they are complete.",
         )

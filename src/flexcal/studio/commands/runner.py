@@ -41,7 +41,7 @@ class CommandRunner:
         if self.is_busy:
             assert self.current is not None
             raise FlexcalError(
-                "E-STUDIO-122", f"'{self.current.line}' is still running; wait for its end or cancel it."
+                "E-STUDIO-042", f"'{self.current.line}' is still running; wait for its end or cancel it."
             )
         run = CommandRun(arguments, self.folder)
         self.runs.append(run)

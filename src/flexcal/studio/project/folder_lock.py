@@ -38,7 +38,7 @@ def _hold(handle: int, name: str) -> None:
     except BlockingIOError as problem:
         process = os.pread(handle, 20, 0).decode("ascii", "replace").strip() or "that just started"
         raise InputError(
-            "E-STUDIO-123",
+            "E-STUDIO-043",
             f"another studio (process {process}) has {name} open; open its URL in a second window, or end it first.",
         ) from problem
     except OSError:

@@ -58,7 +58,7 @@ class Project:
         """Project of a folder; raises `InputError` where there is none."""
         if not folder.is_dir():
             raise InputError(
-                "E-STUDIO-120", f"{folder} is not a folder; give the folder of the robot's files."
+                "E-STUDIO-040", f"{folder} is not a folder; give the folder of the robot's files."
             )
         return cls(folder.resolve())
 
@@ -85,7 +85,7 @@ class Project:
             Where it lies outside the project, links followed, or is no name of a file.
         """
         outside = InputError(
-            "E-STUDIO-121", f"'{name}' is not in the folder {self.name}; give the name of a file there."
+            "E-STUDIO-041", f"'{name}' is not in the folder {self.name}; give the name of a file there."
         )
         if not name.strip() or "\0" in name or Path(name).is_absolute():
             raise outside

@@ -47,7 +47,7 @@ class Motion:
         self._times, self._q = np.asarray(times, dtype=float), np.asarray(q, dtype=float)
         if len(self._times) < 2 or len(self._times) != len(self._q) or not (np.diff(self._times) > 0).all():
             raise FlexcalError(
-                "E-STUDIO-040",
+                "E-STUDIO-018",
                 f"a motion of {len(self._q)} positions needs as many times, two or more, that increase; "
                 f"there are {len(self._times)}.",
             )

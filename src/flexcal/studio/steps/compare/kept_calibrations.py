@@ -24,7 +24,7 @@ def keep_calibration(project: Project) -> str:
     source = project.folder / CALIBRATION
     if not source.is_dir():
         raise InputError(
-            "E-STUDIO-050", f"there is no folder {CALIBRATION} to copy; calibrate first (step 4)."
+            "E-STUDIO-019", f"there is no folder {CALIBRATION} to copy; calibrate first (step 4)."
         )
     name = day = f"{CALIBRATION}-{date.today().isoformat()}"
     number = 2

@@ -150,7 +150,7 @@ class _Followed(RowSource):
         self.window.project.path(name)
         if Path(name) == Path(self.measuring.series.purpose.rows):
             raise InputError(
-                "E-STUDIO-093",
+                "E-STUDIO-036",
                 f"{name} is the table that the rows are kept in; let the other program write a file of its own.",
             )
 

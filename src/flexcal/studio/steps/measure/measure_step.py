@@ -267,7 +267,7 @@ class MeasureStep(Step):
     def _exclude(self) -> None:
         measuring, row = self.measuring, self._row()
         if row < 0:
-            raise InputError("E-STUDIO-095", "there is no row yet to exclude.")
+            raise InputError("E-STUDIO-038", "there is no row yet to exclude.")
         key = row_keys(measuring.series)[row]
         if measuring.series.rows[row].excluded:
             measuring.include(row)
@@ -281,7 +281,7 @@ class MeasureStep(Step):
     def _skip(self) -> None:
         following = self.measuring.following(self.window.selection.key)
         if following is None or not following.planned:
-            raise InputError("E-STUDIO-096", "only planned poses can be skipped.")
+            raise InputError("E-STUDIO-039", "only planned poses can be skipped.")
         self.measuring.skip(following.number)
         self.window.say(f"pose {following.number} is skipped; pick it in the list to measure it after all.")
         self.refresh()

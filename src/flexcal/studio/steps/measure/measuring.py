@@ -243,7 +243,7 @@ class Measuring:
     def _load(self) -> None:
         project, purpose = self.project, self.purpose
         if not project.robot_file.is_file():
-            raise InputError("E-STUDIO-094", "there is no robot.yaml yet: describe the robot in step 1.")
+            raise InputError("E-STUDIO-037", "there is no robot.yaml yet: describe the robot in step 1.")
         model = self._model()
         now = (purpose, stamp(project, purpose), model)
         if self._series is not None and self._read == now:

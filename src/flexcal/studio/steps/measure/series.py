@@ -124,7 +124,7 @@ def read_pose_plan(project: Project, purpose: Purpose, model: RobotModel) -> Pos
     plan = read_plan_for_robot(path, model)
     if not isinstance(plan, PosePlan):
         raise InputError(
-            "E-STUDIO-090", f"{purpose.plan} is no plan of poses; plan them in step 2, or remove the file."
+            "E-STUDIO-033", f"{purpose.plan} is no plan of poses; plan them in step 2, or remove the file."
         )
     return plan
 

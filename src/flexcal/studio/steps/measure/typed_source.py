@@ -40,9 +40,9 @@ class TypedSource(RowSource):
         series, pose = self.measuring.series, self.following
         values = tuple(float(field.value) for field in self._fields)
         if pose is None:
-            raise InputError("E-STUDIO-091", "no pose is next, so the point is of none; choose a pose first.")
+            raise InputError("E-STUDIO-034", "no pose is next, so the point is of none; choose a pose first.")
         if values == self._taken or not any(values):
-            raise InputError("E-STUDIO-092", f"type x, y and z of pose {pose.number} first.")
+            raise InputError("E-STUDIO-035", f"type x, y and z of pose {pose.number} first.")
         last = None if series.poses is None else series.poses.subset([len(series.poses) - 1])
         model = series.model
         poses = PoseSet(

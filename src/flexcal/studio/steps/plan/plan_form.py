@@ -80,10 +80,10 @@ class PlanForm(ABC):
         name = self._out.value.strip()
         path = self.window.project.path(name)
         if path.suffix != ".yaml":
-            raise InputError("E-STUDIO-080", f"the plan's file is '{name}'; give a name that ends in .yaml.")
+            raise InputError("E-STUDIO-030", f"the plan's file is '{name}'; give a name that ends in .yaml.")
         if name == ROBOT or (path.exists() and read_plan_file(path) is None):
             raise InputError(
-                "E-STUDIO-081", f"{name} is there and is no plan; give another name, such as {self.file}."
+                "E-STUDIO-031", f"{name} is there and is no plan; give another name, such as {self.file}."
             )
         return name
 

@@ -56,7 +56,7 @@ class WorkingFields:
         for axis, one, other in zip("xyz", low, high, strict=True):
             if not one < other:
                 raise InputError(
-                    "E-STUDIO-082",
+                    "E-STUDIO-032",
                     f"the working volume reaches from {one:g} to {other:g} m along {axis}; give the smallest value first.",
                 )
         return ",".join(f"{one:.10g}:{other:.10g}" for one, other in zip(low, high, strict=True))

@@ -36,7 +36,7 @@ class Example:
         there = [path.name for path in files if (project.folder / path.name).exists()]
         if there:
             raise InputError(
-                "E-STUDIO-077",
+                "E-STUDIO-027",
                 f"the folder {project.name} has {', '.join(there)} already, which an example does not overwrite; open an empty folder.",
             )
         with atomic_paths(*(project.folder / path.name for path in files)) as places:

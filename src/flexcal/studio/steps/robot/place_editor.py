@@ -183,7 +183,7 @@ class PlaceEditor:
         config = self._model.config
         if not _NAME.fullmatch(name) or name in config.points or name in config.stations:
             raise InputError(
-                "E-STUDIO-079",
+                "E-STUDIO-029",
                 f"'{name}' cannot be the name of another {kind}; give one of letters, digits and _ that robot.yaml does not have yet.",
             )
         if kind == "instrument":

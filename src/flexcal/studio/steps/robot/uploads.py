@@ -43,11 +43,11 @@ def write_upload(project: Project, name: str, content: bytes, *, replace: bool) 
     ending = Path(name).suffix.lower()
     if not _NAME.fullmatch(name) or name != name.strip() or name.endswith("."):
         raise InputError(
-            "E-STUDIO-070",
+            "E-STUDIO-020",
             f"'{_shown(name)}' is no name for a file here; rename it with letters, digits and . _ - alone, as robot.urdf.",
         )
     if not content:
-        raise InputError("E-STUDIO-071", f"{name} is empty; upload the robot's URDF.")
+        raise InputError("E-STUDIO-021", f"{name} is empty; upload the robot's URDF.")
     if ending in _URDF:
         _require_urdf(name, content)
         place = project.path(Path(name).with_suffix(".urdf").name)
@@ -55,17 +55,17 @@ def write_upload(project: Project, name: str, content: bytes, *, replace: bool) 
         place = _mesh_place(project, name)
     elif ending == ".xacro":
         raise InputError(
-            "E-STUDIO-072",
+            "E-STUDIO-022",
             f"{name} is xacro, not URDF; expand it first and upload that: xacro {name} > {Path(name).stem.removesuffix('.urdf')}.urdf.",
         )
     else:
         raise InputError(
-            "E-STUDIO-073",
+            "E-STUDIO-023",
             f"{name} is neither a URDF nor a mesh ({', '.join(_MESHES)}); upload one of these, and put tables into the folder.",
         )
     if place.exists() and place.read_bytes() != content and not replace:
         raise InputError(
-            "E-STUDIO-074",
+            "E-STUDIO-024",
             f"{place.relative_to(project.folder)} is there already with other content; rename the new one, or tick 'Replace a file of "
             "the same name'.",
         )
@@ -78,7 +78,7 @@ def require_size(name: str, size: int) -> None:
     """Raise `InputError` for a file of more bytes than are taken."""
     if size > LARGEST:
         raise InputError(
-            "E-STUDIO-075",
+            "E-STUDIO-025",
             f"{_shown(name)} has {size / 1e6:.0f} MB, more than the {LARGEST // 1_000_000} MB that are taken here; "
             "put it into the folder itself.",
         )
@@ -99,7 +99,7 @@ def _require_urdf(name: str, content: bytes) -> None:
             raise InputError(problem.code, str(problem).replace(str(path), name)) from problem
     if root.tag != "robot" or root.find("link") is None:
         raise InputError(
-            "E-STUDIO-076",
+            "E-STUDIO-026",
             f"{name} is XML, but no URDF: it lacks <robot> with a <link> inside; upload the robot's URDF.",
         )
 
@@ -111,6 +111,6 @@ def _mesh_place(project: Project, name: str) -> Path:
     listed = " and ".join(place.relative_to(project.folder).as_posix() for place in places)
     reason = f"it may be {listed}" if places else "no URDF of the folder names such a mesh there"
     raise InputError(
-        "E-STUDIO-078",
+        "E-STUDIO-028",
         f"{name}: {reason}; put the mesh into the folder itself, where the URDF looks for it.",
     )
