@@ -152,7 +152,6 @@ def test_a_typed_point(page: Any, running: Any, cell: Any) -> None:
     for axis, value in (("x", "534.8619"), ("y", "-572.7086"), ("z", "901.3214")):
         page.get_by_label(f"{axis} / mm").fill(value)
         page.get_by_label(f"{axis} / mm").press("Tab")
-    page.wait_for_timeout(300)
     press(page, "Take this point")
     page.get_by_text("Next: pose 2").wait_for(timeout=WAIT)
     (row,) = rows(folder)
@@ -165,7 +164,6 @@ def test_a_typed_point(page: Any, running: Any, cell: Any) -> None:
     choose(page, "Station", "moved")
     page.get_by_label("x / mm").fill("612.3456")
     page.get_by_label("x / mm").press("Tab")
-    page.wait_for_timeout(300)
     press(page, "Take this point")
     page.get_by_text("Next: pose 3").wait_for(timeout=WAIT)
     assert [row["station"] for row in rows(folder)] == ["tracker", "moved"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
     from flexcal.studio.steps.measure.measuring import Measuring
     from flexcal.studio.window import Window
 
+_SETTLING = 0.4
+"""Seconds within which the browser sends a number after the key that ended it; the press of a button arrives at once."""
+
 
 class TypedSource(RowSource):
     """The point of the next pose, typed in mm."""
@@ -25,6 +29,7 @@ class TypedSource(RowSource):
     def __init__(self, window: Window, measuring: Measuring, refresh: Callable[[], None]):
         super().__init__(window, measuring, refresh)
         self._taken: tuple[float, ...] | None = None
+        self._due: float | None = None
 
     def add(self) -> None:
         """Add a field a coordinate, and the button that takes them."""
@@ -33,7 +38,16 @@ class TypedSource(RowSource):
         self.window.button("Take this point (N)", self.measure_next, main=True)
 
     def measure_next(self) -> None:
-        """Take the point; raises `InputError` where it was not typed, and where no pose is next."""
+        """Take the point, when the last number that was typed has arrived too."""
+        self._due = time.monotonic() + _SETTLING
+
+    def tick(self) -> None:
+        """Take the point that is due; raises `InputError` where it was not typed, and where no pose is next."""
+        if self._due is not None and time.monotonic() >= self._due:
+            self._due = None
+            self._take_point()
+
+    def _take_point(self) -> None:
         from flexcal.data.poses import DEFAULT_SIGMA, PoseSet
         from flexcal.jobs.guidance import cells_of
 
