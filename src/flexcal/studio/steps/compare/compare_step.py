@@ -215,7 +215,7 @@ class CompareStep(Step):
         scope = f"over {len(sizes)} random poses within the joint ranges of both. A motion of the whole robot against the instrument"
         self.window.gui.add_html(paragraph(f"{told} {scope} is taken out."))
         start = int(np.clip(_LENGTH / max(np.percentile(change.distance, 90), 1e-9), 1, 5000))
-        factor = self.window.gui.add_slider("Exaggeration", min=1, max=5000, step=1, initial_value=start)
+        factor = self.window.gui.add_slider("Magnify", min=1, max=5000, step=1, initial_value=start)
         self._arrows = ResidualArrows(self.window.scene, change.points, change.displacement, start)
 
         def stretch() -> None:

@@ -53,7 +53,7 @@ class ResidualsView:
         self._labels = {_MODELS.get(name, name): name for name in self._errors}
         gui = window.gui
         self._model = gui.add_dropdown("Model", tuple(self._labels), initial_value=_MODELS[CALIBRATED])
-        self._factor = gui.add_slider("Exaggeration", min=1, max=2000, step=1, initial_value=self._fitting())
+        self._factor = gui.add_slider("Magnify", min=1, max=2000, step=1, initial_value=self._fitting())
         self._table = gui.add_html("")
         self._course = None
         self._arrows: ResidualArrows | None = None
@@ -89,7 +89,16 @@ class ResidualsView:
             self._keys[i]: (f"pose {self._keys[i]}", f"{sizes[i]:.3f}", *(f"{e:+.3f}" for e in errors[i]))
             for i in largest
         }
-        self._table.content = picked_rows(_COLUMNS, rows, chosen, height="11em") + _FRAME
+        history = "" if here is None else self._history(here)
+        self._table.content = history + picked_rows(_COLUMNS, rows, chosen, height="11em") + _FRAME
+
+    def _history(self, row: int) -> str:
+        """Errors of one pose from the robot as it was to the calibrated one."""
+        ordered = [(label, name) for name, label in _MODELS.items() if name in self._errors][::-1]
+        told = [
+            f"{label} {np.linalg.norm(self._errors[name][row]) / MILLIMETRE:.3f}" for label, name in ordered
+        ]
+        return paragraph(f"pose {self._keys[row]}, error / mm: {' → '.join(told)}")
 
     def close(self) -> None:
         """Remove the arrows from the scene."""
