@@ -69,6 +69,7 @@ def require_whole(folder: Path) -> None:
     assert read >= 2
 
 
+@pytest.mark.slow
 def test_killed_while_robot_poses_and_rows_are_made(page: Any, tmp_path: Path) -> None:
     """A number that was written stays; a plan is drawn again; rows, an exclusion and the next pose are as before."""
     pytest.importorskip("viser", reason="viser is absent: pip install 'flexcal[studio]'")

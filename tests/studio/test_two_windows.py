@@ -34,6 +34,7 @@ def folder(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_two_browsers_show_the_same(browser: Any, page: Any, folder: Path) -> None:
     """Steps, rows and the picked pose follow in the other one, also in one that is loaded again or opened late."""
     other_context = browser.new_context(viewport={"width": 820, "height": 1180})
