@@ -1,4 +1,4 @@
-from .arm_poses import ArmPoses, arms_at
+from .arm_poses import ArmPoses, arms_at, evenly
 from .best_fit_registration import best_placement, can_register, can_register_with_points, rigid_placement
 from .error_scale_test import ErrorScale, error_scale, prediction_document
 from .errors_by_model import CALIBRATED, DECLARED, NOMINAL, OWN, RIGID, MeasuredPoints, errors_before
@@ -42,6 +42,7 @@ __all__ = [
     "can_register_with_points",
     "error_scale",
     "errors_before",
+    "evenly",
     "orientation_document",
     "orientation_errors",
     "prediction_document",

@@ -41,12 +41,12 @@ _MOST_ARROWS = 1500
 
 def arms_at(model: RobotModel, poses: PoseSet, errors: Mapping[str, np.ndarray]) -> ArmPoses:
     """Arm of `model` at the points, with `errors` (N, 3) m of the instrument's frame; if there are many, an even selection."""
-    rows = _evenly(len(poses), _MOST_ARROWS)
+    rows = evenly(len(poses), _MOST_ARROWS)
     corners = joint_polylines(model, poses.subset(rows))
     turned = {name: in_base(model, poses, vectors)[rows] for name, vectors in errors.items()}
     surface = LinkSurface.of(model)
-    drawn = surface.at(model, poses.q[rows[_evenly(len(rows), _EXAMPLES)]]).astype(np.float32)
-    arms = corners[_evenly(len(rows), _MOST_ARMS)]
+    drawn = surface.at(model, poses.q[rows[evenly(len(rows), _EXAMPLES)]]).astype(np.float32)
+    arms = corners[evenly(len(rows), _MOST_ARMS)]
     return ArmPoses(arms, drawn, surface.triangles, poses.pose[rows], corners[:, -1], turned)
 
 
@@ -78,5 +78,6 @@ def in_base(model: RobotModel, poses: PoseSet, vectors: np.ndarray) -> np.ndarra
     return turned
 
 
-def _evenly(total: int, most: int) -> np.ndarray:
+def evenly(total: int, most: int) -> np.ndarray:
+    """Numbers of `most` of `total` things, evenly spread; of all where there are fewer."""
     return np.unique(np.linspace(0, total - 1, min(total, most)).astype(int))

@@ -1,6 +1,7 @@
 from .candidate_pool import PosePool
 from .checks import check_metres, check_same_pose
 from .columns import check_positive, unit_quaternions, whole_numbers
+from .excluded_rows import EXCLUDED
 from .frame_touches import FrameMethod, FrameTouches
 from .image_folders import images_of, tables_of
 from .measured_tables import read_grouped_poses, read_pose_pool, read_poses, write_poses
@@ -15,6 +16,7 @@ __all__ = [
     "DEFAULT_SIGMA",
     "DIRECTION",
     "DISTANCE",
+    "EXCLUDED",
     "LINE",
     "PLANE",
     "FrameMethod",

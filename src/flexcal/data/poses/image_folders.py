@@ -26,8 +26,8 @@ def images_of(table: Path) -> list[Path]:
     file = open_table(table)
     if "image" not in file.columns:
         return []
-    others = dict.fromkeys((EXCLUDED, *file.text_columns()))
-    others = [name for name in others if name != "image" and name in file.columns]
+    texts = {EXCLUDED, *file.text_columns()} - {"image"}
+    others = [name for name in file.columns if name in texts]
     names = file.leaving_out(others).read(("image",)).columns["image"]
     return [table.parent / name for name in dict.fromkeys(names.tolist())]
 

@@ -7,6 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
+from flexcal.calibration.kinds import best_motion
 from flexcal.data.poses import PoseSet
 
 GROSS = 0.030
@@ -109,11 +110,9 @@ def _samples(count: int) -> list[np.ndarray]:
 
 
 def _moved(expected: np.ndarray, measured: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """Points `expected` (N, 3), mapped by the rigid motion that fits the `chosen` ones to the measured (Kabsch 1976)."""
-    centre, other = expected[chosen].mean(axis=0), measured[chosen].mean(axis=0)
-    left, _, right = np.linalg.svd((measured[chosen] - other).T @ (expected[chosen] - centre))
-    turn = np.diag([1.0, 1.0, float(np.sign(np.linalg.det(left @ right)))])
-    return other + (expected - centre) @ (left @ turn @ right).T
+    """Points `expected` (N, 3), mapped by the rigid motion that fits the `chosen` ones to the measured."""
+    rotation, translation = best_motion(expected[chosen], measured[chosen])
+    return expected @ rotation.T + translation
 
 
 def _extents(points: np.ndarray) -> np.ndarray:

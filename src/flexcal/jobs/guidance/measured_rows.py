@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from flexcal.data.poses import EXCLUDED
 from flexcal.errors import InputError, unreadable
 from flexcal.files.transaction import atomic_paths, current_path
-from flexcal.jobs.guidance.row_cells import EXCLUDED
 
 ROWS, STATION = "poses.csv", "station"
 

@@ -13,7 +13,6 @@ from flexcal.data.tables import Table, TableFile, assign, mapped_signals, standa
 from flexcal.errors import InputError
 from flexcal.model.robot import RobotModel
 
-EXCLUDED = "excluded"
 _TEXTS = ("target", "station")
 _NUMBERS = ("sigma", "sigma_xyz", "payload", "temperature", "t", "tau", "quaternion", "sigma_angle", "force")
 

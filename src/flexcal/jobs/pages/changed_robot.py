@@ -17,6 +17,7 @@ from flexcal.files.transaction import current_path
 from flexcal.jobs.result_files import read_results
 from flexcal.model.robot import RobotModel
 from flexcal.report.results import Run
+from flexcal.report.sections import input_files
 
 _ABOVE = 3
 """Number of folders above a result in which its robot.yaml is looked for."""
@@ -56,9 +57,8 @@ def geometry_change(
 
 def _digest(estimate: Estimate, suffixes: tuple[str, ...]) -> str | None:
     """SHA-256 of the input with one of these endings."""
-    return next(
-        (v for k, v in estimate.provenance.items() if k.startswith("input.") and k.endswith(suffixes)), None
-    )
+    files = input_files(estimate.provenance)
+    return next((digest for name, digest in files.items() if name.endswith(suffixes)), None)
 
 
 def _robot_file(folders: tuple[Path, Path], estimates: tuple[Estimate, Estimate]) -> Path | None:
@@ -68,10 +68,10 @@ def _robot_file(folders: tuple[Path, Path], estimates: tuple[Estimate, Estimate]
         above = folder.resolve()
         there += [above, *list(above.parents)[:_ABOVE]]
     names = [
-        key.removeprefix("input.").rpartition("/")[2]
+        name.rpartition("/")[2]
         for estimate in reversed(estimates)
-        for key in estimate.provenance
-        if key.startswith("input.") and key.endswith((".yaml", ".yml"))
+        for name in input_files(estimate.provenance)
+        if name.endswith((".yaml", ".yml"))
     ]
     files = [f for place in [*there, Path.cwd()] for n in dict.fromkeys(names) if (f := place / n).is_file()]
     known = {_digest(estimate, (".yaml", ".yml")) for estimate in estimates}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import plotly.graph_objects as go
@@ -23,36 +23,46 @@ def accuracy_space(accuracy: PredictedAccuracy) -> go.Figure:
     at, error = accuracy.position[rows], accuracy.p95[rows] / MILLIMETRE
     figure = canvas(560, legend=False)
     figure.add_trace(
-        go.Scatter3d(
-            x=as_float32(at[:, 0]),
-            y=as_float32(at[:, 1]),
-            z=as_float32(at[:, 2]),
-            mode="markers",
-            marker={
-                "size": 3,
-                "color": as_float32(error),
-                "colorscale": COLOURS,
-                "cmin": 0.0,
-                "cmax": float(np.quantile(error, 0.995)),
-                "colorbar": colour_bar(),
-            },
-            text=as_float32(error),
-            hovertemplate="95 % within %{text:.3f} mm<extra></extra>",
+        coloured_points(
+            at,
+            error,
+            "95 % / mm",
+            as_float32(error),
+            "95 % within %{text:.3f} mm",
+            largest=float(np.quantile(error, 0.995)),
         )
     )
     figure.update_layout(scene=space_axes(), margin={"l": 0, "r": 0, "t": 10, "b": 0})
     return figure
 
 
-def colour_bar() -> dict[str, object]:
-    """Colour bar."""
-    return {
-        "title": {"text": "95 % / mm", "side": "top"},
-        "thickness": 12,
-        "len": 0.7,
-        "x": 1,
-        "xanchor": "right",
-    }
+def coloured_points(
+    at: np.ndarray,
+    values: np.ndarray,
+    title: str,
+    told: np.ndarray | Sequence[str],
+    hover: str,
+    *,
+    largest: float | None = None,
+) -> go.Scatter3d:
+    """Points (N, 3), m, coloured by `values` (N,) up to the `largest`; `title` is that of the colour bar, `hover` shows each as `told`."""
+    bar = {"title": {"text": title, "side": "top"}, "thickness": 12, "len": 0.7, "x": 1, "xanchor": "right"}
+    marker = {
+        "size": 3,
+        "color": as_float32(values),
+        "colorscale": COLOURS,
+        "cmin": 0.0,
+        "colorbar": bar,
+    } | ({} if largest is None else {"cmax": largest})
+    return go.Scatter3d(
+        x=as_float32(at[:, 0]),
+        y=as_float32(at[:, 1]),
+        z=as_float32(at[:, 2]),
+        mode="markers",
+        marker=marker,
+        text=told,
+        hovertemplate=f"{hover}<extra></extra>",
+    )
 
 
 _CELLS = 30

@@ -6,7 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from flexcal.calibration.comparison import GeometryChange
-from flexcal.report.figures.accuracy_map import COLOURS, SHOWN
+from flexcal.report.figures.accuracy_map import SHOWN, coloured_points
 from flexcal.report.figures.robot_arm import space_axes
 from flexcal.report.layout import RIGID, as_float32, canvas
 from flexcal.units import MILLIMETRE
@@ -38,28 +38,6 @@ def tool_displacement(change: GeometryChange) -> go.Figure:
         )
     )
     told = [f"{m:.3f} ± {s:.3f}" for m, s in zip(size / MILLIMETRE, std / MILLIMETRE, strict=True)]
-    figure.add_trace(
-        go.Scatter3d(
-            x=as_float32(at[:, 0]),
-            y=as_float32(at[:, 1]),
-            z=as_float32(at[:, 2]),
-            mode="markers",
-            marker={
-                "size": 3,
-                "color": as_float32(size / MILLIMETRE),
-                "colorscale": COLOURS,
-                "cmin": 0.0,
-                "colorbar": {
-                    "title": {"text": "moved / mm", "side": "top"},
-                    "thickness": 12,
-                    "len": 0.7,
-                    "x": 1,
-                    "xanchor": "right",
-                },
-            },
-            text=told,
-            hovertemplate="moved by %{text} mm<extra></extra>",
-        )
-    )
+    figure.add_trace(coloured_points(at, size / MILLIMETRE, "moved / mm", told, "moved by %{text} mm"))
     figure.update_layout(scene=space_axes(), margin={"l": 0, "r": 0, "t": 10, "b": 0})
     return figure
