@@ -49,9 +49,8 @@ def test_from_urdf_and_poses_to_the_calibrated_urdf(page: Any, folder: Path) -> 
         page.get_by_role("button", name="Create robot.yaml").click(timeout=LONG)
         page.get_by_text("A ruler's centimetre suffices", exact=False).wait_for(timeout=LONG)
         number(page, "z / mm", 31)
-        page.wait_for_timeout(600)  # the browser sends a number a moment after its last key
         page.get_by_role("button", name="Write to robot.yaml").click(timeout=LONG)
-        page.wait_for_function("document.body.innerText.includes('(0, 0, 31)')", timeout=LONG)
+        page.get_by_text("robot.yaml: measured point smr: (0, 0, 0) → (0, 0, 31) mm.").wait_for(timeout=LONG)
         assert "0.031" in (folder / "robot.yaml").read_text()
 
         open_step(page, "Calibrate")

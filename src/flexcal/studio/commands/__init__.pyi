@@ -1,4 +1,4 @@
-from .command_run import CommandRun
+from .command_run import CommandRun, command_line
 from .runner import CommandRunner
 
-__all__ = ["CommandRun", "CommandRunner"]
+__all__ = ["CommandRun", "CommandRunner", "command_line"]

@@ -22,6 +22,11 @@ _LINES = 2000
 _PROGRAM = (sys.executable, "-m", "flexcal.cli.main")
 
 
+def command_line(arguments: Sequence[str]) -> str:
+    """The line that has these arguments after `flexcal`, as typed in a terminal."""
+    return shlex.join(["flexcal", *arguments])
+
+
 class CommandRun:
     """A command line of flexcal in a process of its own, with its progress, messages and JSON document.
 
@@ -66,7 +71,7 @@ class CommandRun:
     @property
     def line(self) -> str:
         """The command line that does the same in a terminal."""
-        return shlex.join(["flexcal", *self.arguments])
+        return command_line(self.arguments)
 
     @property
     def stage(self) -> tuple[str, float] | None:

@@ -1,6 +1,7 @@
 from .choices import Choices
 from .folder_lock import sole_studio
-from .pose_tables import pose_files
+from .planned import read_plan_file
+from .pose_tables import COMPUTED, is_result, pose_files
 from .project import (
     CALIBRATION,
     CHECK_PLAN,
@@ -17,6 +18,7 @@ __all__ = [
     "CALIBRATION",
     "CHECKED",
     "CHECK_PLAN",
+    "COMPUTED",
     "MAP",
     "MEASURED",
     "PLAN",
@@ -24,6 +26,8 @@ __all__ = [
     "VERIFICATION",
     "Choices",
     "Project",
+    "is_result",
     "pose_files",
+    "read_plan_file",
     "sole_studio",
 ]

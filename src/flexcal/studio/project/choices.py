@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -39,6 +40,11 @@ class Choices:
         """A choice, of the type of `default`; that where it was not made."""
         value = self.values.get(name, default)
         return value if isinstance(value, type(default)) else default
+
+    def among(self, name: str, options: Sequence[str], default: str | None = None) -> str:
+        """A choice among texts, where it is still one of them; else `default`, by default the first."""
+        kept = self.get(name, "")
+        return kept if kept in options else options[0] if default is None else default
 
     def put(self, name: str, value: Any) -> None:
         """Keep a choice; a folder that cannot be written keeps none."""

@@ -21,7 +21,7 @@ def pose_files(project: Project) -> list[str]:
     names = [
         name
         for name in project.files(".csv", ".parquet")
-        if not _is_result(project, name) and (own or _has_readings(project.folder / name))
+        if not is_result(project, name) and (own or _has_readings(project.folder / name))
     ]
     return sorted(names, key=lambda name: (name != MEASURED, -(project.folder / name).stat().st_size))
 
@@ -33,7 +33,8 @@ def _declares_columns(project: Project) -> bool:
         return False
 
 
-def _is_result(project: Project, name: str) -> bool:
+def is_result(project: Project, name: str) -> bool:
+    """Whether a file is in a folder of results."""
     return (project.folder / name).with_name("results.json").is_file() and "/" in name
 
 
@@ -48,11 +49,11 @@ def _has_readings(path: Path) -> bool:
         return False
     columns = {cell.strip().strip('"') for cell in head[0].split(",")} if head else set()
     return (
-        "q1" in columns and not columns & _COMPUTED and any(not _PLANNED.fullmatch(name) for name in columns)
+        "q1" in columns and not columns & COMPUTED and any(not _PLANNED.fullmatch(name) for name in columns)
     )
 
 
-_COMPUTED = {"p95_mm", "unambiguous"}
+COMPUTED = {"p95_mm", "unambiguous"}
 """Columns of accuracy maps and of commands."""
 _PLANNED = re.compile(r"q\d+|pose|payload|plan|set|name|seed")
 """Columns that a table of planned poses has too."""

@@ -114,15 +114,15 @@ class Project:
         return found
 
     def results(self, kind: str | None = None) -> list[str]:
-        """Names of the folders with a results.json, newest last; of one kind (as 'calibrate') where it is given."""
-        from flexcal.jobs.result_files import RESULTS, read_results
+        """Names of the folders with a results.json, newest last; of one kind (as 'calibration') where it is given."""
+        from flexcal.jobs.result_files import RESULTS
 
         folders = []
         for name in self.files(RESULTS):
             folder = Path(name).parent
             if folder == Path(".") or Path(name).name != RESULTS:
                 continue
-            if kind is None or _kind(read_results, self.folder / folder) == kind:
+            if kind is None or _kind(self.folder / folder) == kind:
                 folders.append(folder.as_posix())
         return sorted(folders, key=lambda name: (self.folder / name / RESULTS).stat().st_mtime_ns)
 
@@ -138,8 +138,10 @@ class Project:
         return tuple(stamps)
 
 
-def _kind(read, folder: Path) -> str | None:
+def _kind(folder: Path) -> str | None:
+    from flexcal.jobs.result_files import read_results
+
     try:
-        return read(folder).get("kind")
+        return read_results(folder).get("kind")
     except InputError:
         return None

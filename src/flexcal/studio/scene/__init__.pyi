@@ -11,7 +11,7 @@ from .points import Points
 from .residual_arrows import ResidualArrows
 from .robot_view import RobotView
 from .surroundings import Surroundings
-from .working_box import WorkingBox
+from .working_box import WorkingBox, box_edges
 
 __all__ = [
     "BLOCKED",
@@ -36,5 +36,6 @@ __all__ = [
     "RobotView",
     "Surroundings",
     "WorkingBox",
+    "box_edges",
     "colliding_links",
 ]

@@ -51,7 +51,6 @@ class AccuracyVolume:
         self._size = float(0.6 * space) if size is None else size
         self._plane: tuple[int, float, bool] | None = None
         self._cloud: viser.PointCloudHandle
-        self._shown = True
         self._draw()
 
     @property
@@ -80,15 +79,6 @@ class AccuracyVolume:
         self._plane = None
         self._draw()
 
-    @property
-    def visible(self) -> bool:
-        """Whether it is shown."""
-        return self._shown
-
-    @visible.setter
-    def visible(self, shown: bool) -> None:
-        self._shown = self._cloud.visible = shown
-
     def remove(self) -> None:
         """Take it out of the scene."""
         self._cloud.remove()
@@ -97,5 +87,5 @@ class AccuracyVolume:
         shown = self.mask
         self._cloud = self._scene.add_point_cloud(
             self._name, self.points[shown], self.scale.colours(self.values[shown]), point_size=self._size,
-            point_shape="circle", precision="float32", visible=self._shown,
+            point_shape="circle", precision="float32",
         )  # fmt: skip

@@ -72,15 +72,6 @@ class DraggablePoint:
     def xyz(self, xyz: np.ndarray) -> None:
         self._handle.position = np.asarray(xyz, dtype=float)
 
-    @property
-    def visible(self) -> bool:
-        """Whether it is shown."""
-        return self._root.visible
-
-    @visible.setter
-    def visible(self, shown: bool) -> None:
-        self._root.visible = shown
-
     def remove(self) -> None:
         """Take it out of the scene."""
         self._root.remove()

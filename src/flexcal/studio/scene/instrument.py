@@ -44,15 +44,6 @@ class Instrument:
         self._stand.position = np.asarray(position, dtype=float)
         self.look_at(self._points, self._blocked)
 
-    @property
-    def visible(self) -> bool:
-        """Whether it is shown, with its lines."""
-        return self._root.visible
-
-    @visible.setter
-    def visible(self, shown: bool) -> None:
-        self._root.visible = shown
-
     def look_at(self, points: np.ndarray, blocked: np.ndarray | None = None) -> None:
         """Draw lines of sight to `points` (N, 3), m, those with `blocked` (N,) in another colour; none for no points."""
         points = np.asarray(points, dtype=float).reshape(-1, 3)

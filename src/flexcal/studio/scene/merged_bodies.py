@@ -37,15 +37,6 @@ class MergedBodies:
         self._vertices = np.zeros((0, 0, 3))
         self._clicked: Callable[[viser.SceneClickEvent], None] | None = None
 
-    @property
-    def visible(self) -> bool:
-        """Whether they are shown."""
-        return self._root.visible
-
-    @visible.setter
-    def visible(self, shown: bool) -> None:
-        self._root.visible = shown
-
     def show(self, vertices: np.ndarray, colour_numbers: np.ndarray, colours: np.ndarray) -> None:
         """Draw N bodies with `vertices` (N, V, 3), m, each in the row of `colours` (C, 3) that `colour_numbers` (N,) names.
 
@@ -84,7 +75,7 @@ class MergedBodies:
         @self._scene.on_click()
         def clicked(event: viser.SceneClickEvent) -> None:
             body = self.pick(np.array(event.ray_origin), np.array(event.ray_direction))
-            if body is not None and self.visible:
+            if body is not None:
                 callback(body)
 
         self._clicked = clicked

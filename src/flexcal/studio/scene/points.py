@@ -60,15 +60,6 @@ class Points:
         self._points.show(self._corners(1.0), numbers.ravel(), different)
         self.highlight(self._selected)
 
-    @property
-    def visible(self) -> bool:
-        """Whether they are shown."""
-        return self._points.visible
-
-    @visible.setter
-    def visible(self, shown: bool) -> None:
-        self._points.visible = shown
-
     def highlight(self, number: int | None) -> None:
         """Mark one point as selected, or none."""
         self._selected = number

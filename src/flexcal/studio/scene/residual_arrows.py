@@ -81,15 +81,6 @@ class ResidualArrows:
         """Tips (N, 3), m, as drawn."""
         return self.starts + self._exaggeration * self.vectors
 
-    @property
-    def visible(self) -> bool:
-        """Whether they are shown."""
-        return self._arrows.visible
-
-    @visible.setter
-    def visible(self, shown: bool) -> None:
-        self._arrows.visible = shown
-
     def highlight(self, number: int | None) -> None:
         """Mark one arrow as selected, or none."""
         self._selected = number

@@ -66,15 +66,6 @@ class WorkingBox:
             handle.position = np.asarray(corner, dtype=float)
         self._draw()
 
-    @property
-    def visible(self) -> bool:
-        """Whether it is shown."""
-        return self._root.visible
-
-    @visible.setter
-    def visible(self, shown: bool) -> None:
-        self._root.visible = shown
-
     def remove(self) -> None:
         """Take it out of the scene."""
         self._root.remove()
@@ -84,7 +75,10 @@ class WorkingBox:
         self._changed(*self.corners)
 
     def _draw(self) -> None:
-        upper = (np.arange(8)[:, None] >> np.arange(3)) & 1
-        lower_corner, upper_corner = self.corners
-        corners = np.where(upper == 1, upper_corner, lower_corner)
-        self._edges.points = corners[_EDGES].astype(np.float32)
+        self._edges.points = box_edges(*self.corners).astype(np.float32)
+
+
+def box_edges(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """Ends (12, 2, 3) of the edges of a box with these corners (3,)."""
+    is_upper = (np.arange(8)[:, None] >> np.arange(3)) & 1
+    return np.where(is_upper == 1, upper, lower)[_EDGES]

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
 from flexcal.studio.window.markup import paragraph
+from flexcal.studio.window.place import Place
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
     import viser
 
     from flexcal.report.layout import FigureBlock
+    from flexcal.studio.window.window import Window
 
 _POINTS = 3000
 """Points of a curve that are sent, at most: a figure is a few hundred pixels wide."""
@@ -26,29 +28,29 @@ class ReportFigures:
     gui : viser.GuiApi
         Where they are added, at the current place.
     blocks : sequence of FigureBlock
-        The figures; those of the arm in space are left out, as the scene shows it.
+        The figures, one or more.
     dark : bool
         Whether the window is dark.
     """
 
     def __init__(self, gui: viser.GuiApi, blocks: Sequence[FigureBlock], *, dark: bool):
         self._gui, self._dark = gui, dark
-        self._blocks = {block.title: block for block in blocks if block.slider is None}
+        import plotly.graph_objects as go
+
+        self._blocks = {block.title: block for block in blocks}
         titles = tuple(self._blocks)
         self._choice = gui.add_dropdown("Figure", titles, initial_value=titles[0])
-        self._selectors = gui.add_folder(None)
-        self._plot = gui.add_plotly(_figure(self._blocks[titles[0]], {}, dark), config=_CONFIG)
+        self._selectors = Place(gui)
+        self._plot = gui.add_plotly(go.Figure(), config=_CONFIG)
         self._caption = gui.add_html("")
         self._choice.on_update(lambda _: self._show())
         self._show()
 
     def _show(self) -> None:
         block = self._blocks[self._choice.value]
-        order = self._choice.order
-        self._selectors.remove()
-        self._selectors = self._gui.add_folder(None, order=order + 0.5, visible=bool(block.selectors))
         chosen = {selector.key: selector.options[0] for selector in block.selectors}
-        with self._selectors:
+        self._selectors.visible = bool(block.selectors)
+        with self._selectors.anew():
             for selector in block.selectors:
                 choice = self._gui.add_dropdown(selector.label, selector.options)
 
@@ -65,6 +67,12 @@ class ReportFigures:
         height = figure.to_plotly_json()["layout"].get("height", _WIDTH)
         self._plot.aspect = min(max(height / _WIDTH, 0.5), 2.5)
         self._plot.figure = figure
+
+
+def figure_tab(window: Window, blocks: Sequence[FigureBlock]) -> dict[str, Callable[[], object]]:
+    """A tab of the figures panel with figures of a report; none without any. The arm in space is left out, as the scene shows it."""
+    shown = [block for block in blocks if block.slider is None]
+    return {"Figures": lambda: ReportFigures(window.gui, shown, dark=window.dark)} if shown else {}
 
 
 _WIDTH = 380

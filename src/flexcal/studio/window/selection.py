@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Sequence
 
 
 class Selection:
@@ -38,3 +39,9 @@ class Selection:
         self.key = None if key == self.key else key
         for listener in self._listeners:
             listener()
+
+
+def pose_keys(numbers: Sequence[int]) -> list[str]:
+    """Key of every row of a table in the selection: the number of its pose, and its row where the pose has several."""
+    counts = Counter(numbers)
+    return [f"{n}.{row + 1}" if counts[n] > 1 else f"{n}" for row, n in enumerate(numbers)]

@@ -103,6 +103,7 @@ class ShownRobot:
 
 def _comfortable(model: RobotModel) -> np.ndarray:
     """Zero, or the middle of the joint's range where that leaves zero out."""
-    ranges = np.array([(joint.lower, joint.upper) for joint in model.motor_joints])
-    outside = (ranges[:, 0] > 0) | (ranges[:, 1] < 0)
-    return np.where(outside, np.where(outside, ranges.mean(axis=1), 0.0), 0.0)
+    from flexcal.model.kinematics import joint_limits
+
+    lower, upper = joint_limits(model)
+    return np.array([(a + b) / 2 if a > 0 or b < 0 else 0.0 for a, b in zip(lower, upper, strict=True)])

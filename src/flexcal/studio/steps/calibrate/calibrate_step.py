@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from flexcal.jobs.result_files import RESULTS
+from flexcal.studio.commands import command_line
 from flexcal.studio.project import CALIBRATION, pose_files
 from flexcal.studio.steps.calibrate.stages import (
     INERTIALS,
@@ -34,12 +35,9 @@ class CalibrateStep(Step):
         """Add the choice of measured poses, a line and a button a stage, and the result of one of them."""
         window, gui = self.window, self.window.gui
         self._shown = None
-        names = pose_files(window.project)
-        chosen = window.choices.get("measured", names[0] if names else _NONE)
+        names = pose_files(window.project) or [_NONE]
         self._measured = gui.add_dropdown(
-            "Measured poses",
-            names or [_NONE],
-            initial_value=chosen if chosen in names else (names or [_NONE])[0],
+            "Measured poses", names, initial_value=window.choices.among("measured", names)
         )
         self._measured.on_update(lambda _: window.post(self._choose))
         self._place = Place(gui)
@@ -48,15 +46,20 @@ class CalibrateStep(Step):
     def refresh(self) -> None:
         """Show the stages as the folder has them; the result where it has changed."""
         project = self.window.project
-        listed = stages(project, "" if self._measured.value == _NONE else self._measured.value)
-        stamp = project.stamp()
-        if (stamp, listed, self._stage, self.window.dark) != self._shown:
-            self._shown = (stamp, listed, self._stage, self.window.dark)
+        chosen = "" if self._measured.value == _NONE else self._measured.value
+        shown = (project.stamp(), chosen, self._stage, self.window.dark)
+        if shown != self._shown:
+            self._shown = shown
+            listed = stages(project, chosen)
             self._list(listed)
-            folder = self._folder()
-            chosen = self._measured.value if folder == CALIBRATION else ""
+            finished = {s.title: s.folder for s in listed if (project.folder / s.folder / RESULTS).is_file()}
+            # that of the stage that ran last, else of the last one that is there
+            title = self._stage if self._stage in finished else next(reversed(finished), None)
+            folder = None if title is None else finished[title]
             self._result.show(
-                folder, lambda: self._add_choice(folder), chosen="" if chosen == _NONE else chosen
+                folder,
+                lambda: self._add_choice(tuple(finished), title),
+                chosen=chosen if folder == CALIBRATION else "",
             )
         self._result.refresh()
 
@@ -79,7 +82,7 @@ class CalibrateStep(Step):
                     self.window.button(
                         f"{'Calibrate' if stage.folder == CALIBRATION else 'Identify'}{again}: {stage.title.lower()}",
                         lambda stage=stage: self._run(stage),
-                        hint="$ flexcal " + " ".join(stage.arguments),
+                        hint=f"$ {command_line(stage.arguments)}",
                         main=stage.folder == CALIBRATION,
                     )
 
@@ -100,13 +103,11 @@ class CalibrateStep(Step):
         self.window.choices.put("stage", stage.title)
         self.window.command(stage.arguments)
 
-    def _add_choice(self, folder: str | None) -> None:
+    def _add_choice(self, titles: tuple[str, ...], title: str | None) -> None:
         """A choice of the stage whose result is shown, where there are several."""
-        found = {stage.title: stage.folder for stage in self._with_results()}
-        if len(found) < 2:
+        if title is None or len(titles) < 2:
             return
-        here = next(title for title, place in found.items() if place == folder)
-        choice = self.window.gui.add_dropdown("Result of", tuple(found), initial_value=here)
+        choice = self.window.gui.add_dropdown("Result of", titles, initial_value=title)
 
         def chosen() -> None:
             self._stage = choice.value
@@ -114,12 +115,3 @@ class CalibrateStep(Step):
             self.refresh()
 
         choice.on_update(lambda _: self.window.post(chosen))
-
-    def _folder(self) -> str | None:
-        """Folder of the result to show: of the stage that ran last, else of the last one that is there."""
-        found = self._with_results()
-        return next((s.folder for s in found if s.title == self._stage), found[-1].folder if found else None)
-
-    def _with_results(self) -> list[Stage]:
-        folder = self.window.project.folder
-        return [s for s in stages(self.window.project, "") if (folder / s.folder / RESULTS).is_file()]

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
-from pathlib import Path
 from typing import Literal
 
-from flexcal.errors import FlexcalError, InputError
-from flexcal.jobs.result_files import RESULTS
-from flexcal.studio.project import CALIBRATION, MEASURED, Project
+from flexcal.errors import FlexcalError
+from flexcal.jobs.result_files import ESTIMATES, RESULTS
+from flexcal.studio.project import CALIBRATION, MEASURED, Project, read_plan_file
+from flexcal.studio.steps.results import ResultSource
 
 INERTIALS, RESPONSES, STIFFNESS = "inertials", "responses", "stiffness"
 """Folders of results."""
@@ -122,47 +121,23 @@ def _stage(
 
 def _difference(project: Project, measured: str) -> str:
     """How the measured poses of the result differ from a file of them; empty where it is fitted to that file as it is now."""
-    from flexcal.files.formats import sha256_of
-
-    file, estimates = project.folder / measured, project.folder / CALIBRATION / "estimates.yaml"
-    try:
-        written = estimates.stat()
-        inputs = _inputs(estimates, written.st_mtime_ns, written.st_size)
-        digest = sha256_of(file)
-    except (OSError, FlexcalError):
+    folder = project.folder / CALIBRATION
+    source = ResultSource.read(folder)
+    if source is None or not (folder / ESTIMATES).is_file() or not (project.folder / measured).is_file():
         return "has a result, but of which poses cannot be read"
-    if digest in inputs.values():
+    if source.is_of(project.folder / measured):
         return ""
-    if file.name in [Path(name).name for name in inputs]:
+    if source.names_table(measured):
         return f"calibrated from {measured} as it was; it has changed since"
-    return f"calibrated from {', '.join(inputs) or 'other poses'}; {measured} is not in it"
-
-
-@lru_cache(maxsize=4)
-def _inputs(estimates: Path, changed: int, size: int) -> dict[str, str]:
-    """SHA-256 of the tables of poses, by name, that a calibration is fitted to; `changed` and `size` tell versions of the file apart."""
-    from flexcal.files.formats import read_estimates
-
-    block = read_estimates(estimates).get("calibration")
-    origin = {} if block is None else block.provenance
-    return {
-        key.removeprefix("input."): digest
-        for key, digest in origin.items()
-        if key.startswith("input.") and Path(key).suffix in (".csv", ".parquet")
-    }
+    return f"calibrated from {', '.join(source.tables) or 'other poses'}; {measured} is not in it"
 
 
 def _plans(project: Project) -> dict[str, str]:
     """Kind of the plan in each folder of recordings."""
-    from flexcal.data.plans import read_plan
-
     found = {}
     for name in project.files("plan.yaml"):
         folder, _, file = name.rpartition("/")
-        if not folder or file != "plan.yaml":
-            continue
-        try:
-            found[folder] = read_plan(project.folder / name).kind
-        except (InputError, FlexcalError):
-            continue
+        plan = read_plan_file(project.folder / name) if folder and file == "plan.yaml" else None
+        if plan is not None:
+            found[folder] = plan.kind
     return found

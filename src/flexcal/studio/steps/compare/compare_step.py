@@ -9,17 +9,18 @@ import numpy as np
 
 from flexcal.errors import FlexcalError
 from flexcal.jobs.result_files import RESULTS
+from flexcal.studio.commands import command_line
 from flexcal.studio.project import CALIBRATION
-from flexcal.studio.scene import ResidualArrows
 from flexcal.studio.steps.compare.kept_calibrations import calibrations, keep_calibration
 from flexcal.studio.window import (
+    MagnifiedArrows,
     Place,
-    ReportFigures,
     Step,
     Window,
     add_sections,
     add_verdict,
     command_text,
+    figure_tab,
     heading,
     paragraph,
     step_link,
@@ -30,10 +31,6 @@ if TYPE_CHECKING:
     import viser
 
     from flexcal.report.results import Comparison
-
-_LENGTH = 0.1
-"""Length, m, of the larger arrows at first."""
-
 
 _UNCHANGED = (
     "Next: nothing has to be done; the earlier calibration still holds. A few fresh poses would verify it."
@@ -47,7 +44,7 @@ class CompareStep(Step):
 
     def __init__(self, window: Window):
         super().__init__(window)
-        self._arrows: ResidualArrows | None = None
+        self._arrows: MagnifiedArrows | None = None
         self._names: tuple[str, ...] = ()
         self._stamp: object = None
         self._kept: tuple[object, Comparison] | None = None
@@ -100,10 +97,7 @@ class CompareStep(Step):
     def _kept_choice(self, label: str, names: tuple[str, ...], default: str) -> viser.GuiDropdownHandle[str]:
         """A choice of a calibration that a restart keeps."""
         name, choices = f"compare.{label}", self.window.choices
-        chosen = choices.get(name, default)
-        field = self.window.gui.add_dropdown(
-            label, names, initial_value=chosen if chosen in names else default
-        )
+        field = self.window.gui.add_dropdown(label, names, initial_value=choices.among(name, names, default))
 
         def chosen_another() -> None:
             choices.put(name, field.value)
@@ -193,12 +187,9 @@ class CompareStep(Step):
                 with window.gui.add_folder("Which calibration is more accurate", expand_by_default=False):
                     add_verdict(window.gui, page)
             add_sections(window.gui, page)
-            line = f"$ flexcal report {comparison.first.name} --compare {comparison.second.name}"
-            window.gui.add_html(paragraph("the same as a page:", "faint") + command_text(line))
-        if page.figures:
-            window.figures.show(
-                {"Figures": lambda: ReportFigures(window.gui, page.figures, dark=window.dark)}
-            )
+            line = command_line(("report", comparison.first.name, "--compare", comparison.second.name))
+            window.gui.add_html(paragraph("the same as a page:", "faint") + command_text(f"$ {line}"))
+        window.figures.show(figure_tab(window, page.figures))
 
     def _add_displacement(self, comparison: Comparison) -> None:
         change = comparison.change
@@ -214,15 +205,8 @@ class CompareStep(Step):
         )
         scope = f"over {len(sizes)} random poses within the joint ranges of both. A motion of the whole robot against the instrument"
         self.window.gui.add_html(paragraph(f"{told} {scope} is taken out."))
-        start = int(np.clip(_LENGTH / max(np.percentile(change.distance, 90), 1e-9), 1, 5000))
-        factor = self.window.gui.add_slider("Magnify", min=1, max=5000, step=1, initial_value=start)
-        self._arrows = ResidualArrows(self.window.scene, change.points, change.displacement, start)
-
-        def stretch() -> None:
-            if self._arrows is not None:
-                self._arrows.exaggeration = factor.value
-
-        factor.on_update(lambda _: self.window.post(stretch))
+        self._arrows = MagnifiedArrows(self.window, change.distance, 5000)
+        self._arrows.show(change.points, change.displacement)
 
 
 def _next(later: str) -> str:

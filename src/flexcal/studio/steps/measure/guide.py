@@ -93,7 +93,6 @@ class Guide:
         self._tell = tell
         self._changed = threading.Condition()
         self._latest: Question | None = None
-        self._stopped = False
         self._known = _Known()
         threading.Thread(target=self._run, daemon=True, name="guide").start()
 
@@ -103,20 +102,12 @@ class Guide:
             self._latest = question
             self._changed.notify()
 
-    def stop(self) -> None:
-        """End the thread."""
-        with self._changed:
-            self._stopped = True
-            self._changed.notify()
-
     def _run(self) -> None:
         answered: Question | None = None
         while True:
             with self._changed:
-                while self._latest is answered and not self._stopped:
+                while self._latest is answered:
                     self._changed.wait()
-                if self._stopped:
-                    return
                 answered = self._latest
             assert answered is not None
             try:

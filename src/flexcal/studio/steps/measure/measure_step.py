@@ -18,7 +18,7 @@ from flexcal.studio.steps.measure.sentences import next_text, outlook_text, row_
 from flexcal.studio.steps.measure.series import PURPOSES
 from flexcal.studio.steps.measure.typed_source import TypedSource
 from flexcal.studio.steps.measure.virtual_source import VirtualSource
-from flexcal.studio.window import Step, Window, paragraph
+from flexcal.studio.window import Place, Step, Window, paragraph
 
 _SOURCES: tuple[type[RowSource], ...] = (TypedSource, FileSource, FolderSource, VirtualSource)
 
@@ -60,8 +60,8 @@ class MeasureStep(Step):
             self._moved_button = window.button("", self._move_station)
             self._moved_button.visible = False
             self._add_choice("Rows come from", "row source", [one.title for one in _SOURCES])
-            self._place = gui.add_folder(None)
-            self._station_place = gui.add_folder(None)
+            self._place = Place(gui)
+            self._station_place = Place(gui)
             self._station_button = window.button(
                 "",
                 self._move_station,
@@ -171,11 +171,8 @@ class MeasureStep(Step):
     def _show_station(self) -> None:
         measuring, names = self.measuring, self.measuring.series.model.stations.names
         if names != self._stations:
-            order, self._stations = self._station_place.order, names
-            self._station_place.remove()
-            with self._body:
-                self._station_place = self.window.gui.add_folder(None, order=order)
-            with self._station_place:
+            self._stations = names
+            with self._station_place.anew():
                 self._station = self.window.gui.add_dropdown(
                     "Station",
                     names,
@@ -215,9 +212,8 @@ class MeasureStep(Step):
 
     # choices
     def _add_choice(self, label: str, name: str, options: list[str]) -> None:
-        chosen = self.window.choices.get(name, options[0])
         element = self.window.gui.add_dropdown(
-            label, options, initial_value=chosen if chosen in options else options[0]
+            label, options, initial_value=self.window.choices.among(name, options)
         )
         element.on_update(lambda _: self.window.post(lambda: self._chosen(name, element.value)))
 
@@ -232,13 +228,10 @@ class MeasureStep(Step):
         self.refresh()
 
     def _add_source(self) -> None:
-        order, title = self._place.order, self.window.choices.get("row source", _SOURCES[0].title)
-        self._place.remove()
+        title = self.window.choices.get("row source", _SOURCES[0].title)
         kind = next((one for one in _SOURCES if one.title == title), _SOURCES[0])
         self._source = kind(self.window, self.measuring, self.refresh)
-        with self._body:
-            self._place = self.window.gui.add_folder(None, order=order)
-        with self._place:
+        with self._place.anew():
             self._source.add()
 
     # actions

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.studio.window import paragraph
-from flexcal.units import DEGREE, MILLIMETRE
+from flexcal.studio.window import joint_unit, paragraph
 
 if TYPE_CHECKING:
+    from flexcal.model.parts import Joint
     from flexcal.model.robot import RobotModel
     from flexcal.studio.steps.measure.next_pose import NextPose
 
@@ -21,8 +22,7 @@ def pose_card(model: RobotModel, pose: NextPose, place: str) -> str:
     Joint positions are those of the URDF; of prismatic joints mm and m.
     """
     cells = "".join(
-        _joint(joint.name, joint.kind == "prismatic", float(value))
-        for joint, value in zip(model.motor_joints, pose.q, strict=True)
+        _joint(joint, float(value)) for joint, value in zip(model.motor_joints, pose.q, strict=True)
     )
     payload = "" if pose.payload is None else paragraph(f"payload {pose.payload:g} kg")
     reserve = _reserve(model, pose.q)
@@ -37,21 +37,31 @@ def pose_card(model: RobotModel, pose: NextPose, place: str) -> str:
 
 def _reserve(model: RobotModel, q: np.ndarray) -> str:
     """What is not known of a pose (n,) of a robot without collision shapes; empty for others."""
-    from flexcal.design.scene import below_base, has_collision_shapes, is_hanging
+    from flexcal.design.scene import below_base
 
-    if has_collision_shapes(model):
+    is_checked, hangs = _shape(model)
+    if is_checked:
         return ""
-    below = not is_hanging(model) and bool(below_base(model, q[None])[0])
+    below = not hangs and bool(below_base(model, q[None])[0])
     low = " A joint or the point is below the base plane." if below else ""
     return f"Collisions are not checked: the URDF has no collision shapes; move there slowly and look.{low}"
 
 
-def _joint(name: str, slides: bool, value: float) -> str:
-    large, unit = (f"{value / MILLIMETRE:.3f}", "mm") if slides else (f"{value / DEGREE:.3f}", "°")
-    large = large.replace("-", "\N{MINUS SIGN}") if np.isfinite(value) else "?"
-    small = f"{value:.6f} {'m' if slides else 'rad'}"
+@lru_cache(maxsize=2)
+def _shape(model: RobotModel) -> tuple[bool, bool]:
+    """Whether a robot has collision shapes, and whether it hangs; asked for every row that comes."""
+    from flexcal.design.scene import has_collision_shapes, is_hanging
+
+    shapes = has_collision_shapes(model)
+    return shapes, not shapes and is_hanging(model)
+
+
+def _joint(joint: Joint, value: float) -> str:
+    size, unit = joint_unit(joint, "°")
+    large = f"{value / size:.3f}".replace("-", "\N{MINUS SIGN}") if np.isfinite(value) else "?"
+    small = f"{value:.6f} {'m' if joint.kind == 'prismatic' else 'rad'}"
     return (
-        f'<div style="line-height:1.15;"><div style="font-size:0.7em;opacity:0.8;">{escape(name)} · {small}</div>'
+        f'<div style="line-height:1.15;"><div style="font-size:0.7em;opacity:0.8;">{escape(joint.name)} · {small}</div>'
         f'<div style="font-size:1.65em;font-weight:600;font-variant-numeric:tabular-nums;white-space:nowrap;">{large}'
         f'<span style="font-size:0.6em;font-weight:400;"> {unit}</span></div></div>'
     )

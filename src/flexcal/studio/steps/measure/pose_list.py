@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from flexcal.studio.window import Tone, picked_rows
+from flexcal.studio.window import Tone, picked_rows, pose_keys
 
 if TYPE_CHECKING:
     from flexcal.jobs.guidance import Judgement, JudgementCode
@@ -39,9 +39,8 @@ _WORDS: dict[JudgementCode, str] = {
 
 
 def row_keys(series: Series) -> list[str]:
-    """Key of every row in the selection: the number of its pose, and its row where the pose has several."""
-    numbers = series.numbers.tolist()
-    return [f"{n}.{row + 1}" if numbers.count(n) > 1 else f"{n}" for row, n in enumerate(numbers)]
+    """Key of every row in the selection."""
+    return pose_keys(series.numbers.tolist())
 
 
 def pose_list(

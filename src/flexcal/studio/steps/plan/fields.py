@@ -47,10 +47,8 @@ class Fields:
         self, name: str, label: str, options: Sequence[str], *, hint: str
     ) -> viser.GuiDropdownHandle[Any]:
         """One of some texts, the first by default."""
-        value = self._window.choices.get(f"plan.{self._form}.{name}", options[0])
-        field = self._window.gui.add_dropdown(
-            label, tuple(options), initial_value=value if value in options else options[0], hint=hint
-        )
+        value = self._window.choices.among(f"plan.{self._form}.{name}", options)
+        field = self._window.gui.add_dropdown(label, tuple(options), initial_value=value, hint=hint)
         return self._kept(field, name, str)
 
     def tick(self, name: str, label: str, *, hint: str) -> viser.GuiCheckboxHandle:

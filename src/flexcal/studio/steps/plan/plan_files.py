@@ -3,13 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from flexcal.errors import FlexcalError
-from flexcal.studio.project import ROBOT, Project
-
-if TYPE_CHECKING:
-    from flexcal.data.plans import Plan
+from flexcal.studio.project import ROBOT, Project, read_plan_file
 
 _HEAD = 200_000
 """Bytes of a file in which its kind is looked for."""
@@ -25,16 +20,6 @@ def plan_files(project: Project, kind: str) -> list[str]:
         and read_plan_file(project.folder / name) is not None
     ]
     return sorted(names, key=lambda name: (name.count("/"), name))
-
-
-def read_plan_file(path: Path) -> Plan | None:
-    """A plan; None where the file is none."""
-    from flexcal.data.plans import read_plan
-
-    try:
-        return read_plan(path)
-    except FlexcalError:
-        return None
 
 
 def _says(path: Path, kind: str) -> bool:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar
 
 from flexcal.errors import InputError
-from flexcal.studio.project import ROBOT
+from flexcal.studio.commands import command_line
+from flexcal.studio.project import ROBOT, read_plan_file
 from flexcal.studio.steps.plan.fields import Fields
-from flexcal.studio.steps.plan.plan_files import read_plan_file
 from flexcal.studio.window import command_text, paragraph
 
 if TYPE_CHECKING:
@@ -102,7 +101,7 @@ class PlanForm(ABC):
     def show_line(self) -> None:
         """Show the command line as the fields make it."""
         try:
-            line = shlex.join(["flexcal", *self.arguments])
+            line = command_line(self.arguments)
         except InputError as problem:
             self._line.content = paragraph(self.window.project.told(str(problem)), "bad")
             return

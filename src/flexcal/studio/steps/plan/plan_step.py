@@ -5,16 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from flexcal.errors import FlexcalError
+from flexcal.studio.project import read_plan_file
 from flexcal.studio.steps.plan.frequency_form import FrequencyForm
 from flexcal.studio.steps.plan.motion_plan_view import MotionPlanView
-from flexcal.studio.steps.plan.plan_files import plan_files, read_plan_file
+from flexcal.studio.steps.plan.plan_files import plan_files
 from flexcal.studio.steps.plan.plan_form import PlanForm
 from flexcal.studio.steps.plan.plan_view import PlanView
 from flexcal.studio.steps.plan.pose_form import PoseForm
 from flexcal.studio.steps.plan.pose_plan_view import PosePlanView
 from flexcal.studio.steps.plan.trajectory_form import TrajectoryForm
 from flexcal.studio.steps.plan.verification_form import VerificationForm
-from flexcal.studio.window import Step, Window, add_fold, paragraph
+from flexcal.studio.window import Place, Step, Window, add_fold, paragraph
 
 if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
@@ -41,15 +42,13 @@ class PlanStep(Step):
         """Add the choice of what to plan, the form for it, and the plan."""
         window, gui = self.window, self.window.gui
         self._asked = self._shown = None
-        subject = window.choices.get("plan", PoseForm.subject)
+        subjects = tuple(_FORMS)
         self._subject = gui.add_dropdown(
-            "What to plan",
-            tuple(_FORMS),
-            initial_value=subject if subject in _FORMS else PoseForm.subject,
+            "What to plan", subjects, initial_value=window.choices.among("plan", subjects)
         )
         self._subject.on_update(lambda _: window.post(self._choose))
-        self._place = gui.add_folder(None)
-        self._result = gui.add_folder(None)
+        self._place = Place(gui)
+        self._result = Place(gui)
 
     def refresh(self) -> None:
         """Show form and plan anew where their files have changed, and the selected pose."""
@@ -101,11 +100,9 @@ class PlanStep(Step):
 
     def _ask(self) -> None:
         """The form of what is to be planned; why there is none, where the robot cannot be used."""
-        window, order = self.window, self._place.order
+        window = self.window
         self._close_form()
-        self._place.remove()
-        self._place = window.gui.add_folder(None, order=order)
-        with self._place:
+        with self._place.anew():
             model = self._model()
             if model is None:
                 return
@@ -149,15 +146,13 @@ class PlanStep(Step):
         return form.file if form.file in plans else ""
 
     def _show(self, plans: tuple[str, ...]) -> None:
-        window, order = self.window, self._result.order
+        window = self.window
         self._close_view()
         window.figures.clear()
-        self._result.remove()
-        self._result = window.gui.add_folder(None, order=order)
-        if not plans or self._form is None:
-            return
         chosen = self._chosen(plans)
-        with self._result:
+        with self._result.anew():
+            if not plans or self._form is None:
+                return
             options = plans if chosen else (_NONE, *plans)
             self._plan = window.gui.add_dropdown("Plan shown", options, initial_value=chosen or _NONE)
             self._plan.on_update(lambda _: window.post(self._choose_plan))

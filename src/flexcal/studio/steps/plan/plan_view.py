@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from html import escape
 from typing import TYPE_CHECKING
 
 from flexcal.data.plans import page_beside
+from flexcal.studio.window import file_link
 
 if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
@@ -52,8 +52,5 @@ class PlanView(ABC):
         """Add a link to the page beside the plan, where there is one."""
         page = page_beside(self.window.project.folder / self.name)
         if page.is_file():
-            place = escape(page.relative_to(self.window.project.folder).as_posix(), quote=True)
-            self.window.gui.add_html(
-                f'<a href="files/{place}" target="_blank" rel="noopener" style="margin:0.5em;font-size:0.85em;">'
-                "open the plan's page</a>"
-            )
+            name = page.relative_to(self.window.project.folder).as_posix()
+            self.window.gui.add_html(file_link(name, "open the plan's page"))

@@ -13,8 +13,7 @@ from flexcal.studio.steps.plan.plan_view import PlanView
 from flexcal.studio.steps.plan.player import Player
 from flexcal.studio.steps.plan.pose_checks import PoseChecks
 from flexcal.studio.steps.plan.pose_scene import PoseScene
-from flexcal.studio.window import ReportFigures, add_sections, add_verdict, paragraph, picked_rows
-from flexcal.units import DEGREE, MILLIMETRE
+from flexcal.studio.window import ReportFigures, add_sections, add_verdict, joint_unit, paragraph, picked_rows
 
 if TYPE_CHECKING:
     from flexcal.data.plans import PosePlan
@@ -131,11 +130,11 @@ class PosePlanView(PlanView):
         self._figures = ReportFigures(self.window.gui, blocks, dark=self.window.dark)
 
     def _columns(self) -> tuple[str, ...]:
-        units = ["mm" if joint.kind == "prismatic" else "°" for joint in self.model.motor_joints]
+        units = [joint_unit(joint, "°")[1] for joint in self.model.motor_joints]
         return ("pose", "check", *(f"q{i} / {unit}" for i, unit in enumerate(units, 1)))
 
     def _rows(self) -> dict[str, tuple[str, ...]]:
-        scale = np.array([MILLIMETRE if j.kind == "prismatic" else DEGREE for j in self.model.motor_joints])
+        scale = np.array([joint_unit(joint)[0] for joint in self.model.motor_joints])
         return {
             key: (f"pose {key}", self._checks.words(row), *(f"{x:.1f}" for x in self.plan.q[row] / scale))
             for row, key in enumerate(self._keys)

@@ -6,16 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.studio.scene import BLOCKED, COLLIDING, MEASURED, Instrument, Points
+from flexcal.studio.scene import BLOCKED, COLLIDING, MEASURED, TARGET, Instrument, Points, box_edges
 from flexcal.studio.steps.plan.pose_checks import PoseChecks
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from flexcal.studio.window import Window
-
-_EDGES = np.array([(a, a | bit) for bit in (1, 2, 4) for a in range(8) if not a & bit])
-_GREY = (125, 134, 144)
 
 
 class PoseScene:
@@ -51,10 +48,9 @@ class PoseScene:
             self._instrument = Instrument(scene, checks.instrument, "instrument", name="/plan/instrument")
             self._nodes.append(self._instrument)
         if working is not None:
-            ends = working[(np.arange(8)[:, None] >> np.arange(3)) & 1, np.arange(3)]
             self._nodes.append(
                 scene.add_line_segments(
-                    "/plan/working", ends[_EDGES], _GREY, thickness=1.5, thickness_units="screen"
+                    "/plan/working", box_edges(*working), TARGET, thickness=1.5, thickness_units="screen"
                 )
             )
         self.select(None)

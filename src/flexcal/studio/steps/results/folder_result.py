@@ -10,10 +10,10 @@ from flexcal.studio.steps.results.residuals_view import ResidualsView
 from flexcal.studio.steps.results.result_source import ResultSource
 from flexcal.studio.window import (
     Place,
-    ReportFigures,
     Window,
     add_sections,
     add_verdict,
+    figure_tab,
     file_link,
     heading,
     paragraph,
@@ -73,9 +73,7 @@ class FolderResult:
         figures: dict[str, Callable[[], object]] = {}
         if self._residuals is not None:
             figures["Poses"] = self._residuals.add_course
-        if page.figures:
-            figures["Figures"] = lambda: ReportFigures(window.gui, page.figures, dark=window.dark)
-        window.figures.show(figures)
+        window.figures.show(figures | figure_tab(window, page.figures))
 
     def refresh(self) -> None:
         """Show the selected pose."""

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
+from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 from flexcal.errors import FlexcalError
 from flexcal.files.formats import read_estimates, sha256_of
-from flexcal.jobs.result_files import RESULTS, read_results
+from flexcal.jobs.result_files import ESTIMATES, RESULTS, read_results
+from flexcal.report.sections import input_files
 
-_INPUT = "input."
 _TABLES = (".csv", ".parquet")
 
 
@@ -37,18 +38,8 @@ class ResultSource:
     @classmethod
     def read(cls, folder: Path) -> ResultSource | None:
         """Source of the result in `folder`; None where there is no result that can be read."""
-        try:
-            results = read_results(folder)
-            written = datetime.fromtimestamp((folder / RESULTS).stat().st_mtime)
-        except (FlexcalError, OSError):
-            return None
-        inputs = _provenance(folder, results)
-        tables = {
-            key.removeprefix(_INPUT): digest
-            for key, digest in inputs.items()
-            if key.startswith(_INPUT) and key.endswith(_TABLES)
-        }
-        return cls(str(results["kind"]), tables, written)
+        files = (folder / RESULTS, folder / ESTIMATES)
+        return _read(folder, tuple(path.stat().st_mtime_ns if path.is_file() else 0 for path in files))
 
     @property
     def names(self) -> str:
@@ -73,14 +64,31 @@ class ResultSource:
         except (FlexcalError, OSError):
             return False
 
+    def names_table(self, file: str) -> bool:
+        """Whether one of the tables has the name of a file, in whatever folder."""
+        return PurePosixPath(file).name in {PurePosixPath(name).name for name in self.tables}
+
     def difference(self, project: Path, chosen: str) -> str:
         """What distinguishes the chosen table, by its name in the folder `project`, from those of the result; empty where nothing does."""
         if not self.tables or self.is_of(project / chosen):
             return ""
-        if PurePosixPath(chosen).name in {PurePosixPath(name).name for name in self.tables}:
+        if self.names_table(chosen):
             return f"{chosen} has changed since the result below was computed."
         verb = "verified" if self.kind == "verification" else "used"
         return f"The result below is of {self.names}; {chosen} has not been {verb}."
+
+
+@lru_cache(maxsize=16)
+def _read(folder: Path, changed: tuple[int, ...]) -> ResultSource | None:
+    """Source of a result; `changed` tells the versions of its files apart."""
+    try:
+        results = read_results(folder)
+        written = datetime.fromtimestamp((folder / RESULTS).stat().st_mtime)
+    except (FlexcalError, OSError):
+        return None
+    files = input_files(_provenance(folder, results))
+    tables = {name: digest for name, digest in files.items() if name.endswith(_TABLES)}
+    return ResultSource(str(results["kind"]), tables, written)
 
 
 def _provenance(folder: Path, results: Mapping[str, Any]) -> Mapping[str, str]:
@@ -88,7 +96,7 @@ def _provenance(folder: Path, results: Mapping[str, Any]) -> Mapping[str, str]:
     if isinstance(results.get("provenance"), dict):
         return results["provenance"]
     try:
-        blocks = read_estimates(folder / "estimates.yaml")
+        blocks = read_estimates(folder / ESTIMATES)
     except (FlexcalError, OSError):
         return {}
     return blocks[results["kind"]].provenance if results["kind"] in blocks else {}

@@ -8,8 +8,7 @@ import numpy as np
 
 from flexcal.model.parts import Joint
 from flexcal.model.robot import RobotModel
-from flexcal.studio.window import Window, add_fold, table
-from flexcal.units import DEGREE, MILLIMETRE
+from flexcal.studio.window import Window, add_fold, joint_unit, table
 
 _FREE_TURN, _FREE_WAY = 180.0, 1000.0
 """Ends of the slider of a joint without limits, deg and mm."""
@@ -28,7 +27,7 @@ class JointSliders:
 
     def __init__(self, window: Window, model: RobotModel):
         self._window, self._model = window, model
-        self._units = np.array([_unit(joint) for joint in model.motor_joints])
+        self._units = np.array([joint_unit(joint)[0] for joint in model.motor_joints])
         gui = window.gui
         present = (np.zeros(model.n) if window.robot.q is None else window.robot.q) / self._units
         units = slider_units(model)
@@ -36,7 +35,7 @@ class JointSliders:
         for joint, value in zip(model.motor_joints, present, strict=True):
             lower, upper = slider_range(joint)
             slider = gui.add_slider(
-                f"{joint.name} / {_symbol(joint)}" if units == "deg, mm" else joint.name,
+                f"{joint.name} / {joint_unit(joint)[1]}" if units == "deg, mm" else joint.name,
                 lower,
                 upper,
                 0.1,
@@ -69,15 +68,15 @@ class JointSliders:
 
 def slider_units(model: RobotModel) -> str:
     """Units of the sliders: "deg", "mm", or "deg, mm" where some joints turn and some slide."""
-    return ", ".join(sorted({_symbol(joint) for joint in model.motor_joints}))
+    return ", ".join(sorted({joint_unit(joint)[1] for joint in model.motor_joints}))
 
 
 def slider_range(joint: Joint) -> tuple[float, float]:
     """Lower and upper end of a joint's slider, deg or mm: its limits, half a turn or a metre to both sides without; to 0.01."""
     free = _FREE_WAY if joint.kind == "prismatic" else _FREE_TURN
+    unit, _ = joint_unit(joint)
     lower, upper = (
-        round(limit / _unit(joint), 2) if math.isfinite(limit) else limit
-        for limit in (joint.lower, joint.upper)
+        round(limit / unit, 2) if math.isfinite(limit) else limit for limit in (joint.lower, joint.upper)
     )
     lower, upper = (lower if math.isfinite(lower) else -free), (upper if math.isfinite(upper) else free)
     return (lower, upper) if upper > lower else (lower, lower + 0.1)
@@ -87,14 +86,14 @@ def limits_table(model: RobotModel) -> str:
     """HTML of the limits of every joint with a motor."""
     rows = []
     for column, joint in enumerate(model.motor_joints, 1):
-        symbol, force = _symbol(joint), "N" if joint.kind == "prismatic" else "N m"
+        (unit, symbol), force = joint_unit(joint), "N" if joint.kind == "prismatic" else "N m"
         rows.append(
             (
                 f"q{column}",
                 joint.name,
-                _limit(joint.lower / _unit(joint), symbol),
-                _limit(joint.upper / _unit(joint), symbol),
-                _limit(joint.velocity / _unit(joint), f"{symbol}/s"),
+                _limit(joint.lower / unit, symbol),
+                _limit(joint.upper / unit, symbol),
+                _limit(joint.velocity / unit, f"{symbol}/s"),
                 _limit(joint.effort, force),
             )
         )
@@ -103,11 +102,3 @@ def limits_table(model: RobotModel) -> str:
 
 def _limit(value: float, unit: str) -> str:
     return f"{value:.4g} {unit}" if math.isfinite(value) else "none"
-
-
-def _unit(joint: Joint) -> float:
-    return MILLIMETRE if joint.kind == "prismatic" else DEGREE
-
-
-def _symbol(joint: Joint) -> str:
-    return "mm" if joint.kind == "prismatic" else "deg"

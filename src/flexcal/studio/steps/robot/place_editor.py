@@ -12,6 +12,7 @@ from flexcal.model.urdf import read_urdf
 from flexcal.studio.steps.robot.place_markers import PlaceMarkers
 from flexcal.studio.steps.robot.places import BASE, Place, Triple, places_of
 from flexcal.studio.steps.robot.robot_file import RobotFile
+from flexcal.studio.window import Place as GuiPlace
 from flexcal.studio.window import Window, add_fold, paragraph, table
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}")
@@ -49,7 +50,7 @@ class PlaceEditor:
         if self._index is not None:
             self._choice = gui.add_dropdown("Edit", titles, initial_value=titles[self._index])
             self._choice.on_update(lambda _: window.post(self._choose))
-        self._fields = gui.add_folder(None)
+        self._fields = GuiPlace(gui)
         if file.last_change is not None:
             window.button("Take the last change back", file.take_back, hint=file.last_change)
         with add_fold(gui, "Add a point, payload or instrument", is_open=not self.places):
@@ -78,13 +79,10 @@ class PlaceEditor:
         return tuple(kind for kind in _KINDS if kind != "payload" or not has_load)
 
     def _show(self) -> None:
-        order = self._fields.order
-        self._fields.remove()
-        self._fields = self._window.gui.add_folder(None, order=order)
-        if self._index is None:
-            return
-        place, gui, window = self._saved, self._window.gui, self._window
-        with self._fields:
+        with self._fields.anew():
+            if self._index is None:
+                return
+            place, gui, window = self._saved, self._window.gui, self._window
             frames = (BASE,) if place.frame == BASE else tuple(self._frames)
             self._frame = gui.add_dropdown(
                 "Frame", frames, initial_value=place.frame, disabled=place.frame == BASE

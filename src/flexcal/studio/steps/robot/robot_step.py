@@ -20,7 +20,7 @@ from flexcal.studio.steps.robot.problem_listing import problem_listing
 from flexcal.studio.steps.robot.robot_file import RobotFile
 from flexcal.studio.steps.robot.uploads import LARGEST, require_size
 from flexcal.studio.steps.robot.urdf_choice import UrdfChoice
-from flexcal.studio.window import Step, Window, add_fold, facts, paragraph
+from flexcal.studio.window import Place, Step, Window, add_fold, facts, paragraph
 
 if TYPE_CHECKING:
     from flexcal.studio.scene import MeshNotDrawn
@@ -48,7 +48,7 @@ class RobotStep(Step):
     def open(self) -> None:
         """Add the place for what the folder allows."""
         self._shown = None
-        self._place = self.window.gui.add_folder(None)
+        self._place = Place(self.window.gui)
 
     def refresh(self) -> None:
         """Show the robot of the folder: of robot.yaml, with all of its problems, else of the chosen URDF."""
@@ -73,10 +73,7 @@ class RobotStep(Step):
 
     def _rebuild(self) -> None:
         self.close()
-        order = self._place.order
-        self._place.remove()
-        self._place = self.window.gui.add_folder(None, order=order)
-        with self._place:
+        with self._place.anew():
             if self.window.project.robot_file.is_file():
                 self._show_description()
             else:

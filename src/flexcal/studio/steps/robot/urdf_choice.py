@@ -37,9 +37,10 @@ class UrdfChoice:
         gui = window.gui
         names = window.project.files(".urdf")
         if not described:
-            kept = window.choices.get("urdf", "")
-            first = kept if kept in names else (names or [_NONE])[0]
-            self._choice = gui.add_dropdown("URDF", names or [_NONE], initial_value=first)
+            options = names or [_NONE]
+            self._choice = gui.add_dropdown(
+                "URDF", options, initial_value=window.choices.among("urdf", options)
+            )
             self._choice.on_update(lambda _: window.post(self._chosen))
             ends = self._ends()
             if ends:
@@ -68,8 +69,7 @@ class UrdfChoice:
     def urdf(self) -> str | None:
         """Name of the chosen URDF; None where the folder has none."""
         names = self._window.project.files(".urdf")
-        kept = self._window.choices.get("urdf", "")
-        return kept if kept in names else names[0] if names else None
+        return self._window.choices.among("urdf", names) if names else None
 
     @property
     def tip(self) -> str | None:

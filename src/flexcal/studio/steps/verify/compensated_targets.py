@@ -11,10 +11,9 @@ from flexcal.jobs.inputs import CalibratedRobot, is_station_identified
 from flexcal.studio.project import CALIBRATION
 from flexcal.studio.scene import TARGET, Points
 from flexcal.studio.steps.verify.corrected_command import CorrectedCommand, TypedTarget
-from flexcal.studio.steps.verify.part import Part
 from flexcal.studio.steps.verify.target_file import TargetFile
 from flexcal.studio.steps.verify.target_files import target_files
-from flexcal.studio.window import Place, Window, paragraph, table
+from flexcal.studio.window import Place, Step, Window, joint_unit, paragraph, table
 from flexcal.units import DEGREE, MILLIMETRE
 
 _BASE = "the robot's base"
@@ -26,7 +25,7 @@ _BASE_TOLD = (
 _AT = (400.0, 200.0, 300.0)
 
 
-class CompensatedTargets(Part):
+class CompensatedTargets(Step):
     """A target typed in, its corrected command and the robot there, the nominal one as a ghost; a file of targets."""
 
     title = "Compensate"
@@ -167,7 +166,7 @@ class CompensatedTargets(Part):
         gui, joints = self.window.gui, self._robot.model.motor_joints
         rows = []
         for joint, nominal, q in zip(joints, found.nominal, found.q, strict=True):
-            unit, symbol = (MILLIMETRE, "mm") if joint.kind == "prismatic" else (DEGREE, "deg")
+            unit, symbol = joint_unit(joint)
             rows.append(
                 (
                     f"{joint.name} / {symbol}",

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import shlex
 from typing import Any
 
 from flexcal.errors import FlexcalError
 from flexcal.jobs.result_files import RESULTS
-from flexcal.studio.commands import CommandRun
+from flexcal.studio.commands import CommandRun, command_line
 from flexcal.studio.project import CALIBRATION, VERIFICATION
 from flexcal.studio.steps.verify.export_formats import ExportFormat, complete_formats, export_formats
-from flexcal.studio.steps.verify.part import Part
-from flexcal.studio.window import Place, Window, command_text, file_link, paragraph
+from flexcal.studio.window import Place, Step, Window, command_text, file_link, paragraph
 
 _SMALL = 0.01
 """Error, mm, that an exported file may have without a warning."""
@@ -25,7 +23,7 @@ _PARTICULARS = {
 }
 
 
-class Exports(Part):
+class Exports(Step):
     """A format and its command line; the customer's report and its particulars; what they wrote, as links."""
 
     title = "Export"
@@ -56,15 +54,13 @@ class Exports(Part):
             with self.window.gui.add_folder("Report for the customer"):
                 self._add_report()
 
-    def close(self) -> None:
-        """Nothing of it is in the scene."""
-
     def _add_formats(self) -> None:
         window, gui = self.window, self.window.gui
         offered = {each.name: each for each in self._formats if not each.refusal}
-        chosen = window.choices.get("format", "urdf")
+        names = tuple(offered)
+        default = "urdf" if "urdf" in offered else names[0]
         choice = gui.add_dropdown(
-            "Format", tuple(offered), initial_value=chosen if chosen in offered else next(iter(offered))
+            "Format", names, initial_value=window.choices.among("format", names, default)
         )
         told = gui.add_html("")
         window.button(
@@ -130,7 +126,7 @@ class Exports(Part):
 
 
 def _line(arguments: tuple[str, ...]) -> str:
-    return command_text("$ flexcal " + shlex.join(arguments))
+    return command_text(f"$ {command_line(arguments)}")
 
 
 def _loss(document: dict[str, Any], complete: list[str]) -> str:

@@ -21,11 +21,10 @@ def fresh_files(project: Project) -> list[str]:
     """Names of tables of measured poses without rows of the calibration; that of a guided session first."""
     folder = project.folder / CALIBRATION
     source = ResultSource.read(folder)
-    fitted = set() if source is None else {name.rpartition("/")[2] for name in source.tables}
     names = [
         name
         for name in pose_files(project)
-        if name.rpartition("/")[2] not in fitted
+        if (source is None or not source.names_table(name))
         and not _is_fitted(_stamped(project.folder / name), _stamped(folder / "points.csv"))
     ]
     return sorted(names, key=lambda name: name != CHECKED)

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from flexcal.jobs.result_files import RESULTS
+from flexcal.studio.commands import command_line
 from flexcal.studio.project import CALIBRATION, CHECKED, VERIFICATION
 from flexcal.studio.steps.results import FolderResult, ResultSource
 from flexcal.studio.steps.verify.fresh_files import fresh_files
-from flexcal.studio.steps.verify.part import Part
 from flexcal.studio.window import (
     Place,
+    Step,
     Window,
     paragraph,
     step_link,
 )
 
 
-class FreshPoses(Part):
+class FreshPoses(Step):
     """Accuracy at poses measured outside the fit."""
 
     title = "Verify"
@@ -58,8 +59,7 @@ class FreshPoses(Part):
                     + step_link("Plan", "plan poses to verify on")
                 )
                 return
-            chosen = window.choices.get("fresh", names[0])
-            self._file = chosen if chosen in names else names[0]
+            self._file = window.choices.among("fresh", names)
             files = window.gui.add_dropdown("Fresh poses", names, initial_value=self._file)
             files.on_update(lambda _: window.post(lambda: self._choose(files.value)))
             self._buttons = Place(window.gui)
@@ -82,17 +82,17 @@ class FreshPoses(Part):
             window.button(
                 "Verify on these poses" + ("" if source is not None else again),
                 self._verify if source is None else self._ask,
-                hint="$ flexcal " + " ".join(self._arguments()),
+                hint=f"$ {command_line(self._arguments())}",
                 main=True,
             )
 
     def _other_source(self) -> ResultSource | None:
         """What the present verification is of, where that is another table."""
-        source = ResultSource.read(self.window.project.folder / VERIFICATION)
-        name = self._file.rpartition("/")[2]
-        if source is None or name in {table.rpartition("/")[2] for table in source.tables}:
+        folder = self.window.project.folder
+        source = ResultSource.read(folder / VERIFICATION)
+        if source is None or source.names_table(self._file) or source.is_of(folder / self._file):
             return None
-        return None if source.is_of(self.window.project.folder / self._file) else source
+        return source
 
     def _ask(self) -> None:
         """Have the replacement of a verification of another table confirmed."""

@@ -44,18 +44,19 @@ class MapView:
         gui, names = window.gui, tuple(self._errors)
         gui.add_html(paragraph(_sentence(self._errors)))
         gui.add_html(table(("error / mm", "median", "P90", "worst"), _rows(self._errors)))
-        shown = window.choices.get("map error", _MEAN)
-        self._error = gui.add_dropdown("Colours", names, initial_value=shown if shown in names else _MEAN)
+        choices = window.choices
+        self._error = gui.add_dropdown(
+            "Colours", names, initial_value=choices.among("map error", names, _MEAN)
+        )
         self._legend = gui.add_html("")
         self._shared = gui.add_checkbox(
             "Same colours",
-            window.choices.get("map same colours", False),
+            choices.get("map same colours", False),
             hint="one scale of colours for the errors before and after calibration",
             visible=_BEFORE in self._errors,
         )
         cuts = (_NO_CUT, "x", "y", "z")
-        cut = window.choices.get("map cut", "y")
-        self._axis = gui.add_dropdown("Cut along", cuts, initial_value=cut if cut in cuts else "y")
+        self._axis = gui.add_dropdown("Cut along", cuts, initial_value=choices.among("map cut", cuts, "y"))
         self._position = gui.add_slider(
             "Plane / mm", min=-1, max=1, step=_STEP, initial_value=0, visible=False
         )

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import shlex
 from typing import Any
 
-from flexcal.studio.commands import CommandRun
+from flexcal.studio.commands import CommandRun, command_line
 from flexcal.studio.project import CALIBRATION
 from flexcal.studio.window import Window, command_text, file_link, paragraph, table
 
@@ -36,8 +35,7 @@ class TargetFile:
                 )
             )
             return
-        chosen = window.choices.get("targets", names[0])
-        self._file = gui.add_dropdown("Targets", names, initial_value=chosen if chosen in names else names[0])
+        self._file = gui.add_dropdown("Targets", names, initial_value=window.choices.among("targets", names))
         self._line = gui.add_html("")
         window.button("Compensate the file", self._run)
         self._told = gui.add_html(_links(window))
@@ -57,7 +55,7 @@ class TargetFile:
 
     def _changed(self) -> None:
         self._window.choices.put("targets", self._file.value)
-        self._line.content = command_text("$ flexcal " + shlex.join(self._arguments()))
+        self._line.content = command_text(f"$ {command_line(self._arguments())}")
 
     def _run(self) -> None:
         self._window.command(self._arguments(), self._ended)

@@ -6,11 +6,10 @@ from flexcal.studio.project import CALIBRATION
 from flexcal.studio.steps.verify.compensated_targets import CompensatedTargets
 from flexcal.studio.steps.verify.exports import Exports
 from flexcal.studio.steps.verify.fresh_poses import FreshPoses
-from flexcal.studio.steps.verify.part import Part
 from flexcal.studio.steps.verify.volume_accuracy import VolumeAccuracy
 from flexcal.studio.window import Place, Step, Window, heading, paragraph, step_link
 
-_PARTS: tuple[type[Part], ...] = (FreshPoses, VolumeAccuracy, CompensatedTargets, Exports)
+_PARTS: tuple[type[Step], ...] = (FreshPoses, VolumeAccuracy, CompensatedTargets, Exports)
 _OPEN = "● "
 
 
@@ -21,7 +20,7 @@ class VerifyStep(Step):
 
     def __init__(self, window: Window):
         super().__init__(window)
-        self._part: Part | None = None
+        self._part: Step | None = None
 
     def open(self) -> None:
         """Add the choice of the part, and the part that was chosen last."""
@@ -66,7 +65,7 @@ class VerifyStep(Step):
             self._part.open()
         self.refresh()
 
-    def _add_choice(self, chosen: type[Part]) -> None:
+    def _add_choice(self, chosen: type[Step]) -> None:
         """A button a part; the one that is open is marked."""
         parts = {(_OPEN if part is chosen else "") + part.title: part.title for part in _PARTS}
         choice = self.window.gui.add_button_group("Show", tuple(parts))

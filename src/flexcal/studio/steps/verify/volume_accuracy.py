@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import shlex
-
 from flexcal.errors import FlexcalError
 from flexcal.jobs.accuracy import MapTable
 from flexcal.jobs.calibration import outside_ranges
 from flexcal.jobs.inputs import CalibratedRobot
+from flexcal.studio.commands import command_line
 from flexcal.studio.project import CALIBRATION, MAP
 from flexcal.studio.steps.verify.fresh_files import fresh_files
 from flexcal.studio.steps.verify.map_view import MapView
-from flexcal.studio.steps.verify.part import Part
 from flexcal.studio.steps.verify.working_places import working_places
-from flexcal.studio.window import Place, Window, command_text, file_link, paragraph
+from flexcal.studio.window import Place, Step, Window, command_text, file_link, paragraph
 
 _TABLE = f"{MAP}.csv"
 _NONE = "nothing"
 
 
-class VolumeAccuracy(Part):
+class VolumeAccuracy(Step):
     """Where the map is computed and what verifies it; the map in the scene, before and after calibration, cut open."""
 
     title = "Map"
@@ -59,8 +57,12 @@ class VolumeAccuracy(Part):
     def _ask(self, places: dict[str, tuple[str, ...]], fresh: list[str]) -> None:
         window, gui = self.window, self.window.gui
         with self._question.anew():
-            where = _dropdown(window, "Where", "map where", list(places))
-            verified = _dropdown(window, "Fresh poses", "map verified", [*fresh, _NONE])
+            choices, names = window.choices, list(places)
+            where = gui.add_dropdown("Where", names, initial_value=choices.among("map where", names))
+            names = [*fresh, _NONE]
+            verified = gui.add_dropdown(
+                "Fresh poses", names, initial_value=choices.among("map verified", names)
+            )
             line = gui.add_html("")
 
             def arguments() -> tuple[str, ...]:
@@ -75,7 +77,7 @@ class VolumeAccuracy(Part):
             def changed() -> None:
                 window.choices.put("map where", where.value)
                 window.choices.put("map verified", verified.value)
-                line.content = command_text("$ flexcal " + shlex.join(arguments()))
+                line.content = command_text(f"$ {command_line(arguments())}")
 
             for choice in (where, verified):
                 choice.on_update(lambda _: window.post(changed))
@@ -111,8 +113,3 @@ class VolumeAccuracy(Part):
             self._view = MapView(window, table)
             if path.with_suffix(".html").is_file():
                 window.gui.add_html(file_link(f"{MAP}.html", "open the page of the map"))
-
-
-def _dropdown(window: Window, label: str, name: str, options: list[str]):
-    chosen = window.choices.get(name, options[0])
-    return window.gui.add_dropdown(label, options, initial_value=chosen if chosen in options else options[0])
