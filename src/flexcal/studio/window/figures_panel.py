@@ -43,10 +43,10 @@ class FiguresPanel:
             self._panel.minimize()
 
     def _is_narrow(self) -> bool:
-        """Whether the scene of a window is narrow."""
+        """Whether the scene of every window is narrow: the panel is the same in all."""
         widths = [client.camera.image_width for client in self._server.get_clients().values()]
         taken = 0 if self._panel is None else _WIDTH
-        return bool(widths) and min(widths) + taken < _NARROW
+        return bool(widths) and max(widths) + taken < _NARROW
 
     def clear(self) -> None:
         """Remove the figures."""
