@@ -216,7 +216,7 @@ def guided_session(walk: Walk, url: str) -> dict[str, Image.Image]:
     walk.turn(-60, 40, -6)
     walk.take(SHORT)
     walk.choose("Cut along", "y")
-    walk.turn(-130, -20, 2)
+    walk.turn(60, -20, 2)
     walk.show("5 Verify")
     map = walk.take()
     walk.choose("Colours", "calibrated, mean")
