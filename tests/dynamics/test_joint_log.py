@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import distributed
 import joblib
 import numpy as np
 import pytest
@@ -79,7 +80,6 @@ def test_processes_change_nothing(logs: list[Path], observation: Observation, tm
 
 
 def test_the_same_call_on_dask(logs: list[Path], observation: Observation, tmp_path: Path) -> None:
-    distributed = pytest.importorskip("distributed", reason="distributed (Dask) is not installed")
     with (
         distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, dashboard_address=None, local_directory=str(tmp_path / "dask")
