@@ -45,6 +45,7 @@ SUBJECTS = {
     "TABLE": "Tables",
     "TOOL": "Tool and work object",
     "URDF": "URDF",
+    "WORK": "Worker processes and clusters",
     "YAML": "YAML",
 }
 HEAD = """# Errors

@@ -16,7 +16,7 @@ import os, sys, time
 from pathlib import Path
 from joblib import Parallel, delayed
 from flexcal.jobs.logs import scratch_folder
-from flexcal.jobs.logs.worker_processes import WorkerTask, start_workers
+from flexcal.parallel import WorkerTask, start_workers
 
 def work(folder):
     Path(folder, f"pid_{os.getpid()}").touch()

@@ -14,8 +14,8 @@ from flexcal.dynamics.inverse_model import Observation
 from flexcal.dynamics.regression import ExperimentSystem, experiment_system
 from flexcal.dynamics.signals import JointLog, Window
 from flexcal.jobs.logs.preprocessing import Preprocessing
-from flexcal.jobs.logs.worker_processes import WorkerTask, start_workers
 from flexcal.model.robot import RobotModel
+from flexcal.parallel import WorkerTask, start_workers
 from flexcal.progress import Progress
 
 _LEAST = 1e-6

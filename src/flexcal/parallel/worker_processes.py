@@ -6,7 +6,8 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Generic, ParamSpec, TypeVar
 
@@ -33,16 +34,24 @@ class WorkerTask(Generic[P, T]):
 
 def start_workers(jobs: int) -> None:
     """Start joblib worker processes that leave Ctrl-C, sent to all processes of a terminal, to this process."""
+    from joblib import Parallel, delayed
+
+    with interrupts_left_to_this_process():
+        Parallel(n_jobs=jobs)(delayed(WorkerTask(int))() for _ in range(jobs))
+
+
+@contextmanager
+def interrupts_left_to_this_process() -> Iterator[None]:
+    """Within the block, processes are started that ignore Ctrl-C."""
     from multiprocessing import resource_tracker
 
-    from joblib import Parallel, delayed
     from joblib.externals.loky.backend import resource_tracker as loky_tracker
 
     for tracker in (resource_tracker, loky_tracker):  # their start would let signals through again
         tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # which is handed down
     try:
-        Parallel(n_jobs=jobs)(delayed(WorkerTask(int))() for _ in range(jobs))
+        yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 

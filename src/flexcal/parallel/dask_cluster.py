@@ -1,0 +1,192 @@
+"""Tasks on a Dask cluster."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+import uuid
+from collections.abc import Callable, Iterable, Iterator
+from itertools import islice
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from flexcal.errors import FlexcalError, InputError
+from flexcal.parallel.outcome import Outcome, TaskError, run_task
+from flexcal.parallel.workers import Workers
+
+if TYPE_CHECKING:
+    from distributed import Future
+
+V = TypeVar("V")
+_AHEAD = 2
+"""Tasks a thread that are sent before the last has ended, so that none waits for the next."""
+_RECOUNT = 1.0
+"""Seconds between two counts of the workers."""
+_GIVEN_UP = "all worker processes ended while they ran this task (killed, out of memory, or crashed)"
+_one_at_a_time = threading.Lock()
+"""Held while a task runs: robots have memory of their own to compute in, and threads of a worker share them."""
+_PATIENCE = 10.0
+"""Seconds that the scheduler may take to answer, and a first worker to arrive."""
+
+
+class DaskCluster(Workers):
+    """Runs tasks on the workers of a Dask scheduler.
+
+    Parameters
+    ----------
+    address : str
+        `dask://host:port`, or `tls://host:port` with certificates as Dask's configuration names them (distributed.comm.tls). Functions and
+        values travel as pickles, which can run any code: a cluster must be one's own.
+
+    Raises
+    ------
+    InputError
+        Where the package distributed is missing, no scheduler answers, it has no worker, or a worker has no flexcal or another version.
+    """
+
+    client: Any
+    """The `distributed.Client`, for what is more than independent tasks."""
+
+    def __init__(self, address: str):
+        try:
+            from distributed import Client
+        except ImportError as problem:
+            raise InputError(
+                "E-WORK-001", f"{address} needs Dask: pip install 'flexcal[cluster]'."
+            ) from problem
+        self.address = address
+        self._threads, self._counted = 0, -math.inf
+        place = address.replace("dask://", "tcp://", 1)
+        try:
+            self.client = Client(place, timeout=_PATIENCE, set_as_default=False)
+        except (OSError, TypeError, ValueError) as problem:  # TypeError: no certificates
+            reason = " ".join(str(problem).split())
+            raise InputError(
+                "E-WORK-002",
+                f"no Dask scheduler can be reached at {address} ({reason}); check the address, and that 'dask scheduler' runs there; "
+                "tls:// needs the certificates of distributed.comm.tls in Dask's configuration.",
+            ) from problem
+        try:
+            self._require_workers()
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def count(self) -> int:
+        """As `Workers.count`: threads of all workers."""
+        return sum(self.client.nthreads().values())
+
+    def results(self, function: Callable[..., V], tasks: Iterable[Any], *common: Any) -> Iterator[Outcome[V]]:
+        """As `Workers.results`.
+
+        Raises `FlexcalError` where the scheduler is lost, and `InputError` where a worker that came later has another flexcal or none.
+        """
+        from distributed import as_completed
+
+        name = f"flexcal-{uuid.uuid4().hex}"
+        client, numbered = self.client, iter(enumerate(tasks))
+        shared = client.submit(_together, function, *common, key=f"{name}-common")
+        waiting = as_completed(loop=client.loop, with_results=True, raise_errors=False)
+        running: dict[Future, tuple[int, Any]] = {}
+        suspects: list[tuple[int, Any]] = []  # each ran beside a killed worker, or killed it
+
+        def send(index: int, task: Any, turn: str) -> None:
+            future = client.submit(_run, shared, index, task, key=f"{name}-{index}-{turn}", pure=False)
+            running[future] = index, task
+            waiting.add(future)
+
+        try:
+            for index, task in islice(numbered, self._ahead()):
+                send(index, task, "first")
+            while running:
+                future, result = next(waiting)
+                index, task = running.pop(future)
+                outcome = self._outcome(future.status, result, index)
+                if outcome is None:
+                    suspects.append((index, task))
+                else:
+                    yield outcome
+                for index, task in islice(numbered, max(0, self._ahead() - len(running))):
+                    send(index, task, "first")
+            for index, task in suspects:  # each alone
+                send(index, task, "second")
+                future, result = next(waiting)
+                del running[future]
+                outcome = self._outcome(future.status, result, index)
+                yield outcome or Outcome(index, None, TaskError(None, _GIVEN_UP), 0.0)
+        finally:
+            if client.status == "running":
+                client.cancel([*running, shared])
+
+    def _ahead(self) -> int:
+        """Tasks that may be under way; workers that came in the last second may be missing."""
+        if time.monotonic() > self._counted + _RECOUNT:
+            before, self._threads, self._counted = self._threads, self.count, time.monotonic()
+            if self._threads > before:
+                self._require_same_version()
+        return max(1, _AHEAD * self._threads)
+
+    def close(self) -> None:
+        """As `Workers.close`; the cluster goes on."""
+        self.client.close()
+
+    def _outcome(self, status: str, result: Any, index: int) -> Outcome[Any] | None:
+        """What a task gave; None where its workers were killed."""
+        from distributed import KilledWorker
+
+        if status == "finished":
+            return result
+        if status != "error":  # cancelled, as all are when the connection ends
+            raise FlexcalError(
+                "E-WORK-003",
+                f"the connection to the scheduler at {self.address} was lost; start it again, and go on.",
+            )
+        problem = result[1]  # of type, exception, traceback
+        if isinstance(problem, KilledWorker):
+            return None
+        if isinstance(problem, ImportError):
+            self._require_same_version()
+        return Outcome(index, None, TaskError.of(problem), 0.0)  # not readable there, or its value not here
+
+    def _require_workers(self) -> None:
+        try:
+            self.client.wait_for_workers(1, timeout=_PATIENCE)
+        except TimeoutError as problem:
+            raise InputError(
+                "E-WORK-004",
+                f"the scheduler at {self.address} has no workers; start some with 'dask worker {self.client.scheduler.address}'.",
+            ) from problem
+        self._require_same_version()
+
+    def _require_same_version(self) -> None:
+        from importlib.metadata import version
+
+        def installed() -> str | None:  # travels whole, as a function within a function
+            from importlib.metadata import PackageNotFoundError, version
+
+            try:
+                import flexcal  # noqa: F401
+
+                return version("flexcal")
+            except (ImportError, PackageNotFoundError):
+                return None
+
+        own = version("flexcal")
+        for worker, other in self.client.run(installed, on_error="ignore").items():
+            if other != own:
+                has = "no flexcal" if other is None else f"flexcal {other}"
+                raise InputError(
+                    "E-WORK-005",
+                    f"the worker {worker} has {has}, and this is flexcal {own}; install the same version in its environment.",
+                )
+
+
+def _together(*values: Any) -> tuple[Any, ...]:
+    return values
+
+
+def _run(shared: tuple[Any, ...], index: int, task: Any) -> Outcome[Any]:
+    function, *common = shared
+    with _one_at_a_time:
+        return run_task(function, index, task, tuple(common))

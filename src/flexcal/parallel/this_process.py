@@ -1,0 +1,28 @@
+"""Tasks one after the other in this process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, TypeVar
+
+from flexcal.parallel.outcome import Outcome, run_task
+from flexcal.parallel.workers import Workers
+
+V = TypeVar("V")
+
+
+class ThisProcess(Workers):
+    """Runs tasks one after the other, without another process."""
+
+    @property
+    def count(self) -> int:
+        """As `Workers.count`: 1."""
+        return 1
+
+    def results(self, function: Callable[..., V], tasks: Iterable[Any], *common: Any) -> Iterator[Outcome[V]]:
+        """As `Workers.results`, in the order of the tasks."""
+        for index, task in enumerate(tasks):
+            yield run_task(function, index, task, common)
+
+    def close(self) -> None:
+        """As `Workers.close`: nothing was started."""
