@@ -17,6 +17,11 @@ def test_spectrum_finds_phasors_on_whole_and_half_lines(rng):
     np.testing.assert_allclose(spectrum(signal, periods, np.array([3, 8])), phasors[:2], atol=1e-12)
     np.testing.assert_allclose(spectrum(signal, periods, np.array([3.0, 8.0, 10.5])), phasors, atol=1e-12)
     np.testing.assert_allclose(spectrum(signal, periods, np.array([4, 9])), 0.0, atol=1e-12)
+    odd = np.array([11, 3, 149])  # of both kinds, in any order
+    expected = np.fft.rfft(signal.reshape(periods, samples, 2).mean(0), axis=0)[odd] * (2.0 / samples)
+    np.testing.assert_allclose(spectrum(signal, periods, odd), expected, atol=1e-12)
+    with refused("E-FRF-041", "150", "300"):
+        spectrum(signal, periods, np.array([3, 150]))
     with refused("E-FRF-012", "2"):
         spectrum(signal, periods, np.array([3.25]))
     with refused("E-FRF-011"):

@@ -1,6 +1,7 @@
 """Spectra of recordings: phasors of motor position and torque at chosen lines, and noise bins."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -52,9 +53,10 @@ def kept_samples(plan: MultisinePlan, recording: Recording) -> slice:
 
 
 def spectrum(signal: np.ndarray, periods: int, lines: np.ndarray) -> np.ndarray:
-    """Phasors (L, …) of a signal (samples, …) over a whole number of periods, at `lines` in multiples of f0.
+    """Phasors (L, …) of a signal (samples, …) over a whole number of periods, at `lines` > 0 in multiples of f0.
 
-    Whole lines: the periods are averaged first, which gives the same numbers from a transform `periods` times shorter.
+    Whole lines: the periods are averaged first, which gives the same numbers from a transform `periods` times shorter; where all are
+    odd, as those of a multisine, from one of a quarter period.
     Lines that are multiples of 1 / periods (so half-integers for two): the transform of the whole stretch.
     """
     lines = np.asarray(lines)
@@ -63,7 +65,15 @@ def spectrum(signal: np.ndarray, periods: int, lines: np.ndarray) -> np.ndarray:
         raise FlexcalError(
             "E-FRF-011", f"{samples} samples do not divide into {periods} periods; cut whole periods."
         )
+    if 2 * periods * lines.max(initial=0) >= samples:
+        raise FlexcalError(
+            "E-FRF-041",
+            f"The line {lines.max():g} needs more than the {samples // periods} samples of a period; log at a higher rate, or plan a "
+            "lower band.",
+        )
     if np.issubdtype(lines.dtype, np.integer):
+        if samples % (4 * periods) == 0 and (lines % 2 == 1).all():
+            return _odd_bins(signal, periods, lines)
         signal = signal.reshape(periods, samples // periods, *signal.shape[1:]).mean(0)
         bins = lines
     else:
@@ -74,8 +84,33 @@ def spectrum(signal: np.ndarray, periods: int, lines: np.ndarray) -> np.ndarray:
                 f"A line is not a multiple of 1/{periods} of the base frequency; keep more periods.",
             )
     columns = np.ascontiguousarray(signal.reshape(signal.shape[0], -1).T)
+    columns -= columns.mean(1, keepdims=True)
     phasors = np.fft.rfft(columns, axis=1)[:, bins].T * (2.0 / signal.shape[0])
     return phasors.reshape(bins.size, *signal.shape[1:])
+
+
+def _odd_bins(signal: np.ndarray, periods: int, bins: np.ndarray) -> np.ndarray:
+    """`spectrum` at odd bins of the mean of the periods, x_n with N a multiple of four.
+
+    X_{4m+1} = Σ_{n<N/4} (d_n - j d_{n+N/4}) exp(-j2πn/N) exp(-j2πnm/(N/4)) with d_n = x_n - x_{n+N/2}, X_{4m+3} the conjugate of
+    X_{N-4m-3}: a transform of a quarter of the length.
+    """
+    quarter = len(signal) // (4 * periods)
+    weights = np.tile([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, -1.0]], periods) / (2 * quarter * periods)
+    folded = (weights @ signal.reshape(4 * periods, -1)).reshape(2, quarter, -1)
+    turned = np.empty((folded.shape[2], quarter), complex)
+    turned.real, turned.imag = folded[0].T, -folded[1].T
+    turned *= _quarter_turn(quarter)
+    first = bins % 4 == 1
+    phasors = np.fft.fft(turned, axis=1)[:, np.where(first, bins // 4, quarter - 1 - bins // 4)].T
+    phasors.imag *= np.where(first, 1.0, -1.0)[:, None]
+    return phasors.reshape(bins.size, *signal.shape[1:])
+
+
+@lru_cache(maxsize=1)
+def _quarter_turn(samples: int) -> np.ndarray:
+    """exp(-jπn/2N), n = 0 … N - 1."""
+    return np.exp(-0.5j * np.pi / samples * np.arange(samples))
 
 
 def noise_in_half_sum(plan: MultisinePlan) -> bool:

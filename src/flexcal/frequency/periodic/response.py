@@ -395,8 +395,8 @@ def response_of(
     n = len(joints)
     return FrequencyResponse(
         frequencies_hz=lines * plan.base_frequency_hz,
-        **sensed(records.sensors, n, average_response(spectra, realisations, average), total / members),
-        noise_covariance=kronecker(gain, noise[:, :n, :n]) / members,
+        **sensed(records.sensors, n, average_response(spectra, realisations, average), total),
+        noise_covariance=kronecker(gain / members, noise[:, :n, :n]),
         degrees_of_freedom=freedom,
         realisations=realisations[:, :, :n],
         joints=joints,
@@ -413,13 +413,18 @@ def sensed(
     sensors: tuple[str, ...], axes: int, stacked: np.ndarray, covariance: np.ndarray
 ) -> dict[str, Any]:
     """Response fields split from `stacked` rows (L, n + S, n), axes then sensors, and the `covariance` of their vec."""
+    if not sensors:
+        return {"response": stacked, "covariance": covariance}
     own = (
         np.arange(axes)[:, None] * stacked.shape[1] + np.arange(axes)
     ).ravel()  # columns, of each the axes' rows
-    values: dict[str, Any] = {"response": stacked[:, :axes], "covariance": covariance[:, own[:, None], own]}
-    if sensors:
-        values |= {"sensors": sensors, "sensor_response": stacked[:, axes:], "joint_covariance": covariance}
-    return values
+    return {
+        "response": stacked[:, :axes],
+        "covariance": covariance[:, own[:, None], own],
+        "sensors": sensors,
+        "sensor_response": stacked[:, axes:],
+        "joint_covariance": covariance,
+    }
 
 
 def _elements(covariance: np.ndarray, axes: int) -> np.ndarray:

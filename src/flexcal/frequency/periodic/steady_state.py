@@ -24,16 +24,16 @@ def keep_periods(plan: MultisinePlan, recording: Recording) -> tuple[np.ndarray,
     The last only where the noise is not read from the half sum of both signs. Raises `FlexcalError` as `kept_samples` does.
     """
     rows, axes = kept_samples(plan, recording), np.asarray(plan.joints)
-    periods = plan.periods - plan.settle_periods
     position, torque, sensed = recording.q[rows], recording.torque[rows], recording.sensor_readings[rows]
-    whole_lines = noise_in_half_sum(plan)
-    if whole_lines:  # average the periods before anything is copied
-        position, torque, sensed = (_average(signal, periods) for signal in (position, torque, sensed))
-        periods = 1
-    mean = position.mean(0)
-    signal = np.hstack([position[:, axes] - mean[axes], sensed - sensed.mean(0), torque[:, axes]])
-    kept = (mean, *(spectrum(signal, periods, lines) for lines in (plan.lines, plan.detection_lines)))
-    return kept if whole_lines else (*kept, spectrum(signal, periods, noise_lines(plan)))
+
+    def columns(lines: np.ndarray) -> np.ndarray:
+        q, s, u = (spectrum(x, plan.periods - plan.settle_periods, lines) for x in (position, sensed, torque))
+        return np.hstack([q[:, axes], s, u[:, axes]])
+
+    mean = np.full(len(position), 1.0 / len(position)) @ position
+    whole = columns(np.array([*plan.lines, *plan.detection_lines], int))
+    kept = (mean, *np.split(whole, [len(plan.lines)]))
+    return kept if noise_in_half_sum(plan) else (*kept, columns(noise_lines(plan)))
 
 
 def experiment_spectra(records: PoseRecords, pooled_lines: int) -> ExperimentSpectra:
@@ -82,7 +82,3 @@ def odd_distortion(records: PoseRecords, response: np.ndarray, noise: np.ndarray
     quiet = np.array([np.interp(left_out, lines, np.real(noise[:, i, i])).mean() for i in range(n)])
     excited = np.abs(records.difference(1)[..., :n] * column_factor(records, lines)[:, :n]) ** 2
     return np.sqrt(np.maximum(power - quiet, 0.0) / excited.mean((0, 1, 2)))
-
-
-def _average(signal: np.ndarray, periods: int) -> np.ndarray:
-    return signal.reshape(periods, len(signal) // periods, signal.shape[1]).mean(0)
