@@ -35,6 +35,7 @@ SUBJECTS = {
     "PLAN": "Plans",
     "POSES": "Poses",
     "PROG": "Robot programs",
+    "RECHECK": "Recheck of a calibration",
     "REPORT": "Reports",
     "ROBOT": "robot.yaml",
     "ROS": "Descriptions of ROS",

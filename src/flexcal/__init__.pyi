@@ -70,6 +70,7 @@ from .jobs.gains import GainsIdentification, identify_gains
 from .jobs.inertials import InertialsIdentification, identify_inertials
 from .jobs.inputs import CalibratedRobot
 from .jobs.payload import PayloadIdentification, identify_payload
+from .jobs.recheck import Recheck, recheck
 from .jobs.response import AxisResponse, frequency_response
 from .jobs.stiffness import StiffnessIdentification, identify_stiffness
 from .model.robot import RobotModel
@@ -122,6 +123,7 @@ __all__ = [
     "PowerModel",
     "Prediction",
     "Program",
+    "Recheck",
     "Recording",
     "Repeatability",
     "RobotModel",
@@ -168,6 +170,7 @@ __all__ = [
     "read_targets",
     "read_torque_model",
     "read_yaml",
+    "recheck",
     "repeatability",
     "rigid_motion",
     "tool_at_rest",

@@ -86,6 +86,7 @@ def calibrated_arm(folder: Path, examples: Path) -> list[str]:
         seen = predict_measurements(model, visits).position + 2e-5 * rng.standard_normal((3 * len(q), 3))
         write_poses(folder / f"{name}.csv", replace(visits, position=seen))
     shutil.copy("compensated.csv", "visits.csv")
+    shutil.copy("others.csv", "visit.csv")
     write_touches(folder, model)
     entry = {"drive_mode": 0, "homing_offset": 0, "range_min": 500, "range_max": 3600}
     motors = {name: {"id": k, **entry} for k, name in enumerate(model.joint_names, 1)}
@@ -98,6 +99,7 @@ def calibrated_arm(folder: Path, examples: Path) -> list[str]:
         "filter",
         "verify",
         "repeatability",
+        "recheck",
         "map",
         "predict",
         "certificate",
@@ -201,6 +203,7 @@ PLACES = {
         "identify frame",
         "verify",
         "repeatability",
+        "recheck",
         "map",
         "compensate",
         "filter",

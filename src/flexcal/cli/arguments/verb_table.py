@@ -276,6 +276,14 @@ STEPS = (
                 ("results.json", "report.html"),
             ),
             Verb(
+                ("recheck",),
+                "recheck",
+                "Recheck",
+                "whether the robot is still as calibrated, by about ten poses: what changed, and slow drifts over visits",
+                "flexcal recheck robot.yaml visit.csv",
+                ("visits.json", "plan.yaml", "results.json", "report.html"),
+            ),
+            Verb(
                 ("map",),
                 "map",
                 "Map",

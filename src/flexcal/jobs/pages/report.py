@@ -38,6 +38,7 @@ from flexcal.report.pages import (
     InclinationStudy,
     InertialsStudy,
     PayloadStudy,
+    RecheckStudy,
     ResponseStudy,
     StiffnessStudy,
     VerificationStudy,
@@ -49,6 +50,7 @@ from flexcal.report.pages import (
     inclination_page,
     inertials_page,
     payload_page,
+    recheck_page,
     response_page,
     stiffness_page,
     two_stage_page,
@@ -93,6 +95,8 @@ def _page(folder: Path, results: Mapping[str, Any], kind: Kind) -> Page:
         return gains_page(results)
     if kind == "payload":
         return payload_page(PayloadStudy(results, _block(folder, "payload"), read_predictions(folder)))
+    if kind == "recheck":
+        return recheck_page(RecheckStudy(results["robot"], results))
     if kind == "dynamics":
         return dynamics_page(DynamicsStudy(results, _block(folder, "dynamics"), read_predictions(folder)))
     if kind == "verification":

@@ -33,6 +33,7 @@ Kind = Literal[
     "inertials",
     "measurement",
     "payload",
+    "recheck",
     "repeatability",
     "response",
     "stiffness",

@@ -1,4 +1,5 @@
 from .accuracy_map import SHOWN, accuracy_space, accuracy_views, variance_shares
+from .drift_sums import cumulative_sums, visit_errors
 from .error_distributions import error_distribution, error_histogram, predicted_quantiles
 from .estimated_parameters import (
     correlation_map,
@@ -39,6 +40,7 @@ __all__ = [
     "bode",
     "calibration_errors",
     "correlation_map",
+    "cumulative_sums",
     "error_components",
     "error_distribution",
     "error_field",
@@ -78,4 +80,5 @@ __all__ = [
     "torque_traces",
     "variance_shares",
     "verification_errors",
+    "visit_errors",
 ]

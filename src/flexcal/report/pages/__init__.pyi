@@ -13,6 +13,7 @@ from .inertials import InertialsStudy, inertials_checks, inertials_page
 from .payload import PayloadStudy, payload_page
 from .pose_design import PoseStudy, pose_page
 from .program import ProgramStudy, program_page
+from .recheck import RecheckStudy, recheck_page
 from .repeatability import RepeatabilityStudy, repeatability_page
 from .run_comparison import comparison_page
 from .stiffness import StiffnessStudy, stiffness_checks, stiffness_page
@@ -33,6 +34,7 @@ __all__ = [
     "PayloadStudy",
     "PoseStudy",
     "ProgramStudy",
+    "RecheckStudy",
     "RepeatabilityStudy",
     "ResponseStudy",
     "StiffnessStudy",
@@ -54,6 +56,7 @@ __all__ = [
     "payload_page",
     "pose_page",
     "program_page",
+    "recheck_page",
     "repeatability_page",
     "response_page",
     "stiffness_checks",

@@ -1,0 +1,40 @@
+from .change_effects import PossibleChange, possible_changes
+from .cumulative_sums import AVERAGE_RUN, DriftSum, ShiftAtVisit, drift_sums
+from .detection import DetectionLimit, detection_limits
+from .displaced_tool import MovedTool, TellingPose, moved_tool, telling_pose
+from .global_test import FALSE_ALARM, GlobalTest
+from .judged_visit import JudgedVisit, Suspect, judge_visit
+from .visit_errors import (
+    LEAST_MATCHED,
+    Compared,
+    VisitErrors,
+    errors_from_calibration,
+    errors_from_reference,
+    planned_errors,
+)
+
+__all__ = [
+    "AVERAGE_RUN",
+    "FALSE_ALARM",
+    "LEAST_MATCHED",
+    "Compared",
+    "DetectionLimit",
+    "DriftSum",
+    "GlobalTest",
+    "JudgedVisit",
+    "MovedTool",
+    "PossibleChange",
+    "ShiftAtVisit",
+    "Suspect",
+    "TellingPose",
+    "VisitErrors",
+    "detection_limits",
+    "drift_sums",
+    "errors_from_calibration",
+    "errors_from_reference",
+    "judge_visit",
+    "moved_tool",
+    "planned_errors",
+    "possible_changes",
+    "telling_pose",
+]

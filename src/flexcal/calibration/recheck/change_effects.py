@@ -1,0 +1,125 @@
+"""Changes that a robot or its set-up may have undergone, with their effect on measured points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from flexcal.calibration.measurement import PredictedMeasurements, predict_measurements
+from flexcal.model.robot import GEOMETRY, STATION, RobotModel
+
+ChangeKind = Literal[
+    "joint_shifted", "tool_bumped", "thermal_growth", "payload_changed", "instrument_moved", "wrong_reading"
+]
+_STEP = 0.1
+"""Payload, kg, of the finite difference."""
+
+
+@dataclass(frozen=True, eq=False)
+class PossibleChange:
+    """Change of one `kind`: of `subject`, a joint, a point on the tool, a station or a pose, by parameters `names` in `units`.
+
+    `columns` (3 K, k) are the derivatives of the measured points, m per unit.
+    """
+
+    kind: ChangeKind
+    subject: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    columns: np.ndarray
+
+
+def possible_changes(model: RobotModel, at: PredictedMeasurements) -> list[PossibleChange]:
+    """Changes of single joints, of the tool, of all lengths, of the payload and of the instrument's place at predicted points.
+
+    Joints that move no point are left out, and so is the payload of an arm that does not yield to it.
+    """
+    changes = [
+        PossibleChange(
+            "joint_shifted",
+            joint.name,
+            (f"{joint.name}.offset",),
+            ("m" if joint.kind == "prismatic" else "rad",),
+            _flat(at.jacobian([f"{joint.name}.offset"])),
+        )
+        for joint in model.motor_joints
+    ]
+    changes += [_tool(model, at, target) for target in at.poses.targets]
+    changes += _whole_tool(model, at)
+    if at.carrier is None:
+        grown = np.zeros((len(at.poses), 6, 1))
+        grown[:, :3, 0] = at.kinematics.position
+        changes.append(
+            PossibleChange("thermal_growth", "all lengths", ("growth",), ("m/m",), _flat(at.moved(grown)))
+        )
+    changes += _payload(model, at)
+    for station in at.poses.stations:
+        names = tuple(f"station.{station}.{key}" for key in STATION)
+        changes.append(
+            PossibleChange(
+                "instrument_moved",
+                station,
+                names,
+                ("m",) * 3 + ("rad",) * 3,
+                _flat(at.jacobian(names)),
+            )
+        )
+    return [change for change in changes if np.abs(change.columns).max(initial=0.0) > 1e-12]
+
+
+def wrong_readings(poses: int, numbers: np.ndarray) -> list[PossibleChange]:
+    """A wrong reading of each of the poses, whose numbers are (K,)."""
+    eye = np.eye(3 * poses)
+    return [
+        PossibleChange(
+            "wrong_reading", str(number), ("dx", "dy", "dz"), ("m",) * 3, eye[:, 3 * k : 3 * k + 3]
+        )
+        for k, number in enumerate(numbers.tolist())
+    ]
+
+
+def _flat(columns: np.ndarray) -> np.ndarray:
+    return columns.reshape(-1, columns.shape[2])
+
+
+def _place(model: RobotModel, target: str) -> list[str]:
+    """Parameters of the place of a point on the tool."""
+    if target == next(iter(model.points)):
+        return [f"tool.{key}" for key in GEOMETRY if key.startswith("length")]
+    return [f"point.{target}.{axis}" for axis in "xyz"]
+
+
+def _tool(model: RobotModel, at: PredictedMeasurements, target: str) -> PossibleChange:
+    columns = _flat(at.jacobian(_place(model, target)))
+    own = np.repeat(at.poses.target == target, 3)
+    return PossibleChange(
+        "tool_bumped", target, tuple(_place(model, target)), ("m",) * 3, columns * own[:, None]
+    )
+
+
+def _whole_tool(model: RobotModel, at: PredictedMeasurements) -> list[PossibleChange]:
+    """Motion of all points on the tool together, where several in one frame were measured."""
+    targets = at.poses.targets
+    if len(targets) < 2 or len({model.points[name].frame for name in targets}) > 1:
+        return []
+    columns = np.zeros((3 * len(at.poses), 6))
+    for target in targets:
+        moved = _tool(model, at, target).columns
+        turned = np.cross(np.eye(3), model.points[target].xyz).T
+        columns += np.hstack([moved, moved @ turned])
+    names = tuple(f"tool.{key}" for key in STATION)
+    return [PossibleChange("tool_bumped", "the tool", names, ("m",) * 3 + ("rad",) * 3, columns)]
+
+
+def _payload(model: RobotModel, at: PredictedMeasurements) -> list[PossibleChange]:
+    """Change of the payload's mass, kg, where one is declared."""
+    if model.payload is None:
+        return []
+    poses = at.poses
+    mass = np.full(len(poses), model.payload.mass) if poses.payload is None else poses.payload
+    heavier = predict_measurements(model, replace(poses, payload=mass + _STEP)).position
+    lighter = predict_measurements(model, replace(poses, payload=mass)).position
+    columns = (heavier - lighter).reshape(-1, 1) / _STEP
+    return [PossibleChange("payload_changed", "payload", ("payload.mass",), ("kg",), columns)]

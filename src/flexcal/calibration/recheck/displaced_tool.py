@@ -1,0 +1,130 @@
+"""How far a change moves the tool over the joint ranges of the calibration, and where two suspected changes differ most."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.calibration.measurement import PredictedMeasurements, predict_measurements
+from flexcal.calibration.recheck.change_effects import possible_changes
+from flexcal.calibration.recheck.judged_visit import Suspect
+from flexcal.data.poses import DEFAULT_SIGMA, PoseSet
+from flexcal.model.kinematics import joint_limits, random_configurations
+from flexcal.model.robot import RobotModel
+
+_POSES = 300
+_DRAWS = 400
+_TURN = 2 * np.pi
+
+
+@dataclass(frozen=True, eq=False)
+class MovedTool:
+    """Displacement of a point on the tool over random poses within the calibrated joint ranges, m.
+
+    `mean` and `p95` over the poses with their 95 % intervals from the uncertainty of the change; `farthest` are the joint positions (n,)
+    at which the tool moved most, rad or m, and `largest` how far it did there.
+    """
+
+    mean: float
+    mean_interval: tuple[float, float]
+    p95: float
+    p95_interval: tuple[float, float]
+    farthest: np.ndarray
+    largest: float
+
+
+@dataclass(frozen=True, eq=False)
+class TellingPose:
+    """Joint positions `q` (n,), rad or m, at which two changes predict points that are `apart` m."""
+
+    q: np.ndarray
+    apart: float
+
+
+def moved_tool(
+    model: RobotModel, ranges: Mapping[str, tuple[float, float]], suspect: Suspect, target: str
+) -> MovedTool:
+    """Displacement of `target` by a suspected change; none by an instrument that moved, or a wrong reading."""
+    at = _random_points(model, ranges, target)
+    columns = _columns(model, at, suspect)
+    if columns is None:
+        nothing = (0.0, 0.0)
+        return MovedTool(0.0, nothing, 0.0, nothing, at.poses.q[0], 0.0)
+    distance = _distances(columns @ suspect.estimate)
+    root = np.linalg.cholesky(suspect.covariance + 1e-30 * np.eye(len(suspect.std)))
+    drawn = suspect.estimate + np.random.default_rng(2).standard_normal((_DRAWS, len(suspect.std))) @ root.T
+    spread = np.stack([_distances(columns @ values) for values in drawn])
+    mean, p95 = spread.mean(axis=1), np.quantile(spread, 0.95, axis=1)
+    farthest = int(distance.argmax())
+    return MovedTool(
+        float(distance.mean()),
+        _interval(mean),
+        float(np.quantile(distance, 0.95)),
+        _interval(p95),
+        at.poses.q[farthest],
+        float(distance[farthest]),
+    )
+
+
+def telling_pose(
+    model: RobotModel,
+    ranges: Mapping[str, tuple[float, float]],
+    suspects: tuple[Suspect, Suspect],
+    target: str,
+) -> TellingPose | None:
+    """The pose at which two suspects differ most; None where one of them is of the instrument or a reading."""
+    at = _random_points(model, ranges, target)
+    columns = [_columns(model, at, suspect) for suspect in suspects]
+    if columns[0] is None or columns[1] is None:
+        return None
+    apart = _distances(columns[0] @ suspects[0].estimate - columns[1] @ suspects[1].estimate)
+    best = int(apart.argmax())
+    return TellingPose(at.poses.q[best], float(apart[best]))
+
+
+def _random_points(
+    model: RobotModel, ranges: Mapping[str, tuple[float, float]], target: str
+) -> PredictedMeasurements:
+    limits = np.clip(joint_limits(model), -_TURN, _TURN)
+    for k, name in enumerate(model.motor_names):
+        if name in ranges:
+            low, high = ranges[name]
+            limits[:, k] = max(limits[0, k], low), min(limits[1, k], high)
+    q = random_configurations(model, _POSES, np.random.default_rng(0), limits[0], limits[1])
+    poses = PoseSet(
+        q=q,
+        position=np.zeros((_POSES, 3)),
+        sigma=np.full((_POSES, 3), DEFAULT_SIGMA),
+        torque=None,
+        payload=None,
+        target=np.full(_POSES, target),
+        station=np.full(_POSES, model.stations.names[0]),
+        temperature=None,
+        pose=np.arange(_POSES),
+    )
+    at_base = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
+    return predict_measurements(at_base, poses, jacobians=True)
+
+
+def _columns(model: RobotModel, at: PredictedMeasurements, suspect: Suspect) -> np.ndarray | None:
+    if suspect.change.kind in ("instrument_moved", "wrong_reading"):
+        return None
+    return next(
+        (
+            change.columns
+            for change in possible_changes(at.model, at)
+            if (change.kind, change.subject) == (suspect.change.kind, suspect.change.subject)
+        ),
+        None,
+    )
+
+
+def _distances(displacement: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(displacement.reshape(-1, 3), axis=1)
+
+
+def _interval(values: np.ndarray) -> tuple[float, float]:
+    low, high = np.quantile(values, [0.025, 0.975])
+    return float(low), float(high)

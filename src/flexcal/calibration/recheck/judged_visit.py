@@ -1,0 +1,227 @@
+"""Judgement of a visit: as calibrated, one change that explains the errors and no other does about as well, or neither."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.calibration.recheck.change_effects import PossibleChange, possible_changes, wrong_readings
+from flexcal.calibration.recheck.cumulative_sums import ShiftAtVisit
+from flexcal.calibration.recheck.global_test import FALSE_ALARM, GlobalTest, SeenChange, seen_change
+from flexcal.calibration.recheck.visit_errors import VisitErrors
+from flexcal.estimation import student_quantile
+
+_ALIKE = 2 * np.log(20.0)
+"""Difference of twice the log-likelihood below which two changes explain the errors about as well: odds of 20."""
+_LARGE = 1e-4
+"""Shift of a joint, rad or m, above which the points do not move in proportion to it."""
+_STEPS = 4
+_EVIDENT = 0.1
+"""Share of the errors that an instrument that moved may leave where something else changed too."""
+_LEAST = 12
+"""Least number of coordinates for which the place of the instrument is fitted without being asked."""
+
+
+@dataclass(frozen=True, eq=False)
+class Suspect:
+    """A change that explains the errors of a visit.
+
+    Attributes
+    ----------
+    change : PossibleChange
+        What changed.
+    estimate, std : ndarray
+        By how much (k,), in the units of the change, and standard deviations.
+    covariance : ndarray
+        Their covariance (k, k).
+    quantile : float
+        Half-width of their 95 % intervals in standard deviations (Student).
+    remainder : float
+        Probability that chance leaves what the change does not explain.
+    score : float
+        Twice the negative log-likelihood, with what Schwarz's criterion adds for the parameters and for the number of changes of the kind.
+    misfit : float
+        Sum of squares that the change leaves, whitened.
+    same : bool
+        Whether its effect at these points cannot be told from that of the best suspect, which is part of it.
+    """
+
+    change: PossibleChange
+    estimate: np.ndarray
+    std: np.ndarray
+    covariance: np.ndarray
+    quantile: float
+    remainder: float
+    score: float
+    misfit: float
+    same: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class JudgedVisit:
+    """Judgement of a visit.
+
+    Attributes
+    ----------
+    test : GlobalTest
+        The test whether the robot is as calibrated, and what it sees.
+    probability : float
+        That chance makes errors as conspicuous.
+    suspects : tuple of Suspect
+        Where the test rejects, changes that explain the errors about equally well, the best first; empty where none does.
+    together : float
+        Probability that chance leaves what all changes together do not explain.
+    shifts : tuple of Suspect
+        Every change of one parameter, as if it were the only one, whatever the verdict.
+    instrument : {"known", "declared", "evident"}
+        Why the place of the instrument was fitted to the visit, if it was.
+    """
+
+    test: GlobalTest
+    probability: float
+    suspects: tuple[Suspect, ...]
+    together: float
+    shifts: tuple[Suspect, ...]
+    instrument: str = "known"
+
+    @property
+    def as_calibrated(self) -> bool:
+        """Whether nothing speaks against the calibration, at 1 % false alarms."""
+        return self.probability > FALSE_ALARM
+
+    @property
+    def verdict(self) -> str:
+        """One of as_calibrated, the kinds of changes, ambiguous (of several kinds or joints), and recalibrate."""
+        if self.as_calibrated:
+            return "instrument_moved" if self.instrument == "evident" else "as_calibrated"
+        if not self.suspects:
+            return "recalibrate"
+        return self.suspects[0].change.kind if len(self.suspects) == 1 else "ambiguous"
+
+    def at_visit(self, series: str) -> tuple[ShiftAtVisit, ...]:
+        """Shifts of single joints, of all lengths and of the payload with the part of their variance that visits of a `series` share."""
+        result = []
+        for suspect in self.shifts:
+            item = next(seen for seen in self.test.seen if seen.change is suspect.change)
+            weights = (item.columns.T @ self.test.whitening)[0] * suspect.covariance[0, 0]
+            own, common = (
+                float(np.sqrt(weights @ part @ weights))
+                for part in (self.test.errors.own, self.test.errors.common)
+            )
+            result.append(
+                ShiftAtVisit(suspect.change.subject, float(suspect.estimate[0]), own, common, series)
+            )
+        return tuple(result)
+
+
+def judge_visit(errors_of: Callable[[bool], VisitErrors | None], *, placed: bool) -> JudgedVisit | None:
+    """Judge the errors of a visit that `errors_of` gives, its argument being whether the place of the instrument is fitted.
+
+    Where that was not `placed` and the errors are those of an instrument that stands elsewhere, it is fitted then. None where `errors_of`
+    gives none.
+    """
+    errors = errors_of(placed)
+    if errors is None:
+        return None
+    judged = _judge(errors)
+    if placed:
+        return replace(judged, instrument="declared")
+    if judged.as_calibrated or judged.suspects:
+        return judged
+    again = errors_of(True)
+    if again is None or again.errors.size < _LEAST:
+        return judged
+    moved = _judge(again)
+    # an instrument that moved leaves nothing else; errors that remain have another cause, unless they are a small part of the whole
+    before = float(np.sum((judged.test.whitening @ errors.errors) ** 2))
+    after = float(np.sum((moved.test.whitening @ again.errors) ** 2))
+    if moved.as_calibrated or (moved.suspects and after < _EVIDENT * before):
+        return replace(moved, instrument="evident")
+    return judged
+
+
+def _judge(errors: VisitErrors) -> JudgedVisit:
+    changes = possible_changes(errors.model, errors.at)
+    test = GlobalTest.of(errors, changes)
+    probability = test.probability(errors.errors)
+    shifts = tuple(_suspect(test, item, 1) for item in test.seen if len(item.change.names) == 1)
+    together = _together(test)
+    suspects = _suspects(test) if probability <= FALSE_ALARM else ()
+    return JudgedVisit(test, probability, suspects, together, shifts)
+
+
+def _together(test: GlobalTest) -> float:
+    whitened = test.whitening @ test.errors.errors
+    every = np.hstack([item.basis for item in test.seen] or [np.zeros((test.size, 0))])
+    basis, sizes, _ = np.linalg.svd(every, full_matrices=False)
+    basis = basis[:, sizes > 1e-6]
+    left = whitened - basis @ (basis.T @ whitened)
+    count = test.size - basis.shape[1]
+    return float(test.chance(float(left @ left), count)) if count > 0 else 1.0
+
+
+def _suspects(test: GlobalTest) -> tuple[Suspect, ...]:
+    errors = test.errors
+    root = np.linalg.cholesky(errors.covariance)
+    readings = [
+        seen_change(change, test.whitening, root)
+        for change in wrong_readings(len(errors.poses), errors.poses.pose)
+    ]
+    every = [*test.seen, *(item for item in readings if item.seen and item.basis.shape[1] < test.size)]
+    kinds = [item.change.kind for item in every]
+    found = [(item, _suspect(test, item, kinds.count(item.change.kind))) for item in every]
+    fitting = [pair for pair in found if pair[1].remainder > FALSE_ALARM]
+    if not fitting:
+        return ()
+    best_item, best = min(fitting, key=lambda pair: pair[1].score)
+    # alike: as likely with all that the criterion adds, or a change of more parameters of which the best one is a part
+    alike = [best]
+    for item, suspect in fitting:
+        if suspect is best:
+            continue
+        same = _contains(item, best_item)
+        if same or suspect.score < best.score + _ALIKE:
+            alike.append(replace(suspect, same=same or _contains(best_item, item)))
+    return tuple(sorted(alike, key=lambda s: s.score))
+
+
+def _contains(larger: SeenChange, smaller: SeenChange) -> bool:
+    """Whether every effect of one change is one of another."""
+    left = smaller.basis - larger.basis @ (larger.basis.T @ smaller.basis)
+    return bool(np.linalg.norm(left, axis=0).max(initial=0.0) < 1e-3)
+
+
+def _suspect(test: GlobalTest, item: SeenChange, alternatives: int) -> Suspect:
+    """A change fitted alone; a joint's by Gauss-Newton, as its effect is not in proportion to a large shift."""
+    change, columns = item.change, item.columns
+    values = test.whitening @ test.errors.errors
+    scale = np.linalg.norm(columns, axis=0)
+    inverse = np.linalg.pinv(columns / np.where(scale > 0, scale, 1.0), rcond=1e-6)
+    inverse = inverse / np.where(scale > 0, scale, np.inf)[:, None]
+    estimate = inverse @ values
+    left = values - columns @ estimate
+    if change.kind == "joint_shifted" and np.abs(estimate).max() > _LARGE:
+        start = test.errors.model.value(change.names[0])
+        for _ in range(_STEPS):
+            left = test.whitening @ test.errors.with_values({change.names[0]: start + float(estimate[0])})
+            estimate = estimate + inverse @ left
+        left = test.whitening @ test.errors.with_values({change.names[0]: start + float(estimate[0])})
+    misfit = float(left @ left)
+    rank = item.basis.shape[1]
+    count = test.size - rank
+    remainder = float(test.chance(misfit, count)) if count > 0 else 1.0
+    freedom = test.freedom
+    cost = misfit if not np.isfinite(freedom) else (freedom + test.size) * float(np.log1p(misfit / freedom))
+    covariance = inverse @ inverse.T
+    return Suspect(
+        change,
+        estimate,
+        np.sqrt(np.diag(covariance)),
+        covariance,
+        student_quantile(0.975, freedom) if np.isfinite(freedom) else 1.96,
+        remainder,
+        cost + rank * float(np.log(test.size)) + 2 * float(np.log(alternatives)),
+        misfit,
+    )

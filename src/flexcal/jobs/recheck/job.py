@@ -1,0 +1,121 @@
+"""Recheck of the robot of a robot.yaml by files of measured poses, with the visits before."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import date
+from pathlib import Path
+
+from flexcal.calibration.recheck import drift_sums
+from flexcal.data.poses import DEFAULT_SIGMA, PoseSet, read_poses, tables_of
+from flexcal.errors import InputError
+from flexcal.files.formats import block_sha256, provenance, sha256_of
+from flexcal.jobs.inputs import CalibratedRobot, image_provenance, require_distinct_files
+from flexcal.jobs.recheck.result import Recheck, recheck
+from flexcal.jobs.recheck.visit_history import Readings, Visit, read_visits, with_visit, write_visits
+from flexcal.jobs.result_files import RunRecord
+from flexcal.progress import Progress, silent
+
+_LARGEST = 5e-3
+"""Standard deviation of a shift above which it is no information for cumulative sums, rad or m."""
+
+
+def recheck_robot(
+    robot_file: Path,
+    files: Sequence[Path],
+    out: Path,
+    *,
+    estimates: Path | None = None,
+    refit: bool = False,
+    reference: bool = False,
+    day: str | None = None,
+    command: str = "",
+    progress: Progress = silent,
+) -> Recheck:
+    """`recheck` of the robot of a robot.yaml, against the reference visit among those stored in the folder `out`, to which this is added.
+
+    Without a reference visit the first that is as calibrated becomes it; with `reference` this one does. `day` is the date of the visit,
+    ISO 8601, by default today. results.json and report.html are left in `out` too. Raises `FlexcalError` as reading and `recheck` do, and
+    `InputError` for a date that is none.
+    """
+    when = _date(day)
+    files = tables_of(files)
+    require_distinct_files(files)
+    robot = CalibratedRobot.from_yaml(robot_file, estimates)
+    assert robot.stored is not None
+    progress("reading", 0.0)
+    poses = read_poses(list(files), robot.model, require_motion=False)
+    progress("reading", 1.0)
+    calibration = block_sha256(robot.stored, "calibration")
+    digests = {f"{k}. {file.name}": sha256_of(file) for k, file in enumerate(files, start=1)}
+    stored = read_visits(out, robot.nominal.name)
+    # visits compared with another calibration, as before the last one, are kept and do not count
+    before = [v for v in stored if v.calibration == calibration and v.files != digests and v.date <= when]
+    references = [k for k, v in enumerate(before) if v.reference]
+    base = before[references[-1]] if references else None
+    before = before[references[-1] :] if references else before
+    judged = recheck(
+        robot, poses, reference=None if base is None else base.readings.poses(DEFAULT_SIGMA), refit=refit
+    )
+    absolute = judged.absolute or judged.judged
+    origin = provenance([robot_file, robot.nominal.urdf, *files], None, robot.stored, tuple(robot.blocks))
+    judged = replace(
+        judged,
+        reference_date=base.date if base is not None and judged.absolute is not None else None,
+        record=RunRecord(origin | image_provenance(files), command),
+    )
+    series = _series(judged, base, calibration)
+    shifts = [item for item in judged.judged.at_visit(series) if item.std < _LARGEST]
+    history = [*before, _visit(judged, poses, when, digests, calibration, shifts)]
+    judged = replace(
+        judged, dates=tuple(v.date for v in history), drifts=drift_sums([v.shifts for v in history])
+    )
+    visit = _visit(judged, poses, when, digests, calibration, shifts)
+    visit = replace(visit, reference=reference or (base is None and absolute.verdict == "as_calibrated"))
+    progress("writing", 0.5)
+    judged.write(out)
+    write_visits(out, robot.nominal.name, with_visit(stored, visit))
+    progress("writing", 1.0)
+    return judged
+
+
+def _visit(
+    judged: Recheck, poses: PoseSet, when: str, digests: dict[str, str], calibration: str, shifts: list
+) -> Visit:
+    return Visit(
+        date=when,
+        files=digests,
+        calibration=calibration,
+        reference=False,
+        verdict=judged.verdict,
+        sentence=judged.headline,
+        probability=judged.judged.probability,
+        shifts=shifts,
+        readings=Readings.of(poses),
+        alarms=[item.subject for item in judged.alarms],
+        suspects=judged.numbers["suspects"],
+    )
+
+
+def _series(judged: Recheck, base: Visit | None, calibration: str) -> str:
+    """Name of what visits share that are compared with the same thing at the same poses."""
+    errors = judged.judged.test.errors
+    against = calibration if errors.compared == "calibration" or base is None else json.dumps(base.files)
+    poses = sorted(
+        f"{target} {q}"
+        for target, q in zip(errors.poses.target.tolist(), errors.poses.q.round(3).tolist(), strict=True)
+    )
+    told = json.dumps([errors.compared, against, errors.placed, poses])
+    return hashlib.sha256(told.encode()).hexdigest()[:16]
+
+
+def _date(day: str | None) -> str:
+    if day is None:
+        return date.today().isoformat()
+    try:
+        return date.fromisoformat(day).isoformat()
+    except ValueError:
+        raise InputError("E-RECHECK-009", f"--date {day} is no date; write it like 2026-03-31.") from None

@@ -1,0 +1,130 @@
+"""The judgement of a visit in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from flexcal.calibration.recheck import FALSE_ALARM, JudgedVisit, MovedTool, Suspect, TellingPose
+from flexcal.units import MILLIMETRE
+
+_KELVIN = 12e-6
+"""Growth of steel, m/m/K."""
+_SMALL = 0.5
+"""Share of the calibrated robot's expected error below which a displacement of the tool hardly matters."""
+
+
+def judgement_sentence(judged: JudgedVisit, tools: Sequence[MovedTool], expected: float) -> str:
+    """What the visit says of the robot; `tools` are the displacements by the suspects, `expected` the error of the calibrated robot, m."""
+    chance = _chance(judged.probability)
+    moved = judged.instrument == "evident"
+    elsewhere = "the instrument, or the base of the robot, stands elsewhere; beside that the robot is "
+    if judged.as_calibrated:
+        if moved:
+            return f"{elsewhere}as calibrated ({chance}; false alarms {FALSE_ALARM:.0%})"
+        return f"as calibrated ({chance}; false alarms {FALSE_ALARM:.0%})"
+    lead = "the instrument, or the base of the robot, stands elsewhere; beside that: " if moved else ""
+    if not judged.suspects:
+        if judged.together > FALSE_ALARM:
+            return (
+                f"{lead}recalibrate ({chance}): no single change of a joint, of the tool, of all lengths, of the payload or of the "
+                "instrument explains the errors, several together would"
+            )
+        return (
+            f"{lead}recalibrate ({chance}): the errors are not those of shifted joints, a bumped tool, growth or a moved instrument, all "
+            "together; if the instrument is noisier than at the calibration, or poses were not those commanded, measure again first"
+        )
+    told = [suspect_in_words(s) for s in judged.suspects]
+    if len(told) == 1:
+        return f"{lead}{told[0]} ({chance}){_effect(judged.suspects[0], tools[0], expected)}"
+    return f"{lead}{', or '.join(told)} ({chance}){_effect(judged.suspects[0], tools[0], expected)}"
+
+
+def telling_sentence(judged: JudgedVisit, telling: TellingPose | None, noise: float) -> str:
+    """What would tell the two best suspects apart; empty where there is one. `noise` is that of a reading, m."""
+    if len(judged.suspects) < 2:
+        return ""
+    kinds = {suspect.change.kind for suspect in judged.suspects[:2]}
+    first, second = (suspect_name(s) for s in judged.suspects[:2])
+    if "instrument_moved" in kinds:
+        return (
+            f"what tells {first} from {second}: a point that is fixed to the robot's base, measured with the others; it moves with the "
+            "instrument alone"
+        )
+    if "wrong_reading" in kinds:
+        pose = next(s.change.subject for s in judged.suspects[:2] if s.change.kind == "wrong_reading")
+        return f"what tells {first} from {second}: pose {pose} measured again"
+    if telling is None or telling.apart < 2 * noise:
+        return f"no pose of this point tells {first} from {second}; a second point on the tool does, measured at the same poses"
+    q = ", ".join(f"{value:.3f}" for value in telling.q)
+    return (
+        f"the pose that best tells {first} from {second}: q = {q}, where they put the point "
+        f"{telling.apart / MILLIMETRE:.3f} mm apart"
+    )
+
+
+def suspect_name(suspect: Suspect) -> str:
+    """Name of a change without its size."""
+    subject = suspect.change.subject
+    return {
+        "joint_shifted": f"a shift of {subject}",
+        "tool_bumped": f"a bump of {subject}",
+        "thermal_growth": "thermal growth",
+        "payload_changed": "another payload",
+        "instrument_moved": "another place of the instrument",
+        "wrong_reading": f"a wrong reading of pose {subject}",
+    }[suspect.change.kind]
+
+
+def suspect_in_words(suspect: Suspect) -> str:
+    """A change with its size and 95 % half-width."""
+    change, values, stds = suspect.change, suspect.estimate, suspect.quantile * suspect.std
+    value, half = float(values[0]), float(stds[0])
+    if change.kind == "joint_shifted":
+        return f"{change.subject} shifted by {_amount(value, half, change.units[0])}"
+    if change.kind == "thermal_growth":
+        return (
+            f"thermal growth: all lengths by {_signed(1e6 * value, 1e6 * half)} µm/m (as {value / _KELVIN:+.1f} K of steel), unless it is "
+            "the scale of the instrument".replace("-", "−")
+        )
+    if change.kind == "payload_changed":
+        return f"the payload changed by {_signed(value, half)} kg"
+    size = float(np.linalg.norm(values[:3]))
+    # half-width along the displacement itself
+    along = values[:3] / max(size, 1e-30)
+    half = suspect.quantile * float(np.sqrt(along @ suspect.covariance[:3, :3] @ along))
+    told = f"{size / MILLIMETRE:.3f} ± {half / MILLIMETRE:.3f} mm"
+    if change.kind == "tool_bumped":
+        return f"tool bumped: {change.subject} moved by {told}"
+    if change.kind == "wrong_reading":
+        return f"pose {change.subject} disagrees on its own, by {told}: measure it again"
+    turned = float(np.linalg.norm(values[3:]))
+    return f"the instrument, or the base of the robot, stands elsewhere by {told} and {turned * 1e3:.3f} mrad"
+
+
+def _effect(suspect: Suspect, tool: MovedTool, expected: float) -> str:
+    if suspect.change.kind in ("instrument_moved", "wrong_reading"):
+        return "; beside that the robot is as calibrated"
+    low, high = (value / MILLIMETRE for value in tool.p95_interval)
+    told = (
+        f"; the tool is off by {tool.mean / MILLIMETRE:.3f} mm on average and {tool.p95 / MILLIMETRE:.3f} mm ({low:.3f} to {high:.3f}) at "
+        "95 % of the poses within the calibrated joint ranges"
+    )
+    if tool.p95_interval[1] < _SMALL * expected:
+        told += f": significant, but small beside the {expected / MILLIMETRE:.3f} mm that are expected of the calibrated robot"
+    return told
+
+
+def _amount(value: float, half: float, unit: str) -> str:
+    factor, name = {"rad": (1e3, "mrad"), "m": (1e3, "mm")}[unit]
+    return f"{_signed(factor * value, factor * half)} {name}"
+
+
+def _signed(value: float, half: float) -> str:
+    digits = int(min(max(1 - np.floor(np.log10(max(half, 1e-12))), 0), 6))
+    return f"{value:+.{digits}f} ± {half:.{digits}f}".replace("-", "−")
+
+
+def _chance(probability: float) -> str:
+    return f"p = {probability:.2g}" if probability > 1e-4 else "p < 1e-4"

@@ -1,0 +1,233 @@
+"""Plan of the poses of rechecks: those that find shifts of single joints best, with the predicted power."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.calibration.recheck import (
+    Compared,
+    DetectionLimit,
+    GlobalTest,
+    detection_limits,
+    planned_errors,
+    possible_changes,
+)
+from flexcal.data.plans import PosePlan, write_plan
+from flexcal.data.poses import PoseSet
+from flexcal.design.poses import measurement_order, measuring_noise, random_candidates
+from flexcal.design.scene import CollisionChecker, MeasuringSetup
+from flexcal.errors import FlexcalError
+from flexcal.jobs.inputs import CalibratedRobot, robot_provenance
+from flexcal.jobs.recheck.result import SHIFT, UNSEEN, power_block
+from flexcal.jobs.result_files import RunRecord
+from flexcal.model.robot import RobotModel
+from flexcal.progress import Progress, silent
+
+PLAN = "plan.yaml"
+ROUNDS = 3
+"""Number of readings of every pose at the reference visit for which the power is predicted."""
+_CANDIDATES = 400
+_SWEEPS = 5
+_FLOOR = 1e-6
+"""Information of a joint, relative to the largest, below which it counts as none."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedVisit:
+    """Plan of N poses, and by design of the recheck what it finds.
+
+    Attributes
+    ----------
+    plan : PosePlan
+        The poses in an order of short moves.
+    limits : mapping of tuple of DetectionLimit
+        Shifts of single joints that are found, by what the visit is compared with: "calibration", "reference" (each pose read once) and
+        "reference_repeated" (each read three times), and the same with "_refit" where the instrument was moved in between.
+    file : Path
+        File of the plan.
+    record : RunRecord
+        What it comes from.
+    """
+
+    plan: PosePlan
+    limits: Mapping[str, tuple[DetectionLimit, ...]]
+    file: Path
+    record: RunRecord
+
+    def document(self) -> dict[str, Any]:
+        """The JSON document."""
+        return {
+            "plan": self.file,
+            "poses": len(self.plan),
+            "seed": self.plan.seed,
+            "power": {name: power_block(limits) for name, limits in self.limits.items()},
+            **self.record.document(),
+        }
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """Predicted shifts that are found, by design, as text."""
+        words = {
+            "reference_repeated": f"against a reference visit that reads every pose {ROUNDS} times",
+            "reference": "against a reference visit that reads every pose once",
+            "calibration": "against the calibration alone",
+        }
+        told = []
+        for name, word in words.items():
+            told.append(f"{word}: {_found(self.limits[name])}")
+        told.append(
+            f"the first of these, with the instrument set up anew: {_found(self.limits['reference_repeated_refit'])}"
+        )
+        return tuple(told)
+
+
+def plan_visit(
+    robot_file: Path,
+    out: Path,
+    count: int,
+    *,
+    estimates: Path | None = None,
+    refit: bool = False,
+    seed: int = 0,
+    command: str = "",
+    progress: Progress = silent,
+) -> PlannedVisit:
+    """Choose `count` poses that find the least shifts of single joints, and write plan.yaml to the folder `out`.
+
+    With `refit` they are chosen for an instrument that is set up anew for every visit. Raises `FlexcalError` as reading does, for fewer
+    than four poses, and where too few poses are free and visible.
+    """
+    if count < 4:
+        raise FlexcalError("E-RECHECK-008", f"{count} poses tell too little; plan four or more, better ten.")
+    robot = CalibratedRobot.from_yaml(robot_file, estimates)
+    model = robot.model
+    checker, setup = CollisionChecker(model), MeasuringSetup.declared(model, None)
+    progress("candidates", 0.0)
+    candidates = _candidates(robot, checker, setup, max(_CANDIDATES, 4 * count), seed)
+    progress("candidates", 0.5)
+    chosen = _chosen(model, candidates, count, refit=refit)
+    order = measurement_order(checker, candidates.q[chosen]).order
+    poses = candidates.subset(chosen[order])
+    plan = PosePlan(q=poses.q, seed=seed, name="recheck")
+    progress("candidates", 1.0)
+    limits = {}
+    designs: tuple[tuple[str, Compared, int], ...] = (
+        ("calibration", "calibration", 1),
+        ("reference", "reference", 1),
+        ("reference_repeated", "reference", ROUNDS),
+    )
+    for name, compared, rounds in designs:
+        for suffix, placed in (("", False), ("_refit", True)):
+            errors = planned_errors(model, poses, compared=compared, placed=placed, rounds=rounds)
+            test = GlobalTest.of(errors, possible_changes(model, errors.at))
+            limits[name + suffix] = detection_limits(test, SHIFT)
+    write_plan(out / PLAN, plan)
+    return PlannedVisit(plan, limits, out / PLAN, RunRecord(robot_provenance(robot.nominal, []), command))
+
+
+def _candidates(
+    robot: CalibratedRobot, checker: CollisionChecker, setup: MeasuringSetup, count: int, seed: int
+) -> PoseSet:
+    """Poses within the joint ranges of the calibration, of its first point, whose readings are still zero."""
+    model = robot.model
+    ranges = robot.blocks["calibration"].ranges
+    rng = np.random.default_rng([seed, 8])
+    drawn = random_candidates(checker, 4 * count, rng, setup, preload=True)
+    inside = np.ones(len(drawn), bool)
+    for k, name in enumerate(model.motor_names):
+        if name in ranges:
+            inside &= (drawn[:, k] >= ranges[name][0]) & (drawn[:, k] <= ranges[name][1])
+    # where the calibration covered a small part, joints are drawn there
+    q = drawn[inside] if inside.sum() >= count else _within(model, drawn, ranges, checker)
+    q = q[:count]
+    stated = model.value("scatter.instrument_share") > 0 or not model.scatter.std.any()
+    sigma = measuring_noise(model, q, setup) if stated else np.full(len(q), 1e-4)
+    return PoseSet(
+        q=q,
+        position=np.zeros((len(q), 3)),
+        sigma=np.repeat(sigma[:, None], 3, axis=1),
+        torque=None,
+        payload=None,
+        target=np.full(len(q), robot.measured[0]),
+        station=np.full(len(q), model.stations.names[0]),
+        temperature=None,
+        pose=np.arange(1, len(q) + 1),
+        sigma_given=stated,
+    )
+
+
+def _within(
+    model: RobotModel,
+    drawn: np.ndarray,
+    ranges: Mapping[str, tuple[float, float]],
+    checker: CollisionChecker,
+) -> np.ndarray:
+    """Configurations moved linearly into the ranges, those free of collision."""
+    q = drawn.copy()
+    for k, name in enumerate(model.motor_names):
+        if name in ranges:
+            low, high = ranges[name]
+            share = (q[:, k] - q[:, k].min()) / max(float(np.ptp(q[:, k])), 1e-12)
+            q[:, k] = low + share * (high - low)
+    return q[~checker.collides(q)]
+
+
+def _chosen(model: RobotModel, candidates: PoseSet, count: int, *, refit: bool) -> np.ndarray:
+    """Indices (count,) of the candidates with the least sum of squared variances of single joints: greedily, then by exchange."""
+    errors = planned_errors(model, candidates, compared="reference", placed=False)
+    changes = possible_changes(model, errors.at)
+    joints = [c.columns for c in changes if c.kind == "joint_shifted"]
+    place = [c.columns for c in changes if c.kind == "instrument_moved"] if refit else []
+    columns = np.hstack([*joints, *place]).reshape(len(candidates), 3, -1)
+    own = np.array([errors.own[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] for k in range(len(candidates))])
+    white = np.linalg.solve(np.linalg.cholesky(own), columns)
+    information = np.swapaxes(white, 1, 2) @ white
+    largest = information[:, range(len(joints)), range(len(joints))].max(axis=0)
+    seen = largest > _FLOOR * largest.max()
+    chosen: list[int] = []
+    total = 1e-6 * np.diag(np.diag(information.mean(axis=0)) + 1e-12)
+    for _ in range(count):
+        best = _best(total, information, len(joints), seen, chosen)
+        chosen.append(best)
+        total = total + information[best]
+    for _ in range(_SWEEPS):
+        before = list(chosen)
+        for place_of in range(count):
+            total = total - information[chosen[place_of]]
+            others = [c for k, c in enumerate(chosen) if k != place_of]
+            chosen[place_of] = _best(total, information, len(joints), seen, others)
+            total = total + information[chosen[place_of]]
+        if chosen == before:
+            break
+    return np.array(chosen)
+
+
+def _best(total: np.ndarray, information: np.ndarray, joints: int, seen: np.ndarray, taken: list[int]) -> int:
+    """Candidate with which the sum of the squared variances of single joints is least."""
+    whole = total + information
+    single = whole[:, range(joints), range(joints)]
+    if whole.shape[1] > joints:
+        across = whole[:, :joints, joints:]
+        single = single - np.einsum(
+            "kij,kji->ki", across, np.linalg.solve(whole[:, joints:, joints:], np.swapaxes(across, 1, 2))
+        )
+    score = np.sum(1 / np.maximum(single[:, seen], 1e-12) ** 2, axis=1)
+    score[taken] = np.inf
+    return int(score.argmin())
+
+
+def _found(limits: tuple[DetectionLimit, ...]) -> str:
+    told = []
+    for limit in limits:
+        unit = "mrad" if limit.unit == "rad" else "mm"
+        told.append(
+            f"{limit.subject} not seen"
+            if limit.found >= UNSEEN
+            else f"{limit.subject} {limit.found * 1e3:.3f} {unit}"
+        )
+    return ", ".join(told)

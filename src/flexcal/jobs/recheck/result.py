@@ -1,0 +1,407 @@
+"""Result of a recheck."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.calibration.recheck import (
+    AVERAGE_RUN,
+    FALSE_ALARM,
+    LEAST_MATCHED,
+    DetectionLimit,
+    DriftSum,
+    JudgedVisit,
+    MovedTool,
+    Suspect,
+    TellingPose,
+    VisitErrors,
+    detection_limits,
+    errors_from_calibration,
+    errors_from_reference,
+    judge_visit,
+    moved_tool,
+    telling_pose,
+)
+from flexcal.data.poses import PoseSet
+from flexcal.errors import FlexcalError
+from flexcal.jobs.calibration import ignored_columns_remarks, outside_ranges
+from flexcal.jobs.inputs import CalibratedRobot, is_station_identified
+from flexcal.jobs.pages import REPORT, PlottedResult
+from flexcal.jobs.recheck.judgement_words import judgement_sentence, suspect_in_words, telling_sentence
+from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, header, write_results
+from flexcal.report.layout import Page
+from flexcal.report.pages import RecheckStudy, recheck_page
+from flexcal.units import MILLIMETRE
+
+SHIFT = 0.05e-3
+"""Shift of a joint, rad (of sliding joints m), whose probability of being found is stated."""
+UNSEEN = 20e-3
+"""Shift, rad or m, above which a joint counts as not seen."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Recheck(PlottedResult):
+    """Result of `recheck`: whether a robot is as calibrated.
+
+    Attributes
+    ----------
+    model : RobotModel
+        The calibrated robot.
+    poses : PoseSet
+        The measured points.
+    judged : JudgedVisit
+        The judgement, against the reference visit where there is one, else against the calibration.
+    absolute : JudgedVisit or None
+        The judgement against the calibration where there is a reference visit.
+    limits : tuple of DetectionLimit
+        What the visit finds of shifts of single joints.
+    tools : tuple of MovedTool
+        How far each suspect moved the tool.
+    telling : TellingPose or None
+        Pose that would tell the two best suspects apart.
+    expected : float
+        Expected error of the calibrated robot at these poses, root mean square, m.
+    outside : str
+        Which poses lie outside the joint ranges of the calibration.
+    unmatched : bool
+        Whether a reference visit was given that has fewer than four poses in common with this one.
+    reference_date : str or None
+        Date of the reference visit, where it was one of a folder.
+    dates : tuple of str
+        Dates of the visits behind `drifts`, this one included.
+    drifts : tuple of DriftSum
+        Cumulative sums over the stored visits.
+    record : RunRecord
+        What the result comes from.
+    """
+
+    poses: PoseSet
+    judged: JudgedVisit
+    absolute: JudgedVisit | None
+    limits: tuple[DetectionLimit, ...]
+    tools: tuple[MovedTool, ...]
+    telling: TellingPose | None
+    expected: float
+    outside: str
+    unmatched: bool = False
+    reference_date: str | None = None
+    dates: tuple[str, ...] = ()
+    drifts: tuple[DriftSum, ...] = ()
+    record: RunRecord = NOT_RECORDED
+
+    @property
+    def verdict(self) -> str:
+        """The judgement as a word, as in results.json."""
+        return self.judged.verdict
+
+    @property
+    def headline(self) -> str:
+        """The judgement in a sentence."""
+        return judgement_sentence(self.judged, self.tools, self.expected)
+
+    def summary(self) -> str:
+        """The judgement, what would have been found, and remarks."""
+        return "\n".join([self.headline, self.power_sentence, *self.remarks])
+
+    @property
+    def power_sentence(self) -> str:
+        """Shifts of joints that such a visit finds."""
+        seen = [limit for limit in self.limits if limit.found < UNSEEN]
+        lost = [limit.subject for limit in self.limits if limit.found >= UNSEEN]
+        told = ", ".join(f"{limit.subject} {limit.found * 1e3:.3f}" for limit in seen)
+        unit = "mrad" if all(limit.unit == "rad" for limit in seen) else "mrad or mm"
+        sentence = (
+            f"found with 95 % would be shifts ({unit}) of {told}"
+            if seen
+            else "no shift of a joint would be found"
+        )
+        return sentence + (f"; not seen: {', '.join(lost)}" if lost else "")
+
+    @property
+    def alarms(self) -> tuple[DriftSum, ...]:
+        """Cumulative sums that passed their limit over several visits, the largest first; a jump at one visit is no drift."""
+        passed = [item for item in self.drifts if item.alarm is not None and item.alarm != item.since]
+        return tuple(sorted(passed, key=lambda item: -max(item.upward[-1], item.downward[-1])))
+
+    @cached_property
+    def remarks(self) -> tuple[str, ...]:
+        """Remarks, one sentence each."""
+        judged, errors = self.judged, self.judged.test.errors
+        remarks = [*self.poses.notes, *ignored_columns_remarks(self.poses)]
+        if self.outside:
+            remarks.append(self.outside)
+        if judged.instrument == "declared":
+            remarks.append(
+                "the place of the instrument was fitted to these poses, which takes six of their coordinates; a shift of a vertical first "
+                "joint, or another that only turns or moves the whole, cannot be seen then"
+            )
+        noise = float(np.sqrt(np.trace(errors.own) / len(errors.own)))
+        if telling := telling_sentence(judged, self.telling, noise):
+            remarks.append(telling)
+        if self.absolute is not None and not self.absolute.as_calibrated and judged.as_calibrated:
+            remarks.append(
+                "since the reference visit nothing changed, but against the calibration itself: "
+                + judgement_sentence(
+                    self.absolute, [_none(self.poses)] * max(1, len(self.absolute.suspects)), 0.0
+                )
+            )
+        if self.unmatched:
+            remarks.append(
+                f"fewer than {LEAST_MATCHED} poses are those of the reference visit (joint positions within 0.0001 rad, as commanded, not "
+                "as read), so the visit is compared with the calibrated model"
+            )
+        elif errors.compared == "calibration":
+            remarks.append(
+                "compared with the calibrated model, whose own errors count; a reference visit to the same poses after the calibration "
+                "(--reference) makes the test sharper, for they cancel"
+            )
+        elif errors.noise == "calibration":
+            remarks.append(
+                "the scatter is that of the calibration, which may contain errors of its model; a reference visit that measures every pose "
+                "three times tells the robot's own, and makes the test sharper"
+            )
+        if self.alarms:
+            remarks.append(self._alarm(self.alarms))
+        return tuple(remarks)
+
+    def _alarm(self, alarms: Sequence[DriftSum]) -> str:
+        item = alarms[0]
+        assert item.alarm is not None and item.since is not None
+        others = ", ".join(other.subject for other in alarms[1:])
+        return (
+            f"{item.subject} drifts: over the visits from {self.dates[item.since]} to {self.dates[item.alarm]} its shift adds up beyond "
+            f"chance (cumulative sum; one false alarm in {AVERAGE_RUN:.0f} visits)"
+            + (f"; so does that of {others}, which the same drift may make" if others else "")
+        )
+
+    def write(self, folder: str | Path) -> None:
+        """Write results.json and report.html to a folder.
+
+        Parameters
+        ----------
+        folder : str or Path
+            The folder, which is created where it is missing.
+        """
+        write_results(Path(folder), self.document())
+        self.report(Path(folder) / REPORT)
+
+    def _page(self) -> Page:
+        return recheck_page(RecheckStudy(self.model.name, self.document()))
+
+    def document(self) -> dict[str, Any]:
+        """The content of results.json."""
+        return {
+            **header("recheck"),
+            "robot": self.model.name,
+            "recheck": self.numbers,
+            "drift": self._drift(),
+            "sentence": self.headline,
+            "power_sentence": self.power_sentence,
+            "remarks": list(self.remarks),
+            **self.record.document(),
+        }
+
+    @cached_property
+    def numbers(self) -> dict[str, Any]:
+        """Block `recheck` of the document."""
+        judged, errors = self.judged, self.judged.test.errors
+        size = np.linalg.norm(errors.errors.reshape(-1, 3), axis=1) / MILLIMETRE
+        noise = np.sqrt(np.trace(_blocks(errors.covariance), axis1=1, axis2=2)) / MILLIMETRE
+        return {
+            "verdict": judged.verdict,
+            "probability": judged.probability,
+            "false_alarm": FALSE_ALARM,
+            "compared": errors.compared,
+            "reference": self.reference_date,
+            "noise": errors.noise,
+            "instrument": judged.instrument,
+            "poses": len(errors.poses),
+            "suspects": [
+                _suspect_block(s, tool) for s, tool in zip(judged.suspects, self.tools, strict=True)
+            ],
+            "together": judged.together,
+            "telling_pose": None
+            if self.telling is None
+            else {"q": self.telling.q, "apart_mm": self.telling.apart / MILLIMETRE},
+            "against_calibration": None
+            if self.absolute is None
+            else {"verdict": self.absolute.verdict, "probability": self.absolute.probability},
+            "expected_mm": self.expected / MILLIMETRE,
+            "power": power_block(self.limits),
+            "each": [
+                {"pose": int(pose), "target": str(target), "distance_mm": float(d), "expected_mm": float(e)}
+                for pose, target, d, e in zip(
+                    errors.poses.pose, errors.poses.target, size, noise, strict=True
+                )
+            ],
+        }
+
+    def _drift(self) -> dict[str, Any]:
+        return {
+            "average_run": AVERAGE_RUN,
+            "limit": self.drifts[0].limit if self.drifts else None,
+            "visits": list(self.dates),
+            "sums": {
+                item.subject: {
+                    "upward": item.upward,
+                    "downward": item.downward,
+                    "alarm": item.alarm,
+                    "since": item.since,
+                }
+                for item in self.drifts
+            },
+        }
+
+
+def power_block(limits: Sequence[DetectionLimit]) -> dict[str, Any]:
+    """Block of a JSON document on the shifts of joints that a visit finds; null where a joint is not seen."""
+    return {
+        "shift": SHIFT,
+        "joints": {
+            limit.subject: {
+                "unit": limit.unit,
+                "std": limit.std if limit.found < UNSEEN else None,
+                "power": limit.power,
+                "found_95_percent": limit.found if limit.found < UNSEEN else None,
+                "least_possible": limit.bound if limit.found < UNSEEN else None,
+            }
+            for limit in limits
+        },
+    }
+
+
+def _suspect_block(suspect: Suspect, tool: MovedTool) -> dict[str, Any]:
+    change = suspect.change
+    return {
+        "kind": change.kind,
+        "subject": change.subject,
+        "words": suspect_in_words(suspect),
+        "changes": {
+            name: {
+                "estimate": float(value),
+                "std": float(std),
+                "low": float(value - suspect.quantile * std),
+                "high": float(value + suspect.quantile * std),
+                "unit": unit,
+            }
+            for name, unit, value, std in zip(
+                change.names, change.units, suspect.estimate, suspect.std, strict=True
+            )
+        },
+        "remainder": suspect.remainder,
+        "same_at_these_poses": suspect.same,
+        "tool_mm": {
+            "mean": tool.mean / MILLIMETRE,
+            "mean_interval": [v / MILLIMETRE for v in tool.mean_interval],
+            "p95": tool.p95 / MILLIMETRE,
+            "p95_interval": [v / MILLIMETRE for v in tool.p95_interval],
+            "largest": tool.largest / MILLIMETRE,
+            "at": tool.farthest,
+        },
+    }
+
+
+def _blocks(covariance: np.ndarray) -> np.ndarray:
+    """Blocks (K, 3, 3) on the diagonal of a covariance (3 K, 3 K)."""
+    count = len(covariance) // 3
+    return covariance.reshape(count, 3, count, 3)[np.arange(count), :, np.arange(count)]
+
+
+def _none(poses: PoseSet) -> MovedTool:
+    return MovedTool(0.0, (0.0, 0.0), 0.0, (0.0, 0.0), poses.q[0], 0.0)
+
+
+def recheck(
+    robot: CalibratedRobot, poses: PoseSet, *, reference: PoseSet | None = None, refit: bool = False
+) -> Recheck:
+    """Judge by few measured poses whether a robot is as calibrated, and what changed.
+
+    Parameters
+    ----------
+    robot : CalibratedRobot
+        `Calibration.robot`, or ``CalibratedRobot.from_yaml(path)``.
+    poses : PoseSet
+        Joint positions (N, n) in rad or m and measured points (N, 3) in m, about ten.
+    reference : PoseSet, optional
+        The same poses, or some of them, as measured when the robot was as calibrated; errors of the model cancel then.
+    refit : bool
+        Whether the instrument stands elsewhere than at the calibration, or at the reference visit.
+
+    Returns
+    -------
+    Recheck
+        Its `verdict`, `headline`, `summary()`, `document()`, `report(path)` and `write(folder)`.
+
+    Raises
+    ------
+    FlexcalError
+        For fewer than four poses, points that the calibration did not measure, measurements that are not of points, and where neither
+        the noise of the instrument nor the scatter of the robot is known.
+
+    Examples
+    --------
+    >>> from flexcal import RobotModel, calibrate, read_poses, recheck
+    >>> model = RobotModel.from_yaml("examples/ur5_tracker/robot.yaml", estimates=False)
+    >>> poses = read_poses("examples/ur5_tracker/grid.csv", model)
+    >>> robot = calibrate(model, poses.subset(slice(None, None, 13)), terms=["kinematic"]).robot
+    >>> recheck(robot, poses.subset(slice(3, 1000, 100))).verdict
+    'as_calibrated'
+    """
+    model = robot.model
+    _require(robot, poses)
+    if reference is not None:
+        _require(robot, reference)
+    unknown = any(not is_station_identified(model, station) for station in poses.stations)
+
+    def against_calibration(placed: bool) -> VisitErrors | None:
+        return errors_from_calibration(model, poses, placed=placed)
+
+    def against_reference(placed: bool) -> VisitErrors | None:
+        assert reference is not None
+        return errors_from_reference(model, poses, reference, placed=placed)
+
+    absolute = judge_visit(against_calibration, placed=refit or unknown)
+    assert absolute is not None
+    relative = None
+    if reference is not None:
+        relative = judge_visit(
+            against_reference, placed=refit or set(poses.stations) != set(reference.stations)
+        )
+    judged = relative or absolute
+    ranges, target = robot.blocks["calibration"].ranges, poses.targets[0]
+    suspects = judged.suspects
+    whole = absolute.test.errors.covariance
+    return Recheck(
+        model=model,
+        poses=poses,
+        judged=judged,
+        absolute=absolute if relative is not None else None,
+        limits=detection_limits(judged.test, SHIFT),
+        tools=tuple(moved_tool(model, ranges, suspect, target) for suspect in suspects),
+        telling=telling_pose(model, ranges, (suspects[0], suspects[1]), target)
+        if len(suspects) > 1
+        else None,
+        expected=float(np.sqrt(3 * np.trace(whole) / len(whole))),
+        outside=outside_ranges(robot, poses.q),
+        unmatched=reference is not None and relative is None,
+    )
+
+
+def _require(robot: CalibratedRobot, poses: PoseSet) -> None:
+    unmeasured = [name for name in poses.targets if name not in robot.measured]
+    if unmeasured:
+        raise FlexcalError(
+            "E-RECHECK-006",
+            f"no calibration pose measured {' and '.join(unmeasured)}, so its place on the tool is not known; measure "
+            f"{' or '.join(robot.measured)}.",
+        )
+    if len(poses) < 4:
+        raise FlexcalError(
+            "E-RECHECK-007", f"{len(poses)} poses tell too little; measure four or more, better ten."
+        )

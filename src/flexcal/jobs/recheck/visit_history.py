@@ -1,0 +1,159 @@
+"""The file of all visits to a robot: visits.json."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.calibration.recheck import ShiftAtVisit
+from flexcal.data.poses import PoseSet
+from flexcal.errors import FlexcalError, InputError, unreadable
+from flexcal.files.structuring import structure
+from flexcal.files.transaction import current_path, write_text
+from flexcal.jobs.result_files import json_text
+
+VISITS = "visits.json"
+"""File of the visits, in the folder of `--out`."""
+_SCHEMA = 1
+_ADVICE = "restore it from a copy, or move it away to begin anew"
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Measured points of a visit, N rows: SI units, `sigma` and `payload` None where they were not given."""
+
+    pose: list[int]
+    target: list[str]
+    station: list[str]
+    q: list[list[float]]
+    position: list[list[float]]
+    sigma: list[list[float]] | None = None
+    payload: list[float] | None = None
+
+    @classmethod
+    def of(cls, poses: PoseSet) -> Readings:
+        """Readings of a pose set of points."""
+        return cls(
+            poses.pose.tolist(),
+            poses.target.tolist(),
+            poses.station.tolist(),
+            poses.q.tolist(),
+            poses.position.tolist(),
+            poses.sigma.tolist() if poses.sigma_given else None,
+            None if poses.payload is None else poses.payload.tolist(),
+        )
+
+    def poses(self, sigma: float) -> PoseSet:
+        """The pose set; `sigma`, m, is that of each coordinate where none was given."""
+        position = np.array(self.position, dtype=float).reshape(-1, 3)
+        given = self.sigma is not None
+        return PoseSet(
+            q=np.array(self.q, dtype=float),
+            position=position,
+            sigma=np.array(self.sigma, dtype=float) if given else np.full(position.shape, sigma),
+            torque=None,
+            payload=None if self.payload is None else np.array(self.payload, dtype=float),
+            target=np.array(self.target),
+            station=np.array(self.station),
+            temperature=None,
+            pose=np.array(self.pose, dtype=int),
+            sigma_given=given,
+        )
+
+
+@dataclass(frozen=True)
+class Visit:
+    """One visit to a robot.
+
+    Attributes
+    ----------
+    date : str
+        ISO 8601 date.
+    files : mapping of str
+        SHA-256 of the files of measured poses by name; the same files are the same visit.
+    calibration : str
+        SHA-256 of the calibration that it was compared with.
+    reference : bool
+        Whether later visits are compared with it.
+    verdict, sentence : str
+        The judgement, as a word and in words.
+    probability : float
+        That chance makes errors as conspicuous in a robot as calibrated.
+    shifts : list of ShiftAtVisit
+        Of every joint, as if it alone had shifted.
+    readings : Readings
+        What was measured.
+    alarms : list of str
+        Joints whose cumulative sums had passed their limit.
+    suspects : list
+        Changes that explain the errors, as in results.json.
+    """
+
+    date: str
+    files: dict[str, str]
+    calibration: str
+    reference: bool
+    verdict: str
+    sentence: str
+    probability: float
+    shifts: list[ShiftAtVisit]
+    readings: Readings
+    alarms: list[str]
+    suspects: list[Any]
+
+
+@dataclass(frozen=True)
+class _Visits:
+    kind: str
+    schema: int
+    robot: str
+    visits: list[Visit]
+
+
+def read_visits(folder: Path, robot: str) -> tuple[Visit, ...]:
+    """Visits stored in a folder, by date; none where there is no file.
+
+    Raises `InputError` for a file of another version, robot or program.
+    """
+    path = folder / VISITS
+    if not current_path(path).is_file():
+        return ()
+    try:
+        content = json.loads(current_path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as problem:
+        raise unreadable(path, problem, _ADVICE) from problem
+    known = (
+        isinstance(content, Mapping) and content.get("kind") == "visits" and content.get("schema") == _SCHEMA
+    )
+    if not known:
+        raise InputError("E-RECHECK-003", f"{path} holds no visits of this version of flexcal; {_ADVICE}.")
+    try:
+        stored = structure(content, _Visits)
+    except FlexcalError as problem:
+        raise InputError("E-RECHECK-004", f"{path} is damaged ({problem}); {_ADVICE}.") from problem
+    if stored.robot != robot:
+        raise InputError(
+            "E-RECHECK-005",
+            f"{path} has visits to the robot '{stored.robot}', and this one is '{robot}'; give another --out.",
+        )
+    return tuple(stored.visits)
+
+
+def with_visit(visits: Sequence[Visit], visit: Visit) -> tuple[Visit, ...]:
+    """Visits with one more, by date; one of the same files and calibration is replaced, its date kept."""
+    same = [v for v in visits if (v.files, v.calibration) == (visit.files, visit.calibration)]
+    others = [v for v in visits if v not in same]
+    if same and same[0].date < visit.date:
+        visit = replace(visit, date=same[0].date)
+    return tuple(sorted([*others, visit], key=lambda v: v.date))
+
+
+def write_visits(folder: Path, robot: str, visits: Sequence[Visit]) -> None:
+    """Write visits.json to a folder, atomically."""
+    content = asdict(_Visits("visits", _SCHEMA, robot, list(visits)))
+    write_text(folder / VISITS, json_text(content) + "\n")

@@ -1,0 +1,215 @@
+"""The report of a recheck of a calibrated robot (`flexcal recheck`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from flexcal.report.figures import cumulative_sums, visit_errors
+from flexcal.report.layout import (
+    Check,
+    Fact,
+    FigureBlock,
+    Page,
+    Section,
+    Status,
+    Table,
+    Text,
+    Verdict,
+    document_millimetres,
+    significant,
+)
+from flexcal.report.sections import provenance_section
+
+_HEADLINES = {
+    "as_calibrated": "As calibrated",
+    "joint_shifted": "A joint shifted",
+    "tool_bumped": "Tool bumped",
+    "thermal_growth": "Thermal growth",
+    "payload_changed": "Another payload",
+    "instrument_moved": "The instrument moved, the robot is as calibrated",
+    "wrong_reading": "One pose disagrees on its own",
+    "ambiguous": "Changed, in one of several ways",
+    "recalibrate": "Recalibrate",
+}
+_COMPARED = {
+    "calibration": "the calibrated model, whose own errors are part of what is expected",
+    "reference": "a reference visit to the same poses, so that errors of the model cancel",
+}
+_NOISE = {
+    "calibration": "as the calibration found it",
+    "repeats": "of repeated readings of the same poses",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class RecheckStudy:
+    """Recheck of the robot called `name`, and `results` as the verb prints them."""
+
+    name: str
+    results: Mapping[str, Any]
+
+
+def recheck_page(study: RecheckStudy) -> Page:
+    """The page before it becomes HTML."""
+    results = study.results
+    block = results["recheck"]
+    found = [j["found_95_percent"] for j in block["power"]["joints"].values()]
+    least = None if not found or any(v is None for v in found) else max(found)
+    tool = block["suspects"][0]["tool_mm"] if block["suspects"] else None
+    facts = (
+        Fact(
+            "Is it as calibrated?",
+            significant(block["probability"], 2),
+            "",
+            f"Probability that chance makes errors as conspicuous; below {block['false_alarm']:g} something changed.",
+            _status(block["verdict"]),
+        ),
+        Fact(
+            "How far is the tool off now?",
+            document_millimetres(None if tool is None else tool["p95"]),
+            "mm",
+            f"At 95 % of the poses; {document_millimetres(block['expected_mm'])} mm (rms) are expected of the calibrated robot.",
+        ),
+        Fact(
+            "What would have been found?",
+            "–" if least is None else f"{least * 1e3:.3f}",
+            "mrad or mm",
+            "Shift of any joint that is found with 95 %; joint by joint below.",
+        ),
+    )
+    verdict = Verdict(
+        _status(block["verdict"]),
+        _HEADLINES[block["verdict"]],
+        _sentence(results["sentence"]),
+        facts,
+        (),
+        "",
+        _checks(results),
+    )
+    return Page(
+        title=f"{study.name}: recheck",
+        subtitle=f"{block['poses']} poses and points, compared with {_COMPARED[block['compared']]}",
+        verdict=verdict,
+        sections=[
+            _visit_section(results),
+            *([_suspects_section(block)] if block["suspects"] else []),
+            _power_section(block),
+            *([_drift_section(results["drift"])] if results["drift"]["sums"] else []),
+            provenance_section(results["command"], None, {}, results["provenance"]),
+        ],
+        document=results,
+    )
+
+
+def _status(verdict: str) -> Status:
+    if verdict == "as_calibrated":
+        return "good"
+    return "care" if verdict in ("instrument_moved", "wrong_reading") else "bad"
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}."
+
+
+def _checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
+    block, drift = results["recheck"], results["drift"]
+    lost = [name for name, joint in block["power"]["joints"].items() if joint["found_95_percent"] is None]
+    alarms = [name for name, item in drift["sums"].items() if item["alarm"] is not None]
+    checks = [
+        Check("Is the robot as calibrated?", _sentence(results["sentence"]), _status(block["verdict"])),
+        Check(
+            "Does the visit see every joint?",
+            f"Not {', '.join(lost)}: these points do not show their shift." if lost else "Yes.",
+            "care" if lost else "good",
+        ),
+        Check(
+            "Does anything drift over the visits?",
+            f"{', '.join(alarms)}: see the cumulative sums."
+            if alarms
+            else f"Not beyond chance in {len(drift['visits'])} visits.",
+            "care" if alarms else "good" if len(drift["visits"]) > 1 else "unknown",
+        ),
+    ]
+    return tuple(checks)
+
+
+def _visit_section(results: Mapping[str, Any]) -> Section:
+    block = results["recheck"]
+    figure = FigureBlock(
+        "figure-visit",
+        "Pose by pose",
+        visit_errors(block["each"]),
+        "Distance between measured and expected point, beside what scatter, and against the calibration its own errors, let expect.",
+        "Measured and expected distances of every pose.",
+    )
+    lead = f"The scatter is {_NOISE[block['noise']]}."
+    if block["reference"] is not None:
+        lead += f" The reference visit is that of {block['reference']}."
+    return Section(
+        "visit", "The visit", lead, (figure, Text(tuple(_sentence(remark) for remark in results["remarks"])))
+    )
+
+
+def _suspects_section(block: Mapping[str, Any]) -> Section:
+    rows = tuple(
+        (
+            item["words"],
+            significant(item["remainder"], 2),
+            document_millimetres(item["tool_mm"]["mean"]),
+            document_millimetres(item["tool_mm"]["p95"]),
+            ", ".join(f"{value:.2f}" for value in item["tool_mm"]["at"]),
+        )
+        for item in block["suspects"]
+    )
+    table = Table(
+        "table-suspects",
+        "Changes that explain the errors about equally well, the most likely first",
+        ("change (95 % interval)", "p of the rest", "tool off: mean / mm", "p95 / mm", "most at q / rad, m"),
+        rows,
+        note="Each as if it alone had happened. p of the rest: probability that chance leaves what the change does not explain.",
+        text_columns=(4,),
+    )
+    return Section("suspects", "What changed", "", (table,))
+
+
+def _power_section(block: Mapping[str, Any]) -> Section:
+    rows = tuple(
+        (
+            name,
+            *(
+                "not seen" if joint[key] is None else f"{joint[key] * 1e3:.4f}"
+                for key in ("std", "found_95_percent", "least_possible")
+            ),
+            f"{100 * joint['power']:.0f} %",
+        )
+        for name, joint in block["power"]["joints"].items()
+    )
+    table = Table(
+        "table-power",
+        "Shifts of single joints that this visit finds, mrad (of sliding joints mm)",
+        (
+            "joint",
+            "std",
+            "found with 95 %",
+            "least that any test finds",
+            f"{block['power']['shift'] * 1e3:g}: found with",
+        ),
+        rows,
+        note="At 1 % false alarms of the whole. The last but one column is that of the best test for this joint alone (Neyman and "
+        "Pearson), by the Cramér-Rao bound of these poses and this noise: no evaluation of the same measurements finds less.",
+    )
+    return Section("power", "What would have been found", "", (table,))
+
+
+def _drift_section(drift: Mapping[str, Any]) -> Section:
+    figure = FigureBlock(
+        "figure-drift",
+        "Cumulative sums over the visits",
+        cumulative_sums(drift),
+        f"Every sum adds up what a visit differs from those before it. Beyond the dashed limits (± {drift['limit']:.2f}) a joint drifts; "
+        f"false alarms of all sums together are {drift['average_run']:.0f} visits apart on average, or more.",
+        "Upward and downward cumulative sums of every joint against the visits.",
+    )
+    return Section("drift", "Slow drifts", "", (figure,))
