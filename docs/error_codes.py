@@ -34,6 +34,7 @@ SUBJECTS = {
     "MODEL": "Robot model",
     "PLAN": "Plans",
     "POSES": "Poses",
+    "PRIOR": "Prior of a robot model",
     "PROG": "Robot programs",
     "RECHECK": "Recheck of a calibration",
     "REPORT": "Reports",

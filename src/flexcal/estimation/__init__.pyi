@@ -2,6 +2,7 @@ from .conic_constraint import Cone
 from .conic_least_squares import ConicFit
 from .estimate import Dropped, Estimate
 from .gaussian_distance import distance_probability, distance_quantile, mean_distance, principal_variances
+from .hierarchical_model import Measured, Population, population
 from .identifiability import RANK_TOLERANCE, Identifiability, analyse, name_direction
 from .loss import Cauchy, Huber, Loss, Squares, loss_named
 from .misfit import Misfit
@@ -28,10 +29,12 @@ __all__ = [
     "Huber",
     "Identifiability",
     "Loss",
+    "Measured",
     "Misfit",
     "NotFinite",
     "Parameter",
     "Parameters",
+    "Population",
     "Problem",
     "Sensitivity",
     "Squares",
@@ -47,6 +50,7 @@ __all__ = [
     "loss_named",
     "mean_distance",
     "name_direction",
+    "population",
     "principal_variances",
     "profile_cost_increase",
     "solve",

@@ -1,6 +1,7 @@
 from .bearing_axes import BearingAxes, compare_bearings
 from .coupled_drives import Coupling, undeclared_coupling
 from .drift_test import Drift
+from .fleet_conflict import FleetConflict
 from .gravity_residuals import GravityLoads, gravity_loads
 from .jumps_in_readings import ReadingJump, reading_jumps
 from .learning_curve import LearningCurve, LearningPoint
@@ -18,6 +19,7 @@ __all__ = [
     "Disagreement",
     "Drift",
     "FarZero",
+    "FleetConflict",
     "GravityLoads",
     "LearningCurve",
     "LearningPoint",

@@ -1,5 +1,7 @@
+from .base_placement import base_errors
 from .elastic_prior import ElasticPrior
 from .fitted_points import CONVERGED
+from .fleet_prior import FleetPrior
 from .gauge_freedom import (
     KNOWN_POINT_STD,
     point_uncertainty,
@@ -32,10 +34,12 @@ __all__ = [
     "PER_JOINT",
     "TOLERANCE",
     "ElasticPrior",
+    "FleetPrior",
     "GeometricFit",
     "LossName",
     "StratifiedSample",
     "all_errors",
+    "base_errors",
     "declared_size",
     "fit_geometry",
     "free_joints",

@@ -17,6 +17,7 @@ from flexcal.calibration.error_model import (
     joint_rotation_jacobian,
 )
 from flexcal.calibration.fit.elastic_prior import ElasticPrior, with_instruments
+from flexcal.calibration.fit.fleet_prior import FleetPrior
 from flexcal.calibration.fit.held_size import held_lengths
 from flexcal.calibration.fit.least_squares_problem import GeometryProblem, PlainLoss
 from flexcal.calibration.fit.marginalised_elasticity import marginalised
@@ -70,6 +71,8 @@ _FAR_ZERO = 0.2
 _SLACK = 1.5
 """Factor by which the squared scatter of few points, from their median, may be too small."""
 
+_TOLD = 0.6
+"""Standard deviation, relative to the plausible one, below which other robots tell a parameter: each of two whose sum they tell has 0.7."""
 _FREE_STIFFNESS = 0.3
 """Relative 1σ of every stiffness about its prior while the scatter is estimated."""
 
@@ -95,6 +98,7 @@ class PointFit:
     near: Mapping[str, float]
     far_zeros: bool
     progress: Progress
+    fleet: FleetPrior | None = None
 
     @classmethod
     def of(
@@ -108,6 +112,7 @@ class PointFit:
         marginalised: bool,
         near: Mapping[str, float],
         progress: Progress,
+        fleet: FleetPrior | None = None,
     ) -> PointFit:
         """Input without the term `transmission` for fewer than 20 different poses, which do not determine its variance.
 
@@ -130,13 +135,22 @@ class PointFit:
         held = held_lengths(start, poses)
         geometric = geometric_parameters(start, poses, terms)
         geometric = Parameters(item for item in geometric if item.name not in held)
+        if fleet is not None:
+            fleet = fleet.among(geometric.names)
+            geometric = fleet.applied(geometric)
         # zeros that are far off are to be found as such, not as lengths of links that are turned; that of the last joint may as well
         # be where the target is
         last = {start.point(target).joint for target in poses.targets}
         inner = [f"{joint.name}.offset" for i, joint in enumerate(start.joints) if i not in last]
         zeros = [name for name in inner if name in geometric] if far_zeros else []
-        seen = kinematic_identifiability(start, poses, geometric, prefer=zeros)
-        require_enough(start, poses, geometric, seen)
+        known = () if fleet is None else fleet.names
+        told = Parameters(item for item in geometric if item.name not in known)
+        seen = kinematic_identifiability(start, poses, told, prefer=zeros)
+        require_enough(start, poses, told, seen)
+        if fleet is not None:
+            # of the others those that pivoting keeps come first, so that the poses determine them beside what the prior tells
+            zeros = [*zeros, *seen.kept_names]
+            seen = kinematic_identifiability(start, poses, geometric, prefer=zeros)
         structural = random_identifiability(start, poses, geometric, seen)
         if structural.rank > seen.rank or poses.kind is not None:
             # these poses hide something: what may be off most, as the place of the instrument, is to take it up
@@ -157,6 +171,7 @@ class PointFit:
             near,
             far_zeros,
             progress,
+            fleet,
         )
 
     @cached_property
@@ -188,6 +203,12 @@ class PointFit:
         seen = self.identifiability.kept_names
         declared = [p.name for p in self.geometric if np.isfinite(p.prior_std)]
         return tuple(name for name in self.structural.kept_names if name not in (*seen, *declared))
+
+    @property
+    def unknowns(self) -> int:
+        """Number of parameters that the poses alone determine: of none that other robots of the model tell."""
+        known = () if self.fleet is None else self.fleet.names
+        return sum(name not in known for name in self.identifiability.kept_names)
 
     @cached_property
     def plausible(self) -> dict[str, float]:
@@ -276,7 +297,9 @@ class PointFit:
             # where a parameter is held that moved a loop far, the others' values may leave the loop open
             values = {} if near is None or fixed != near.fixed else values
         kept = Parameters(
-            replace(p, value=values.get(p.name, p.value), prior_mean=p.value) if p.name in values else p
+            replace(p, value=values[p.name], prior_mean=p.value if p.prior_mean is None else p.prior_mean)
+            if p.name in values
+            else p
             for p in kept
         )
         whitening = scatter.weights(at.readings, turns)
@@ -284,7 +307,9 @@ class PointFit:
         prior = prior.started(values)
         passes = 0
         while True:
-            task = GeometryProblem(self.start, self.poses, kept, prior, flank, self.elastic, whitening)
+            task = GeometryProblem(
+                self.start, self.poses, kept, prior, flank, self.elastic, whitening, self.fleet
+            )
             if self.marginalised and len(prior.parameters):
                 estimate = marginalised(task, progress=self.progress)
             else:
@@ -348,9 +373,9 @@ class FittedPoints:
         residual = self.at.residual + slopes @ (moved.coordinates() - moved.prior_mean())
         residual = residual + waves @ np.array([estimate.values.get(name, 0.0) for name in names])
         free = ~np.isfinite(self.task.kept.prior_std())
-        known = self.task.kept.prior_std()[~free]
+        known = self.task.kept_covariance[np.ix_(~free, ~free)]
         shift = estimate.parameters.subset(self.task.kept.names).coordinates() - self.task.kept.prior_mean()
-        tied = np.concatenate([tied, columns[:, :, ~free] * known], axis=2)
+        tied = np.concatenate([tied, columns[:, :, ~free] @ np.linalg.cholesky(known)], axis=2)
         residual = residual + columns[:, :, ~free] @ shift[~free]
         columns = columns[:, :, free]
         scale = np.linalg.norm(columns, axis=(0, 1))
@@ -379,7 +404,7 @@ class FittedPoints:
         """Common scatter of all coordinates of a unit, from the median of the residuals' distances."""
         present = self.at.readings.present
         rows = int(present.sum())
-        spread = rows / max(rows - self.fit.identifiability.rank, 1)
+        spread = rows / max(rows - self.fit.unknowns, 1)
         squares = (self.at.residual**2).sum(axis=1) / _CHI_MEDIAN[present.sum(axis=1)]
         readings = self.at.readings
         groups = {n: readings.of_scatter(n).any(axis=1) for n in (ROBOT, *readings.instruments)}
@@ -488,6 +513,11 @@ class FittedPoints:
         stds = np.sqrt(np.diag(estimate.covariance))
         waves = {name: size * self.scatter.transmission for name, size in self.fit.waves.items()}
         beforehand = {p.name: p.prior_std for p in self.task.kept} | waves
+        if self.fit.fleet is not None:
+            # what other robots of the model tell is known; of a sum that they tell, neither of its two terms is
+            beforehand |= {
+                name: _TOLD * plausible_size(self.fit.start, name) for name in self.fit.fleet.names
+            }
         known = zip(self.fit.prior.parameters, np.sqrt(np.diag(self.fit.prior.covariance)), strict=True)
         beforehand |= {p.name: std for p, std in known if p.name.endswith(".scale")}
         return tuple(

@@ -11,6 +11,7 @@ import numpy as np
 from flexcal.calibration.error_model import ErrorComponents, ErrorStatistics, LinearFit
 from flexcal.calibration.fit.elastic_prior import NOTHING_ELASTIC, ElasticPrior
 from flexcal.calibration.fit.fitted_points import CONVERGED, FittedPoints, PointFit
+from flexcal.calibration.fit.fleet_prior import FleetPrior
 from flexcal.calibration.fit.least_squares_problem import LossName, PlainLoss
 from flexcal.calibration.fit.practical_identifiability import Undetermined
 from flexcal.calibration.fit.terms import moving_joints
@@ -42,7 +43,8 @@ class GeometricFit:
     the kinematic Jacobian, `undetermined` what has full rank and is hidden by noise or the choice of poses; `readings` (R, 3),
     measured minus predicted, m of the points, then rad of the orientations; `linear` the fit linearised at its solution, without outliers;
     `flank` (N, n); `ambiguous` (N,) poses whose flank is not certain; `terms` those fitted;
-    `size` the length that is held where no reading tells how large the robot is.
+    `size` the length that is held where no reading tells how large the robot is; `fleet` the prior from other robots of the model, of the
+    parameters of this fit.
     """
 
     model: RobotModel
@@ -58,6 +60,7 @@ class GeometricFit:
     ambiguous: np.ndarray
     terms: tuple[str, ...]
     size: tuple[str, ...] = ()
+    fleet: FleetPrior | None = None
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.model.name}: {self.errors}>"
@@ -146,6 +149,7 @@ def fit_geometry(
     elasticity: Literal["reestimated", "marginalised"] = "reestimated",
     secant_scale: float = 0.0,
     loss: Loss | LossName = "auto",
+    fleet: FleetPrior | None = None,
     near: Mapping[str, float] | None = None,
     tolerance: float = CONVERGED,
     progress: Progress = silent,
@@ -178,6 +182,8 @@ def fit_geometry(
         Relative standard deviation of the ratio of each drive's secant stiffness under gravity to its tangent stiffness.
     loss : {"auto", "squares", "huber", "cauchy"} or Loss
         Loss function; "cauchy" finds outliers, "auto" takes it where squares leave some.
+    fleet : FleetPrior, optional
+        Prior of the geometry from other robots of the model.
     near : mapping of float, optional
         Values of parameters from which to start, as of a fit to nearly the same points; by default those of the `model`.
     tolerance : float
@@ -223,6 +229,7 @@ def fit_geometry(
         marginalised=elasticity == "marginalised",
         near=near or {},
         progress=progress,
+        fleet=fleet,
     )
     first, plain = _rough(fit), "squares" if loss == "auto" else loss
     fitted = _settled(first, plain)
@@ -290,6 +297,7 @@ def _calibration(fitted: FittedPoints) -> GeometricFit:
         ambiguous=ambiguous_poses(calibrated, fitted.at),
         terms=fit.terms,
         size=fit.size,
+        fleet=fit.fleet,
     )
 
 

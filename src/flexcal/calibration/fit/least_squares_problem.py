@@ -10,6 +10,7 @@ import numpy as np
 
 from flexcal.calibration.error_model import Whitening
 from flexcal.calibration.fit.elastic_prior import ElasticPrior
+from flexcal.calibration.fit.fleet_prior import FleetPrior, prior_covariance
 from flexcal.calibration.measurement import PredictedMeasurements, Readings, predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Estimate, Loss, Parameters, Problem, solve
@@ -24,8 +25,8 @@ LossName = Literal["auto", "squares", "huber", "cauchy"]
 class GeometryProblem:
     """Problem of fitting the geometric parameters `kept` of the robot `start` to `poses` on the backlash flanks `flank` (N, n).
 
-    `prior` is what is known of stiffness and inertia beforehand; `elastic` says whether the arm deflects at all; `whitening` weighs
-    the readings.
+    `prior` is what is known of stiffness and inertia beforehand, `fleet` what other robots of the model tell of the geometry; `elastic`
+    says whether the arm deflects at all; `whitening` weighs the readings.
     """
 
     start: RobotModel
@@ -35,6 +36,12 @@ class GeometryProblem:
     flank: np.ndarray
     elastic: bool
     whitening: Whitening
+    fleet: FleetPrior | None = None
+
+    @property
+    def kept_covariance(self) -> np.ndarray:
+        """Prior covariance (p, p) of the geometric parameters, infinite on the diagonal where there is none."""
+        return prior_covariance(self.kept, self.fleet)
 
     def predicted(self, values: Mapping[str, float], *, jacobians: bool = False) -> PredictedMeasurements:
         """Predicted measurements of the robot with the given named values, on the flanks of this fit."""
@@ -66,7 +73,9 @@ class GeometryProblem:
             columns = self.columns(at, parameters.names)[there]
             return self.residual(at)[there], -columns * parameters.natural_slope(x)
 
-        covariance = np.diag(parameters.prior_std() ** 2)
+        size = len(parameters)
+        covariance = np.zeros((size, size))
+        covariance[: len(self.kept), : len(self.kept)] = self.kept_covariance
         covariance[len(self.kept) :, len(self.kept) :] = self.prior.covariance
         groups = np.repeat(readings.row, 3)[there]
         problem = Problem(parameters, linearise, None, covariance, groups)

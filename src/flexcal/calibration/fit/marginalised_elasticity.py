@@ -91,7 +91,7 @@ class _Marginal:
         def residual(x: np.ndarray) -> np.ndarray:
             return self.shrunk(self.residual(values(x)))
 
-        return Problem(kept, linearise, residual)
+        return Problem(kept, linearise, residual, fit.kept_covariance)
 
 
 def _joint(at: _Marginal, geometry: Estimate) -> Estimate:

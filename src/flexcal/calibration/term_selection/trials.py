@@ -226,19 +226,30 @@ class TermTrials:
         return {
             item.name: item.prior_std
             for item in every
-            if np.isfinite(item.prior_std) and item.name.rpartition(".")[2] in (*GEOMETRY, *ORIGIN)
+            if np.isfinite(item.prior_std)
+            and item.name.rpartition(".")[2] in (*GEOMETRY, *ORIGIN)
+            and item.name not in self._of_fleet
         }
+
+    @property
+    def _of_fleet(self) -> tuple[str, ...]:
+        """Parameters with a prior from other robots of the model."""
+        return () if self.rigid.fleet is None else self.rigid.fleet.names
 
     @cached_property
     def _free(self) -> list[str]:
         """Parameters that the points determine by rank, without those that have a prior."""
-        return [name for name in self.rigid.identifiability.kept_names if name not in self._known]
+        known = (*self._known, *self._of_fleet)
+        return [name for name in self.rigid.identifiability.kept_names if name not in known]
 
     @cached_property
     def _held(self) -> np.ndarray:
         """Columns (R, 3, k) of springs, inertia and geometry with a prior, in its standard deviations."""
         prior, names = self.rigid.prior, tuple(self._known)
         known = self._seen(names) * np.array([self._known[name] for name in names])
+        if self.rigid.fleet is not None:
+            own = self._seen(self._of_fleet) @ np.linalg.cholesky(self.rigid.fleet.covariance)
+            known = np.concatenate([known, own], axis=2)
         if not len(prior.parameters):
             return known
         parameters = self.rigid.estimate.parameters.subset(prior.parameters.names)
@@ -253,7 +264,8 @@ class TermTrials:
                     n for n in self._free if n.rpartition(".")[2] in (*GEOMETRY, *ORIGIN, *STATION, "zero")
                 )
             else:
-                names = geometric_parameters(self.model, self.rigid.poses, [term]).names
+                every = geometric_parameters(self.model, self.rigid.poses, [term]).names
+                names = tuple(n for n in every if n not in self._of_fleet)
             self._columns[term] = self._seen(names)
         return self._columns[term]
 

@@ -72,6 +72,8 @@ class Calibrate:
     """Treatment of the uncertainty of stiffness and inertia; both give the same geometry to first order."""
     hold_out: Annotated[str | None, arg(metavar="COLUMN", help_behavior_hint="")] = None
     """Column of POSES: the measurements with each of its values are left out of a further calibration in turn, and compared with it."""
+    prior: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="")] = None
+    """Prior of the geometry from other robots of the model, as 'flexcal fleet --prior' writes it: fewer poses are then enough."""
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
     """Folder for report.html, results.json, points.csv and estimates.yaml (then not beside robot.yaml); without it there is no report."""
     write_point: bool = False
@@ -183,6 +185,7 @@ class Calibrate:
             secant_scale=self.secant_scale,
             elasticity=self.elasticity,
             hold_out=self.hold_out,
+            prior=self.prior,
             out=self.out,
             command=command_line(),
             progress=progress,

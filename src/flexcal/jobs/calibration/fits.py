@@ -10,7 +10,14 @@ import numpy as np
 
 from flexcal.calibration.diagnostics import BearingAxes, compare_bearings
 from flexcal.calibration.error_model import TRANSMISSION
-from flexcal.calibration.fit import CONVERGED, GeometricFit, LossName, StratifiedSample, fit_geometry
+from flexcal.calibration.fit import (
+    CONVERGED,
+    FleetPrior,
+    GeometricFit,
+    LossName,
+    StratifiedSample,
+    fit_geometry,
+)
 from flexcal.calibration.measurement import OneFlank
 from flexcal.calibration.term_selection import (
     TermSelection,
@@ -29,12 +36,13 @@ _COMPARED = 1e-4
 
 @dataclass(frozen=True)
 class FitSettings:
-    """How to fit: `terms`, None for those that cross-validation supports, and the rest as `calibrate` has it."""
+    """How to fit: `terms`, None for those that cross-validation supports, and the rest as `calibrate` has it; `fleet` is its `prior`."""
 
     terms: tuple[str, ...] | None
     loss: LossName
     secant_scale: float
     elasticity: Literal["reestimated", "marginalised"]
+    fleet: FleetPrior | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +87,7 @@ class Fits:
                 elasticity=settings.elasticity,
                 secant_scale=settings.secant_scale,
                 loss=loss,
+                fleet=settings.fleet,
                 near=None if start is None else start.estimate.values,
                 tolerance=CONVERGED if near is None else _COMPARED,
             )

@@ -9,9 +9,10 @@ from typing import Literal
 
 from flexcal.calibration.fit import LossName
 from flexcal.data.poses import read_grouped_poses, read_poses, tables_of
-from flexcal.files.formats import provenance, read_estimates
+from flexcal.files.formats import provenance, read_estimates, sha256_of
 from flexcal.jobs.calibration.procedure import calibrate
 from flexcal.jobs.calibration.result import Calibration
+from flexcal.jobs.fleet_prior import FLEET, read_fleet_prior
 from flexcal.jobs.inputs import image_provenance, require_distinct_files
 from flexcal.jobs.result_files import estimates_target
 from flexcal.model.robot import RobotModel, with_blocks
@@ -27,6 +28,7 @@ def calibrate_robot(
     secant_scale: float = 0.0,
     elasticity: Literal["reestimated", "marginalised"] = "reestimated",
     hold_out: str | None = None,
+    prior: Path | None = None,
     out: Path | None = None,
     command: str = "",
     progress: Progress = silent,
@@ -37,6 +39,8 @@ def calibrate_robot(
     (None: as robot.yaml says) are names, or "auto" for those that cross-validation supports. A sigma in the files is that of the
     instrument; the scatter of robot and model are found from the points. `hold_out` names a column: the measurements with each of its
     values are left out in turn.
+
+    `prior` is a file with the prior of other robots of the model, as `pool_fleet` writes it.
 
     With `out`, estimates, results.json, points.csv, arm.npz, gravity_loads.npz and report.html go to that folder, and nothing beside
     robot.yaml changes. Raises `FlexcalError` as reading and `fit_geometry` do; nothing is written then.
@@ -55,6 +59,7 @@ def calibrate_robot(
     else:
         poses, groups = read_grouped_poses(files, model, hold_out)
         labels = hold_out, groups
+    fleet = None if prior is None else read_fleet_prior(prior, bare)
     progress("reading", 1.0)
     calibration = calibrate(
         model,
@@ -64,10 +69,13 @@ def calibrate_robot(
         secant_scale=secant_scale,
         elasticity=elasticity,
         hold_out=labels,
+        prior=fleet,
         progress=progress,
     )
     origin = provenance([robot_file, bare.urdf, *files], None, source if blocks else None, tuple(blocks))
     origin |= image_provenance(files)
+    if prior is not None:
+        origin[f"input.{FLEET}"] = sha256_of(prior)
     estimate = replace(calibration.estimate, provenance=origin | dict(calibration.estimate.provenance))
     result = replace(
         calibration,

@@ -9,7 +9,15 @@ from typing import Literal
 import numpy as np
 
 from flexcal.calibration.error_model import TRANSMISSION
-from flexcal.calibration.fit import LEVELS, PER_JOINT, GeometricFit, LossName, StratifiedSample, all_errors
+from flexcal.calibration.fit import (
+    LEVELS,
+    PER_JOINT,
+    FleetPrior,
+    GeometricFit,
+    LossName,
+    StratifiedSample,
+    all_errors,
+)
 from flexcal.calibration.term_selection import cross_validated
 from flexcal.calibration.verification import uncalibrated_model, uncalibrated_orientations
 from flexcal.data.poses import PoseSet
@@ -37,6 +45,7 @@ def calibrate(
     secant_scale: float = 0.0,
     elasticity: Literal["reestimated", "marginalised"] = "reestimated",
     hold_out: tuple[str, np.ndarray] | None = None,
+    prior: FleetPrior | None = None,
     progress: Progress = silent,
 ) -> Calibration:
     """Calibrate the geometry of a robot from measured points, with its elastic deflection taken into account.
@@ -64,6 +73,9 @@ def calibrate(
     hold_out : tuple of str and ndarray, optional
         Name and labels (N,) of groups of measurements. Each group is left out in turn of another calibration, with terms selected anew,
         and compared with it: `Calibration.held_out`.
+    prior : FleetPrior, optional
+        Prior of the geometry from other robots of the model, as `flexcal fleet --prior` writes it. Its terms are fitted, and those asked
+        for.
     progress : Progress
         Called with the stage and the share of it that is done.
 
@@ -95,7 +107,9 @@ def calibrate(
     sample = StratifiedSample.of(measured)
     poses = measured if sample is None else measured.subset(sample.rows)
     requested = _terms(model, terms)
-    settings = FitSettings(requested, loss, secant_scale, elasticity)
+    if prior is not None:
+        requested = tuple(dict.fromkeys([*prior.terms, *(requested or ()), TRANSMISSION]))
+    settings = FitSettings(requested, loss, secant_scale, elasticity, prior)
     fits = Fits.of(nominal, poses, settings, progress=progress)
     held_out = None
     if hold_out is not None:
@@ -137,7 +151,9 @@ def calibrate(
         levels=fits.levels,
         selected=selected,
         bearings=fits.bearings,
-        validated=None if fits.selection is None or poses.tilted.any() else cross_validated(selected),
+        validated=None
+        if (fits.selection is None and prior is None) or poses.tilted.any()
+        else cross_validated(selected),
         sample=sample,
         everywhere=None if sample is None else all_errors(selected.model, measured, progress),
         held_out=held_out,

@@ -52,6 +52,7 @@ from flexcal.files.formats import Block, json_values
 from flexcal.jobs.calibration.held_out import HeldOut
 from flexcal.jobs.calibration.held_out_tilts import HeldOutTilts
 from flexcal.jobs.calibration.inclinations import inclination_document
+from flexcal.jobs.calibration.prior_of_fleet import fleet_document, fleet_remarks
 from flexcal.jobs.calibration.remarks import calibration_remarks, floor_remark, outliers_of
 from flexcal.jobs.calibration.sockets import base_remark, place_remarks, scale_document, scale_remark
 from flexcal.jobs.calibration.subsample import calibration_subsample_remark, subsample_document
@@ -251,6 +252,7 @@ class Calibration(Identification):
         learning = LearningCurve.of(selected)
         bearings = bearing_remarks(self.bearings, selected)
         blamed = self.bearings is not None and self.bearings.contradicted
+        fleet = fleet_document(selected)
         misfit = None if self.stiffness is None else self.stiffness.misfit
         return {
             "robot": selected.model.name,
@@ -305,12 +307,14 @@ class Calibration(Identification):
             "learning_curve": None if learning is None else learning.document(),
             "scale": scale,
             "bearings": bearings_block(self.bearings),
+            "fleet": fleet,
             "stage1": None if self.stiffness is None else {"misfit": misfit_document(self.stiffness.misfit)},
             "remarks": [
                 *calibration_subsample_remark(self.sample, self.everywhere),
                 *([chosen.remark] if chosen and chosen.remark else []),
                 *scale_remark(scale),
                 *base_remark(selected),
+                *fleet_remarks(fleet),
                 *([] if self.levels is None or coupling is not None else [self.levels.sentence]),
                 *calibration_remarks(selected, self._cause),
                 *(() if blamed else bearings),

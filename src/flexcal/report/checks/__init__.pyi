@@ -16,6 +16,7 @@ from .dynamics import (
 )
 from .elastic_model import check_misfit, check_responses, misfit_document, misfit_sentences, read_misfit
 from .excitation import excitation_checks
+from .fleet_prior import check_fleet
 from .measured_responses import limit_of, response_checks, worst_pose
 from .payload import BODILESS, UNLIKE, payload_checks
 from .places import check_places
@@ -59,6 +60,7 @@ __all__ = [
     "check_external",
     "check_fit",
     "check_flanks",
+    "check_fleet",
     "check_fresh_poses",
     "check_held_out",
     "check_held_out_tilts",

@@ -18,6 +18,7 @@ from flexcal.report.checks import (
     check_bearings,
     check_drift,
     check_error_budget,
+    check_fleet,
     check_held_out,
     check_left_out,
     check_misfit,
@@ -217,6 +218,7 @@ def calibration_checks(
         check_outliers(len(estimate.outliers), errors).named("outliers"),
         *([] if results.get("places") is None else [check_places(results["places"])]),
         *check_bearings(results.get("bearings")),
+        *check_fleet(results.get("fleet")),
         *_stage_one_checks(results.get("stage1")),
     )
 

@@ -1,0 +1,73 @@
+"""Prior of a robot's geometry from other robots of its model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.estimation import Parameters
+
+
+@dataclass(frozen=True, eq=False)
+class FleetPrior:
+    """Normal distribution of geometric parameters over the robots of a model, as calibrated ones tell it.
+
+    `mean` (p,) of the parameters `names` is known with the covariance `uncertainty` (p, p); robots differ from it by `spread` (p,), 1σ,
+    which is known with `freedom` (p,) degrees of freedom. All are in natural units, as deviations from the URDF. `terms` are those fitted
+    to the `robots`, the folders' names; `source` says where the prior was read.
+    """
+
+    names: tuple[str, ...]
+    mean: np.ndarray
+    uncertainty: np.ndarray
+    spread: np.ndarray
+    freedom: np.ndarray
+    terms: tuple[str, ...]
+    robots: tuple[str, ...]
+    source: str = ""
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Covariance (p, p) of a further robot's parameters about the mean."""
+        return self.uncertainty + np.diag(self.spread**2)
+
+    def among(self, names: Iterable[str]) -> FleetPrior:
+        """Prior of those of its parameters that are among `names`, in their order."""
+        own = {name: k for k, name in enumerate(self.names)}
+        kept = [own[name] for name in names if name in own]
+        return replace(
+            self,
+            names=tuple(self.names[k] for k in kept),
+            mean=self.mean[kept],
+            uncertainty=self.uncertainty[np.ix_(kept, kept)],
+            spread=self.spread[kept],
+            freedom=self.freedom[kept],
+        )
+
+    def applied(self, parameters: Parameters) -> Parameters:
+        """The `parameters`, starting from this prior where it has them."""
+        means = dict(zip(self.names, self.mean.tolist(), strict=True))
+        stds = dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+        return Parameters(
+            replace(
+                item,
+                value=max(means[item.name], item.lower),
+                prior_mean=means[item.name],
+                prior_std=stds[item.name],
+            )
+            if item.name in means
+            else item
+            for item in parameters
+        )
+
+
+def prior_covariance(parameters: Parameters, fleet: FleetPrior | None) -> np.ndarray:
+    """Covariance (p, p) of the prior of geometric parameters, infinite on the diagonal where there is none."""
+    covariance = np.diag(parameters.prior_std() ** 2)
+    if fleet is not None:
+        own = fleet.among(parameters.names)
+        rows = [parameters.index(name) for name in own.names]
+        covariance[np.ix_(rows, rows)] = own.covariance
+    return covariance

@@ -1,0 +1,70 @@
+"""What a calibration has from other robots of the model, and whether they fit this one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from flexcal.calibration.diagnostics import FleetConflict
+from flexcal.calibration.fit import GeometricFit
+
+_LEARNT = 0.8
+"""Standard deviation, relative to that of the prior, from which the measurements say little of a parameter."""
+_LISTED = 8
+
+
+def fleet_document(fit: GeometricFit) -> dict[str, Any] | None:
+    """Block `fleet` of results.json; None for a calibration without such a prior.
+
+    `from_fleet` are the parameters of which these measurements tell so little that their standard deviation is at least 0.8 times the
+    prior's, and which the other robots tell.
+    """
+    fleet, conflict = fit.fleet, FleetConflict.of(fit)
+    if fleet is None or conflict is None:
+        return None
+    before = np.sqrt(np.diag(fleet.covariance))
+    std = [fit.estimate.std(name) for name in fleet.names]
+    known = [
+        name
+        for name, s, b in zip(fleet.names, std, before, strict=True)
+        if s is not None and s >= _LEARNT * b
+    ]
+    return {
+        "file": fleet.source,
+        "robots": list(fleet.robots),
+        "parameters": len(fleet.names),
+        "from_fleet": known,
+        "conflict": conflict.document(),
+    }
+
+
+def fleet_remarks(block: dict[str, Any] | None) -> list[str]:
+    """Sentences on the block `fleet` of results.json."""
+    if block is None:
+        return []
+    robots, known = block["robots"], block["from_fleet"]
+    named = ", ".join(known[:_LISTED]) + (f" and {len(known) - _LISTED} more" if len(known) > _LISTED else "")
+    sentence = f"calibrated with a prior of {len(robots)} other robots of the model ({block['file']})"
+    sentence += (
+        f": {len(known)} of its {block['parameters']} parameters are from the fleet, not from these measurements: {named}"
+        if known
+        else f": the measurements improve all its {block['parameters']} parameters"
+    )
+    return [sentence, *([conflict_sentence(block)] if block["conflict"]["contradicted"] else [])]
+
+
+def conflict_sentence(block: dict[str, Any]) -> str:
+    """What is said of a robot that the prior does not fit."""
+    conflict = block["conflict"]
+    most = [f"{name} ({shift:+.1f} σ)" for name, shift in conflict["shifts"].items()]
+    where = f", most in {', '.join(most)}" if most else ""
+    return (
+        f"the prior does not fit this robot (p {_probability(conflict['probability'])}): it deviates from the other robots "
+        f"{conflict['size']:.2g} times as much as they differ among each other{where}; is it of another model or batch, or was it "
+        "repaired? Calibrate it without --prior"
+    )
+
+
+def _probability(value: float) -> str:
+    return f"= {value:.2g}" if value > 0.003 else "< 0.003"

@@ -1,0 +1,36 @@
+"""Check of the prior that a calibration has from other robots of the model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from flexcal.report.layout import Check
+
+_QUESTION = "Is the robot like those that its prior is from?"
+
+
+def check_fleet(block: Mapping[str, Any] | None) -> tuple[Check, ...]:
+    """The check from the block `fleet` of results.json; none for a calibration without such a prior."""
+    if block is None:
+        return ()
+    conflict, robots = block["conflict"], len(block["robots"])
+    if conflict["contradicted"]:
+        return (
+            Check(
+                _QUESTION,
+                f"No: the prior does not fit this robot, which deviates from the {robots} others {conflict['size']:.2g} times as much as "
+                "they differ among each other. Calibrate it without --prior.",
+                "bad",
+                "fleet",
+            ),
+        )
+    return (
+        Check(
+            _QUESTION,
+            f"Yes: nothing in these measurements contradicts the {robots} others (p = {conflict['probability']:.2g}); "
+            f"{len(block['from_fleet'])} of {block['parameters']} parameters are known from them, not from these measurements.",
+            "good",
+            "fleet",
+        ),
+    )

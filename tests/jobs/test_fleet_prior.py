@@ -1,0 +1,201 @@
+"""The prior of a robot model from calibrated robots, of an arm that was simulated without the library's kinematics."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from refusals import refused
+from simulated_fleet import (
+    Fleet,
+    SimulatedRobot,
+    random_poses,
+    write_poses,
+    write_robot,
+)
+
+from flexcal import RobotModel, fit_geometry
+from flexcal.calibration.fit import FleetPrior, GeometricFit, base_errors
+from flexcal.calibration.measurement import predict_measurements
+from flexcal.data.poses import PoseSet
+from flexcal.jobs.calibration import calibrate_robot
+from flexcal.jobs.fleet_prior import CalibratedMember, pool_fleet, pooled_prior, read_fleet_prior
+
+NOISE = 5e-5
+
+
+@dataclass(frozen=True, eq=False)
+class Pooled:
+    """A fleet, its nominal model, the calibrated members and their prior."""
+
+    fleet: Fleet
+    model: RobotModel
+    members: Sequence[CalibratedMember]
+    prior: FleetPrior
+
+
+def poses_of(q: np.ndarray, position: np.ndarray) -> PoseSet:
+    """Measured points as the library has them."""
+    size = len(q)
+    return PoseSet(
+        q=q,
+        position=position,
+        sigma=np.full((size, 3), NOISE),
+        torque=None,
+        payload=None,
+        target=np.full(size, "ball"),
+        station=np.full(size, "tracker"),
+        temperature=None,
+        pose=np.arange(size),
+    )
+
+
+def fitted(
+    model: RobotModel, robot: SimulatedRobot, count: int, rng: np.random.Generator, prior: FleetPrior | None
+) -> GeometricFit:
+    q = random_poses(count, rng)
+    return fit_geometry(
+        model, poses_of(q, robot.measured(q, NOISE, rng)), terms=["kinematic"], loss="squares", fleet=prior
+    )
+
+
+def pooled(folder: Path, robots: int, poses: int, seed: int, spread: float) -> Pooled:
+    rng = np.random.default_rng(seed)
+    model = RobotModel.from_yaml(write_robot(folder))
+    fleet = Fleet.drawn(rng, spread)
+    fits = [fitted(model, fleet.robot(rng), poses, rng, None) for _ in range(robots)]
+    members = [CalibratedMember(f"robot_{k}", model, fit.estimate) for k, fit in enumerate(fits)]
+    return Pooled(fleet, model, members, pooled_prior(members))
+
+
+def errors_elsewhere(
+    fit: GeometricFit, robot: SimulatedRobot, rng: np.random.Generator
+) -> tuple[float, float]:
+    """90th percentile, m, of the errors at poses outside the fit, and the share of the errors in the 95 % intervals of a coordinate."""
+    q = random_poses(200, rng)
+    at = predict_measurements(
+        fit.model, poses_of(q, robot.measured(q, 0.0, rng)), elastic=False, jacobians=True
+    )
+    names = [n for n in fit.estimate.parameters.names if not n.startswith("scatter.")]
+    own = at.jacobian(names)
+    covariance = fit.estimate.marginal(names)[1]
+    std = np.sqrt(np.einsum("nip,pq,niq->ni", own, covariance, own))
+    p90 = float(np.quantile(np.linalg.norm(at.residual, axis=1), 0.9))
+    return p90, float(np.mean(np.abs(at.residual) < 1.96 * std))
+
+
+@pytest.fixture(scope="module")
+def six(tmp_path_factory: pytest.TempPathFactory) -> Pooled:
+    return pooled(tmp_path_factory.mktemp("six"), robots=6, poses=30, seed=1, spread=0.1)
+
+
+def test_eight_poses_are_enough_with_the_prior_and_too_few_without(six: Pooled) -> None:
+    rng = np.random.default_rng(50)
+    robot = six.fleet.robot(rng)
+    q = random_poses(8, rng)
+    poses = poses_of(q, robot.measured(q, NOISE, rng))
+    with refused("E-CAL-009", "8 poses"):
+        fit_geometry(six.model, poses, terms=["kinematic"])
+    fit = fit_geometry(six.model, poses, terms=["kinematic"], fleet=six.prior)
+    p90, inside = errors_elsewhere(fit, robot, rng)
+    assert p90 < 3.5e-4
+    assert inside > 0.7
+    nominal = replace(
+        fit,
+        model=six.model.with_values(
+            {n: v for n, v in fit.estimate.values.items() if n[:4] in ("stat", "tool")}
+        ),
+    )
+    assert errors_elsewhere(nominal, robot, rng)[0] > 10 * p90
+
+
+def test_the_place_of_the_base_and_the_tool_are_not_pooled(six: Pooled) -> None:
+    assert set(base_errors(six.model)) == {
+        "joint_1.offset", "joint_1.misalignment_1", "joint_1.misalignment_2", "joint_1.length_z",
+    }  # fmt: skip
+    assert not {n for n in six.prior.names if n.startswith(("tool.", "station."))}
+    assert not set(six.prior.names) & set(base_errors(six.model))
+
+
+def test_a_robot_of_another_type_is_told_and_one_of_the_type_is_not(six: Pooled) -> None:
+    from flexcal.calibration.diagnostics import FleetConflict
+
+    rng = np.random.default_rng(60)
+    own, other = six.fleet, Fleet.drawn(rng)
+    alike = [FleetConflict.of(fitted(six.model, own.robot(rng), 12, rng, six.prior)) for _ in range(4)]
+    assert not any(test is None or test.contradicted for test in alike)
+    for count in (10, 25):
+        test = FleetConflict.of(fitted(six.model, other.robot(rng), count, rng, six.prior))
+        assert test is not None
+        assert test.contradicted
+        assert test.size > 3
+        assert test.shifts
+
+
+def test_the_file_has_the_prior_and_refuses_other_robots(six: Pooled, tmp_path: Path) -> None:
+    files = []
+    rng = np.random.default_rng(70)
+    for k in range(3):
+        file = write_robot(tmp_path / f"robot_{k}")
+        q = random_poses(25, rng)
+        measured = write_poses(file.parent / "poses.csv", q, six.fleet.robot(rng).measured(q, NOISE, rng))
+        calibrate_robot(file, [measured], terms=["kinematic"])
+        files.append(file)
+    out = tmp_path / "prior.yaml"
+    prior = pool_fleet(files, out)
+    again = read_fleet_prior(out, six.model)
+    assert again.names == prior.names
+    assert again.robots == ("robot_0", "robot_1", "robot_2")
+    np.testing.assert_allclose(again.covariance, prior.covariance, rtol=1e-12, atol=1e-20)
+    np.testing.assert_array_equal(again.mean, prior.mean)
+
+    new = write_robot(tmp_path / "new")
+    q = random_poses(12, rng)
+    robot = six.fleet.robot(rng)
+    few = write_poses(tmp_path / "few.csv", q, robot.measured(q, NOISE, rng))
+    result = calibrate_robot(new, [few], prior=out, out=tmp_path / "out")
+    block: Any = result.document()["fleet"]
+    assert block["robots"] == list(prior.robots)
+    assert not block["conflict"]["contradicted"]
+    assert any("prior of 3 other robots" in remark for remark in result.document()["remarks"])
+    assert (tmp_path / "out" / "report.html").exists()
+
+    odd = write_robot(tmp_path / "odd")
+    urdf = odd.parent / "arm.urdf"
+    urdf.write_text(urdf.read_text().replace('xyz="0.42', 'xyz="0.43'))
+    with refused("E-PRIOR-007", "joint_3", "10 mm"):
+        read_fleet_prior(out, RobotModel.from_yaml(odd))
+    # a robot with this prior would count the others twice
+    calibrate_robot(new, [few], prior=out)
+    with refused("E-PRIOR-005", "new"):
+        pool_fleet([*files, new], out)
+    with refused("E-PRIOR-001", "odd"):
+        pool_fleet([*files, odd], out)
+    with refused("E-PRIOR-002", "at least 3"):
+        pool_fleet(files[:2], out)
+
+
+def test_robots_with_other_terms_are_refused(six: Pooled) -> None:
+    member = six.members[0]
+    other = replace(member.estimate, provenance={"option.terms": "kinematic lateral_compliance transmission"})
+    with refused("E-PRIOR-004", "lateral_compliance", "--terms"):
+        pooled_prior([*six.members, replace(member, name="odd", estimate=other)])
+
+
+@pytest.mark.slow
+def test_a_fleet_of_thirty_tells_the_next_robot(tmp_path: Path) -> None:
+    """Robots that differ by a tenth of the errors of their type: far better than without the others, and intervals that are true."""
+    alone, few, inside = [], [], []
+    for seed in (11, 12):
+        batch = pooled(tmp_path / str(seed), robots=30, poses=40, seed=seed, spread=0.1)
+        rng = np.random.default_rng(seed + 100)
+        for _ in range(8):
+            robot = batch.fleet.robot(rng)
+            alone.append(errors_elsewhere(fitted(batch.model, robot, 15, rng, None), robot, rng)[0])
+            p90, covered = errors_elsewhere(fitted(batch.model, robot, 15, rng, batch.prior), robot, rng)
+            few.append(p90)
+            inside.append(covered)
+    assert np.mean(few) < 0.75 * np.mean(alone)
+    assert 0.9 < np.mean(inside) < 0.99
