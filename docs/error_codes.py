@@ -28,6 +28,7 @@ SUBJECTS = {
     "EXPORT": "Export",
     "FILE": "Files",
     "FIT": "Least squares",
+    "FLEET": "Fleets",
     "FRF": "Frequency responses",
     "IMPORT": "Import of measurements",
     "LOG": "Recordings",

@@ -93,6 +93,10 @@ def calibrated_arm(folder: Path, examples: Path) -> list[str]:
     (folder / "motors.json").write_text(json.dumps(motors, indent=4), "utf-8")
     run("flexcal verify robot.yaml others.csv --out checked")
     run("flexcal repeatability robot.yaml visits.csv --out repeated")
+    (folder / "robots").mkdir()
+    shutil.copytree("results", "robots/ur5/2026-03-01")
+    for name in ("robot.yaml", "ur5.urdf"):
+        shutil.copy(name, "robots/ur5")
     return [
         "identify tool",
         "identify frame",
@@ -104,6 +108,7 @@ def calibrated_arm(folder: Path, examples: Path) -> list[str]:
         "predict",
         "certificate",
         "report",
+        "fleet",
         *EXPORTS,
     ]
 
@@ -210,6 +215,7 @@ PLACES = {
         "predict",
         "certificate",
         "report",
+        "fleet",
         *EXPORTS,
     },
     recordings_of_two_payloads: {"identify gains"},

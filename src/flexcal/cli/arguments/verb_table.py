@@ -337,6 +337,19 @@ STEPS = (
         ),
     ),
     Step(
+        "Many robots, measured again and again",
+        (
+            Verb(
+                ("fleet",),
+                "fleet",
+                "Fleet",
+                "results of many robots in one table: who is out of tolerance, who drifts, who differs",
+                "flexcal fleet robots --out fleet.parquet",
+                page=True,
+            ),
+        ),
+    ),
+    Step(
         "All of it in a window",
         (
             Verb(

@@ -583,10 +583,13 @@ class RobotConfig:
 
     `bearings` says whether the bearings of elastic joints tilt before or after the joint's rotation (Eq. 1: after); without it the data
     decide, where they tell. `relations`, beside those that the URDF gives as <mimic>, and `loops` determine joints without motors;
-    `motors`: the others in the order of the columns q1, q2, ….
+    `motors`: the others in the order of the columns q1, q2, …. `serial` says which robot it is, in a fleet, and `tolerance` its largest P90
+    of errors of the tool, m.
     """
 
     robot: str
+    serial: str | None = None
+    tolerance: float | None = None
     points: dict[str, PointConfig] = field(default_factory=dict)
     locked: dict[str, float] = field(default_factory=dict)
     relations: tuple[RelationConfig, ...] = ()
@@ -612,3 +615,7 @@ class RobotConfig:
     force_sensor: ForceSensorConfig | None = None
     signals: dict[str, SignalConfig] = field(default_factory=dict)
     estimates: str = "estimates.yaml"
+
+    def __post_init__(self) -> None:
+        if self.tolerance is not None and not self.tolerance > 0:
+            raise FlexcalError("E-ROBOT-079", f"tolerance must be positive, not {self.tolerance:g} m.")

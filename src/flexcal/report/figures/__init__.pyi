@@ -10,6 +10,7 @@ from .estimated_parameters import (
     term_label,
     term_scores,
 )
+from .fleet import fleet_errors, trend_courses
 from .frequency_plan import amplitude_spectrum, planned_arm, poses_against_std, predicted_springs
 from .frequency_responses import bode, response_fit, response_levels, sensor_fit
 from .learning_curve import learning_curves
@@ -45,6 +46,7 @@ __all__ = [
     "error_distribution",
     "error_field",
     "error_histogram",
+    "fleet_errors",
     "joint_positions",
     "learning_curves",
     "limit_shares",
@@ -78,6 +80,7 @@ __all__ = [
     "tool_displacement",
     "torque_spectra",
     "torque_traces",
+    "trend_courses",
     "variance_shares",
     "verification_errors",
     "visit_errors",

@@ -6,6 +6,7 @@ from .customer import CustomerStudy, write_customer_report
 from .drive_gains import gains_page
 from .dynamics import DynamicsStudy, dynamics_checks, dynamics_page
 from .excitation import ExcitationStudy, excitation_page
+from .fleet import fleet_page
 from .frequency_design import FrequencyDesignStudy, frequency_page
 from .frequency_response import ResponseStudy, response_page
 from .inclinations import InclinationStudy, inclination_checks, inclination_page
@@ -46,6 +47,7 @@ __all__ = [
     "dynamics_checks",
     "dynamics_page",
     "excitation_page",
+    "fleet_page",
     "frequency_page",
     "gains_page",
     "inclination_checks",

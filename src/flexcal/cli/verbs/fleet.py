@@ -1,0 +1,63 @@
+"""`flexcal fleet`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from flexcal.cli.arguments.invocation import command_line
+from flexcal.cli.arguments.shared_options import Json, MaybeNumber, file_argument
+from flexcal.cli.terminal.console import Console
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """Gather the results of many robots in one table, and say which are out of tolerance, which drift, and which differ from the others.
+
+    A robot is a folder with robot.yaml, and with results in it or below; robots are told apart by `serial:` in robot.yaml, or by their
+    folders. Results of several visits stay in folders whose names have the day in them, as calibrate --out 2026-03-01.
+    """
+
+    fleet: Annotated[
+        Positional[str],
+        file_argument(
+            "DIR", "folder of the robots' folders, or an address for fsspec, as s3://bucket/robots"
+        ),
+    ]
+    out: Annotated[Path, arg(metavar="FILE", aliases=["-o"])] = Path("fleet.parquet")
+    """The table (.parquet), with the page beside it."""
+    tolerance: Annotated[
+        MaybeNumber, arg(metavar="MM", help_behavior_hint="(default: as each robot.yaml declares)")
+    ] = None
+    """Largest P90 of errors, mm, for robots whose robot.yaml has no tolerance."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Gather, judge, and print every robot that needs attention."""
+        from flexcal.cli.tables.fleet import fleet_table
+        from flexcal.data.plans import page_beside
+        from flexcal.jobs.fleet import review_fleet
+        from flexcal.units import MILLIMETRE
+
+        console = Console(self.json)
+        with console.progress() as progress:
+            fleet = review_fleet(
+                self.fleet,
+                tolerance=None if self.tolerance is None else MILLIMETRE * self.tolerance,
+                command=command_line(),
+                progress=progress,
+            )
+            fleet.write(self.out)
+        document = fleet.document()
+        console.show(fleet_table(document))
+        console.say(document["headline"])
+        for remark in document["remarks"]:
+            console.say(remark)
+        for problem in document["problems"]:
+            console.say(f"{problem['place']}: {problem['sentence']}")
+        page = page_beside(self.out)
+        console.say(f"wrote {self.out} and {page}: {document['counts']['rows']} rows")
+        console.finish(document, f"open {page}")

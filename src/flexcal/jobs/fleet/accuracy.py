@@ -1,0 +1,117 @@
+"""Accuracy of every robot of a fleet against its tolerance, now and as its trend goes on."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Literal
+
+from flexcal.fleet import Crossing, crossing
+from flexcal.jobs.fleet.courses import FEWEST_VISITS, Record, date_at, latest, years
+from flexcal.jobs.fleet.drifts import Drift, error_drifts
+
+_ONE_SIDED = 1.645
+"""Quantile of the normal distribution: a robot that keeps its tolerance is called out of it in 5 % of verifications at most."""
+_LARGEST_EXTRAPOLATION = 2.0
+"""How far a trend is extrapolated beyond the last visit, over the time from the first to the last."""
+
+State = Literal["out", "within", "undecided", "not_judged"]
+
+
+@dataclass(frozen=True, eq=False)
+class RobotAccuracy:
+    """The latest verification of a robot, or None; its `tolerance`, m, and whether it is kept; trend and when that reaches the tolerance.
+
+    `outlook` says the last two in a sentence.
+    """
+
+    robot: str
+    model: str
+    tolerance: float | None
+    verification: Record | None
+    state: State
+    reason: str
+    drift: Drift | None
+    reaches: Crossing | None
+    outlook: str
+
+    @property
+    def reached(self) -> tuple[datetime | None, datetime | None, datetime | None]:
+        """Date at which the trend reaches the tolerance, and the interval of that; None where there is none."""
+        if self.reaches is None:
+            return None, None, None
+        return date_at(self.reaches.time), date_at(self.reaches.low), date_at(self.reaches.high)
+
+
+def robot_accuracies(
+    robots: dict[str, tuple[str, float | None]], records: Sequence[Record], level: float
+) -> list[RobotAccuracy]:
+    """Accuracy of all robots, whose model and tolerance (m) are given by name; drifts are significant at the `level`."""
+    verified: dict[str, list[Record]] = defaultdict(list)
+    fitted: dict[str, int] = defaultdict(int)
+    for r in records:
+        if r["kind"] == "verification" and r["name"] == "error.p90" and r["value"] is not None and r["std"]:
+            if r["independent"]:
+                verified[r["robot"]].append(r)
+            else:
+                fitted[r["robot"]] += 1
+    last = {robot: latest(group) for robot, group in verified.items()}
+    same = {
+        robot: [r for r in group if r["calibration"] == last[robot]["calibration"]]
+        for robot, group in verified.items()
+    }
+    drifts = error_drifts(same)
+    found = []
+    for robot, (model, tolerance) in robots.items():
+        verification, drift = last.get(robot), drifts.get(robot)
+        state, reason = _state(verification, tolerance, fitted[robot])
+        reaches, outlook = _outlook(same.get(robot, []), drift, tolerance, state, level)
+        found.append(
+            RobotAccuracy(robot, model, tolerance, verification, state, reason, drift, reaches, outlook)
+        )
+    return found
+
+
+def _state(verification: Record | None, tolerance: float | None, fitted: int) -> tuple[State, str]:
+    """Whether the tolerance is kept, by the rule of ISO 14253-1: proven only where the uncertainty of the P90 does not matter."""
+    if verification is None:
+        return "not_judged", (
+            "verified only at poses that its calibration was fitted to" if fitted else "no verification"
+        )
+    if tolerance is None:
+        return "not_judged", "no tolerance"
+    value, margin = verification["value"], _ONE_SIDED * verification["std"]
+    if value - margin > tolerance:
+        return "out", "P90 is above the tolerance by more than its uncertainty"
+    if value + margin <= tolerance:
+        return "within", "P90 is below the tolerance by more than its uncertainty"
+    return "undecided", "P90 is nearer to the tolerance than its uncertainty; verify at more poses"
+
+
+def _outlook(
+    verifications: Sequence[Record], drift: Drift | None, tolerance: float | None, state: State, level: float
+) -> tuple[Crossing | None, str]:
+    """When the tolerance is reached, where the data say it, and a sentence on the trend."""
+    if drift is None:
+        dated = sum(r["date"] is not None for r in verifications)
+        return None, (
+            f"no trend: {dated} dated verification{'' if dated == 1 else 's'} of the present calibration; "
+            f"{FEWEST_VISITS} on different days are needed"
+        )
+    if drift.probability > level:
+        return None, "no significant trend"
+    if drift.trend.slope < 0:
+        return None, "errors decrease"
+    if tolerance is None or state == "out":
+        return None, "errors increase"
+    reaches = crossing(drift.trend, tolerance)
+    if reaches is None:
+        return None, "errors increase; when they reach the tolerance cannot be told"
+    ahead = reaches.time - years(drift.visits.dates[-1])
+    if ahead > _LARGEST_EXTRAPOLATION * drift.visits.span:
+        return None, (
+            f"errors increase; the tolerance is farther ahead than {_LARGEST_EXTRAPOLATION:g} times the time observed, so no date is given"
+        )
+    return reaches, "errors increase and reach the tolerance if they go on so"

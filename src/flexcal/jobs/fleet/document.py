@@ -1,0 +1,212 @@
+"""JSON document of a fleet, which its page is made from (docs/file-formats.md)."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from typing import Any
+
+from flexcal.jobs.fleet.accuracy import RobotAccuracy
+from flexcal.jobs.fleet.courses import years
+from flexcal.jobs.fleet.drifts import Drift
+from flexcal.jobs.fleet.gathering import GatheredFleet
+from flexcal.jobs.fleet.parameters import ParameterSpread
+from flexcal.units import MILLIMETRE
+
+
+def fleet_document(
+    place: str,
+    gathered: GatheredFleet,
+    accuracies: Sequence[RobotAccuracy],
+    drifts: Sequence[Drift],
+    spreads: Sequence[ParameterSpread],
+    declared: Mapping[str, float | None],
+    level: float,
+    command: str,
+) -> dict[str, Any]:
+    """All numbers of a fleet: lengths with `_mm` in mm, values of parameters in SI units, slopes per year."""
+    serials = {project.robot: project.serial for project in gathered.projects}
+    results = gathered.table.frame.select("robot", "folder", "kind").unique().group_by("robot").len()
+    counts = dict(results.iter_rows())
+    found = [drift for drift in drifts if drift.probability <= level]
+    by_robot: dict[str, list[Drift]] = defaultdict(list)
+    for drift in found:
+        by_robot[drift.robot].append(drift)
+    tested_parameters = Counter(drift.robot for drift in drifts)
+    robots = [
+        {
+            "robot": item.robot,
+            "model": item.model,
+            "serial": serials.get(item.robot),
+            "results": counts.get(item.robot, 0),
+            **_accuracy(item, declared.get(item.robot), level),
+            "parameter_trends": tested_parameters[item.robot],
+            "drifting_parameters": [drift.name for drift in by_robot[item.robot]],
+            "outlying_parameters": [
+                spread.name
+                for spread in spreads
+                for outlier in spread.outliers
+                if spread.robots[outlier.number] == item.robot
+            ],
+        }
+        for item in accuracies
+    ]
+    states = Counter(str(robot["state"]) for robot in robots)
+    tested = [item for item in accuracies if item.drift is not None]
+    return {
+        "place": place,
+        "headline": _headline(robots, states),
+        "counts": {
+            "robots": len(robots),
+            "models": len({robot["model"] for robot in robots}),
+            "results": sum(counts.values()),
+            "rows": gathered.table.frame.height,
+            **{state: states[state] for state in ("out", "within", "undecided", "not_judged")},
+            "drifting": sum(bool(r["drifts"] or r["drifting_parameters"]) for r in robots),
+            "error_trends_tested": len(tested),
+            "parameter_trends_tested": len(drifts),
+            "robots_with_parameter_trends": len({drift.robot for drift in drifts}),
+            "reaching_tolerance": sum(robot["reaches"] is not None for robot in robots),
+            "problems": len(gathered.problems),
+        },
+        "level": level,
+        "robots": robots,
+        "parameter_drifts": [_drift(drift) for drift in sorted(found, key=lambda drift: drift.probability)],
+        "parameters": [_spread(spread) for spread in spreads],
+        "problems": [{"place": p.place, "sentence": p.sentence} for p in gathered.problems],
+        "remarks": _remarks(gathered, accuracies, spreads),
+        "command": command,
+    }
+
+
+def _headline(robots: Sequence[Mapping[str, Any]], states: Mapping[str, int]) -> str:
+    many = f"{len(robots)} robot{'' if len(robots) == 1 else 's'}"
+    if all(robot["tolerance_mm"] is None for robot in robots):
+        return f"{many}; no tolerance is stated, so none is judged"
+    words = [
+        f"{states.get(state, 0)} {label}"
+        for state, label in (
+            ("out", "out of tolerance"),
+            ("within", "within"),
+            ("undecided", "too near to tell"),
+            ("not_judged", "not judged"),
+        )
+    ]
+    return f"{many}: {', '.join(words)}"
+
+
+def _accuracy(item: RobotAccuracy, declared: float | None, level: float) -> dict[str, Any]:
+    verification, drift = item.verification, item.drift
+    source = None if item.tolerance is None else "option" if declared is None else "robot.yaml"
+    date, low, high = item.reached
+    return {
+        "state": item.state,
+        "reason": item.reason,
+        "tolerance_mm": _millimetres(item.tolerance),
+        "tolerance_from": source,
+        "p90_mm": None if verification is None else _millimetres(verification["value"]),
+        "p90_std_mm": None if verification is None else _millimetres(verification["std"]),
+        "verified": None if verification is None else _day(verification["date"]),
+        "drifts": drift is not None and drift.probability <= level,
+        "trend": None if drift is None else _trend(drift, MILLIMETRE, "mm"),
+        "outlook": item.outlook,
+        "reaches": None
+        if item.reaches is None
+        else {"date": _day(date), "low": _day(low), "high": _day(high)},
+    }
+
+
+def _trend(drift: Drift, scale: float, unit: str) -> dict[str, Any]:
+    low, high = drift.trend.slope_interval(0.95)
+    return {
+        "visits": len(drift.visits.dates),
+        "first": _day(drift.visits.dates[0]),
+        "last": _day(drift.visits.dates[-1]),
+        "unit": unit,
+        "per_year": drift.trend.slope / scale,
+        "low": low / scale,
+        "high": high / scale,
+        "probability": drift.trend.probability,
+        "adjusted_probability": drift.probability,
+        "dates": [_day(date) for date in drift.visits.dates],
+        "values": (drift.visits.values / scale).tolist(),
+        "std": (drift.visits.std / scale).tolist(),
+        "line": [
+            drift.trend.at(years(date)) / scale for date in (drift.visits.dates[0], drift.visits.dates[-1])
+        ],
+    }
+
+
+def _drift(drift: Drift) -> dict[str, Any]:
+    return {"robot": drift.robot, "model": drift.model, "kind": drift.kind, "name": drift.name} | _trend(
+        drift, 1.0, drift.unit
+    )
+
+
+def _spread(spread: ParameterSpread) -> dict[str, Any]:
+    distribution = spread.distribution
+    return {
+        "model": spread.model,
+        "urdf": spread.urdf,
+        "kind": spread.kind,
+        "name": spread.name,
+        "unit": spread.unit,
+        "absorbs": spread.absorbs.split(),
+        "robots": len(spread.robots),
+        "mean": distribution.mean,
+        "mean_std": distribution.mean_std,
+        "spread": distribution.spread,
+        "spread_low": distribution.spread_low,
+        "spread_high": distribution.spread_high,
+        "measurement_std": float((spread.std**2).mean() ** 0.5),
+        "outliers": [
+            {
+                "robot": spread.robots[item.number],
+                "value": float(spread.values[item.number]),
+                "std": float(spread.std[item.number]),
+                "score": item.score,
+                "adjusted_probability": item.probability,
+            }
+            for item in spread.outliers
+        ],
+    }
+
+
+def _remarks(
+    gathered: GatheredFleet, accuracies: Sequence[RobotAccuracy], spreads: Sequence[ParameterSpread]
+) -> list[str]:
+    remarks = []
+    frame = gathered.table.frame
+    undated = frame.filter(frame["date"].is_null())["folder"].n_unique()
+    if undated:
+        subject = "1 folder of results has" if undated == 1 else f"{undated} folders of results have"
+        remarks.append(
+            f"{subject} no date and counts in no trend: give folders of --out a name with the day of the measurement, as 2026-03-01"
+        )
+    if gathered.repeated:
+        remarks.append(
+            f"{gathered.repeated} results stand in several folders of a robot and count once, with their earliest date"
+        )
+    urdfs: dict[str, set[str]] = defaultdict(set)
+    for model, urdf in frame.select("model", "urdf").unique().iter_rows():
+        urdfs[model].add(urdf)
+    for model, digests in sorted(urdfs.items()):
+        if len(digests) > 1:
+            remarks.append(
+                f"{len(digests)} different URDFs have the name {model}; parameters are deviations from a URDF, so robots are compared with "
+                "those of the same one"
+            )
+    if len(accuracies) > 1 and not spreads:
+        remarks.append(
+            "no parameter is known of three robots of one model or more, so nothing is said of their spread"
+        )
+    return remarks
+
+
+def _millimetres(value: float | None) -> float | None:
+    return None if value is None else value / MILLIMETRE
+
+
+def _day(date: datetime | None) -> str | None:
+    return None if date is None else date.date().isoformat()

@@ -1,0 +1,237 @@
+"""Estimates, verifications and visits of all robots of a fleet, gathered in one table."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Estimate, Parameter
+from flexcal.files.formats import Block, read_estimates, sha256_of
+from flexcal.jobs.fleet.places import local_fleet
+from flexcal.jobs.fleet.projects import Problem, Project, ResultFolder, find_results, problem_of
+from flexcal.jobs.fleet.result_values import result_values
+from flexcal.jobs.fleet.table import FleetTable, Row
+from flexcal.jobs.result_files import ESTIMATES, RESULTS, read_results
+from flexcal.progress import Progress, silent
+
+_MODEL_FILES = (".yaml", ".yml", ".urdf", ".xml")
+_DIGITS = 12
+"""Number of hexadecimal digits of a SHA-256 that tell files apart in the table."""
+
+
+@dataclass(frozen=True, eq=False)
+class GatheredFleet:
+    """The table of a fleet, its `projects`, its `problems`, and `repeated`: how many results stand in several folders."""
+
+    table: FleetTable
+    projects: Sequence[Project]
+    problems: Sequence[Problem]
+    repeated: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Result:
+    """Rows of one result, and what it is the same by wherever it stands."""
+
+    identity: str
+    rows: Sequence[Row]
+
+    @property
+    def first(self) -> Row:
+        """The first row."""
+        return self.rows[0]
+
+
+def gather_fleet(place: str | Path, progress: Progress = silent) -> GatheredFleet:
+    """Gather the results of all projects in a folder, or at an address that fsspec reads.
+
+    Parameters
+    ----------
+    place : str or Path
+        The folder, or an address such as ``s3://bucket/robots``.
+    progress : Progress
+        Called with the stage and the share of it that is done.
+
+    Returns
+    -------
+    GatheredFleet
+        What cannot be read is among its `problems`.
+
+    Raises
+    ------
+    InputError
+        Where there is no such folder, or the address cannot be read.
+    """
+    with local_fleet(str(place)) as root:
+        folders, projects, problems = find_results(root)
+        problems = list(problems)
+        results: list[_Result] = []
+        for number, folder in enumerate(folders):
+            progress("reading", number / len(folders))
+            results += _results(root, folder, problems)
+        progress("reading", 1.0)
+    kept, repeated = _distinct(results, problems)
+    return GatheredFleet(
+        FleetTable.of(row for result in kept for row in result.rows), projects, problems, repeated
+    )
+
+
+def _results(root: Path, folder: ResultFolder, problems: list[Problem]) -> Iterator[_Result]:
+    at, project = folder.folder, folder.project
+    estimates = project.estimates if at == project.folder else at / ESTIMATES
+    for path, read in ((estimates, _estimates), (at / RESULTS, _values)):
+        if not path.is_file():
+            continue
+        try:
+            yield from read(_row(root, folder, path), path)
+        except FlexcalError as problem:
+            problems.append(problem_of(root, path, problem))
+        except (KeyError, TypeError, ValueError, AttributeError) as problem:
+            problems.append(
+                Problem(
+                    path.relative_to(root).as_posix(),
+                    f"it has not the entries that the verb writes ({type(problem).__name__}: {problem}); run the verb again.",
+                )
+            )
+
+
+def _row(root: Path, folder: ResultFolder, path: Path) -> Row:
+    """What all rows from a file have in common."""
+    project = folder.project
+    return Row(
+        robot=project.robot,
+        serial=project.serial,
+        model=project.model,
+        urdf=project.urdf,
+        tolerance=project.tolerance,
+        folder=folder.folder.relative_to(root).as_posix(),
+        date=folder.date,
+        modified=datetime.fromtimestamp(path.stat().st_mtime).replace(microsecond=0),
+        kind="",
+        name="",
+        value=None,
+        std=None,
+        unit="",
+        identifiable=True,
+        prior_share=None,
+        absorbs="",
+        terms="",
+        data="",
+        calibration=None,
+        independent=None,
+        file=path.relative_to(root).as_posix(),
+        sha256=sha256_of(path),
+    )
+
+
+def _estimates(common: Row, path: Path) -> Iterator[_Result]:
+    for block, estimate in read_estimates(path).items():
+        yield _block(common, block, estimate)
+
+
+def _block(common: Row, block: Block, estimate: Estimate) -> _Result:
+    absorbed: dict[str, list[str]] = {}
+    for dropped in estimate.dropped:
+        for kept, coefficient in dropped.absorbed_by:
+            if abs(coefficient) > 1e-9:
+                absorbed.setdefault(kept, []).append(dropped.name)
+    held = {dropped.name for dropped in estimate.dropped}
+    common = replace(
+        common,
+        kind=block,
+        urdf=_digest_of_urdf(estimate.provenance) or common.urdf,
+        terms=estimate.provenance.get("option.terms", ""),
+        data=_data(estimate.provenance),
+    )
+    rows = [
+        replace(
+            common,
+            name=item.name,
+            value=None if item.name in held else float(item.value),
+            std=None if item.name in held else estimate.std(item.name),
+            unit=item.unit,
+            identifiable=item.name not in held and estimate.std(item.name) is not None,
+            prior_share=None if item.name in held else _prior_share(estimate, item),
+            absorbs=" ".join(sorted(absorbed.get(item.name, ()))),
+        )
+        for item in estimate.parameters
+    ]
+    content = json.dumps([block, estimate.values, sorted(held)], sort_keys=True)
+    return _Result(hashlib.sha256(content.encode()).hexdigest(), rows)
+
+
+def _prior_share(estimate: Estimate, item: Parameter) -> float:
+    """Share of the information on a parameter that its prior has."""
+    number = estimate.parameters.index(item.name)
+    variance = float(estimate.covariance[number, number])
+    return min(1.0, variance / item.prior_std**2) if item.prior_std > 0 else 1.0
+
+
+def _values(common: Row, path: Path) -> Iterator[_Result]:
+    document = read_results(path.parent)
+    values = result_values(document)
+    if not values:
+        return
+    origin = document.get("provenance") or {}
+    fitted = document.get("fitted")
+    common = replace(
+        common,
+        kind=document["kind"],
+        urdf=_digest_of_urdf(origin) or common.urdf,
+        data=_data(origin),
+        calibration=origin.get("block.calibration"),
+        independent=None if fitted is None else not fitted,
+    )
+    rows = [
+        replace(common, name=item.name, value=item.value, std=item.std, unit=item.unit) for item in values
+    ]
+    content = json.dumps([document["kind"], origin, [[v.name, v.value] for v in values]], sort_keys=True)
+    yield _Result(hashlib.sha256(content.encode()).hexdigest(), rows)
+
+
+def _digest_of_urdf(origin: Mapping[str, str]) -> str | None:
+    return next(
+        (v for k, v in origin.items() if k.startswith("input.") and k.endswith((".urdf", ".xml"))), None
+    )
+
+
+def _data(origin: Mapping[str, Any]) -> str:
+    """First digits of the SHA-256 of the files of measurements that a result was made from."""
+    return " ".join(
+        sorted(
+            str(digest)[:_DIGITS]
+            for name, digest in origin.items()
+            if name.startswith("input.") and not name.endswith(_MODEL_FILES)
+        )
+    )
+
+
+def _distinct(results: Sequence[_Result], problems: list[Problem]) -> tuple[list[_Result], int]:
+    """Every result once, of those that stand in several folders of a robot the one with the earliest date; one that stands in folders of
+    several robots is a problem, and counts for the first of them.
+    """
+    kept: dict[str, _Result] = {}
+    repeated = 0
+    for result in results:
+        other = kept.get(result.identity)
+        if other is None:
+            kept[result.identity] = result
+        elif other.first.robot != result.first.robot:
+            problems.append(
+                Problem(
+                    result.first.file,
+                    f"the {result.first.kind} is the same as in {other.first.file} of the robot {other.first.robot}, so it is no result of "
+                    f"the robot {result.first.robot} and is not counted; measure this robot, or give both one `serial:`.",
+                )
+            )
+        else:
+            repeated += 1
+            if (result.first.date or datetime.max) < (other.first.date or datetime.max):
+                kept[result.identity] = result
+    return list(kept.values()), repeated

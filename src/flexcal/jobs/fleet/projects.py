@@ -1,0 +1,143 @@
+"""Project folders of a fleet, the robots that they are of, and the folders with results in them."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from pathlib import Path
+
+from flexcal.errors import FlexcalError
+from flexcal.files.formats import read_yaml, sha256_of
+from flexcal.jobs.fleet.places import ROBOT
+from flexcal.jobs.result_files import ESTIMATES, RESULTS
+from flexcal.model.robot import RobotConfig
+from flexcal.model.urdf import read_elements
+
+_DATE = re.compile(r"(?<!\d)(\d{4}-\d\d-\d\d)(?:[T_ ](\d\d)[-:.]?(\d\d)(?!\d))?(?!\d)")
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What of a fleet cannot be used: the file or folder from the fleet's, and one sentence."""
+
+    place: str
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Project:
+    """A folder with a robot.yaml. `robot` is its serial, or without one its path from the fleet's folder without dates; `model` the name
+    in the URDF and `urdf` the SHA-256 of that.
+    """
+
+    folder: Path
+    robot: str
+    serial: str | None
+    model: str
+    urdf: str
+    tolerance: float | None
+    estimates: Path
+
+
+@dataclass(frozen=True)
+class ResultFolder:
+    """A folder with results of a project; `date` from the name of the nearest folder that has one in it, None where none has."""
+
+    project: Project
+    folder: Path
+    date: datetime | None
+
+
+def find_results(root: Path) -> tuple[list[ResultFolder], list[Project], list[Problem]]:
+    """Folders with results below `root`, their projects and the problems, in the order of their paths.
+
+    Results belong to the nearest robot.yaml in their folder or above it. Hidden folders, and folders behind links, are not looked into.
+    """
+    results: list[ResultFolder] = []
+    projects: dict[Path, Project | None] = {}
+    problems: list[Problem] = []
+    for folder, files in _folders(root):
+        if ROBOT in files:
+            try:
+                projects[folder] = _project(root, folder)
+            except FlexcalError as problem:
+                projects[folder] = None
+                problems.append(problem_of(root, folder / ROBOT, problem))
+        owner = next((at for at in (folder, *folder.parents) if at in projects), None)
+        project = None if owner is None else projects[owner]
+        own = None if project is None or project.folder != folder else project.estimates
+        if not {ESTIMATES, RESULTS} & set(files) and not (own is not None and own.is_file()):
+            continue
+        if owner is None:
+            problems.append(
+                Problem(
+                    _relative(root, folder),
+                    f"results, but there is no {ROBOT} in this folder or above it; put it beside them.",
+                )
+            )
+        if project is not None:
+            date = date_of(_parts(root, folder))
+            if date is not None and date > datetime.now() + timedelta(days=1):
+                problems.append(
+                    Problem(
+                        _relative(root, folder),
+                        f"the date {date:%Y-%m-%d} is in the future, so these results count as undated; correct the folder's name.",
+                    )
+                )
+                date = None
+            results.append(ResultFolder(project, folder, date))
+    return results, [project for project in projects.values() if project is not None], problems
+
+
+def date_of(parts: tuple[str, ...]) -> datetime | None:
+    """Date, and time if there is one, in the last name that has one, as in `2026-03-01` or `2026-03-01T14-30_after_repair`."""
+    for part in reversed(parts):
+        match = _DATE.search(part)
+        if match is not None:
+            day, hour, minute = match.groups()
+            try:
+                return datetime.strptime(f"{day} {hour or '00'}:{minute or '00'}", "%Y-%m-%d %H:%M")
+            except ValueError:
+                continue
+    return None
+
+
+def problem_of(root: Path, place: Path, problem: Exception) -> Problem:
+    """An error about a file as a row of the list of problems."""
+    prefix = f"{root}{os.sep}"
+    sentence = str(problem).replace(prefix, "")
+    return Problem(_relative(root, place), sentence)
+
+
+def _folders(root: Path) -> Iterator[tuple[Path, list[str]]]:
+    for at, folders, files in os.walk(root):
+        folders[:] = sorted(name for name in folders if not name.startswith("."))
+        yield Path(at), files
+
+
+def _project(root: Path, folder: Path) -> Project:
+    config = read_yaml(folder / ROBOT, RobotConfig)
+    urdf = folder / config.robot
+    model = read_elements(urdf).attributes.get("name") or urdf.stem
+    names = [part for part in _parts(root, folder) if date_of((part,)) is None]
+    place = "/".join(names) or root.resolve().name
+    return Project(
+        folder,
+        config.serial or place,
+        config.serial,
+        model,
+        sha256_of(urdf),
+        config.tolerance,
+        folder / config.estimates,
+    )
+
+
+def _parts(root: Path, folder: Path) -> tuple[str, ...]:
+    return folder.relative_to(root).parts
+
+
+def _relative(root: Path, place: Path) -> str:
+    return place.relative_to(root).as_posix()

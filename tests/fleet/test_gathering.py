@@ -1,0 +1,243 @@
+"""`flexcal fleet` on folders written by other means than flexcal's."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+import pytest
+from fleet_files import write_calibration, write_robot, write_verification
+from refusals import refused
+
+from flexcal.cli.main import main
+from flexcal.jobs.fleet import Fleet, review_fleet
+
+DAYS = ("2024-01-10", "2024-07-01", "2025-01-12", "2025-06-30", "2026-01-05")
+
+
+def robot_named(fleet: Fleet | dict[str, Any], name: str) -> dict[str, Any]:
+    document = fleet.document() if isinstance(fleet, Fleet) else fleet
+    (robot,) = [item for item in document["robots"] if item["robot"] == name]
+    return robot
+
+
+def write_visits(folder: Path, errors: tuple[float, ...], *, name: str, calibration: str = "c") -> None:
+    """A robot's verifications, mm, on the days."""
+    for day, error in zip(DAYS, errors, strict=False):
+        write_verification(folder / day, error, data=f"{name} {day}", calibration=calibration, freedom=1200.0)
+
+
+def test_table_has_every_value_with_its_source(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    fleet = tmp_path / "fleet"
+    write_robot(fleet / "hall_1" / "arm", serial="007", tolerance=2e-4)
+    folder = fleet / "hall_1" / "arm" / "2026-03-01_after_repair"
+    write_calibration(folder, {"j1.offset": (1e-3, 1e-4), "j2.length_x": (2e-3, 1e-4)}, data="a")
+    write_verification(folder / "checked", 0.1, data="b")
+    out = tmp_path / "fleet.parquet"
+    assert main(["fleet", str(fleet), "--out", str(out), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["counts"] | {"robots": 1, "within": 1, "problems": 0} == document["counts"]
+    assert "007" in (tmp_path / "fleet.html").read_text("utf-8")
+    table = pl.read_parquet(out)
+    row = table.row(by_predicate=pl.col("name") == "j1.offset", named=True)
+    assert (row["robot"], row["model"], row["kind"]) == ("007", "scara", "calibration")
+    assert (row["value"], row["std"], row["unit"]) == (1e-3, 1e-4, "rad")
+    assert str(row["date"]) == "2026-03-01 00:00:00"
+    assert row["file"] == "hall_1/arm/2026-03-01_after_repair/estimates.yaml"
+    p90 = table.row(by_predicate=pl.col("name") == "error.p90", named=True)
+    assert p90["value"] == pytest.approx(1e-4) and p90["unit"] == "m" and p90["independent"]
+    assert str(p90["date"]) == "2026-03-01 00:00:00"
+
+
+def test_tolerance_is_judged_with_the_uncertainty_of_the_p90(tmp_path: Path) -> None:
+    """Standard deviation of a P90 of 40 poses: 0.95/√120 of it, 8.7 %; a margin of 14 %."""
+    for name, error in (("bad", 0.24), ("near", 0.21), ("good", 0.16)):
+        write_robot(tmp_path / name, tolerance=2e-4)
+        write_verification(tmp_path / name / "out", error, data=name)
+    write_robot(tmp_path / "fitted", tolerance=2e-4)
+    write_verification(tmp_path / "fitted" / "out", 0.1, data="f", fitted=True)
+    write_robot(tmp_path / "none")
+    write_verification(tmp_path / "none" / "out", 0.1, data="n")
+    fleet = review_fleet(tmp_path)
+    states = {item["robot"]: item["state"] for item in fleet.document()["robots"]}
+    assert states == {
+        "bad": "out",
+        "near": "undecided",
+        "good": "within",
+        "fitted": "not_judged",
+        "none": "not_judged",
+    }
+    assert robot_named(fleet, "none")["reason"] == "no tolerance"
+    assert "fitted" in robot_named(fleet, "fitted")["reason"]
+    judged = review_fleet(tmp_path, tolerance=3e-4)
+    assert robot_named(judged, "none")["tolerance_from"] == "option"
+    assert robot_named(judged, "bad")["tolerance_from"] == "robot.yaml"
+
+
+def test_date_of_a_growing_error(tmp_path: Path) -> None:
+    """0.02 mm a half-year, from 0.10 mm: 0.2 mm after another half-year; a flat robot has no date, nor one with undated visits."""
+    write_robot(tmp_path / "grows", tolerance=2e-4)
+    write_visits(tmp_path / "grows", (0.100, 0.1196, 0.1405, 0.1597, 0.1802), name="g")
+    write_robot(tmp_path / "flat", tolerance=2e-4)
+    write_visits(tmp_path / "flat", (0.100, 0.104, 0.098, 0.103, 0.101), name="f")
+    write_robot(tmp_path / "undated", tolerance=2e-4)
+    for k, error in enumerate((0.10, 0.12, 0.14, 0.16)):
+        write_verification(tmp_path / "undated" / f"visit_{k}", error, data=f"u{k}")
+    fleet = review_fleet(tmp_path)
+    grows = robot_named(fleet, "grows")
+    assert grows["drifts"] and grows["trend"]["low"] < 0.04 < grows["trend"]["high"]
+    assert grows["reaches"]["low"] < "2026-07-01" < grows["reaches"]["high"]
+    assert "2026-05" < grows["reaches"]["date"] < "2026-09"
+    for name in ("flat", "undated"):
+        assert not robot_named(fleet, name)["drifts"] and robot_named(fleet, name)["reaches"] is None
+    assert "0 dated" in robot_named(fleet, "undated")["outlook"]
+    assert any("no date" in remark for remark in fleet.document()["remarks"])
+
+
+def test_no_date_far_beyond_the_observed_time(tmp_path: Path) -> None:
+    write_robot(tmp_path / "slow", tolerance=1e-3)
+    write_visits(tmp_path / "slow", (0.100, 0.1196, 0.1405, 0.1597, 0.1802), name="g")
+    slow = robot_named(review_fleet(tmp_path), "slow")
+    assert slow["drifts"] and slow["reaches"] is None and "farther ahead" in slow["outlook"]
+
+
+def test_calibration_begins_a_new_series(tmp_path: Path) -> None:
+    """Errors that fall because the robot was calibrated again are no trend."""
+    write_robot(tmp_path / "arm", tolerance=2e-4)
+    for day, error, calibration in zip(DAYS, (0.2, 0.21, 0.1, 0.1, 0.1), "aabbb", strict=True):
+        write_verification(tmp_path / "arm" / day, error, data=day, calibration=calibration)
+    trend = robot_named(review_fleet(tmp_path), "arm")["trend"]
+    assert trend["visits"] == 3 and trend["first"] == DAYS[2]
+
+
+def test_repeated_results_are_no_further_visits(tmp_path: Path) -> None:
+    """The same results in three dated folders, and three results of one day, are one visit each."""
+    write_robot(tmp_path / "copied")
+    for day in DAYS[:3]:
+        write_verification(tmp_path / "copied" / day, 0.1, data="same")
+    write_robot(tmp_path / "one_day")
+    for k in range(4):
+        write_verification(tmp_path / "one_day" / DAYS[0] / str(k), 0.1 + 0.01 * k, data=f"d{k}")
+    fleet = review_fleet(tmp_path)
+    assert all(robot["trend"] is None for robot in fleet.document()["robots"])
+    assert any("2 results stand in several folders" in remark for remark in fleet.document()["remarks"])
+
+
+def test_copied_project_is_no_second_robot(tmp_path: Path) -> None:
+    for name in ("first", "second"):
+        write_robot(tmp_path / name)
+        write_calibration(tmp_path / name, {"j1.offset": (1e-3, 1e-4)}, data="a")
+    (problem,) = review_fleet(tmp_path).document()["problems"]
+    assert problem["place"] == "second/estimates.yaml" and "first" in problem["sentence"]
+
+
+def test_parameters_of_the_setup_are_not_compared(tmp_path: Path) -> None:
+    """Neither a station, nor what absorbed it, nor what a prior holds: they differ by where the instrument stood."""
+    rng = np.random.default_rng(3)
+    for k in range(8):
+        write_robot(tmp_path / f"r{k}")
+        odd = 0.05 if k == 5 else 0.0
+        values = {
+            "j1.offset": (float(rng.normal(0, 1e-3)), 1e-4),
+            "j2.offset": (float(rng.normal(0, 1e-3)) + odd, 1e-4),
+            "j1.length_x": (float(rng.normal(0, 1e-3)), 1e-4),
+            "station.tracker.x": (float(rng.normal()), 1e-4),
+            "point.ball.x": (0.0, 1e-4),
+        }
+        write_calibration(
+            tmp_path / f"r{k}", values, data=f"{k}", dropped={"point.ball.x": {"j1.length_x": 0.7}}
+        )
+    document = review_fleet(tmp_path).document()
+    assert {item["name"] for item in document["parameters"]} == {"j1.offset", "j2.offset"}
+    (spread,) = [item for item in document["parameters"] if item["name"] == "j2.offset"]
+    assert [item["robot"] for item in spread["outliers"]] == ["r5"]
+    assert spread["spread"] < 3e-3
+    for k in range(8):
+        write_calibration(tmp_path / f"r{k}", {"j1.offset": (1e-6 * k, 1e-4)}, data=f"{k}", prior_std=2e-4)
+    assert review_fleet(tmp_path).document()["parameters"] == []
+
+
+def test_drift_of_a_parameter(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    for k in range(6):
+        write_robot(tmp_path / f"r{k}")
+        for visit, day in enumerate(DAYS):
+            drift = 5e-4 * visit if k == 2 else 0.0
+            values = {
+                name: (float(rng.normal(0, 5e-5)), 5e-5) for name in ("j1.offset", "j2.offset", "j3.offset")
+            }
+            values["j2.offset"] = (values["j2.offset"][0] + drift, 5e-5)
+            write_calibration(tmp_path / f"r{k}" / day, values, data=f"{k} {day}")
+    document = review_fleet(tmp_path).document()
+    (drift,) = document["parameter_drifts"]
+    assert (drift["robot"], drift["name"]) == ("r2", "j2.offset")
+    assert drift["low"] < 1e-3 < drift["high"]
+
+
+def test_problems_are_rows(tmp_path: Path) -> None:
+    write_robot(tmp_path / "good", tolerance=2e-4)
+    write_verification(tmp_path / "good" / "out", 0.1, data="g")
+    write_robot(tmp_path / "yaml")
+    (tmp_path / "yaml" / "robot.yaml").write_text("robot: arm.urdf\nspeed: 3\n", "utf-8")
+    write_robot(tmp_path / "json")
+    (tmp_path / "json" / "results.json").write_text('{"kind": "verif', "utf-8")
+    write_robot(tmp_path / "keys")
+    (tmp_path / "keys" / "results.json").write_text('{"kind": "verification", "schema": 1}', "utf-8")
+    write_robot(tmp_path / "no_urdf")
+    (tmp_path / "no_urdf" / "arm.urdf").unlink()
+    write_verification(tmp_path / "stray", 0.1, data="s")
+    write_robot(tmp_path / "future")
+    write_verification(tmp_path / "future" / "2925-01-01", 0.1, data="t")
+    write_robot(tmp_path / "npz")
+    write_calibration(tmp_path / "npz", {"j1.offset": (1e-3, 1e-4)}, data="a")
+    (tmp_path / "npz" / "estimates.npz").write_bytes(b"PK no zip")
+    fleet = review_fleet(tmp_path)
+    problems = {item["place"].partition("/")[0]: item["sentence"] for item in fleet.document()["problems"]}
+    assert set(problems) == {"yaml", "json", "keys", "no_urdf", "stray", "future", "npz"}
+    assert robot_named(fleet, "good")["state"] == "within"
+    assert all(sentence.endswith(".") and str(tmp_path) not in sentence for sentence in problems.values())
+
+
+def test_serial_joins_folders(tmp_path: Path) -> None:
+    for site in ("a", "b"):
+        write_robot(tmp_path / site, serial="X1")
+        write_verification(tmp_path / site / "2025-01-01", 0.1, data=site)
+    (robot,) = review_fleet(tmp_path).document()["robots"]
+    assert (robot["robot"], robot["results"]) == ("X1", 2)
+
+
+def test_dated_projects_are_one_robot(tmp_path: Path) -> None:
+    for day in DAYS[:2]:
+        write_robot(tmp_path / "arm" / day)
+        write_verification(tmp_path / "arm" / day, 0.1, data=day)
+    (robot,) = review_fleet(tmp_path).document()["robots"]
+    assert (robot["robot"], robot["verified"]) == ("arm", DAYS[1])
+
+
+@pytest.mark.parametrize("protocol", ["file", "memory"])
+def test_bucket(tmp_path: Path, protocol: str) -> None:
+    fsspec = pytest.importorskip("fsspec")
+    write_robot(tmp_path / "fleet" / "arm", tolerance=2e-4)
+    write_verification(tmp_path / "fleet" / "arm" / "2025-01-01", 0.1, data="a")
+    address = (tmp_path / "fleet").as_uri()
+    if protocol == "memory":
+        address = f"memory://{tmp_path.name}/fleet"
+        fsspec.filesystem("memory").put(f"{tmp_path / 'fleet'}/", f"/{tmp_path.name}/fleet/", recursive=True)
+    there, here = (
+        review_fleet(place).gathered.table.frame.drop("modified") for place in (address, tmp_path / "fleet")
+    )
+    assert there.equals(here)
+
+
+def test_refusals(tmp_path: Path) -> None:
+    with refused("E-FLEET-001", "nowhere"):
+        review_fleet(tmp_path / "nowhere")
+    with refused("E-FLEET-004"):
+        review_fleet(f"memory://{tmp_path.name}/empty")
+    with refused("E-FLEET-003", "nosuch"):
+        review_fleet("nosuch://bucket")
+    with refused("E-FLEET-005", "robot.yaml"):
+        review_fleet(tmp_path)
