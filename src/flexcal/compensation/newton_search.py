@@ -41,9 +41,14 @@ class Commands:
 
 
 def solve_commands(
-    model: RobotModel, aim: ToolPoseTarget, nominal: np.ndarray, payload: np.ndarray | None
+    model: RobotModel,
+    aim: ToolPoseTarget,
+    nominal: np.ndarray,
+    payload: np.ndarray | None,
+    temperature: np.ndarray | None = None,
 ) -> Commands:
-    """Commands of least change from `nominal` (N, n) that bring the deflected robot to `aim`, carrying `payload` (N,) kg.
+    """Commands of least change from `nominal` (N, n) that bring the deflected robot to `aim`, carrying `payload` (N,) kg
+    at `temperature` (N,), °C.
 
     q ← q₀ + J⁺ (r + J (q − q₀)), the Gauss-Newton step to the solution nearest to q₀; for six joints and a full pose it is Newton's.
     A correction of millimetres hardly turns J, so that the first one serves for four steps.
@@ -52,7 +57,7 @@ def solve_commands(
     others make up for it. Rows in which these steps lead away are sought once more by `nearest_positions`. Raises `FlexcalError` where the
     springs cannot carry the arm.
     """
-    search = _Search(model, aim, nominal, payload)
+    search = _Search(model, aim, nominal, payload, temperature)
     for iteration in range(_ITERATIONS):
         if not len(search.rows):
             break
@@ -65,9 +70,15 @@ class _Search:
     """State of the search for all rows; `rows` are the numbers of the active ones."""
 
     def __init__(
-        self, model: RobotModel, aim: ToolPoseTarget, nominal: np.ndarray, payload: np.ndarray | None
+        self,
+        model: RobotModel,
+        aim: ToolPoseTarget,
+        nominal: np.ndarray,
+        payload: np.ndarray | None,
+        temperature: np.ndarray | None,
     ) -> None:
-        self.model, self.aim, self.nominal, self.payload = model, aim, nominal, payload
+        self.model, self.aim, self.nominal = model, aim, nominal
+        self.payload, self.temperature = payload, temperature
         self.lower, self.upper = joint_limits(model)
         self.weight = aim.weight(model)
         self.rows = np.arange(len(nominal))
@@ -112,9 +123,11 @@ class _Search:
     def _at_rest(
         self, rows: np.ndarray, q: np.ndarray, flank: np.ndarray | None, *, jacobians: bool
     ) -> ToolAtRest:
-        payload = None if self.payload is None else self.payload[rows]
+        payload, warm = (None if own is None else own[rows] for own in (self.payload, self.temperature))
         target = self.aim.target[rows]
-        return tool_at_rest(self.model, q, payload, target, flank=flank, jacobians=jacobians)
+        return tool_at_rest(
+            self.model, q, payload, target, flank=flank, jacobians=jacobians, temperature=warm
+        )
 
     def _evaluate(self, rows: np.ndarray, q: np.ndarray, *, jacobians: bool) -> None:
         """Residuals and torques of rows at `q` (k, n) on their flanks, and, with `jacobians`, their Jacobians."""

@@ -106,6 +106,7 @@ def _solve(
         aim.subset(rows),
         known[rows],
         targets.payload if targets.payload is None else targets.payload[rows],
+        targets.temperature if targets.temperature is None else targets.temperature[rows],
     )
     before[rows] = np.linalg.norm(commands.before[:, :3], axis=1)
     failed = ~commands.reached

@@ -12,6 +12,7 @@ from .gauge_freedom import (
 from .geometric_calibration import GeometricFit, fit_geometry
 from .least_squares_problem import LossName
 from .stratified_sample import StratifiedSample, all_errors
+from .temperature_evidence import TemperatureEvidence, sensor_scatter
 from .terms import (
     LEAST_POSES,
     LEVELS,
@@ -25,6 +26,7 @@ from .terms import (
     moving_joints,
     plausible_size,
 )
+from .thermal_terms import THERMAL, is_thermal, thermal_parameters, with_reference_temperature
 
 __all__ = [
     "CONVERGED",
@@ -32,18 +34,21 @@ __all__ = [
     "LEAST_POSES",
     "LEVELS",
     "PER_JOINT",
+    "THERMAL",
     "TOLERANCE",
     "ElasticPrior",
     "FleetPrior",
     "GeometricFit",
     "LossName",
     "StratifiedSample",
+    "TemperatureEvidence",
     "all_errors",
     "base_errors",
     "declared_size",
     "fit_geometry",
     "free_joints",
     "geometric_parameters",
+    "is_thermal",
     "loaded_compliances",
     "manufacturing_tolerances",
     "moving_joints",
@@ -51,5 +56,8 @@ __all__ = [
     "point_uncertainty",
     "probable_robot",
     "probable_robots",
+    "sensor_scatter",
+    "thermal_parameters",
     "with_calibrated_points",
+    "with_reference_temperature",
 ]

@@ -27,6 +27,14 @@ from flexcal.calibration.fit.structural_identifiability import (
     random_identifiability,
     require_enough,
 )
+from flexcal.calibration.fit.temperature_evidence import (
+    TemperatureEvidence,
+    attenuation,
+    correlation_with_time,
+    sensor_scatter,
+    time_columns,
+    widened,
+)
 from flexcal.calibration.fit.terms import (
     LEAST_POSES,
     declared_size,
@@ -34,6 +42,7 @@ from flexcal.calibration.fit.terms import (
     plausible_size,
     random_waves,
 )
+from flexcal.calibration.fit.thermal_terms import THERMAL, is_thermal, with_reference_temperature
 from flexcal.calibration.kinds import KINDS
 from flexcal.calibration.measurement import (
     RADIANS,
@@ -52,7 +61,7 @@ from flexcal.calibration.measurement import (
 )
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import RANK_TOLERANCE, Estimate, Identifiability, Loss, Parameter, Parameters
-from flexcal.model.robot import SCATTER, RobotModel, unit_of
+from flexcal.model.robot import REFERENCE, SCATTER, RobotModel, unit_of
 from flexcal.progress import Progress
 
 CONVERGED = 1e-9
@@ -122,6 +131,8 @@ class PointFit:
             terms = tuple(term for term in terms if term != TRANSMISSION)
         model = model.with_stations(poses.places)
         model = model.with_lenses({name: lens.values for name, lens in poses.lenses.items()})
+        if any(term.rpartition(".")[2] in THERMAL for term in terms):
+            model = with_reference_temperature(model, poses)
         bare = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
         start = register(model, poses, predict_measurements(bare, poses, elastic=elastic).located)
         zeroed = register_with_zeros(start, poses)
@@ -460,6 +471,8 @@ class FittedPoints:
         every = self.fit.geometric + known
         items = [every[name] for name in names]
         items += [Parameter(n, "rad", self.model.value(n)) for n in turns if n not in self.fit.geometric]
+        if self.temperature is not None:
+            items.append(Parameter(REFERENCE, unit_of(REFERENCE), self.temperature[1].reference))
         estimate, fixed = replace(self.estimate, covariance=self._covariance()), Parameters(items)
         scatter, spread = self._scatter_parameters()
         size, all_ = len(estimate.parameters), len(estimate.parameters) + len(fixed) + len(scatter)
@@ -482,7 +495,50 @@ class FittedPoints:
             identifiable=self._identifiable() + (False,) * len(fixed) + tuple(bool(k > 0) for k in spread),
         )
 
+    @cached_property
+    def temperature(self) -> tuple[np.ndarray, TemperatureEvidence] | None:
+        """Covariance (p, p) of the estimate with what time and the sensor have to do with its thermal parameters, and what is known of it;
+        None without such parameters.
+        """
+        estimate, task = self.estimate, self.task
+        names, poses = estimate.parameters.names, self.fit.poses
+        if poses.temperature is None or not any(is_thermal(name) for name in names):
+            return None
+        narrow, thermal = self._independent_of_time(), tuple(name for name in names if is_thermal(name))
+        columns = time_columns(self.at, thermal)
+        slopes = estimate.parameters.natural_slope(estimate.parameters.coordinates())
+        rows = np.repeat(self.inliers, 3)
+        own = rows[:, None] * task.columns(self.at, names) * slopes
+        # what stretches of the measuring order share would take up a change in time
+        products = self.linear.products(replace(self.scatter, order=0.0), columns[self.inliers])
+        wide, stds, probability = widened(
+            poses,
+            estimate.values,
+            narrow,
+            -estimate.covariance @ own.T @ task.whitening(columns),
+            products,
+            int(self.linear.readings.present.sum()) - self.linear.free.shape[2],
+        )
+        before = np.sqrt(np.diag(narrow)).tolist()
+        return wide, TemperatureEvidence(
+            lowest=float(poses.temperature.min()),
+            highest=float(poses.temperature.max()),
+            reference=float(self.model.thermal.reference[0]),
+            spread=float(poses.temperature.std()),
+            timed=poses.time is not None,
+            correlation=correlation_with_time(poses),
+            narrow={name: before[k] for k, name in enumerate(names) if is_thermal(name)},
+            wide=stds,
+            probability=probability,
+            scatter=sensor_scatter(poses),
+            attenuation=attenuation(poses),
+        )
+
     def _covariance(self) -> np.ndarray:
+        """Covariance (p, p) of the estimate, what else changes with time included where parameters change with temperature."""
+        return self._independent_of_time() if self.temperature is None else self.temperature[0]
+
+    def _independent_of_time(self) -> np.ndarray:
         """Covariance (p, p) of the estimate under errors V, where the weights V₀ assume independent, isotropic errors.
 
         Σ + G (V - V₀) Gᵀ with the estimate's response G = Σ Aᵀ V₀⁻¹ to errors of the points; Σ has the prior in it.

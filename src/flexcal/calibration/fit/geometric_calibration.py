@@ -14,6 +14,7 @@ from flexcal.calibration.fit.fitted_points import CONVERGED, FittedPoints, Point
 from flexcal.calibration.fit.fleet_prior import FleetPrior
 from flexcal.calibration.fit.least_squares_problem import LossName, PlainLoss
 from flexcal.calibration.fit.practical_identifiability import Undetermined
+from flexcal.calibration.fit.temperature_evidence import TemperatureEvidence
 from flexcal.calibration.fit.terms import moving_joints
 from flexcal.calibration.measurement import METRES, ambiguous_poses, kind_names, stated_sigma
 from flexcal.data.poses import PoseSet
@@ -44,7 +45,7 @@ class GeometricFit:
     measured minus predicted, m of the points, then rad of the orientations; `linear` the fit linearised at its solution, without outliers;
     `flank` (N, n); `ambiguous` (N,) poses whose flank is not certain; `terms` those fitted;
     `size` the length that is held where no reading tells how large the robot is; `fleet` the prior from other robots of the model, of the
-    parameters of this fit.
+    parameters of this fit; `temperature` what is known of its thermal terms, if any.
     """
 
     model: RobotModel
@@ -61,6 +62,7 @@ class GeometricFit:
     terms: tuple[str, ...]
     size: tuple[str, ...] = ()
     fleet: FleetPrior | None = None
+    temperature: TemperatureEvidence | None = None
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.model.name}: {self.errors}>"
@@ -172,7 +174,8 @@ def fit_geometry(
         Names of the error terms. `transmission`, transmission errors of all revolute joints as waves in the joint position, is
         a random effect: all waves are normal with one variance, which falls with the square of their order and is estimated
         with those of the scatter (best linear unbiased prediction). Few poses leave them near zero and uncertain.
-        `transmission_1`… are free waves of one order; `ratio` are leads of slides and ratios by which joints follow others.
+        `transmission_1`… are free waves of one order; `ratio` are leads of slides and ratios by which joints follow others; `thermal`,
+        `thermal_links`, `thermal_drift` and `thermal_stations` are changes with the measured temperature.
     elastic : bool
         Whether the arm deflects; without, it is fitted as rigid.
     elasticity : {"reestimated", "marginalised"}
@@ -298,6 +301,7 @@ def _calibration(fitted: FittedPoints) -> GeometricFit:
         terms=fit.terms,
         size=fit.size,
         fleet=fit.fleet,
+        temperature=None if fitted.temperature is None else fitted.temperature[1],
     )
 
 

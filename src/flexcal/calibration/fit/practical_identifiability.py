@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.calibration.error_model import Whitening
+from flexcal.calibration.fit.thermal_terms import is_thermal
 from flexcal.calibration.measurement import PredictedMeasurements
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameters, analyse
@@ -64,6 +65,8 @@ def _cause(at: PredictedMeasurements, name: str, partners: tuple[tuple[str, floa
     """Clause for the user: the property of the poses that hides a parameter."""
     start, poses = at.model, at.poses
     owner = name.rpartition(".")[0]
+    if is_thermal(name) and poses.temperature is not None:
+        return f"the temperature varied by {np.ptp(poses.temperature):.1f} K only, at the scatter of these measurements"
     if owner == "tool" or owner.startswith("point."):
         turned = _turning(start, poses, owner)
         if turned < _SMALL_TURN:

@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from flexcal.calibration.fit.thermal_terms import THERMAL, plausible_thermal_size, thermal_parameters
 from flexcal.calibration.kinds import ANGULAR, KINDS, declared_level, kind_of
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import PoseSet
@@ -34,7 +35,17 @@ from flexcal.model.statics import (
 LEAST_POSES = 20
 """Least number of different poses for a selection of terms and for the variance of transmission errors."""
 
-TOLERANCE = {"m": 3e-4, "rad": 5e-4, "rad/(N m)": 1e-6, "1": 1e-3, "m/rad": 1e-5, "rad/m": 1e-3}
+TOLERANCE = {
+    "m": 3e-4,
+    "rad": 5e-4,
+    "rad/(N m)": 1e-6,
+    "1": 1e-3,
+    "m/rad": 1e-5,
+    "rad/m": 1e-3,
+    "1/K": 1e-5,
+    "rad/K": 1e-5,
+    "m/K": 1e-5,
+}
 """Size of a relevant change (1σ of manufacture), by unit, which makes parameters of different units comparable."""
 
 
@@ -65,7 +76,7 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
     `backlash`: the joints declared with it; `transmission` none, its waves being random effects (`random_waves`).
     `gravity_compliance`, `lateral_compliance`, `transmission_1`…: one or two for every revolute joint on the way, compliances only where
     no spring is declared in their place and gravity loads the axis: by moments that vary by more than 1 % of those that vary most.
-    `<joint>.gravity_compliance` is that of one joint.
+    `<joint>.gravity_compliance` is that of one joint. Those of temperature are in `thermal_parameters`.
     """
     joints = moving_joints(model, poses)
     level = next((term for term in terms if term in LEVELS), None)
@@ -82,6 +93,9 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
     for term in terms:
         owner, _, kind = term.rpartition(".")
         if kind in (*LEVELS, "backlash", "transmission"):
+            continue
+        if kind in THERMAL:
+            further |= dict.fromkeys(thermal_parameters(model, poses, term, joints))
             continue
         if kind == "ratio":
             further |= dict.fromkeys(ratio_parameters(model, joints))
@@ -242,12 +256,16 @@ def plausible_size(model: RobotModel, name: str) -> float:
 
     What robot.yaml declares under `prior:` comes first; else joint offsets 5 mrad, misalignments 2 mrad, lengths 1 mm, the place of a
     reflector on the tool 10 mm, the instrument 1 m or rad, and so the rotations of a joint at the base, which take up that of the first
-    station; half a backlash and a wave of a transmission error 1 mrad, compliances 0.1 mrad/(N m), the softest of small arms; ratios 1 ‰.
+    station; half a backlash and a wave of a transmission error 1 mrad, compliances 0.1 mrad/(N m), the softest of small arms;
+    ratios 1 ‰; what changes with temperature as `plausible_thermal_size` says.
     """
     declared = declared_size(model, name)
     if declared is not None:
         return declared
     owner, _, key = name.rpartition(".")
+    thermal = plausible_thermal_size(key)
+    if thermal is not None:
+        return thermal
     if owner.startswith("station.") or (owner.startswith("point.") and key in STATION[3:]):
         return _PLAUSIBLE_STATION
     if owner.startswith("point.") or (owner == "tool" and key.startswith("length")):

@@ -9,9 +9,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexcal.calibration.measurement.thermal_columns import expansion_column, rise_of, station_drift_column
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import PointKinematics, relative_motion
-from flexcal.model.robot import GEOMETRY, LATERAL, ORIGIN, RATIO, SPRINGS, RobotModel
+from flexcal.model.robot import (
+    EXPANSION,
+    GEOMETRY,
+    LATERAL,
+    LINK_EXPANSION,
+    ORIGIN,
+    RATIO,
+    SPRINGS,
+    STATION_DRIFT,
+    ZERO_DRIFT,
+    RobotModel,
+)
 from flexcal.model.statics import (
     carried_mass,
     transmission_column,
@@ -116,6 +128,16 @@ class ArmColumns:
         tilt = self.at.by_row(self.at.lateral[:, joint, LATERAL.index(key)])
         return np.matmul(self._by_motion[:, :, joint, :2], tilt[:, :, None])[:, :, 0]
 
+    def _drifted(self, owner: str, key: str) -> np.ndarray:
+        joint = self.at.model.joint_index(owner)
+        return self.at.by_row(rise_of(self.at))[:, None] * self._by_motion[:, :, joint, 2]
+
+    def _expanded(self, owner: str, key: str) -> np.ndarray:
+        return expansion_column(self.at, f"{owner}.{key}")
+
+    def _shifted_station(self, owner: str, key: str) -> np.ndarray:
+        return station_drift_column(self.at, f"{owner}.{key}")
+
     def _twist(self, joint: int, key: str) -> np.ndarray:
         """Motion (N,) of a joint by its backlash, gravity compliance or one wave or ratio of its transmission."""
         if key == "backlash":
@@ -176,4 +198,8 @@ _BY_KEY: Mapping[str, Callable[[ArmColumns, str, str], np.ndarray]] = {
     **dict.fromkeys(("backlash", "gravity_compliance", "transmission"), ArmColumns._twisted),
     **dict.fromkeys(LATERAL, ArmColumns._tilted),
     "hardening": ArmColumns._hardened,
+    EXPANSION.rpartition(".")[2]: ArmColumns._expanded,
+    LINK_EXPANSION: ArmColumns._expanded,
+    ZERO_DRIFT: ArmColumns._drifted,
+    **dict.fromkeys(STATION_DRIFT, ArmColumns._shifted_station),
 }

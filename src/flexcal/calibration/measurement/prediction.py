@@ -13,7 +13,14 @@ from flexcal.calibration.measurement.arm_columns import ArmColumns
 from flexcal.calibration.measurement.readings import Readings
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
-from flexcal.model.kinematics import PointKinematics, carrier_kinematics, relative_kinematics
+from flexcal.model.kinematics import (
+    PointKinematics,
+    carrier_kinematics,
+    depends_on_temperature,
+    expanded,
+    relative_kinematics,
+    temperature_rise,
+)
 from flexcal.model.parts import left_jacobian, vector_rotation
 from flexcal.model.robot import STATION, RobotModel
 from flexcal.model.statics import (
@@ -231,6 +238,7 @@ def predict_measurements(
         elastic=elastic,
         jacobians=jacobians,
         force=poses.force,
+        temperature=poses.temperature,
     )
     if not np.isfinite(tool.kinematics.position).all():
         pose = poses.pose[int(np.argmin(np.isfinite(tool.kinematics.position).all(axis=1)))]
@@ -239,11 +247,20 @@ def predict_measurements(
             f"a loop of {model.name} does not close at pose {pose} with its present geometry; correct `loops:`, or leave the pose out.",
         )
     carrier = carrier_kinematics(model, poses.q, tool.rest.deflection, poses.station, jacobians=jacobians)
+    rise = None
+    if poses.temperature is not None and depends_on_temperature(model):
+        rise = temperature_rise(model, poses.temperature)
+    if carrier is not None and rise is not None:
+        frames = [model.carriers.get(name) for name in poses.station.tolist()]
+        ends = np.array([-1 if frame is None else frame.joint for frame in frames])
+        carrier = expanded(model, poses.q, carrier, ends, rise)
     seen = tool.kinematics if carrier is None else relative_kinematics(tool.kinematics, carrier)
     at, base = np.empty((len(poses), 3)), np.empty((len(poses), 3, 3))
     for name in poses.stations:
         own, place = poses.station == name, model.stations.pose[model.station_index(name)]
         at[own], base[own] = place[:3], vector_rotation(place[3:])
+        if rise is not None:
+            at[own] += np.outer(rise[own], model.stations.drift[model.station_index(name)])
     located = np.matmul(base, seen.position[:, :, None])[:, :, 0] + at
     position = _read(model, poses, located)
     return PredictedMeasurements(

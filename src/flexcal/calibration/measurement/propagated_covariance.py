@@ -9,11 +9,26 @@ import numpy as np
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import (
     carrier_kinematics,
+    depends_on_temperature,
+    link_vectors,
     point_kinematics,
     relative_kinematics,
 )
 from flexcal.model.parts import LOOP, left_jacobian, vector_rotation
-from flexcal.model.robot import GEOMETRY, LATERAL, MASS_AND_COM, ORIGIN, RATIO, SPRINGS, STATION, RobotModel
+from flexcal.model.robot import (
+    EXPANSION,
+    GEOMETRY,
+    LATERAL,
+    LINK_EXPANSION,
+    MASS_AND_COM,
+    ORIGIN,
+    RATIO,
+    SPRINGS,
+    STATION,
+    STATION_DRIFT,
+    ZERO_DRIFT,
+    RobotModel,
+)
 from flexcal.model.statics import (
     carried_mass,
     elastic_axes,
@@ -26,7 +41,8 @@ from flexcal.model.statics import (
     twist_from_torque,
 )
 
-_GEOMETRIC = (*GEOMETRY, *ORIGIN, *LOOP, *STATION, "backlash", "gravity_compliance", *LATERAL)
+_THERMAL = (EXPANSION.rpartition(".")[2], LINK_EXPANSION, ZERO_DRIFT, *STATION_DRIFT)
+_GEOMETRIC = (*GEOMETRY, *ORIGIN, *LOOP, *STATION, "backlash", "gravity_compliance", *LATERAL, *_THERMAL)
 
 
 def moving_parameters(model: RobotModel, *, elastic: bool = True) -> list[str]:
@@ -47,9 +63,9 @@ def covariance_root(model: RobotModel, names: list[str]) -> np.ndarray:
 class Propagation:
     """Square root of the parameters' covariance, with rows sorted by their effect on the point `target` under `payload` kg.
 
-    `rows` (G + 6 + d + 4 N + T + 6, p): by geometric errors of columns and tool, by the stiffness of the d elastic coordinates, by
+    `rows` (G + 6 + d + 4 N + T + 6 + 1 + N, p): by geometric errors of columns and tool, by the stiffness of the d elastic coordinates, by
     mass and first moment of each link, by the T `twisting` parameters (joint and kind, those that tilt its axis included), by the place
-    of the `station`; natural units.
+    of the `station`, by the expansion of the arm and of each link; natural units. The arm is warmer by `rise`, K, than where these hold.
     """
 
     model: RobotModel
@@ -58,6 +74,7 @@ class Propagation:
     station: str
     twisting: tuple[tuple[int, str], ...]
     rows: np.ndarray
+    rise: float = 0.0
 
     def roots(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points (N, 3) m at `q` (N, n), and roots A (N, 3, k) m: A Aᵀ is the covariance of the point's error.
@@ -87,6 +104,7 @@ class Propagation:
             np.matmul(by_load, regressor),
             twists,
             self._by_station(at.position),
+            self._by_expansion(q, at.position),
         )
         stacked = np.concatenate(columns, axis=2)
         roots = stacked.reshape(-1, stacked.shape[2]) @ self.rows
@@ -121,6 +139,8 @@ class Propagation:
                     -torque[:, joint], self.model.springs.stiffness[joint, 2], hardening
                 )
                 columns[:, k] = twist_by_hardening(twist, hardening)
+            elif kind == ZERO_DRIFT:
+                columns[:, k] = self.rise
             elif kind in LATERAL:
                 columns[:, k] = 0.0
             else:
@@ -154,6 +174,15 @@ class Propagation:
             torque[:, joint] = loads[:, springs[joint]]
         return torque
 
+    def _by_expansion(self, q: np.ndarray, position: np.ndarray) -> np.ndarray:
+        """Motion (N, 3, 1 + joints) of the point by the expansion of the arm and of each link."""
+        columns = np.zeros((len(q), 3, 1 + len(self.model.joints)))
+        if self.rise != 0:
+            end = self.model.point(self.target).joint
+            columns[:, :, 0] = self.rise * position
+            columns[:, :, 1:] = self.rise * link_vectors(self.model, q, position, end).swapaxes(1, 2)
+        return columns
+
     def _by_station(self, position: np.ndarray) -> np.ndarray:
         """∂(point seen from the station, turned into the base frame)/∂(x, y, z, rx, ry, rz of the station), (N, 3, 6)."""
         place = self.model.stations.pose[self.model.station_index(self.station)]
@@ -166,11 +195,17 @@ class Propagation:
 
 
 def propagation(
-    model: RobotModel, *, target: str | None = None, station: str | None = None, payload: float | None = None
+    model: RobotModel,
+    *,
+    target: str | None = None,
+    station: str | None = None,
+    payload: float | None = None,
+    temperature: float | None = None,
 ) -> Propagation:
     """Propagation of the posterior of `model` to a target (default: the first), seen from a station (default: the first), under a payload.
 
-    `payload` in kg as `carried_mass` takes it, None for the declared one. Raises `FlexcalError` for unknown names, a payload without a
+    `payload` in kg as `carried_mass` takes it, None for the declared one; `temperature` in °C, None
+    for that at which the parameters hold. Raises `FlexcalError` for unknown names, a payload without a
     declaration, and a robot of which nothing was estimated that moves a point.
     """
     name = model.point(target).name
@@ -188,11 +223,20 @@ def propagation(
     twisting = [_twisting(model, item) for item in names]
     twists = [item for item in twisting if item is not None]
     first_twist = errors + 6 + len(axes) + bodies
-    rows = np.zeros((first_twist + len(twists) + 6, len(names)))
+    rise = 0.0 if temperature is None else temperature - float(model.thermal.reference[0])
+    rise = rise if depends_on_temperature(model) else 0.0
+    first_growth = first_twist + len(twists) + 6
+    rows = np.zeros((first_growth + 1 + len(model.joints), len(names)))
     for item, row in zip(names, root, strict=True):
         owner, _, key = item.rpartition(".")
         body = errors + 6 + len(axes)
-        if owner == f"station.{place}":
+        if item == EXPANSION:
+            rows[first_growth] += row
+        elif key == LINK_EXPANSION:
+            rows[first_growth + 1 + links.index(owner)] += row
+        elif owner == f"station.{place}" and key in STATION_DRIFT:
+            rows[first_twist + len(twists) + STATION_DRIFT.index(key)] += rise * row
+        elif owner == f"station.{place}":
             rows[first_twist + len(twists) + STATION.index(key)] += row
         elif owner == f"point.{name}":
             rows[errors + 3 + "xyz".index(key)] += row
@@ -231,12 +275,14 @@ def propagation(
             if key != "mass":
                 moments[1 + "xyz".index(key[-1])] = model.links.mass[i]
             rows[body + 4 * i : body + 4 * i + 4] += np.outer(moments, row)
-    return Propagation(model, name, mass, place, tuple(twists), rows)
+    return Propagation(model, name, mass, place, tuple(twists), rows, rise)
 
 
 def _twisting(model: RobotModel, name: str) -> tuple[int, str] | None:
     owner, _, key = name.rpartition(".")
-    if key in ("backlash", "gravity_compliance", *LATERAL) or key.startswith(("transmission_", RATIO)):
+    if key in ("backlash", "gravity_compliance", ZERO_DRIFT, *LATERAL) or key.startswith(
+        ("transmission_", RATIO)
+    ):
         return model.joint_index(owner), key
     if key == "hardening":
         return model.joint_index(owner.removesuffix(".drive")), key

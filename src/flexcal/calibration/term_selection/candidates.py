@@ -9,13 +9,15 @@ import numpy as np
 
 from flexcal.calibration.fit import (
     PER_JOINT,
+    GeometricFit,
     free_joints,
     geometric_parameters,
     loaded_compliances,
     moving_joints,
 )
+from flexcal.calibration.term_selection.thermal_candidates import thermal_candidates
 from flexcal.data.poses import PoseSet
-from flexcal.model.robot import RobotModel
+from flexcal.model.robot import ZERO_DRIFT, RobotModel
 from flexcal.model.statics import carried_mass, certain_flank, gravity_moments, gravity_torque
 
 _CLEAR = 0.2
@@ -40,8 +42,8 @@ class CandidateTerms:
     excluded: tuple[tuple[str, str], ...]
 
 
-def candidates(model: RobotModel, poses: PoseSet) -> CandidateTerms:
-    """Terms to be considered on some poses, by gravity, the declared springs and the moving joints."""
+def candidates(model: RobotModel, poses: PoseSet, rigid: GeometricFit) -> CandidateTerms:
+    """Terms to be considered on some poses, by gravity, the declared springs, the moving joints and the scatter of a `rigid` fit."""
     joints = moving_joints(model, poses)
     masses = carried_mass(model, poses.payload, len(poses))
     torque = gravity_torque(model, poses.q, masses)
@@ -84,6 +86,10 @@ def candidates(model: RobotModel, poses: PoseSet) -> CandidateTerms:
         else:
             model = wider
             kinds.append("backlash")
+    thermal = thermal_candidates(model, poses, rigid)
+    kinds += thermal.kinds
+    single |= {ZERO_DRIFT: thermal.single} if thermal.kinds else {}
+    excluded += thermal.excluded
     kinds += ["ratio"] if geometric_parameters(model, poses, ["ratio"]).names else []
     kinds += [f"transmission_{order}" for order in model.drives.harmonics]
     return CandidateTerms(model, tuple(kinds), single, tuple(excluded))

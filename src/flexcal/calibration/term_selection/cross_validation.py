@@ -15,6 +15,8 @@ from flexcal.data.poses import PoseSet
 from flexcal.model.robot import RobotModel
 
 FOLDS = 8
+FINER = {"thermal_links": "thermal"}
+"""Terms that say in more detail what another one says, and are tried where that was taken."""
 MANY_POSES = 10 * FOLDS
 """Number of different poses from which whole folds are left out rather than single poses."""
 
@@ -122,12 +124,12 @@ def select_terms(
     if distinct < LEAST_POSES:
         more = LEAST_POSES - distinct
         return TermSelection(base, model, (), "nothing", _too_few(distinct, more))
-    open_terms = candidates(model, poses)
     if fitted is not None and len(fitted.poses) == len(poses) and not model.elastic:
         rigid = fitted
     else:
         near = None if fitted is None else fitted.estimate.values
         rigid = fit_geometry(model, poses, terms=base, elastic=bool(model.elastic), loss="squares", near=near)
+    open_terms = candidates(model, poses, rigid)
     by = left_out_by(poses, distinct)
     trials = TermTrials(rigid, open_terms.model, base, folds, by=by)
     chosen, rows = base, [trials.start()]
@@ -148,7 +150,9 @@ def select_terms(
             options = [o for o in options if o != best]
         return options
 
-    remaining = grow(list(open_terms.kinds), 0.0)
+    remaining = grow([kind for kind in open_terms.kinds if kind not in FINER], 0.0)
+    finer = [kind for kind in open_terms.kinds if FINER.get(kind) in chosen]
+    remaining += grow(finer, 0.0) if finer else []
     joints = [term for kind in remaining for term in open_terms.single.get(kind, ())]
     if joints:
         grow(joints, 2 * np.log(len(joints)))

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from flexcal.calibration.fit import LEVELS, GeometricFit, geometric_parameters
+from flexcal.calibration.fit import LEVELS, GeometricFit, geometric_parameters, with_reference_temperature
 from flexcal.calibration.measurement import (
     METRES,
     RADIANS,
@@ -88,7 +88,7 @@ class TermTrials:
         by: str,
     ) -> None:
         self.rigid = rigid
-        self.model = replace(rigid.model, config=model.config)
+        self.model = with_reference_temperature(replace(rigid.model, config=model.config), rigid.poses)
         self.folds = folds
         self.deciding = {"folds": (0, 1), "places": (0,), "poses": (2,)}[by]
         self._out = [_PLACES_OUT if by == "places" else text for text in _OUT]

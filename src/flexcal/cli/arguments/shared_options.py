@@ -41,6 +41,14 @@ PoseFiles = Annotated[
     Positional[Paths],
     file_argument("POSES...", "files of measured poses (CSV or Parquet), one or several"),
 ]
+Temperature = Annotated[
+    MaybeNumber,
+    arg(
+        metavar="°C",
+        help="Temperature of the arm, °C, where no column 'temperature' says it.",
+        help_behavior_hint="(default: that of the calibrated parameters)",
+    ),
+]
 Estimates = Annotated[
     MaybePath,
     arg(

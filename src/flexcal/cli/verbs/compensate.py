@@ -9,7 +9,15 @@ from typing import Annotated, Any
 
 from tyro.conf import Positional, arg
 
-from flexcal.cli.arguments.shared_options import Estimates, Json, MaybeText, Numbers, Robot, require_robot
+from flexcal.cli.arguments.shared_options import (
+    Estimates,
+    Json,
+    MaybeText,
+    Numbers,
+    Robot,
+    Temperature,
+    require_robot,
+)
 from flexcal.cli.arguments.suggested_commands import estimates_option
 from flexcal.cli.terminal.console import Console
 from flexcal.cli.verbs.calibrate import undetermined_point_remark
@@ -40,8 +48,8 @@ class Compensate:
     """Compute motor commands that bring the real tool to given targets, compensating geometry, deflection under the payload and backlash.
 
     TARGETS has the column pose, and q1, q2 and so on: the nominal commands, which define the target pose of the tool and the configuration
-    of the arm; or x, y, z in the base frame, with qw, qx, qy, qz if the orientation matters; or both. payload and target are
-    optional.
+    of the arm; or x, y, z in the base frame, with qw, qx, qy, qz if the orientation matters; or both. payload, temperature and
+    target are optional.
 
     A target that cannot be reached is left out of the commands and listed with the reason; the others are written.
     """
@@ -58,6 +66,7 @@ class Compensate:
     """Point under `points:` that is brought to the targets."""
     frame: Annotated[MaybeText, arg(metavar="FRAME", help_behavior_hint="(default: a point)")] = None
     """URDF frame, such as tool0, whose origin is brought to the targets, in place of a point under `points:`."""
+    temperature: Temperature = None
     start: Annotated[
         Numbers, arg(metavar="Q...", help_behavior_hint="(default: a posture far from singular)")
     ] = ()
@@ -79,6 +88,7 @@ class Compensate:
                 target=self.target,
                 frame=self.frame,
                 start=self.start,
+                temperature=self.temperature,
                 progress=progress,
             )
         document = compensation.document()

@@ -16,6 +16,7 @@ from flexcal.cli.arguments.shared_options import (
     MaybeText,
     Paths,
     Robot,
+    Temperature,
     require_at_least,
     require_robot,
 )
@@ -48,6 +49,7 @@ class Map:
         MaybeNumber, arg(metavar="KG", help_behavior_hint="(default: as robot.yaml declares)")
     ] = None
     """Payload, kg."""
+    temperature: Temperature = None
     estimates: Estimates = None
     seed: Annotated[int, arg(metavar="N")] = 0
     """Seed of the random poses."""
@@ -71,6 +73,7 @@ class Map:
                 count=self.count,
                 verification=self.verification,
                 payload=self.payload,
+                temperature=self.temperature,
                 estimates=self.estimates,
                 seed=self.seed,
                 command=command_line(),

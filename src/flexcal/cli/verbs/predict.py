@@ -8,7 +8,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-from flexcal.cli.arguments.shared_options import Estimates, Json, Robot, require_robot
+from flexcal.cli.arguments.shared_options import Estimates, Json, Robot, Temperature, require_robot
 from flexcal.cli.terminal.console import Console
 
 
@@ -16,14 +16,15 @@ from flexcal.cli.terminal.console import Console
 class Predict:
     """Predict the pose of the real tool for given motor commands: geometry, deflection under the payload, backlash.
 
-    The inverse of 'flexcal compensate', whose commands it reads: pose, q1, q2 and so on; payload and target are optional. It writes
-    x, y, z and qw, qx, qy, qz in the base frame, which 'flexcal compensate' reads.
+    The inverse of 'flexcal compensate', whose commands it reads: pose, q1, q2 and so on; payload, temperature and target are
+    optional. It writes x, y, z and qw, qx, qy, qz in the base frame, which 'flexcal compensate' reads.
     """
 
     robot: Robot
     commands: Annotated[Positional[Path], arg(metavar="COMMANDS", help="file of commands (CSV or Parquet)")]
     out: Annotated[Path, arg(metavar="FILE", aliases=["-o"])] = Path("tool.csv")
     """File for the tool's poses (CSV or Parquet)."""
+    temperature: Temperature = None
     estimates: Estimates = None
     json: Json = False
 
@@ -35,7 +36,12 @@ class Predict:
         console = Console(self.json)
         with console.progress() as progress:
             prediction = predict_robot(
-                self.robot, self.commands, self.out, estimates=self.estimates, progress=progress
+                self.robot,
+                self.commands,
+                self.out,
+                estimates=self.estimates,
+                temperature=self.temperature,
+                progress=progress,
             )
         document = prediction.document()
         beside = document["beside_nominal"]

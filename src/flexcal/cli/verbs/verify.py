@@ -14,6 +14,7 @@ from flexcal.cli.arguments.shared_options import (
     MaybePath,
     PoseFiles,
     Robot,
+    Temperature,
     require_robot_and_files,
 )
 from flexcal.cli.arguments.suggested_commands import estimates_option
@@ -37,6 +38,7 @@ class Verify:
     ] = ()
     """Fit the placement of the instrument, or the measured point, to these poses, where it was moved or replaced since the
     calibration; the geometry is kept. Errors are then leave-one-out errors."""
+    temperature: Temperature = None
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: none)")] = None
     """Folder for report.html, results.json and points.csv; without it there is no report."""
     json: Json = False
@@ -54,6 +56,7 @@ class Verify:
                 self.poses,
                 estimates=self.estimates,
                 refit=tuple(dict.fromkeys(self.refit)),
+                temperature=self.temperature,
                 out=self.out,
                 command=command_line(),
                 progress=progress,

@@ -38,7 +38,7 @@ def read_targets(path: str | Path, model: RobotModel) -> ToolTargets:
     ----------
     path : str or Path
         Table with `pose` and joint positions q1…qn (rad or m), or points x, y, z (m) and optionally qw, qx, qy, qz, or both;
-        `target`, `station` and `payload` (kg) are optional.
+        `target`, `station`, `payload` (kg) and `temperature` (°C) are optional.
     model : RobotModel
         Robot whose joints, points and stations the columns name.
 
@@ -70,7 +70,7 @@ def read_targets(path: str | Path, model: RobotModel) -> ToolTargets:
     """
     file = open_table(path)
     texts = tuple(name for name in ("target", "station") if name in file.columns)
-    signals = assign(file, model, ("pose",), ("q", "xyz", "quaternion", "payload"), texts)
+    signals = assign(file, model, ("pose",), ("q", "xyz", "quaternion", "payload", "temperature"), texts)
     if "q" not in signals and "xyz" not in signals:
         raise file.error(
             "E-POSES-027",
@@ -101,6 +101,7 @@ def read_targets(path: str | Path, model: RobotModel) -> ToolTargets:
         rotation=None if quaternion is None else wxyz_rotation(quaternion),
         station=table.columns["station"] if "station" in texts else None,
         payload=payload_column(table, signals, model),
+        temperature=values["temperature"][:, 0] if "temperature" in values else None,
     )
     _check_once(table, pose)
     return targets
@@ -109,7 +110,8 @@ def read_targets(path: str | Path, model: RobotModel) -> ToolTargets:
 def write_commands(
     path: str | Path, model: RobotModel, commands: ToolTargets, unambiguous: np.ndarray, like: TableFile
 ) -> None:
-    """Write motor commands as CSV or Parquet: `pose`, q1…qn, `target`, `payload` where given, `unambiguous` (N,).
+    """Write motor commands as CSV or Parquet: `pose`, q1…qn, `target`, `payload` and `temperature` where given,
+    `unambiguous` (N,).
 
     Where the file `like` has the columns that `signals:` maps to q, the commands stand in these, in their units. Raises `InputError`
     where the mapping has no inverse.
@@ -124,19 +126,25 @@ def write_commands(
 
 
 def read_commands(path: str | Path, model: RobotModel) -> ToolTargets:
-    """Read motor commands: `pose`, q1…qn, and where given `target` and `payload`; `unambiguous` is not looked at.
+    """Read motor commands: `pose`, q1…qn, and where given `target`, `payload` and `temperature`; `unambiguous` is not looked at.
 
     Raises `InputError` as `read_targets` does.
     """
     file = open_table(path)
     texts = tuple(name for name in ("target", "unambiguous") if name in file.columns)
-    signals = assign(file, model, ("pose", "q"), ("payload",), texts)
+    signals = assign(file, model, ("pose", "q"), ("payload", "temperature"), texts)
     table = file.read(texts)
     q = signals["q"].values(table)
     check_joint_units(model, table, signals["q"], q)
     pose = whole_numbers(table, signals["pose"].columns[0], signals["pose"].values(table)[:, 0])
     _check_once(table, pose)
-    return ToolTargets(pose, _points(file, table, model), q, payload=payload_column(table, signals, model))
+    return ToolTargets(
+        pose,
+        _points(file, table, model),
+        q,
+        payload=payload_column(table, signals, model),
+        temperature=signals["temperature"].values(table)[:, 0] if "temperature" in signals else None,
+    )
 
 
 def write_targets(path: str | Path, targets: ToolTargets) -> None:
@@ -151,8 +159,8 @@ def _columns(targets: ToolTargets) -> dict[str, np.ndarray]:
         if values is not None:
             names = standard_columns(quantity, values.shape[1])
             columns |= {name: values[:, i] for i, name in enumerate(names)}
-    texts = {"target": targets.target, "station": targets.station, "payload": targets.payload}
-    return columns | {name: values for name, values in texts.items() if values is not None}
+    others = {name: getattr(targets, name) for name in ("target", "station", "payload", "temperature")}
+    return columns | {name: values for name, values in others.items() if values is not None}
 
 
 def _points(file: TableFile, table: Table, model: RobotModel) -> np.ndarray:

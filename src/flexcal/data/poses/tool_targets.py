@@ -30,6 +30,8 @@ class ToolTargets:
         Names (N,) of the instrument's places.
     payload : ndarray, optional
         Mass (N,), kg, at the declared payload's centre of mass; by default as declared in robot.yaml.
+    temperature : ndarray, optional
+        Temperature (N,) of the arm, °C; by default that at which the calibrated parameters hold.
 
     Raises
     ------
@@ -44,6 +46,7 @@ class ToolTargets:
     rotation: np.ndarray | None = None
     station: np.ndarray | None = None
     payload: np.ndarray | None = None
+    temperature: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         if self.q is None and self.position is None:
@@ -59,6 +62,7 @@ class ToolTargets:
             "rotation": (rows, 3, 3),
             "station": (rows,),
             "payload": (rows,),
+            "temperature": (rows,),
         }
         for name, shape in shapes.items():
             values = getattr(self, name)

@@ -49,6 +49,7 @@ from flexcal.jobs.inputs import (
     image_provenance,
     is_station_identified,
     require_distinct_files,
+    with_temperature,
 )
 from flexcal.jobs.pages import ReportedResult
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, header, write_arm, write_points
@@ -96,6 +97,8 @@ class Verification(ReportedResult):
         Which of very many points were taken.
     everywhere : ErrorStatistics or None
         Errors at all points, where a sample was taken.
+    temperatures : tuple of str
+        Remarks on the temperatures of the points.
     """
 
     poses: PoseSet
@@ -113,6 +116,7 @@ class Verification(ReportedResult):
     orientation_before: OrientationErrors | None = None
     sample: StratifiedSample | None = None
     everywhere: ErrorStatistics | None = None
+    temperatures: tuple[str, ...] = ()
 
     @property
     def residuals(self) -> np.ndarray:
@@ -157,7 +161,8 @@ class Verification(ReportedResult):
         remarks = [
             *verification_subsample_remark(self.sample, self.everywhere),
             *self.poses.notes,
-            *ignored_columns_remarks(self.poses),
+            *ignored_columns_remarks(self.poses, ("temperature",)),
+            *self.temperatures,
             *([self.outside] if self.outside else []),
             *refit_remarks(self.predicted, self.poses, self.refit, self.better),
         ]
@@ -222,7 +227,12 @@ class Verification(ReportedResult):
 
 
 def verify(
-    robot: CalibratedRobot, poses: PoseSet, *, refit: Sequence[Refit] = (), progress: Progress = silent
+    robot: CalibratedRobot,
+    poses: PoseSet,
+    *,
+    refit: Sequence[Refit] = (),
+    temperature: float | None = None,
+    progress: Progress = silent,
 ) -> Verification:
     """Compare a calibrated robot with points measured outside the fit.
 
@@ -234,6 +244,8 @@ def verify(
         Joint positions (N, n) in rad or m and measured points (N, 3) in m, none of them fitted.
     refit : sequence of {"station", "point"}
         What is placed anew by these poses, the instrument or the measured points; the geometry stays, and errors are then leave-one-out.
+    temperature : float, optional
+        Temperature of the arm, °C, for points that have none; by default that at which the calibrated parameters hold.
     progress : Progress
         Called with the stage and the share of it that is done.
 
@@ -258,6 +270,7 @@ def verify(
     0.1 mm
     """
     require_points(poses)
+    poses, warm = with_temperature(robot, poses, temperature)
     require_stations(robot, poses, "station" in refit)
     turned, measured = poses, poses.without_orientations()
     sample = StratifiedSample.of(measured)
@@ -288,6 +301,7 @@ def verify(
         everywhere=None if sample is None else all_errors(standing, measured, progress),
         orientation=orientation_errors(standing, turned),
         orientation_before=uncalibrated_orientations(uncalibrated.registered, turned),
+        temperatures=warm,
     )
 
 
@@ -297,6 +311,7 @@ def verify_robot(
     *,
     estimates: Path | None = None,
     refit: Sequence[Refit] = (),
+    temperature: float | None = None,
     out: Path | None = None,
     command: str = "",
     progress: Progress = silent,
@@ -312,7 +327,7 @@ def verify_robot(
     progress("reading", 0.0)
     poses = verification_poses(robot, files, placed_again="station" in refit)
     progress("reading", 1.0)
-    verification = verify(robot, poses, refit=refit, progress=progress)
+    verification = verify(robot, poses, refit=refit, temperature=temperature, progress=progress)
     origin = provenance([robot_file, robot.nominal.urdf, *files], None, robot.stored, tuple(robot.blocks))
     origin |= image_provenance(files)
     fitted = fitted_files(robot, files) or verification.fitted

@@ -40,6 +40,7 @@ from flexcal.jobs.inputs import (
     CalibratedRobot,
     is_station_identified,
     require_distinct_files,
+    temperature_remarks,
     unmeasured_targets_remark,
 )
 from flexcal.jobs.pages import PlottedResult
@@ -212,6 +213,7 @@ def accuracy_map(
     count: int = 20_000,
     verification: PoseSet | None = None,
     payload: float | None = None,
+    temperature: float | None = None,
     seed: int = 0,
     progress: Progress = silent,
 ) -> AccuracyMap:
@@ -231,6 +233,8 @@ def accuracy_map(
         Points measured outside the fit. Where errors there are larger than predicted, the map is scaled up; never down.
     payload : float, optional
         Mass, kg; by default as declared.
+    temperature : float, optional
+        Temperature of the arm, °C; by default that at which the calibrated parameters hold.
     seed : int
         Seed of the random poses.
     progress : Progress
@@ -257,7 +261,7 @@ def accuracy_map(
     (50,)
     """
     check = None if verification is None else _Check.of(robot, verification)
-    return _checked_map(robot, check, box, q, count, payload, seed, progress)
+    return _checked_map(robot, check, box, q, count, payload, temperature, seed, progress)
 
 
 def _checked_map(
@@ -267,6 +271,7 @@ def _checked_map(
     q: np.ndarray | None,
     count: int,
     payload: float | None,
+    temperature: float | None,
     seed: int,
     progress: Progress,
 ) -> AccuracyMap:
@@ -276,7 +281,9 @@ def _checked_map(
     # a fixture with sockets is no instrument: what it tells is in the base frame
     instruments = robot.nominal.stations.names
     stations = [s for s in instruments if is_station_identified(model, s)]
-    reach = propagation(model, station=stations[0] if stations else None, payload=payload)
+    reach = propagation(
+        model, station=stations[0] if stations else None, payload=payload, temperature=temperature
+    )
     rng = np.random.default_rng([seed, 7])
     if q is None:
         declared = model.config.working_volume
@@ -291,7 +298,7 @@ def _checked_map(
         model,
         reach,
         predicted,
-        distance_to_nominal(model, robot.with_points, q, reach.target, reach.payload),
+        distance_to_nominal(model, robot.with_points, q, reach.target, reach.payload, temperature),
         box,
         worst,
         {kind: float(values.mean()) for kind, values in error_sources(reach, some).items()},
@@ -299,7 +306,10 @@ def _checked_map(
         scale,
         None if check is None else check.before,
         None if check is None else check.errors,
-        unmeasured_targets_remark(robot, [reach.target]),
+        (
+            *unmeasured_targets_remark(robot, [reach.target]),
+            *temperature_remarks(robot, None if temperature is None else np.array([temperature]), "errors"),
+        ),
         () if check is None else check.fitted,
         outside_ranges(robot, q),
         None if check is None else check.sample,
@@ -314,6 +324,7 @@ def map_accuracy(
     count: int = 20_000,
     verification: Sequence[Path] = (),
     payload: float | None = None,
+    temperature: float | None = None,
     estimates: Path | None = None,
     seed: int = 0,
     command: str = "",
@@ -341,7 +352,7 @@ def map_accuracy(
         q = working_volume(CollisionChecker(robot.model), working, seed).q
     elif working is not None:
         box = box_corners(working)
-    accuracy = _checked_map(robot, check, box, q, count, payload, seed, progress)
+    accuracy = _checked_map(robot, check, box, q, count, payload, temperature, seed, progress)
     origin = provenance(
         [robot_file, robot.nominal.urdf, *verification, *(() if place is None else (place,))],
         {"seed": seed},

@@ -12,6 +12,7 @@ from flexcal.calibration.error_model import TRANSMISSION
 from flexcal.calibration.fit import (
     LEVELS,
     PER_JOINT,
+    THERMAL,
     FleetPrior,
     GeometricFit,
     LossName,
@@ -29,8 +30,8 @@ from flexcal.jobs.calibration.held_out import held_out_errors
 from flexcal.jobs.calibration.held_out_tilts import held_out_tilts
 from flexcal.jobs.calibration.joint_ranges import joint_extents
 from flexcal.jobs.calibration.result import Calibration
-from flexcal.jobs.inputs import TARGETS, TARGETS_BETWEEN, is_station_identified
-from flexcal.model.robot import RobotModel
+from flexcal.jobs.inputs import TARGETS, TARGETS_BETWEEN, TEMPERATURE, is_station_identified
+from flexcal.model.robot import ZERO_DRIFT, RobotModel
 from flexcal.progress import Progress, silent
 
 AUTO = "auto"
@@ -137,7 +138,7 @@ def calibrate(
     estimate = replace(
         selected.estimate,
         provenance=provenance((), options),
-        ranges=joint_extents(selected.model, selected.poses.q),
+        ranges=joint_extents(selected.model, selected.poses.q) | _temperatures(selected),
         measurements=measurement_digests(poses),
     )
     uncalibrated = uncalibrated_model(fits.model, poses)
@@ -159,6 +160,12 @@ def calibrate(
         held_out=held_out,
         orientation_before=uncalibrated_orientations(uncalibrated.registered, poses),
     )
+
+
+def _temperatures(fit: GeometricFit) -> dict[str, tuple[float, float]]:
+    """Range of the temperatures, °C, where the robot changes with them."""
+    told = fit.temperature
+    return {} if told is None else {TEMPERATURE: (told.lowest, told.highest)}
 
 
 def _without_wrong_readings(poses: PoseSet, fit: GeometricFit) -> np.ndarray:
@@ -183,12 +190,13 @@ def _terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str, ...] | 
     if asked == (AUTO,):
         return None
     harmonics = tuple(f"transmission_{order}" for order in model.drives.harmonics)
-    known = (*LEVELS, "backlash", *PER_JOINT, TRANSMISSION, *harmonics, "ratio")
+    known = (*LEVELS, "backlash", *PER_JOINT, TRANSMISSION, *harmonics, "ratio", *THERMAL)
+    of_a_joint = (*PER_JOINT, ZERO_DRIFT)
     for term in asked:
         owner, _, kind = term.rpartition(".")
         if owner:
             model.joint_index(owner)
-        if kind not in (PER_JOINT if owner else known):
+        if kind not in (of_a_joint if owner else known):
             raise FlexcalError(
                 "E-RUN-011",
                 f"there is no geometry term '{term}'; there are {', '.join(known)}, or {AUTO} alone.",

@@ -24,6 +24,7 @@ from flexcal.calibration.diagnostics import (
 from flexcal.calibration.fit import GeometricFit
 from flexcal.jobs.calibration.ignored_columns import ignored_columns_remarks
 from flexcal.jobs.calibration.inclinations import inclination_remarks
+from flexcal.jobs.calibration.thermal import thermal_remarks
 from flexcal.model.robot import BOARD_SCALE, socket_scale
 from flexcal.units import MILLIMETRE, decimals
 
@@ -136,7 +137,8 @@ def calibration_remarks(fit: GeometricFit, cause: Sequence[str] = ()) -> tuple[s
     """Remarks on a calibration, the most important last; a known `cause` of a bad fit precedes its consequences."""
     remarks = [
         *fit.poses.notes,
-        *ignored_columns_remarks(fit.poses),
+        *ignored_columns_remarks(fit.poses, () if fit.temperature is None else ("temperature", "time")),
+        *thermal_remarks(fit),
         *_without_readings(fit),
         *_nominal_springs(fit),
     ]

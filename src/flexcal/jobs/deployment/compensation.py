@@ -14,7 +14,12 @@ from flexcal.compensation import MotorCommands, best_posture, motor_commands
 from flexcal.data.poses import ToolTargets, read_targets, write_commands
 from flexcal.data.tables import TableFile, open_table
 from flexcal.errors import FlexcalError, InputError, naming
-from flexcal.jobs.inputs import CalibratedRobot, is_station_identified, unmeasured_lengths_remark
+from flexcal.jobs.inputs import (
+    CalibratedRobot,
+    at_temperatures,
+    is_station_identified,
+    unmeasured_lengths_remark,
+)
 from flexcal.jobs.pages import Result
 from flexcal.model.kinematics import found_xyz, joint_limits
 from flexcal.model.robot import RobotModel, with_point_at_frame
@@ -137,6 +142,7 @@ def compensate(
     *,
     frame: str | None = None,
     start: Sequence[float] = (),
+    temperature: float | None = None,
     progress: Progress = silent,
 ) -> Compensation:
     """Compute the motor commands that bring the tool of a calibrated robot to its targets.
@@ -156,6 +162,8 @@ def compensate(
     start : sequence of float
         Joint positions (n,), rad or m, where inverse kinematics starts for targets without their own; by default a posture far from
         singular.
+    temperature : float, optional
+        Temperature of the arm, °C, for targets that have none; by default that at which the calibrated parameters hold.
     progress : Progress
         Called with the stage and the share of it that is done.
 
@@ -184,6 +192,7 @@ def compensate(
     array([ True])
     """
     model, nominal = robot.probable, robot.with_points
+    targets, warm = at_temperatures(robot, targets, temperature)
     if frame is not None:
         model, nominal = with_point_at_frame(model, frame), with_point_at_frame(nominal, frame)
         targets = replace(targets, target=np.full(len(targets), frame))
@@ -215,7 +224,7 @@ def compensate(
         origin,
         nominal,
         robot.measured,
-        remarks=unmeasured_lengths_remark(robot),
+        remarks=(*unmeasured_lengths_remark(robot), *warm),
     )
 
 
@@ -228,6 +237,7 @@ def compensate_robot(
     target: str | None = None,
     frame: str | None = None,
     start: Sequence[float] = (),
+    temperature: float | None = None,
     progress: Progress = silent,
 ) -> Compensation:
     """`compensate` for the targets of `file`; the commands go to `out`, CSV or Parquet.
@@ -248,10 +258,19 @@ def compensate_robot(
     if target is not None:
         targets = replace(targets, target=np.full(len(targets), target))
     with naming(file):
-        result = replace(compensate(robot, targets, frame=frame, start=start, progress=progress), table=table)
+        result = replace(
+            compensate(robot, targets, frame=frame, start=start, temperature=temperature, progress=progress),
+            table=table,
+        )
     commands = result.commands
     reached = targets.subset(commands.reached)
-    rows = ToolTargets(reached.pose, reached.target, commands.q[commands.reached], payload=reached.payload)
+    rows = ToolTargets(
+        reached.pose,
+        reached.target,
+        commands.q[commands.reached],
+        payload=reached.payload,
+        temperature=reached.temperature,
+    )
     write_commands(out, result.model, rows, commands.unambiguous[commands.reached], table)
     return result
 

@@ -11,7 +11,7 @@ import numpy as np
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.data.poses import ToolTargets, read_commands, write_targets
 from flexcal.errors import FlexcalError
-from flexcal.jobs.inputs import CalibratedRobot, unmeasured_lengths_remark
+from flexcal.jobs.inputs import CalibratedRobot, at_temperatures, unmeasured_lengths_remark
 from flexcal.jobs.pages import Result
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import carried_mass, certain_flank, points_kinematics, tool_at_rest
@@ -65,7 +65,13 @@ class Prediction(Result):
         }
 
 
-def predict(robot: CalibratedRobot, commands: ToolTargets, *, progress: Progress = silent) -> Prediction:
+def predict(
+    robot: CalibratedRobot,
+    commands: ToolTargets,
+    *,
+    temperature: float | None = None,
+    progress: Progress = silent,
+) -> Prediction:
     """Predict the pose of the real tool for motor commands: geometry, deflection under gravity and payload, backlash.
 
     Parameters
@@ -74,7 +80,9 @@ def predict(robot: CalibratedRobot, commands: ToolTargets, *, progress: Progress
         `Calibration.robot`, or ``CalibratedRobot.from_yaml(path)``.
     commands : ToolTargets
         Commanded joint positions `q` (N, n), rad or m, the names of the points (N,) that are looked at, and payloads (N,), kg, where
-        they are not as declared.
+        they are not as declared, and temperatures (N,), °C.
+    temperature : float, optional
+        Temperature of the arm, °C, for commands that have none; by default that at which the calibrated parameters hold.
     progress : Progress
         Called with the stage and the share of it that is done.
 
@@ -102,6 +110,7 @@ def predict(robot: CalibratedRobot, commands: ToolTargets, *, progress: Progress
     """
     if commands.q is None:
         raise FlexcalError("E-RUN-097", "the commands hold no joint positions q; give those of the motors.")
+    commands, warm = at_temperatures(robot, commands, temperature)
     parts = []
     for first in range(0, len(commands), _BLOCK):
         progress("predicting", first / len(commands))
@@ -110,11 +119,17 @@ def predict(robot: CalibratedRobot, commands: ToolTargets, *, progress: Progress
     progress("predicting", 1.0)
     position, rotation, beside, certain = (np.concatenate(part) for part in zip(*parts, strict=True))
     tool = replace(commands, q=None, position=position, rotation=rotation)
-    return Prediction(robot.probable, tool, beside, certain, unmeasured_lengths_remark(robot))
+    return Prediction(robot.probable, tool, beside, certain, (*unmeasured_lengths_remark(robot), *warm))
 
 
 def predict_robot(
-    robot_file: Path, file: Path, out: Path, *, estimates: Path | None = None, progress: Progress = silent
+    robot_file: Path,
+    file: Path,
+    out: Path,
+    *,
+    estimates: Path | None = None,
+    temperature: float | None = None,
+    progress: Progress = silent,
 ) -> Prediction:
     """`predict` for the commands of `file`; the tool's poses go to `out`, CSV or Parquet.
 
@@ -124,7 +139,7 @@ def predict_robot(
     progress("reading", 0.0)
     commands = read_commands(file, robot.probable)
     progress("reading", 1.0)
-    prediction = predict(robot, commands, progress=progress)
+    prediction = predict(robot, commands, temperature=temperature, progress=progress)
     write_targets(out, prediction.tool)
     return prediction
 
@@ -134,7 +149,7 @@ def _predicted(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Positions (N, 3), orientations (N, 3, 3), deviations from the nominal positions (N, 3), and mask of certain flanks (N,)."""
     assert commands.q is not None
-    at = tool_at_rest(model, commands.q, commands.payload, commands.target)
+    at = tool_at_rest(model, commands.q, commands.payload, commands.target, temperature=commands.temperature)
     there = points_kinematics(nominal, commands.q, None, commands.target, jacobians=False).position
     payload = carried_mass(model, commands.payload, len(commands))
     certain = certain_flank(model, commands.q, at.rest.torque, payload)[:, list(model.backlash_joints)]

@@ -8,6 +8,14 @@ from .experiment_files import (
     read_responses,
     robot_file,
 )
+from .given_temperature import (
+    TEMPERATURE,
+    at_temperatures,
+    calibrated_temperatures,
+    reference_temperature,
+    temperature_remarks,
+    with_temperature,
+)
 from .provenance import image_provenance, robot_provenance
 from .stored_model import (
     TARGETS,
@@ -24,7 +32,10 @@ __all__ = [
     "FREQUENCY_PLAN",
     "TARGETS",
     "TARGETS_BETWEEN",
+    "TEMPERATURE",
     "CalibratedRobot",
+    "at_temperatures",
+    "calibrated_temperatures",
     "common_plan",
     "example_robot",
     "image_provenance",
@@ -33,10 +44,13 @@ __all__ = [
     "plan_files",
     "read_plan_for_robot",
     "read_responses",
+    "reference_temperature",
     "require_distinct_files",
     "robot_file",
     "robot_provenance",
     "stored_estimates",
+    "temperature_remarks",
     "unmeasured_lengths_remark",
     "unmeasured_targets_remark",
+    "with_temperature",
 ]

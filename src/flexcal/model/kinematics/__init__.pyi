@@ -6,6 +6,7 @@ from .link_poses import joint_origins, link_frames
 from .link_surface import LinkSurface, capsule_axes, link_capsules
 from .placements import bearing_placement, found_xyz, joint_placement, link_placement, point_placement
 from .relative import carrier_kinematics, relative_kinematics, relative_motion
+from .thermal_expansion import depends_on_temperature, expanded, link_vectors, temperature_rise
 from .tool_rotations import rotation_freedom
 from .triangle_meshes import box, cylinder, decimated, ellipsoid
 
@@ -20,7 +21,9 @@ __all__ = [
     "cylinder",
     "damped_step",
     "decimated",
+    "depends_on_temperature",
     "ellipsoid",
+    "expanded",
     "found_xyz",
     "joint_batch",
     "joint_limits",
@@ -32,6 +35,7 @@ __all__ = [
     "link_capsules",
     "link_frames",
     "link_placement",
+    "link_vectors",
     "loop_gap",
     "low_discrepancy_configurations",
     "motor_motion",
@@ -42,4 +46,5 @@ __all__ = [
     "relative_kinematics",
     "relative_motion",
     "rotation_freedom",
+    "temperature_rise",
 ]

@@ -199,14 +199,27 @@ class ElasticConfig:
 
 @dataclass(frozen=True)
 class GeometryConfig:
-    """Terms that the geometric calibration may use, and the joints with backlash."""
+    """Terms that the geometric calibration may use, and the joints with backlash.
+
+    `reference_temperature`, °C, at which the calibrated geometry holds where it depends on temperature; by default the mean of the
+    calibration.
+    """
 
     terms: str | tuple[str, ...] = "auto"
     backlash: tuple[str, ...] = ()
+    reference_temperature: float | None = None
 
     def __post_init__(self) -> None:
         levels = ("kinematic", "offsets", "lengths", "backlash")
-        known = (*levels, "gravity_compliance", "lateral_compliance", "transmission", "ratio")
+        known = (
+            *levels,
+            "gravity_compliance",
+            "lateral_compliance",
+            "thermal_drift",
+            "transmission",
+            "ratio",
+        )
+        known = (*known, "thermal", "thermal_links", "thermal_stations")
         if isinstance(self.terms, str) and self.terms != "auto":
             raise FlexcalError(
                 "E-ROBOT-015",
@@ -214,7 +227,7 @@ class GeometryConfig:
             )
         for term in () if isinstance(self.terms, str) else self.terms:
             owner, _, kind = term.rpartition(".")
-            if kind not in (known[4:6] if owner else known):
+            if kind not in (known[4:7] if owner else known):
                 raise FlexcalError(
                     "E-ROBOT-016", f"unknown geometry term '{term}'; known are {', '.join(known)}."
                 )

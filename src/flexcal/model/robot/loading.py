@@ -24,7 +24,7 @@ from flexcal.model.parts import (
 from flexcal.model.robot.arm_sensor import ArmSensor
 from flexcal.model.robot.config import ElasticConfig, RobotConfig
 from flexcal.model.robot.joint_relations import read_relations
-from flexcal.model.robot.parameter_groups import Drives, Geometry, Links, Scatter, Springs, Stations
+from flexcal.model.robot.parameter_groups import Drives, Geometry, Links, Scatter, Springs, Stations, Thermal
 from flexcal.model.robot.parameter_names import COUPLED, FRICTION_PARAMETERS, PARALLEL, SCATTER
 from flexcal.model.urdf import Description, Frame, read_urdf
 
@@ -93,6 +93,7 @@ def read_robot(robot_type: type[RobotModel], file: YamlFile) -> RobotModel:
             stations, [name for name, item in config.measurements.items() if item.kind == "sockets"]
         ),
         scatter=Scatter(np.zeros(len(SCATTER))),
+        thermal=Thermal.at_reference(n, config.geometry.reference_temperature),
         payload=payload,
         force_sensor=_force_sensor(file, description, config),
         carriers={

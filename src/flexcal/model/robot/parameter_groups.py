@@ -106,7 +106,8 @@ class Stations:
     touched face. `zero` (stations,), m: distance from the station's origin at which an instrument of distances reads zero, as the radius
     of a touched sphere. `wire_scale` (stations,): relative deviation of the lengths that a wire reads from the true ones, as a drum of
     another radius has it. `board_scale` (1,): relative deviation of the size of a camera's board from the declared one, `socket_scale`
-    (fixtures,) of the distances between the sockets of each of the `fixtures` that robot.yaml declares.
+    (fixtures,) of the distances between the sockets of each of the `fixtures` that robot.yaml declares. `drift` (stations, 3), m/K: what
+    an instrument's readings shift by per kelvin, in its own frame.
     """
 
     names: tuple[str, ...]
@@ -116,6 +117,7 @@ class Stations:
     board_scale: np.ndarray
     fixtures: tuple[str, ...]
     socket_scale: np.ndarray
+    drift: np.ndarray
 
     @classmethod
     def at_base(cls, names: Sequence[str], fixtures: Sequence[str] = ()) -> Stations:
@@ -129,6 +131,7 @@ class Stations:
             board_scale=np.zeros(1),
             fixtures=tuple(fixtures),
             socket_scale=np.zeros(len(fixtures)),
+            drift=np.zeros((number, 3)),
         )
 
 
@@ -140,6 +143,27 @@ class Scatter:
 
 
 @dataclass(frozen=True, eq=False)
+class Thermal:
+    """Thermal expansion of the arm, and drift of its joint zeros.
+
+    `expansion` (1,), 1/K: linear expansion coefficient of the whole arm; `link_expansion` (n,), 1/K: what that of each joint's link differs
+    from it by; `zero_drift` (n,), rad/K or m/K: what each joint moves by per kelvin with its motor still; `reference` (1,), in the unit of
+    the column `temperature`, °C: the temperature at which all other parameters hold, NaN where none is known.
+    """
+
+    expansion: np.ndarray
+    link_expansion: np.ndarray
+    zero_drift: np.ndarray
+    reference: np.ndarray
+
+    @classmethod
+    def at_reference(cls, joints: int, reference: float | None) -> Thermal:
+        """Arm of so many `joints` that does not change with temperature."""
+        known = np.array([np.nan if reference is None else reference])
+        return cls(np.zeros(1), np.zeros(joints), np.zeros(joints), known)
+
+
+@dataclass(frozen=True, eq=False)
 class Lenses:
     """Intrinsic parameters of cameras: `names`, and `values` (cameras, 9) in the order of `LENS`, pixels and 1."""
 
@@ -147,7 +171,7 @@ class Lenses:
     values: np.ndarray
 
 
-Group = Literal["geometry", "springs", "drives", "links", "stations", "scatter", "lenses"]
+Group = Literal["geometry", "springs", "drives", "links", "stations", "scatter", "thermal", "lenses"]
 """Groups of arrays of a robot model."""
 
 

@@ -16,6 +16,12 @@ if TYPE_CHECKING:
 GEOMETRY = ("offset", "misalignment_1", "misalignment_2", "length_x", "length_y", "length_z")
 RATIO = "ratio_"
 """What a joint moves more than declared per motion of another, whose name follows, or of its own motor."""
+EXPANSION, REFERENCE = "thermal.expansion", "thermal.reference"
+"""Linear expansion coefficient of the arm, and the temperature at which the other parameters hold."""
+LINK_EXPANSION, ZERO_DRIFT = "thermal_expansion", "thermal_drift"
+"""Keys of a link's own expansion beyond the arm's, and of the drift of a joint's zero with temperature."""
+STATION_DRIFT = ("thermal_x", "thermal_y", "thermal_z")
+"""Shift of an instrument's readings with temperature."""
 ORIGIN = ("origin_x", "origin_y", "origin_z")
 """Displacement of a joint that branches off, in its parent link."""
 SPRINGS = ("bearing_x", "bearing_y", "drive")
@@ -59,6 +65,8 @@ SCATTER = (
 _UNITS = {
     **dict.fromkeys(LOOP, "m"),
     **dict.fromkeys(("zero_x", "zero_y", "zero_z"), "rad"),
+    "expansion": "1/K", "thermal_expansion": "1/K", "thermal_drift": "rad/K", "reference": "°C",
+    **dict.fromkeys(("thermal_x", "thermal_y", "thermal_z"), "m/K"),
     "offset": "rad", "misalignment_1": "rad", "misalignment_2": "rad", "length_x": "m", "length_y": "m", "length_z": "m",
     "origin_x": "m", "origin_y": "m", "origin_z": "m",
     "x": "m", "y": "m", "z": "m", "zero": "m", "rx": "rad", "ry": "rad", "rz": "rad", "backlash": "rad", "gravity_compliance": "rad/(N m)",
@@ -82,7 +90,7 @@ _SLIDING = {
 }  # fmt: skip
 
 
-_OF_POSITIONS = ("offset", "backlash", "transmission_")
+_OF_POSITIONS = ("offset", "backlash", "transmission_", ZERO_DRIFT)
 
 
 def unit_in(model: RobotModel, name: str) -> str:
@@ -95,7 +103,7 @@ def unit_in(model: RobotModel, name: str) -> str:
     if owner not in model.joint_names or not key.startswith((*_OF_POSITIONS, *_OF_DRIVES)):
         return unit
     slides = [model.joints[model.joint_index(j)].kind == "prismatic" for j in (owner, other or owner)]
-    return ({"rad": "m"} | _SLIDING).get(unit, unit) if all(slides) else unit
+    return ({"rad": "m", "rad/K": "m/K"} | _SLIDING).get(unit, unit) if all(slides) else unit
 
 
 def geometric_errors(model: RobotModel, joints: Sequence[int]) -> list[str]:
@@ -175,6 +183,10 @@ def parameter_locations(model: RobotModel) -> dict[str, Location]:
             table[f"station.{name}.{key}"] = Location("stations", "pose", (s, k))
         table[f"station.{name}.zero"] = Location("stations", "zero", (s,))
         table[f"station.{name}.scale"] = Location("stations", "wire_scale", (s,))
+        for k, key in enumerate(STATION_DRIFT):
+            table[f"station.{name}.{key}"] = Location("stations", "drift", (s, k))
+    table[EXPANSION] = Location("thermal", "expansion", (0,))
+    table[REFERENCE] = Location("thermal", "reference", (0,))
     table[BOARD_SCALE] = Location("stations", "board_scale", (0,))
     for k, name in enumerate(model.stations.fixtures):
         table[socket_scale(name)] = Location("stations", "socket_scale", (k,))
@@ -201,6 +213,8 @@ def parameter_locations(model: RobotModel) -> dict[str, Location]:
                 )
         for k in ratio_errors(model, i):
             table[f"{joint.name}.{RATIO}{model.joints[k].name}"] = Location("drives", "ratio_error", (i, k))
+        table[f"{joint.name}.{ZERO_DRIFT}"] = Location("thermal", "zero_drift", (i,))
+        table[f"{joint.link}.{LINK_EXPANSION}"] = Location("thermal", "link_expansion", (i,))
         for key in ("rotor_inertia", "viscous", "coulomb", "torque_offset", "delay"):
             table[f"{joint.name}.{key}"] = Location("drives", key, (i,))
         for key in unknown_parallel(model, joint.name):

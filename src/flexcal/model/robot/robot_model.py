@@ -45,6 +45,7 @@ from flexcal.model.robot.parameter_groups import (
     Scatter,
     Springs,
     Stations,
+    Thermal,
 )
 from flexcal.model.robot.parameter_names import GEOMETRY, ORIGIN, parameter_locations
 from flexcal.model.robot.posterior import NOTHING_ESTIMATED, Posterior
@@ -85,6 +86,8 @@ class RobotModel:
         Places of the instrument.
     scatter : Scatter
         Standard deviations of instrument, robot and model error.
+    thermal : Thermal
+        Expansion and drift with temperature.
     payload : Payload or None
         The declared payload.
     force_sensor : ForceSensor or None
@@ -125,6 +128,7 @@ class RobotModel:
     links: Links
     stations: Stations
     scatter: Scatter
+    thermal: Thermal
     payload: Payload | None
     force_sensor: ForceSensor | None
     posterior: Posterior = NOTHING_ESTIMATED
@@ -194,6 +198,7 @@ class RobotModel:
             pose=pose,
             zero=np.concatenate([self.stations.zero, np.zeros(len(more))]),
             wire_scale=np.concatenate([self.stations.wire_scale, np.zeros(len(more))]),
+            drift=np.concatenate([self.stations.drift, np.zeros((len(more), 3))]),
         )
         return replace(self, stations=stations)
 

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.model.kinematics import PointKinematics, point_kinematics
+from flexcal.model.kinematics import (
+    PointKinematics,
+    depends_on_temperature,
+    expanded,
+    point_kinematics,
+    temperature_rise,
+)
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics.applied_force import force_moments, under_force
 from flexcal.model.statics.equilibrium import Equilibrium, static_equilibrium
@@ -66,6 +72,7 @@ def tool_at_rest(
     elastic: bool = True,
     jacobians: bool = False,
     force: np.ndarray | None = None,
+    temperature: np.ndarray | None = None,
 ) -> ToolAtRest:
     """Pose of measured points on the robot at rest, deflected by gravity and payload.
 
@@ -87,6 +94,8 @@ def tool_at_rest(
         Whether derivatives are computed too.
     force : ndarray, optional
         Force (N, 3), N in the base frame, on the points; none by default.
+    temperature : ndarray, optional
+        Temperature (N,) of the arm, °C; by default that at which the robot's parameters hold.
 
     Returns
     -------
@@ -114,9 +123,15 @@ def tool_at_rest(
         rest = static_equilibrium(model, q, masses, flank=flank, elastic=elastic, sensitivities=jacobians)
     else:
         rest = _pulled(model, q, masses, target, force, flank, elastic=elastic)
-    return ToolAtRest(
-        model, q, rest, points_kinematics(model, q, rest.deflection, target, jacobians=jacobians)
-    )
+    if temperature is None or not depends_on_temperature(model):
+        at = points_kinematics(model, q, rest.deflection, target, jacobians=jacobians)
+        return ToolAtRest(model, q, rest, at)
+    rise = temperature_rise(model, temperature)
+    bent = rest.deflection.copy()
+    bent[:, :, 2] += np.outer(rise, model.thermal.zero_drift)
+    ends = np.array([model.point(name).joint for name in target.tolist()])
+    at = points_kinematics(model, q, bent, target, jacobians=jacobians)
+    return ToolAtRest(model, q, replace(rest, deflection=bent), expanded(model, q, at, ends, rise))
 
 
 def _pulled(

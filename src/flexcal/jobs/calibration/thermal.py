@@ -1,0 +1,63 @@
+"""Remarks on the temperature of a calibration: what it changes, and what it cannot be told from."""
+
+from __future__ import annotations
+
+from flexcal.calibration.fit import GeometricFit, TemperatureEvidence
+from flexcal.model.robot import EXPANSION
+
+_MICRO = 1e-6
+_WORTH = 0.02
+"""Attenuation from which it has a sentence."""
+
+
+def thermal_remarks(fit: GeometricFit) -> tuple[str, ...]:
+    """Remarks on a fit with terms of temperature; none for others."""
+    told = fit.temperature
+    if told is None:
+        return ()
+    remarks = [_expansion(fit, told)]
+    if told.confounded:
+        remarks.append(_confounded(told))
+    if told.drifts:
+        remarks.append(
+            f"beside temperature, residuals change with {_clock(told)} (p = {told.probability:.1g}): something drifts that the temperature "
+            "column does not say, as the instrument, or a link that warms up later than the sensor"
+        )
+    if told.scatter is None:
+        remarks.append(
+            "the noise of the temperature's sensor is not known, because temperatures jump from one measurement to the next: a sensor that "
+            f"scatters by s K makes coefficients too small by (s / {told.spread:.1f} K)², which the intervals do not include"
+        )
+    elif told.attenuation > _WORTH:
+        remarks.append(
+            f"the temperature's sensor scatters by {told.scatter:.2g} K from one measurement to the next, which makes coefficients "
+            f"{told.attenuation:.0%} too small; the intervals include it"
+        )
+    return tuple(remarks)
+
+
+def _expansion(fit: GeometricFit, told: TemperatureEvidence) -> str:
+    """What the calibrated robot does with temperature."""
+    where = (
+        f"the calibrated parameters hold at {told.reference:.1f} °C, and temperatures were from {told.lowest:.1f} to "
+        f"{told.highest:.1f} °C"
+    )
+    interval = fit.estimate.interval(EXPANSION) if EXPANSION in fit.estimate.parameters else None
+    if interval is None:
+        return f"the robot changes with temperature: {where}"
+    middle, half = (interval[0] + interval[1]) / 2 / _MICRO, (interval[1] - interval[0]) / 2 / _MICRO
+    of = "longest link" if any(name.endswith(".thermal_expansion") for name in told.narrow) else "arm"
+    return f"the {of} expands by {middle:.1f} ± {half:.1f} µm/m/K (95 %); {where}"
+
+
+def _confounded(told: TemperatureEvidence) -> str:
+    name = max(told.narrow, key=lambda n: told.wide[n] / told.narrow[n])
+    return (
+        f"temperature and {_clock(told)} go together in these measurements (correlation {told.correlation:.2f}), so a change with "
+        f"temperature is hardly told from another drift: it widens the interval of {name} by {told.wide[name] / told.narrow[name]:.1f}; "
+        "measure while the arm warms up and cools down, or with warm and cold poses mixed, to tell them apart"
+    )
+
+
+def _clock(told: TemperatureEvidence) -> str:
+    return "time" if told.timed else "the order of measuring"

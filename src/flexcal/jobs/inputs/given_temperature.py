@@ -1,0 +1,91 @@
+"""Temperature of the arm at targets, commands and measurements of a calibrated robot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from flexcal.data.poses import PoseSet, ToolTargets
+from flexcal.errors import InputError
+from flexcal.jobs.inputs.stored_model import CalibratedRobot
+from flexcal.model.kinematics import depends_on_temperature
+from flexcal.model.robot import RobotModel
+
+TEMPERATURE = "temperature"
+"""Name of the range of temperatures in the block `calibration` of estimates.yaml."""
+_BEYOND = 0.1
+"""Share of the calibrated range by which a temperature may lie outside it."""
+
+
+def at_temperatures(
+    robot: CalibratedRobot, targets: ToolTargets, given: float | None
+) -> tuple[ToolTargets, tuple[str, ...]]:
+    """Targets with their temperatures, their own or the `given` one, and remarks on these.
+
+    Raises `InputError` where both are there.
+    """
+    temperature, remarks = _chosen(robot, targets.temperature, given, len(targets), "positions")
+    return replace(targets, temperature=temperature), remarks
+
+
+def with_temperature(
+    robot: CalibratedRobot, poses: PoseSet, given: float | None
+) -> tuple[PoseSet, tuple[str, ...]]:
+    """Measured points with their temperatures, their own or the `given` one, and remarks on these.
+
+    Raises `InputError` where both are there.
+    """
+    temperature, remarks = _chosen(robot, poses.temperature, given, len(poses), "errors")
+    return replace(poses, temperature=temperature), remarks
+
+
+def _chosen(
+    robot: CalibratedRobot, own: np.ndarray | None, given: float | None, count: int, what: str
+) -> tuple[np.ndarray | None, tuple[str, ...]]:
+    if own is not None and given is not None:
+        raise InputError(
+            "E-RUN-109",
+            "there is a column 'temperature', and --temperature; leave the option or the column out.",
+        )
+    temperature = np.full(count, float(given)) if given is not None else own
+    return temperature, temperature_remarks(robot, temperature, what)
+
+
+def temperature_remarks(
+    robot: CalibratedRobot, temperature: np.ndarray | None, what: str = "positions"
+) -> tuple[str, ...]:
+    """What is to be said of temperatures (N,), °C, at which a calibrated robot is used, or of their absence."""
+    model = robot.model
+    if not depends_on_temperature(model):
+        return (
+            ()
+            if temperature is None
+            else ("the temperature has no effect: the calibrated robot has no term that depends on it",)
+        )
+    low, high = calibrated_temperatures(robot)
+    if temperature is None:
+        return (
+            f"no temperature is given: {what} are for {reference_temperature(model):.1f} °C, and the calibration was from {low:.1f} to "
+            f"{high:.1f} °C; a column 'temperature', or --temperature, says another",
+        )
+    slack = _BEYOND * (high - low)
+    outside = (temperature < low - slack) | (temperature > high + slack)
+    if not outside.any():
+        return ()
+    worst = float(temperature[np.argmax(np.maximum(low - temperature, temperature - high))])
+    beyond = f"outside those of the calibration, {low:.1f} to {high:.1f} °C: expansion and drift are extrapolated there"
+    if outside.all() and np.ptp(temperature) == 0:
+        return (f"the temperature of {worst:.1f} °C lies {beyond}",)
+    return (f"{outside.sum()} of {len(temperature)} temperatures, as {worst:.1f} °C, lie {beyond}",)
+
+
+def calibrated_temperatures(robot: CalibratedRobot) -> tuple[float, float]:
+    """Lowest and highest temperature of the calibration, °C; the reference temperature where they were not stored."""
+    reference = reference_temperature(robot.model)
+    return robot.blocks["calibration"].ranges.get(TEMPERATURE, (reference, reference))
+
+
+def reference_temperature(model: RobotModel) -> float:
+    """Temperature at which the parameters of a robot hold, °C."""
+    return float(model.thermal.reference[0])
