@@ -14,7 +14,7 @@ COLD = 20.0
 
 @dataclass(frozen=True)
 class ThermalArm:
-    """Arm whose link k has the temperature COLD + gradient_k ΔT, expansion coefficients (6,), 1/K, and drifts of joint zeros (6,), rad/K."""
+    """Arm whose link k has the temperature COLD + gradient_k ΔT, expansion (6,), 1/K, and drifts of joint zeros (6,), rad/K."""
 
     arm: DHArm
     expansion: np.ndarray = field(default_factory=lambda: np.full(6, 15e-6))

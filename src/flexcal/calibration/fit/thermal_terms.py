@@ -9,7 +9,7 @@ import numpy as np
 
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
-from flexcal.model.kinematics import link_vectors, point_kinematics
+from flexcal.model.kinematics import link_vectors, point_ends
 from flexcal.model.robot import (
     EXPANSION,
     LINK_EXPANSION,
@@ -90,10 +90,8 @@ def thermal_parameters(model: RobotModel, poses: PoseSet, term: str, joints: Seq
 def _other_links(model: RobotModel, poses: PoseSet, joints: Sequence[int]) -> list[int]:
     """Those of the `joints` whose links are long enough to matter, without the longest."""
     lengths = np.zeros(len(model.joints))
-    for target in poses.targets:
-        q = poses.q[poses.target == target]
-        at = point_kinematics(model, q, point=target, jacobians=False).position
-        vectors = link_vectors(model, q, at, model.point(target).joint)
+    for target, end in point_ends(model, poses.target).items():
+        vectors = link_vectors(model, poses.q[poses.target == target], end)
         lengths = np.maximum(lengths, np.linalg.norm(vectors, axis=2).mean(axis=0))
     longest = int(lengths.argmax())
     return [i for i in joints if lengths[i] > _SHORT * model.reach and i != longest]

@@ -15,6 +15,7 @@ from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import (
     PointKinematics,
+    carrier_ends,
     carrier_kinematics,
     depends_on_temperature,
     expanded,
@@ -251,9 +252,7 @@ def predict_measurements(
     if poses.temperature is not None and depends_on_temperature(model):
         rise = temperature_rise(model, poses.temperature)
     if carrier is not None and rise is not None:
-        frames = [model.carriers.get(name) for name in poses.station.tolist()]
-        ends = np.array([-1 if frame is None else frame.joint for frame in frames])
-        carrier = expanded(model, poses.q, carrier, ends, rise)
+        carrier = expanded(model, poses.q, carrier, poses.station, carrier_ends(model), rise)
     seen = tool.kinematics if carrier is None else relative_kinematics(tool.kinematics, carrier)
     at, base = np.empty((len(poses), 3)), np.empty((len(poses), 3, 3))
     for name in poses.stations:

@@ -12,6 +12,7 @@ from flexcal.model.kinematics import (
     depends_on_temperature,
     link_vectors,
     point_kinematics,
+    point_placement,
     relative_kinematics,
 )
 from flexcal.model.parts import LOOP, left_jacobian, vector_rotation
@@ -178,9 +179,9 @@ class Propagation:
         """Motion (N, 3, 1 + joints) of the point by the expansion of the arm and of each link."""
         columns = np.zeros((len(q), 3, 1 + len(self.model.joints)))
         if self.rise != 0:
-            end = self.model.point(self.target).joint
+            end = point_placement(self.model, self.target)[:2]
             columns[:, :, 0] = self.rise * position
-            columns[:, :, 1:] = self.rise * link_vectors(self.model, q, position, end).swapaxes(1, 2)
+            columns[:, :, 1:] = self.rise * link_vectors(self.model, q, end).swapaxes(1, 2)
         return columns
 
     def _by_station(self, position: np.ndarray) -> np.ndarray:

@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.model.kinematics import link_vectors, relative_motion, temperature_rise
+from flexcal.model.kinematics import (
+    Ends,
+    carrier_ends,
+    link_vectors,
+    point_ends,
+    relative_motion,
+    temperature_rise,
+)
 from flexcal.model.robot import EXPANSION, STATION_DRIFT, RobotModel
 
 if TYPE_CHECKING:
@@ -22,11 +29,10 @@ def rise_of(at: PredictedMeasurements) -> np.ndarray:
 def expansion_column(at: PredictedMeasurements, name: str) -> np.ndarray:
     """Derivative (R, 3) of the readings by the expansion coefficient of the arm, or by what that of a link is beyond it."""
     model, poses, rise = at.model, at.poses, rise_of(at)
-    ends = {target: model.point(target).joint for target in poses.targets}
+    ends = point_ends(model, poses.target)
     moved = _grown(model, poses.q, at.target.position, poses.target, ends, rise, name)
     if at.carrier is not None:
-        frames = {station: frame.joint for station, frame in model.carriers.items()}
-        carried = _grown(model, poses.q, at.carrier.position, poses.station, frames, rise, name)
+        carried = _grown(model, poses.q, at.carrier.position, poses.station, carrier_ends(model), rise, name)
         moved = relative_motion(at.target, at.carrier, moved, carried)
     return at.moved(moved)[:, :, 0]
 
@@ -46,11 +52,11 @@ def _grown(
     q: np.ndarray,
     position: np.ndarray,
     names: np.ndarray,
-    ends: dict[str, int],
+    ends: Ends,
     rise: np.ndarray,
     name: str,
 ) -> np.ndarray:
-    """Motion (N, 6, 1) of points at `position` (N, 3), on the links `ends` by their `names` (N,), by an expansion coefficient."""
+    """Motion (N, 6, 1) of points at `position` (N, 3), by their `names` (N,), by an expansion coefficient."""
     moved = np.zeros((len(q), 6, 1))
     if name == EXPANSION:
         moved[:, :3, 0] = (rise / (1 + model.thermal.expansion[0] * rise))[:, None] * position
@@ -58,5 +64,5 @@ def _grown(
     link = [joint.link for joint in model.joints].index(name.rpartition(".")[0])
     for one, end in ends.items():
         own = names == one
-        moved[own, :3, 0] = rise[own, None] * link_vectors(model, q[own], position[own], end)[:, link]
+        moved[own, :3, 0] = rise[own, None] * link_vectors(model, q[own], end)[:, link]
     return moved

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from tyro.conf import arg
 
-from flexcal.cli.arguments.shared_options import Estimates, Json, MaybeText, Robot, require_robot
+from flexcal.cli.arguments.shared_options import Estimates, Json, MaybeText, Robot, Temperature, require_robot
 from flexcal.cli.terminal.console import Console
 from flexcal.errors import InputError
 from flexcal.export import FORMATS, PlainFormat
@@ -33,6 +33,7 @@ class Export(ABC):
 
     robot: Robot
     out: Annotated[Path, arg(metavar="FILE", help="the file to write")]
+    temperature: Temperature = None
     estimates: Estimates = None
     json: Json = False
     geometric: ClassVar[bool] = True
@@ -75,7 +76,9 @@ def _plain_export(format: PlainFormat) -> type[Export]:
         def write(self) -> ExportedRobot:
             from flexcal.jobs.deployment import export_stored_robot
 
-            return export_stored_robot(self.robot, self.out, format.name, estimates=self.estimates)
+            return export_stored_robot(
+                self.robot, self.out, format.name, estimates=self.estimates, temperature=self.temperature
+            )
 
         def following(self, document: dict[str, Any]) -> str:
             return format.following.format(out=self.out)
@@ -114,6 +117,7 @@ class ExportDh(Export):
             point=self.point,
             four_parameters=self.four_parameters,
             estimates=self.estimates,
+            temperature=self.temperature,
         )
 
     def following(self, document: dict[str, Any]) -> str:
@@ -160,7 +164,12 @@ class ExportIsaac(Export):
                 f"--time-step is in s, between 0.00001 and 0.1, not {self.time_step:g}; give that of the simulation.",
             )
         return export_stored_robot(
-            self.robot, self.out, "isaac", time_step=self.time_step, estimates=self.estimates
+            self.robot,
+            self.out,
+            "isaac",
+            time_step=self.time_step,
+            estimates=self.estimates,
+            temperature=self.temperature,
         )
 
     def following(self, document: dict[str, Any]) -> str:
@@ -191,6 +200,7 @@ class ExportOffsets(Export):
             point=self.point,
             keep_frames=self.keep_frames,
             estimates=self.estimates,
+            temperature=self.temperature,
         )
 
     def following(self, document: dict[str, Any]) -> str:
@@ -221,7 +231,9 @@ class ExportRuntime(Export):
     def write(self) -> ExportedRobot:
         from flexcal.jobs.deployment import export_stored_robot
 
-        return export_stored_robot(self.robot, self.out, "runtime", estimates=self.estimates)
+        return export_stored_robot(
+            self.robot, self.out, "runtime", estimates=self.estimates, temperature=self.temperature
+        )
 
     def following(self, document: dict[str, Any]) -> str:
         return f"read {self.out} with flexcal::runtime::read_model_file in your program: docs/runtime.md"

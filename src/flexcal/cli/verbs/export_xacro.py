@@ -15,6 +15,7 @@ from flexcal.cli.arguments.shared_options import (
     Json,
     MaybePath,
     Robot,
+    Temperature,
     Texts,
     require_robot,
 )
@@ -50,6 +51,7 @@ class ExportXacro:
     """Where the offsets of the joints go: into the origins, or as <param name="offset"> into <ros2_control>, with all limits moved."""
     joint_limits: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="")] = None
     """MoveIt's joint_limits.yaml: its positions move with the offsets in ros2_control."""
+    temperature: Temperature = None
     estimates: Estimates = None
     json: Json = False
 
@@ -67,6 +69,7 @@ class ExportXacro:
             packages={name: Path(value) for name, value in _named(self.packages, "packages").items()},
             zeros=self.zeros,
             joint_limits=self.joint_limits,
+            temperature=self.temperature,
             estimates=self.estimates,
         )
         document = exported.document()

@@ -21,6 +21,7 @@ from flexcal.cli.arguments.shared_options import (
     Numbers,
     Paths,
     Robot,
+    Temperature,
     file_argument,
     require_robot_and_files,
 )
@@ -57,6 +58,7 @@ class Filter:
         ),
     ] = None
     """File for the new program; the folder for one of several files, which keep their names."""
+    temperature: Temperature = None
     estimates: Estimates = None
     tool: Annotated[Numbers, arg(metavar="X...", help_behavior_hint="(default: that of the program)")] = ()
     """Tool centre point in the flange for poses before which the program sets none, in the program's own numbers and units."""
@@ -134,6 +136,7 @@ class Filter:
             flange=self.flange,
             reverse=self.reverse,
             subdivide=None if self.subdivide is None else self.subdivide * MILLIMETRE,
+            temperature=self.temperature,
             page=self.report,
             command=command_line(),
         )

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 
 from tyro.conf import arg
 
-from flexcal.cli.arguments.shared_options import Estimates, Json, MaybePath, Robot, require_robot
+from flexcal.cli.arguments.shared_options import Estimates, Json, MaybePath, Robot, Temperature, require_robot
 from flexcal.cli.terminal.console import Console
 from flexcal.errors import InputError
 
@@ -31,6 +31,7 @@ class Serve:
     """TCP port of 127.0.0.1; 0 takes any free one."""
     token: Annotated[Path, arg(metavar="FILE")] = Path("flexcal.token")
     """File of the token that clients of --port begin with, {"token": "…"}; made where it is absent."""
+    temperature: Temperature = None
     estimates: Estimates = None
     json: Json = False
 
@@ -41,13 +42,15 @@ class Serve:
         require_robot(self.robot)
         if (self.unix is None) == (self.port is None):
             raise InputError("E-CLI-044", "give --unix SOCKET or --port N, one of them.")
-        answers = Answers.from_yaml(self.robot, self.estimates)
+        answers = Answers.from_yaml(self.robot, self.estimates, self.temperature)
         where: list[str] = []
 
         def ready(address: str) -> None:
             where.append(address)
             # standard output is shown when a verb has ended
             print(f"listening on {address}", file=sys.stderr, flush=True)
+            for remark in answers.remarks:
+                print(remark, file=sys.stderr, flush=True)
 
         if self.unix is not None:
             served = serve_unix(answers, self.unix, ready)

@@ -23,7 +23,7 @@ from flexcal.export import (
 )
 from flexcal.files.formats import read_estimates
 from flexcal.jobs.deployment.actuator_export import actuator_remarks, identified_actuators, rendered_actuators
-from flexcal.jobs.inputs import CalibratedRobot, stored_estimates, unmeasured_lengths_remark
+from flexcal.jobs.inputs import CalibratedRobot, held_at, stored_estimates, unmeasured_lengths_remark
 from flexcal.jobs.pages import Result
 from flexcal.model.robot import RobotModel, with_blocks
 
@@ -95,6 +95,7 @@ def export_robot(
     four_parameters: bool = False,
     keep_frames: bool = False,
     time_step: float | None = None,
+    temperature: float | None = None,
 ) -> ExportedRobot:
     """Write a calibrated robot in a file format of other programs, and measure the error due to the terms that the format lacks.
 
@@ -116,6 +117,9 @@ def export_robot(
         Whether base and tool stay nominal where offsets are fitted.
     time_step : float, optional
         Time step, s, in which "isaac" counts delays; 5 ms by default.
+    temperature : float, optional
+        Temperature of the arm, °C, for which the file is; by default that at which the calibrated parameters hold. "json" has the terms of
+        temperature, and takes none.
 
     Returns
     -------
@@ -149,7 +153,12 @@ def export_robot(
             "time_step": time_step,
         },
     )
-    nominal, probable = robot.nominal, robot.probable
+    if temperature is not None and format == "json":
+        raise FlexcalError(
+            "E-RUN-110", "the format 'json' has the terms of temperature in it; leave the temperature out."
+        )
+    probable, warm = held_at(robot, temperature)
+    nominal = robot.nominal
     rendered: RenderedModel
     if format in _CONVENTIONS:
         rendered = render_dh(
@@ -177,7 +186,7 @@ def export_robot(
     else:
         rendered = render(format, probable, nominal)
     written = write_rendered(probable, path, rendered)
-    remarks = (*unmeasured_lengths_remark(robot), *actuator_remarks(robot, format))
+    remarks = (*unmeasured_lengths_remark(robot), *actuator_remarks(robot, format), *warm)
     written = replace(written, remarks=(*written.remarks, *remarks))
     return ExportedRobot(probable, written, "calibration" in robot.blocks)
 
@@ -191,6 +200,7 @@ def export_stored_robot(
     four_parameters: bool = False,
     keep_frames: bool = False,
     time_step: float | None = None,
+    temperature: float | None = None,
     estimates: Path | None = None,
 ) -> ExportedRobot:
     """`export_robot` of the robot of a robot.yaml, as far as it was identified; `estimates` is a file or folder in place of that beside it.
@@ -213,6 +223,7 @@ def export_stored_robot(
         four_parameters=four_parameters,
         keep_frames=keep_frames,
         time_step=time_step,
+        temperature=temperature,
     )
 
 

@@ -17,7 +17,7 @@ from flexcal.jobs.deployment.controller_poses import ControllerPoses
 from flexcal.jobs.deployment.filtered_program import FilteredProgram, ToolPoses
 from flexcal.jobs.deployment.path_corrections import PathCorrections, deviations_of_targets, path_remarks
 from flexcal.jobs.deployment.program_files import output_places, read_program, written_files
-from flexcal.jobs.inputs import CalibratedRobot, unmeasured_lengths_remark
+from flexcal.jobs.inputs import CalibratedRobot, held_at, unmeasured_lengths_remark
 from flexcal.jobs.result_files import RunRecord
 from flexcal.model.robot import RobotModel, with_point_at_frame
 from flexcal.model.statics import tool_at_rest
@@ -41,6 +41,7 @@ def filter_program(
     flange: str = _FLANGE,
     reverse: bool = False,
     subdivide: float | None = None,
+    temperature: float | None = None,
 ) -> FilteredProgram:
     """Replace the targets of a program by those with which the real robot's flange takes the poses that the nominal robot would take.
 
@@ -68,6 +69,8 @@ def filter_program(
         Whether to return from corrected targets to the nominal ones.
     subdivide : float, optional
         Distance, m, by which a line may miss the needed correction between its ends; points are inserted where it misses it by more.
+    temperature : float, optional
+        Temperature of the arm, °C; by default that at which the calibrated parameters hold.
 
     Returns
     -------
@@ -102,7 +105,8 @@ def filter_program(
             "E-PROG-011",
             f"--subdivide {subdivide / MILLIMETRE:g} needs a positive number of millimetres, and no --reverse; correct the command.",
         )
-    model, nominal = (with_point_at_frame(each, flange) for each in (robot.probable, robot.with_points))
+    probable, warm = held_at(robot, temperature)
+    model, nominal = (with_point_at_frame(each, flange) for each in (probable, robot.with_points))
     if model.n != 6:
         raise FlexcalError(
             "E-PROG-002",
@@ -138,6 +142,7 @@ def filter_program(
     before, corrected = (ToolPoses.of(places, program.targets, each) for each in (q, commands))
     remarks = (
         *unmeasured_lengths_remark(robot),
+        *warm,
         *_convention_remarks(joints),
         *_tool_remarks(program, places.tool),
         *program.remarks,
@@ -162,6 +167,7 @@ def filter_program_file(
     flange: str = _FLANGE,
     reverse: bool = False,
     subdivide: float | None = None,
+    temperature: float | None = None,
     page: Path | None = None,
     command: str = "",
 ) -> FilteredProgram:
@@ -191,6 +197,7 @@ def filter_program_file(
         flange=flange,
         reverse=reverse,
         subdivide=subdivide,
+        temperature=temperature,
     )
     origin = provenance([robot_file, robot.nominal.urdf, *sources], None, robot.stored, tuple(robot.blocks))
     result = replace(result, record=RunRecord(origin, command))

@@ -12,7 +12,7 @@ from flexcal.errors import InputError, unreadable
 from flexcal.export import XacroExport, XacroSource, Zeros, render_xacro, shifted_limits
 from flexcal.files.transaction import atomic_path
 from flexcal.jobs.deployment.export import identified_robot
-from flexcal.jobs.inputs import unmeasured_lengths_remark
+from flexcal.jobs.inputs import held_at, unmeasured_lengths_remark
 from flexcal.jobs.pages import Result
 
 
@@ -71,6 +71,7 @@ def export_xacro(
     packages: Mapping[str, Path] | None = None,
     zeros: Zeros = "origins",
     joint_limits: Path | None = None,
+    temperature: float | None = None,
     estimates: Path | None = None,
 ) -> ExportedXacro:
     """Write the files of a robot's description with calibrated numbers into the folder `out`, every other byte as it was.
@@ -89,6 +90,8 @@ def export_xacro(
         Where the offsets of the joints go.
     joint_limits : Path, optional
         MoveIt's joint_limits.yaml, whose positions move with the offsets in ros2_control.
+    temperature : float, optional
+        Temperature of the arm, °C; by default that at which the calibrated parameters hold.
     estimates : Path, optional
         estimates.yaml or its folder, in place of that beside robot.yaml.
 
@@ -110,11 +113,11 @@ def export_xacro(
             f"{joint_limits} stays valid while the zeros are in the origins; give --zeros ros2_control, or leave --joint-limits out.",
         )
     robot = identified_robot(robot_file, estimates)
-    model = robot.probable
+    model, warm = held_at(robot, temperature)
     source = XacroSource(xacro or robot.nominal.urdf, arguments or {}, packages or {})
     export = render_xacro(model, robot.nominal, source, zeros)
     folder, files, changes, main = _below_one_folder(export)
-    remarks = [*export.remarks, *unmeasured_lengths_remark(robot)]
+    remarks = [*export.remarks, *unmeasured_lengths_remark(robot), *warm]
     if joint_limits is not None:
         offsets = dict(zip(model.joint_names, model.joint_offsets.tolist(), strict=True))
         try:

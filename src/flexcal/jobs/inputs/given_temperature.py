@@ -9,7 +9,7 @@ import numpy as np
 from flexcal.data.poses import PoseSet, ToolTargets
 from flexcal.errors import InputError
 from flexcal.jobs.inputs.stored_model import CalibratedRobot
-from flexcal.model.kinematics import depends_on_temperature
+from flexcal.model.kinematics import at_temperature, depends_on_temperature
 from flexcal.model.robot import RobotModel
 
 TEMPERATURE = "temperature"
@@ -50,6 +50,21 @@ def _chosen(
         )
     temperature = np.full(count, float(given)) if given is not None else own
     return temperature, temperature_remarks(robot, temperature, what)
+
+
+def held_at(robot: CalibratedRobot, temperature: float | None) -> tuple[RobotModel, tuple[str, ...]]:
+    """The most probable robot at one temperature, °C, by default that at which its parameters hold, and remarks on it."""
+    if not depends_on_temperature(robot.model):
+        warm = None if temperature is None else np.array([temperature])
+        return robot.probable, temperature_remarks(robot, warm)
+    reference = reference_temperature(robot.model)
+    at = reference if temperature is None else temperature
+    low, high = calibrated_temperatures(robot)
+    said = (
+        f"the arm is given as it is at {at:.1f} °C; it changes with temperature, and was calibrated from {low:.1f} to {high:.1f} °C",
+    )
+    outside = () if temperature is None else temperature_remarks(robot, np.array([temperature]))
+    return at_temperature(robot.probable, at), (*said, *outside)
 
 
 def temperature_remarks(

@@ -12,7 +12,7 @@ import numpy as np
 from flexcal.dynamics.torque_model import TorqueModel
 from flexcal.errors import FlexcalError
 from flexcal.export import render_runtime
-from flexcal.jobs.inputs import CalibratedRobot
+from flexcal.jobs.inputs import CalibratedRobot, held_at
 from flexcal.kernels import RuntimeRobot
 from flexcal.model.parts import rotation_wxyz, wxyz_rotation
 
@@ -25,11 +25,15 @@ class _UnclearError(Exception):
 
 
 class Answers:
-    """Answers of one robot: a JSON object in a line for every line, and never an exception."""
+    """Answers of one robot at one temperature, °C: a JSON object in a line for every line, and never an exception.
 
-    def __init__(self, robot: CalibratedRobot) -> None:
-        drives = TorqueModel.of_blocks(robot.probable, robot.blocks).document()
-        self._robot = RuntimeRobot.read(render_runtime(robot.probable, robot.with_points, drives).text)
+    `remarks` say what the temperature has to do with it.
+    """
+
+    def __init__(self, robot: CalibratedRobot, temperature: float | None = None) -> None:
+        model, self.remarks = held_at(robot, temperature)
+        drives = TorqueModel.of_blocks(model, robot.blocks).document()
+        self._robot = RuntimeRobot.read(render_runtime(model, robot.with_points, drives).text)
         self._joints, self._points = self._robot.joint_names, self._robot.point_names
         self._name = robot.nominal.name
         self._free = np.zeros((0, len(self._joints)))
@@ -43,9 +47,11 @@ class Answers:
         }
 
     @classmethod
-    def from_yaml(cls, robot_file: Path, estimates: Path | None = None) -> Answers:
+    def from_yaml(
+        cls, robot_file: Path, estimates: Path | None = None, temperature: float | None = None
+    ) -> Answers:
         """Answers of the robot of a robot.yaml; raises `FlexcalError` as reading does, and for a robot whose joints follow others."""
-        return cls(CalibratedRobot.from_yaml(robot_file, estimates))
+        return cls(CalibratedRobot.from_yaml(robot_file, estimates), temperature)
 
     def of(self, line: bytes) -> bytes:
         """Answer to a line, with its `id` where it has one, and a line feed at its end."""

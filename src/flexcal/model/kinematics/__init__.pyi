@@ -6,17 +6,29 @@ from .link_poses import joint_origins, link_frames
 from .link_surface import LinkSurface, capsule_axes, link_capsules
 from .placements import bearing_placement, found_xyz, joint_placement, link_placement, point_placement
 from .relative import carrier_kinematics, relative_kinematics, relative_motion
-from .thermal_expansion import depends_on_temperature, expanded, link_vectors, temperature_rise
+from .thermal_expansion import (
+    Ends,
+    at_temperature,
+    carrier_ends,
+    depends_on_temperature,
+    expanded,
+    link_vectors,
+    point_ends,
+    temperature_rise,
+)
 from .tool_rotations import rotation_freedom
 from .triangle_meshes import box, cylinder, decimated, ellipsoid
 
 __all__ = [
+    "Ends",
     "JointMotion",
     "LinkSurface",
     "PointKinematics",
+    "at_temperature",
     "bearing_placement",
     "box",
     "capsule_axes",
+    "carrier_ends",
     "carrier_kinematics",
     "cylinder",
     "damped_step",
@@ -39,6 +51,7 @@ __all__ = [
     "loop_gap",
     "low_discrepancy_configurations",
     "motor_motion",
+    "point_ends",
     "point_kinematics",
     "point_placement",
     "random_configurations",

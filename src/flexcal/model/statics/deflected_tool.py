@@ -11,6 +11,7 @@ from flexcal.model.kinematics import (
     PointKinematics,
     depends_on_temperature,
     expanded,
+    point_ends,
     point_kinematics,
     temperature_rise,
 )
@@ -129,9 +130,9 @@ def tool_at_rest(
     rise = temperature_rise(model, temperature)
     bent = rest.deflection.copy()
     bent[:, :, 2] += np.outer(rise, model.thermal.zero_drift)
-    ends = np.array([model.point(name).joint for name in target.tolist()])
+    ends = point_ends(model, target)
     at = points_kinematics(model, q, bent, target, jacobians=jacobians)
-    return ToolAtRest(model, q, replace(rest, deflection=bent), expanded(model, q, at, ends, rise))
+    return ToolAtRest(model, q, replace(rest, deflection=bent), expanded(model, q, at, target, ends, rise))
 
 
 def _pulled(
