@@ -175,8 +175,11 @@ def test_the_least_shift_is_the_bound_of_the_true_arm(visited: Visited) -> None:
 
 
 def test_run_lengths_are_those_of_the_literature() -> None:
-    """Montgomery, Introduction to Statistical Quality Control, 7th ed., table 9.3: 168 and 465 for both sides, at h = 4 and 5."""
-    assert round(run_length(4.0) / 2) == 168 and round(run_length(5.0) / 2) == 465
+    """Montgomery, Introduction to Statistical Quality Control, 7th ed., tables 9.3 and 9.4, for both sides: 168 and 465 at h = 4 and 5,
+    and 370 at h = 8.01 with half the allowance.
+    """
+    assert round(run_length(4.0, 0.5) / 2) == 168 and round(run_length(5.0, 0.5) / 2) == 465
+    assert run_length(8.01, 0.25) / 2 == pytest.approx(370, rel=0.005)
     limit = decision_limit(AVERAGE_RUN * 7)
     assert run_length(limit) == pytest.approx(2 * 7 * AVERAGE_RUN, rel=1e-6)
 
@@ -240,6 +243,24 @@ def test_what_tells_nothing_is_refused(visited: Visited, examples: Path) -> None
 
 def _renamed(estimate):
     return replace(estimate, provenance={"option.targets": "other"})
+
+
+@pytest.mark.slow
+def test_shifts_are_found_as_often_as_predicted(tmp_path: Path) -> None:
+    """200 visits with the shift of each joint that is to be found in 95 % of them; the right joint is among what is named."""
+    arm = Visited(tmp_path, 17)
+    limits = {limit.subject: limit for limit in arm.judged().limits}
+    for joint in range(1, 7):
+        found, right = 0, 0
+        for k in range(200):
+            if k % 20 == 0:
+                arm.reference = arm.shop.measured(arm.robot.model, np.repeat(arm.q, 3, axis=0))
+            size = limits[f"joint_{joint}"].found * (1 if k % 2 else -1)
+            judged = arm.judged(arm=arm.shop.arm.turned(joint, size)).judged
+            found += not judged.as_calibrated
+            right += f"joint_{joint}" in [suspect.change.subject for suspect in judged.suspects]
+        assert binom.cdf(found, 200, 0.95) > 1e-3, (joint, found)
+        assert right > 0.9 * found, (joint, right, found)
 
 
 @pytest.mark.slow

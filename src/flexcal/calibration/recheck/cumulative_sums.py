@@ -10,8 +10,8 @@ import numpy as np
 
 AVERAGE_RUN = 200.0
 """Average number of visits between two false alarms of all sums together."""
-_ALLOWANCE = 0.5
-"""Shift per visit, in standard deviations, that a sum lets pass: it finds twice that soonest."""
+ALLOWANCE = 0.25
+"""Difference, in standard deviations, that a sum lets pass at each visit: small, for slow drifts; it finds twice that soonest."""
 _STATES = 120
 
 
@@ -43,6 +43,13 @@ class DriftSum:
     limit: float
     alarm: int | None
     since: int | None
+
+    @property
+    def gradual(self) -> bool:
+        """Whether the alarm is that of a drift: half of the limit was passed before the visit of the alarm, which is no jump then."""
+        if self.alarm is None or self.alarm == 0:
+            return False
+        return max(self.upward[self.alarm - 1], self.downward[self.alarm - 1]) > self.limit / 2
 
 
 def drift_sums(visits: Sequence[Sequence[ShiftAtVisit]]) -> tuple[DriftSum, ...]:
@@ -84,7 +91,7 @@ def _sum(subject: str, visits: Sequence[Sequence[ShiftAtVisit]], limit: float) -
     for k in range(len(visits)):
         if k in there and alarm is None:
             start[value <= 0] = k
-            value = np.maximum(0.0, value + np.array([steps[k], -steps[k]]) - _ALLOWANCE)
+            value = np.maximum(0.0, value + np.array([steps[k], -steps[k]]) - ALLOWANCE)
             if value.max() > limit:
                 alarm, since = k, int(start[int(value.argmax())])
         sums[:, k] = value
@@ -99,13 +106,13 @@ def decision_limit(average_run: float) -> float:
     return float(brentq(lambda h: np.log(run_length(h) / 2 / average_run), 1.0, 20.0))  # pyright: ignore[reportArgumentType]
 
 
-def run_length(limit: float) -> float:
+def run_length(limit: float, allowance: float = ALLOWANCE) -> float:
     """Average number of visits until one sum of standard normal values passes a limit, by a Markov chain (Brook and Evans 1972)."""
     from scipy.special import ndtr
 
     width = 2 * limit / (2 * _STATES - 1)
     centre = np.arange(_STATES) * width
-    upper = centre[None] + width / 2 - centre[:, None] + _ALLOWANCE
+    upper = centre[None] + width / 2 - centre[:, None] + allowance
     moves = ndtr(upper) - ndtr(upper - width)
-    moves[:, 0] = ndtr(width / 2 - centre + _ALLOWANCE)
+    moves[:, 0] = ndtr(width / 2 - centre + allowance)
     return float(np.linalg.solve(np.eye(_STATES) - moves, np.ones(_STATES))[0])

@@ -62,6 +62,8 @@ def recheck_robot(
     )
     absolute = judged.absolute or judged.judged
     origin = provenance([robot_file, robot.nominal.urdf, *files], None, robot.stored, tuple(robot.blocks))
+    if base is not None:
+        origin |= {f"input.{name} (reference visit)": digest for name, digest in base.files.items()}
     judged = replace(
         judged,
         reference_date=base.date if base is not None and judged.absolute is not None else None,

@@ -11,12 +11,14 @@ from flexcal.units import MILLIMETRE
 
 _KELVIN = 12e-6
 """Growth of steel, m/m/K."""
+_CLEAR = 4.0
+"""Distance, in standard deviations of a mean of readings, that tells two points apart."""
 _SMALL = 0.5
 """Share of the calibrated robot's expected error below which a displacement of the tool hardly matters."""
 
 
-def judgement_sentence(judged: JudgedVisit, tools: Sequence[MovedTool], expected: float) -> str:
-    """What the visit says of the robot; `tools` are the displacements by the suspects, `expected` the error of the calibrated robot, m."""
+def judgement_sentence(judged: JudgedVisit) -> str:
+    """What the visit says of the robot."""
     chance = _chance(judged.probability)
     moved = judged.instrument == "evident"
     elsewhere = "the instrument, or the base of the robot, stands elsewhere; beside that the robot is "
@@ -35,10 +37,16 @@ def judgement_sentence(judged: JudgedVisit, tools: Sequence[MovedTool], expected
             f"{lead}recalibrate ({chance}): the errors are not those of shifted joints, a bumped tool, growth or a moved instrument, all "
             "together; if the instrument is noisier than at the calibration, or poses were not those commanded, measure again first"
         )
-    told = [suspect_in_words(s) for s in judged.suspects]
-    if len(told) == 1:
-        return f"{lead}{told[0]} ({chance}){_effect(judged.suspects[0], tools[0], expected)}"
-    return f"{lead}{', or '.join(told)} ({chance}){_effect(judged.suspects[0], tools[0], expected)}"
+    return f"{lead}{', or '.join(suspect_in_words(s) for s in judged.suspects)} ({chance})"
+
+
+def effect_sentence(judged: JudgedVisit, tools: Sequence[MovedTool], expected: float) -> str:
+    """How far the most likely change moved the tool, from `tools` of all suspects, beside the `expected` error of the calibrated robot, m;
+    empty where nothing is named.
+    """
+    if judged.as_calibrated or not judged.suspects:
+        return ""
+    return _effect(judged.suspects[0], tools[0], expected)
 
 
 def telling_sentence(judged: JudgedVisit, telling: TellingPose | None, noise: float) -> str:
@@ -55,12 +63,16 @@ def telling_sentence(judged: JudgedVisit, telling: TellingPose | None, noise: fl
     if "wrong_reading" in kinds:
         pose = next(s.change.subject for s in judged.suspects[:2] if s.change.kind == "wrong_reading")
         return f"what tells {first} from {second}: pose {pose} measured again"
-    if telling is None or telling.apart < 2 * noise:
+    if judged.suspects[1].same:
         return f"no pose of this point tells {first} from {second}; a second point on the tool does, measured at the same poses"
+    if telling is None:
+        return ""
     q = ", ".join(f"{value:.3f}" for value in telling.q)
+    readings = int(np.ceil((_CLEAR * noise / telling.apart) ** 2))
     return (
         f"the pose that best tells {first} from {second}: q = {q}, where they put the point "
         f"{telling.apart / MILLIMETRE:.3f} mm apart"
+        + (f", which takes about {readings} readings" if readings > 1 else "")
     )
 
 

@@ -23,6 +23,7 @@ from flexcal.design.poses import measurement_order, measuring_noise, random_cand
 from flexcal.design.scene import CollisionChecker, MeasuringSetup
 from flexcal.errors import FlexcalError
 from flexcal.jobs.inputs import CalibratedRobot, robot_provenance
+from flexcal.jobs.recheck.pose_choice import best_poses
 from flexcal.jobs.recheck.result import SHIFT, UNSEEN, power_block
 from flexcal.jobs.result_files import RunRecord
 from flexcal.model.robot import RobotModel
@@ -32,9 +33,6 @@ PLAN = "plan.yaml"
 ROUNDS = 3
 """Number of readings of every pose at the reference visit for which the power is predicted."""
 _CANDIDATES = 400
-_SWEEPS = 5
-_FLOOR = 1e-6
-"""Information of a joint, relative to the largest, below which it counts as none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +108,7 @@ def plan_visit(
     progress("candidates", 0.0)
     candidates = _candidates(robot, checker, setup, max(_CANDIDATES, 4 * count), seed)
     progress("candidates", 0.5)
-    chosen = _chosen(model, candidates, count, refit=refit)
+    chosen = best_poses(model, candidates, count, refit=refit)
     order = measurement_order(checker, candidates.q[chosen]).order
     poses = candidates.subset(chosen[order])
     plan = PosePlan(q=poses.q, seed=seed, name="recheck")
@@ -175,50 +173,6 @@ def _within(
             share = (q[:, k] - q[:, k].min()) / max(float(np.ptp(q[:, k])), 1e-12)
             q[:, k] = low + share * (high - low)
     return q[~checker.collides(q)]
-
-
-def _chosen(model: RobotModel, candidates: PoseSet, count: int, *, refit: bool) -> np.ndarray:
-    """Indices (count,) of the candidates with the least sum of squared variances of single joints: greedily, then by exchange."""
-    errors = planned_errors(model, candidates, compared="reference", placed=False)
-    changes = possible_changes(model, errors.at)
-    joints = [c.columns for c in changes if c.kind == "joint_shifted"]
-    place = [c.columns for c in changes if c.kind == "instrument_moved"] if refit else []
-    columns = np.hstack([*joints, *place]).reshape(len(candidates), 3, -1)
-    own = np.array([errors.own[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] for k in range(len(candidates))])
-    white = np.linalg.solve(np.linalg.cholesky(own), columns)
-    information = np.swapaxes(white, 1, 2) @ white
-    largest = information[:, range(len(joints)), range(len(joints))].max(axis=0)
-    seen = largest > _FLOOR * largest.max()
-    chosen: list[int] = []
-    total = 1e-6 * np.diag(np.diag(information.mean(axis=0)) + 1e-12)
-    for _ in range(count):
-        best = _best(total, information, len(joints), seen, chosen)
-        chosen.append(best)
-        total = total + information[best]
-    for _ in range(_SWEEPS):
-        before = list(chosen)
-        for place_of in range(count):
-            total = total - information[chosen[place_of]]
-            others = [c for k, c in enumerate(chosen) if k != place_of]
-            chosen[place_of] = _best(total, information, len(joints), seen, others)
-            total = total + information[chosen[place_of]]
-        if chosen == before:
-            break
-    return np.array(chosen)
-
-
-def _best(total: np.ndarray, information: np.ndarray, joints: int, seen: np.ndarray, taken: list[int]) -> int:
-    """Candidate with which the sum of the squared variances of single joints is least."""
-    whole = total + information
-    single = whole[:, range(joints), range(joints)]
-    if whole.shape[1] > joints:
-        across = whole[:, :joints, joints:]
-        single = single - np.einsum(
-            "kij,kji->ki", across, np.linalg.solve(whole[:, joints:, joints:], np.swapaxes(across, 1, 2))
-        )
-    score = np.sum(1 / np.maximum(single[:, seen], 1e-12) ** 2, axis=1)
-    score[taken] = np.inf
-    return int(score.argmin())
 
 
 def _found(limits: tuple[DetectionLimit, ...]) -> str:

@@ -33,7 +33,12 @@ from flexcal.errors import FlexcalError
 from flexcal.jobs.calibration import ignored_columns_remarks, outside_ranges
 from flexcal.jobs.inputs import CalibratedRobot, is_station_identified
 from flexcal.jobs.pages import REPORT, PlottedResult
-from flexcal.jobs.recheck.judgement_words import judgement_sentence, suspect_in_words, telling_sentence
+from flexcal.jobs.recheck.judgement_words import (
+    effect_sentence,
+    judgement_sentence,
+    suspect_in_words,
+    telling_sentence,
+)
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, header, write_results
 from flexcal.report.layout import Page
 from flexcal.report.pages import RecheckStudy, recheck_page
@@ -103,7 +108,7 @@ class Recheck(PlottedResult):
     @property
     def headline(self) -> str:
         """The judgement in a sentence."""
-        return judgement_sentence(self.judged, self.tools, self.expected)
+        return judgement_sentence(self.judged) + effect_sentence(self.judged, self.tools, self.expected)
 
     def summary(self) -> str:
         """The judgement, what would have been found, and remarks."""
@@ -126,7 +131,7 @@ class Recheck(PlottedResult):
     @property
     def alarms(self) -> tuple[DriftSum, ...]:
         """Cumulative sums that passed their limit over several visits, the largest first; a jump at one visit is no drift."""
-        passed = [item for item in self.drifts if item.alarm is not None and item.alarm != item.since]
+        passed = [item for item in self.drifts if item.gradual]
         return tuple(sorted(passed, key=lambda item: -max(item.upward[-1], item.downward[-1])))
 
     @cached_property
@@ -146,10 +151,8 @@ class Recheck(PlottedResult):
             remarks.append(telling)
         if self.absolute is not None and not self.absolute.as_calibrated and judged.as_calibrated:
             remarks.append(
-                "since the reference visit nothing changed, but against the calibration itself: "
-                + judgement_sentence(
-                    self.absolute, [_none(self.poses)] * max(1, len(self.absolute.suspects)), 0.0
-                )
+                "since the reference visit nothing changed; against the calibration itself: "
+                + judgement_sentence(self.absolute)
             )
         if self.unmatched:
             remarks.append(
@@ -253,6 +256,7 @@ class Recheck(PlottedResult):
                     "downward": item.downward,
                     "alarm": item.alarm,
                     "since": item.since,
+                    "drifts": item.gradual,
                 }
                 for item in self.drifts
             },
@@ -311,10 +315,6 @@ def _blocks(covariance: np.ndarray) -> np.ndarray:
     """Blocks (K, 3, 3) on the diagonal of a covariance (3 K, 3 K)."""
     count = len(covariance) // 3
     return covariance.reshape(count, 3, count, 3)[np.arange(count), :, np.arange(count)]
-
-
-def _none(poses: PoseSet) -> MovedTool:
-    return MovedTool(0.0, (0.0, 0.0), 0.0, (0.0, 0.0), poses.q[0], 0.0)
 
 
 def recheck(

@@ -61,9 +61,10 @@ def recheck_page(study: RecheckStudy) -> Page:
     facts = (
         Fact(
             "Is it as calibrated?",
-            significant(block["probability"], 2),
+            {"good": "Yes", "care": "Robot yes", "bad": "No"}.get(_status(block["verdict"]), ""),
             "",
-            f"Probability that chance makes errors as conspicuous; below {block['false_alarm']:g} something changed.",
+            f"Chance makes errors as conspicuous with p = {significant(block['probability'], 2)}; "
+            f"below {block['false_alarm']:g} something changed.",
             _status(block["verdict"]),
         ),
         Fact(
@@ -116,7 +117,7 @@ def _sentence(text: str) -> str:
 def _checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
     block, drift = results["recheck"], results["drift"]
     lost = [name for name, joint in block["power"]["joints"].items() if joint["found_95_percent"] is None]
-    alarms = [name for name, item in drift["sums"].items() if item["alarm"] is not None]
+    alarms = [name for name, item in drift["sums"].items() if item["drifts"]]
     checks = [
         Check("Is the robot as calibrated?", _sentence(results["sentence"]), _status(block["verdict"])),
         Check(
