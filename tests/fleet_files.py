@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -108,6 +108,36 @@ def write_verification(
         },
     }
     (folder / "results.json").write_text(json.dumps(document), "utf-8")
+
+
+def write_visits_of_recheck(folder: Path, visits: Sequence[tuple[str, float]], *, limit: float) -> None:
+    """visits.json of a recheck: day and p-value; a joint is said to have shifted where that is below the `limit`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    empty: dict[str, list[float]] = {"pose": [], "target": [], "station": [], "q": [], "position": []}
+    document = {
+        "kind": "visits",
+        "schema": 1,
+        "robot": "scara",
+        "visits": [
+            {
+                "date": day,
+                "files": {"1. visit.csv": _digest(f"{folder} {day}")},
+                "calibration": _digest("c"),
+                "reference": k == 0,
+                "verdict": "joint_shifted" if p < limit else "as_calibrated",
+                "sentence": "j2 shifted by +0.2 mrad" if p < limit else "as calibrated",
+                "probability": p,
+                "shifts": [
+                    {"subject": "j2", "estimate": 2e-4, "std": 4e-5, "common_std": 3e-5, "series": "s"}
+                ],
+                "readings": {**empty, "sigma": None, "payload": None},
+                "alarms": [],
+                "suspects": [],
+            }
+            for k, (day, p) in enumerate(visits)
+        ],
+    }
+    (folder / "visits.json").write_text(json.dumps(document), "utf-8")
 
 
 def _digest(text: str) -> str:

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import polars as pl
 import pytest
-from fleet_files import write_calibration, write_robot, write_verification
+from fleet_files import write_calibration, write_robot, write_verification, write_visits_of_recheck
 from refusals import refused
 
 from flexcal.cli.main import main
-from flexcal.jobs.fleet import Fleet, review_fleet
+from flexcal.jobs.fleet import Fleet, gather_fleet, review_fleet
 
 DAYS = ("2024-01-10", "2024-07-01", "2025-01-12", "2025-06-30", "2026-01-05")
 
@@ -135,7 +135,7 @@ def test_copied_project_is_no_second_robot(tmp_path: Path) -> None:
 
 
 def test_parameters_of_the_setup_are_not_compared(tmp_path: Path) -> None:
-    """Neither a station, nor what absorbed it, nor what a prior holds: they differ by where the instrument stood."""
+    """Neither a station, nor the joint on the base, nor what absorbed the place of the point, nor what a prior holds."""
     rng = np.random.default_rng(3)
     for k in range(8):
         write_robot(tmp_path / f"r{k}")
@@ -143,20 +143,21 @@ def test_parameters_of_the_setup_are_not_compared(tmp_path: Path) -> None:
         values = {
             "j1.offset": (float(rng.normal(0, 1e-3)), 1e-4),
             "j2.offset": (float(rng.normal(0, 1e-3)) + odd, 1e-4),
-            "j1.length_x": (float(rng.normal(0, 1e-3)), 1e-4),
+            "j3.length_x": (float(rng.normal(0, 1e-3)), 1e-4),
+            "j3.offset": (float(rng.normal(0, 1e-3)), 1e-4),
             "station.tracker.x": (float(rng.normal()), 1e-4),
             "point.ball.x": (0.0, 1e-4),
         }
         write_calibration(
-            tmp_path / f"r{k}", values, data=f"{k}", dropped={"point.ball.x": {"j1.length_x": 0.7}}
+            tmp_path / f"r{k}", values, data=f"{k}", dropped={"point.ball.x": {"j3.length_x": 0.7}}
         )
     document = review_fleet(tmp_path).document()
-    assert {item["name"] for item in document["parameters"]} == {"j1.offset", "j2.offset"}
+    assert {item["name"] for item in document["parameters"]} == {"j2.offset", "j3.offset"}
     (spread,) = [item for item in document["parameters"] if item["name"] == "j2.offset"]
     assert [item["robot"] for item in spread["outliers"]] == ["r5"]
     assert spread["spread"] < 3e-3
     for k in range(8):
-        write_calibration(tmp_path / f"r{k}", {"j1.offset": (1e-6 * k, 1e-4)}, data=f"{k}", prior_std=2e-4)
+        write_calibration(tmp_path / f"r{k}", {"j2.offset": (1e-6 * k, 1e-4)}, data=f"{k}", prior_std=2e-4)
     assert review_fleet(tmp_path).document()["parameters"] == []
 
 
@@ -175,6 +176,48 @@ def test_drift_of_a_parameter(tmp_path: Path) -> None:
     (drift,) = document["parameter_drifts"]
     assert (drift["robot"], drift["name"]) == ("r2", "j2.offset")
     assert drift["low"] < 1e-3 < drift["high"]
+
+
+def test_rechecks_are_corrected_for_their_number(tmp_path: Path) -> None:
+    """Of twelve robots one with p = 0.8 % is as expected by chance, one with p = 0.01 % is not."""
+    for k in range(12):
+        write_robot(tmp_path / f"r{k}")
+        probability = {3: 8e-3, 7: 1e-4}.get(k, 0.5)
+        write_visits_of_recheck(
+            tmp_path / f"r{k}" / "recheck", (("2026-01-02", 0.4), ("2026-02-02", probability)), limit=0.01
+        )
+    fleet = review_fleet(tmp_path)
+    document = fleet.document()
+    assert document["counts"] | {"rechecked": 12, "changed": 1, "problems": 0} == document["counts"]
+    assert (
+        robot_named(fleet, "r7")["recheck"] | {"changed": True, "date": "2026-02-02"}
+        == robot_named(fleet, "r7")["recheck"]
+    )
+    found = robot_named(fleet, "r3")["recheck"]
+    assert found["verdict"] == "joint_shifted" and not found["changed"]
+    frame = fleet.gathered.table.frame
+    shift = frame.filter(robot="r7", name="shift.j2").sort("date").row(-1, named=True)
+    assert (shift["value"], shift["std"]) == (2e-4, pytest.approx(5e-5))
+
+
+def test_joints_on_the_base(tmp_path: Path) -> None:
+    """A fixed joint under the first movable one, a locked one before it, and two arms on one base."""
+    folder = tmp_path / "arm"
+    write_robot(folder)
+    joints = (
+        ("mount", "fixed", "base", "a"),
+        ("lift", "prismatic", "a", "b"),
+        ("left", "revolute", "b", "c"),
+    )
+    joints += (("right", "revolute", "a", "d"), ("elbow", "revolute", "c", "e"))
+    text = "".join(
+        f'<joint name="{n}" type="{t}"><parent link="{p}"/><child link="{c}"/></joint>'
+        for n, t, p, c in joints
+    )
+    (folder / "arm.urdf").write_text(f'<robot name="two">{text}</robot>', "utf-8")
+    (folder / "robot.yaml").write_text("robot: arm.urdf\nlocked: {lift: 0.1}\n", "utf-8")
+    (project,) = gather_fleet(tmp_path).projects
+    assert project.base == {"left", "right"}
 
 
 def test_problems_are_rows(tmp_path: Path) -> None:

@@ -11,7 +11,8 @@ from flexcal.jobs.fleet.accuracy import RobotAccuracy
 from flexcal.jobs.fleet.courses import years
 from flexcal.jobs.fleet.drifts import Drift
 from flexcal.jobs.fleet.gathering import GatheredFleet
-from flexcal.jobs.fleet.parameters import ParameterSpread
+from flexcal.jobs.fleet.parameters import ParameterSpread, own_terms
+from flexcal.jobs.fleet.rechecks import LatestRecheck
 from flexcal.units import MILLIMETRE
 
 
@@ -21,6 +22,7 @@ def fleet_document(
     accuracies: Sequence[RobotAccuracy],
     drifts: Sequence[Drift],
     spreads: Sequence[ParameterSpread],
+    rechecks: Mapping[str, LatestRecheck],
     declared: Mapping[str, float | None],
     level: float,
     command: str,
@@ -41,6 +43,7 @@ def fleet_document(
             "serial": serials.get(item.robot),
             "results": counts.get(item.robot, 0),
             **_accuracy(item, declared.get(item.robot), level),
+            "recheck": _recheck(rechecks.get(item.robot), level),
             "parameter_trends": tested_parameters[item.robot],
             "drifting_parameters": [drift.name for drift in by_robot[item.robot]],
             "outlying_parameters": [
@@ -67,6 +70,8 @@ def fleet_document(
             "error_trends_tested": len(tested),
             "parameter_trends_tested": len(drifts),
             "robots_with_parameter_trends": len({drift.robot for drift in drifts}),
+            "rechecked": len(rechecks),
+            "changed": sum(r["recheck"] is not None and r["recheck"]["changed"] for r in robots),
             "reaching_tolerance": sum(robot["reaches"] is not None for robot in robots),
             "problems": len(gathered.problems),
         },
@@ -117,6 +122,21 @@ def _accuracy(item: RobotAccuracy, declared: float | None, level: float) -> dict
     }
 
 
+def _recheck(visit: LatestRecheck | None, level: float) -> dict[str, Any] | None:
+    """The latest recheck; `changed` where that is significant after correction for the number of robots."""
+    if visit is None:
+        return None
+    return {
+        "date": _day(visit.date),
+        "verdict": visit.verdict,
+        "sentence": visit.sentence,
+        "probability": visit.probability,
+        "adjusted_probability": visit.adjusted,
+        "changed": visit.verdict != "as_calibrated" and visit.adjusted <= level,
+        "alarms": list(visit.alarms),
+    }
+
+
 def _trend(drift: Drift, scale: float, unit: str) -> dict[str, Any]:
     low, high = drift.trend.slope_interval(0.95)
     return {
@@ -153,6 +173,7 @@ def _spread(spread: ParameterSpread) -> dict[str, Any]:
         "name": spread.name,
         "unit": spread.unit,
         "absorbs": spread.absorbs.split(),
+        "terms": spread.terms.split(),
         "robots": len(spread.robots),
         "mean": distribution.mean,
         "mean_std": distribution.mean_std,
@@ -196,6 +217,15 @@ def _remarks(
             remarks.append(
                 f"{len(digests)} different URDFs have the name {model}; parameters are deviations from a URDF, so robots are compared with "
                 "those of the same one"
+            )
+    terms: dict[str, set[str]] = defaultdict(set)
+    for model, own in frame.filter(frame["terms"] != "").select("model", "terms").unique().iter_rows():
+        terms[model].add(own_terms(own))
+    for model, several in sorted(terms.items()):
+        if len(several) > 1:
+            remarks.append(
+                f"calibrations of {model} have different terms ({'; '.join(sorted(several))}), and parameters are compared with those of "
+                "the same ones: name the terms in robot.yaml, as geometry: {terms: [kinematic, gravity_compliance]}"
             )
     if len(accuracies) > 1 and not spreads:
         remarks.append(

@@ -13,10 +13,12 @@ from typing import Any
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate, Parameter
 from flexcal.files.formats import Block, read_estimates, sha256_of
+from flexcal.jobs.fleet.parameter_owners import is_of_robot
 from flexcal.jobs.fleet.places import local_fleet
 from flexcal.jobs.fleet.projects import Problem, Project, ResultFolder, find_results, problem_of
-from flexcal.jobs.fleet.result_values import result_values
+from flexcal.jobs.fleet.result_values import ResultValue, result_values, visit_values
 from flexcal.jobs.fleet.table import FleetTable, Row
+from flexcal.jobs.recheck import VISITS, read_visits
 from flexcal.jobs.result_files import ESTIMATES, RESULTS, read_results
 from flexcal.progress import Progress, silent
 
@@ -37,10 +39,28 @@ class GatheredFleet:
 
 @dataclass(frozen=True, eq=False)
 class _Result:
-    """Rows of one result, and what it is the same by wherever it stands."""
+    """Rows of one result."""
 
-    identity: str
     rows: Sequence[Row]
+
+    @classmethod
+    def of(cls, common: Row, values: Sequence[ResultValue]) -> _Result:
+        """Result of these values; `common` is what all its rows have in common."""
+        return cls(
+            [
+                replace(
+                    common, name=item.name, value=item.value, std=item.std, unit=item.unit, text=item.text
+                )
+                for item in values
+            ]
+        )
+
+    @property
+    def identity(self) -> str:
+        """Digest of its values and of what they were made from, wherever they stand."""
+        first = self.first
+        content = [first.kind, first.data, first.calibration, *((r.name, r.value, r.std) for r in self.rows)]
+        return hashlib.sha256(json.dumps(content).encode()).hexdigest()
 
     @property
     def first(self) -> Row:
@@ -85,11 +105,11 @@ def gather_fleet(place: str | Path, progress: Progress = silent) -> GatheredFlee
 def _results(root: Path, folder: ResultFolder, problems: list[Problem]) -> Iterator[_Result]:
     at, project = folder.folder, folder.project
     estimates = project.estimates if at == project.folder else at / ESTIMATES
-    for path, read in ((estimates, _estimates), (at / RESULTS, _values)):
+    for path, read in ((estimates, _estimates), (at / RESULTS, _values), (at / VISITS, _visits)):
         if not path.is_file():
             continue
         try:
-            yield from read(_row(root, folder, path), path)
+            yield from read(_row(root, folder, path), project, path)
         except FlexcalError as problem:
             problems.append(problem_of(root, path, problem))
         except (KeyError, TypeError, ValueError, AttributeError) as problem:
@@ -118,8 +138,10 @@ def _row(root: Path, folder: ResultFolder, path: Path) -> Row:
         value=None,
         std=None,
         unit="",
+        text=None,
         identifiable=True,
         prior_share=None,
+        of_robot=None,
         absorbs="",
         terms="",
         data="",
@@ -130,12 +152,12 @@ def _row(root: Path, folder: ResultFolder, path: Path) -> Row:
     )
 
 
-def _estimates(common: Row, path: Path) -> Iterator[_Result]:
+def _estimates(common: Row, project: Project, path: Path) -> Iterator[_Result]:
     for block, estimate in read_estimates(path).items():
-        yield _block(common, block, estimate)
+        yield _block(common, project, block, estimate)
 
 
-def _block(common: Row, block: Block, estimate: Estimate) -> _Result:
+def _block(common: Row, project: Project, block: Block, estimate: Estimate) -> _Result:
     absorbed: dict[str, list[str]] = {}
     for dropped in estimate.dropped:
         for kept, coefficient in dropped.absorbed_by:
@@ -158,12 +180,12 @@ def _block(common: Row, block: Block, estimate: Estimate) -> _Result:
             unit=item.unit,
             identifiable=item.name not in held and estimate.std(item.name) is not None,
             prior_share=None if item.name in held else _prior_share(estimate, item),
+            of_robot=is_of_robot(item.name, absorbed.get(item.name, ()), project.base),
             absorbs=" ".join(sorted(absorbed.get(item.name, ()))),
         )
         for item in estimate.parameters
     ]
-    content = json.dumps([block, estimate.values, sorted(held)], sort_keys=True)
-    return _Result(hashlib.sha256(content.encode()).hexdigest(), rows)
+    return _Result(rows)
 
 
 def _prior_share(estimate: Estimate, item: Parameter) -> float:
@@ -173,7 +195,7 @@ def _prior_share(estimate: Estimate, item: Parameter) -> float:
     return min(1.0, variance / item.prior_std**2) if item.prior_std > 0 else 1.0
 
 
-def _values(common: Row, path: Path) -> Iterator[_Result]:
+def _values(common: Row, project: Project, path: Path) -> Iterator[_Result]:
     document = read_results(path.parent)
     values = result_values(document)
     if not values:
@@ -188,11 +210,19 @@ def _values(common: Row, path: Path) -> Iterator[_Result]:
         calibration=origin.get("block.calibration"),
         independent=None if fitted is None else not fitted,
     )
-    rows = [
-        replace(common, name=item.name, value=item.value, std=item.std, unit=item.unit) for item in values
-    ]
-    content = json.dumps([document["kind"], origin, [[v.name, v.value] for v in values]], sort_keys=True)
-    yield _Result(hashlib.sha256(content.encode()).hexdigest(), rows)
+    yield _Result.of(common, values)
+
+
+def _visits(common: Row, project: Project, path: Path) -> Iterator[_Result]:
+    for visit in read_visits(path.parent, project.model):
+        row = replace(
+            common,
+            kind="recheck",
+            date=datetime.fromisoformat(visit.date),
+            data=" ".join(sorted(digest[:_DIGITS] for digest in visit.files.values())),
+            calibration=visit.calibration,
+        )
+        yield _Result.of(row, visit_values(visit))
 
 
 def _digest_of_urdf(origin: Mapping[str, str]) -> str | None:
@@ -219,9 +249,10 @@ def _distinct(results: Sequence[_Result], problems: list[Problem]) -> tuple[list
     kept: dict[str, _Result] = {}
     repeated = 0
     for result in results:
-        other = kept.get(result.identity)
+        identity = result.identity
+        other = kept.get(identity)
         if other is None:
-            kept[result.identity] = result
+            kept[identity] = result
         elif other.first.robot != result.first.robot:
             problems.append(
                 Problem(
@@ -233,5 +264,5 @@ def _distinct(results: Sequence[_Result], problems: list[Problem]) -> tuple[list
         else:
             repeated += 1
             if (result.first.date or datetime.max) < (other.first.date or datetime.max):
-                kept[result.identity] = result
+                kept[identity] = result
     return list(kept.values()), repeated

@@ -15,6 +15,7 @@ from flexcal.jobs.fleet.document import fleet_document
 from flexcal.jobs.fleet.drifts import Drift, parameter_drifts
 from flexcal.jobs.fleet.gathering import GatheredFleet, gather_fleet
 from flexcal.jobs.fleet.parameters import ParameterSpread, comparable, parameter_spreads
+from flexcal.jobs.fleet.rechecks import LatestRecheck, latest_rechecks
 from flexcal.jobs.pages import SummarisedResult
 from flexcal.progress import Progress, silent
 from flexcal.report.layout import write_page
@@ -40,6 +41,8 @@ class Fleet(SummarisedResult):
         Trends of parameters.
     spreads : list of ParameterSpread
         Parameters over the robots of each model.
+    rechecks : mapping of LatestRecheck
+        The latest recheck of every robot that has one.
     declared : mapping of float
         Tolerances that robot.yaml files have, m, by robot.
     command : str
@@ -51,6 +54,7 @@ class Fleet(SummarisedResult):
     accuracies: Sequence[RobotAccuracy]
     drifts: Sequence[Drift]
     spreads: Sequence[ParameterSpread]
+    rechecks: Mapping[str, LatestRecheck]
     declared: Mapping[str, float | None]
     command: str
 
@@ -77,6 +81,7 @@ class Fleet(SummarisedResult):
             self.accuracies,
             self.drifts,
             self.spreads,
+            self.rechecks,
             self.declared,
             LEVEL,
             self.command,
@@ -135,6 +140,7 @@ def review_fleet(
         robot_accuracies(known, records, LEVEL),
         parameter_drifts(parameters),
         parameter_spreads(parameters, LEVEL),
+        latest_rechecks(records),
         {name: own for name, (_, own) in robots.items()},
         command,
     )

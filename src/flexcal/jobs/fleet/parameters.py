@@ -13,10 +13,6 @@ from flexcal.files.formats import BLOCKS
 from flexcal.fleet import Outlying, RandomEffects, outlying, random_effects
 from flexcal.jobs.fleet.courses import Record, latest
 
-_OF_THE_SETUP = (
-    "station.", "point.", "camera.", "board.", "sockets.", "sensor.", "scatter.", "payload.", "force_sensor.",
-)  # fmt: skip
-"""Beginnings of parameters that say how was measured, or what was mounted, and nothing of the robot."""
 _LARGEST_PRIOR_SHARE = 0.1
 """Largest share of a prior in a value: a larger one makes robots alike that are not."""
 FEWEST_ROBOTS = 3
@@ -34,6 +30,7 @@ class ParameterSpread:
     name: str
     unit: str
     absorbs: str
+    terms: str
     robots: tuple[str, ...]
     values: np.ndarray
     std: np.ndarray
@@ -42,7 +39,7 @@ class ParameterSpread:
 
 
 def comparable(records: Sequence[Record]) -> list[Record]:
-    """Records of parameters of robots: determined by measurements, and not tied to where the instrument or the tool was."""
+    """Records of parameters of robots: of the robot itself, and determined by measurements."""
     return [
         r
         for r in records
@@ -52,8 +49,13 @@ def comparable(records: Sequence[Record]) -> list[Record]:
         and r["std"]
         and math.isfinite(r["std"])
         and (r["prior_share"] or 0.0) <= _LARGEST_PRIOR_SHARE
-        and not any(name.startswith(_OF_THE_SETUP) for name in (r["name"], *r["absorbs"].split()))
+        and r["of_robot"]
     ]
+
+
+def own_terms(terms: str) -> str:
+    """Terms of a calibration that decide what its parameters mean: all but transmission errors, which are waves about the mean."""
+    return " ".join(sorted(term for term in terms.split() if "transmission" not in term))
 
 
 def parameter_spreads(records: Sequence[Record], level: float) -> list[ParameterSpread]:
@@ -62,7 +64,7 @@ def parameter_spreads(records: Sequence[Record], level: float) -> list[Parameter
     """
     robots: dict[tuple, dict[str, list[Record]]] = defaultdict(lambda: defaultdict(list))
     for r in records:
-        key = (r["model"], r["urdf"], r["kind"], r["name"], r["unit"], r["absorbs"])
+        key = (r["model"], r["urdf"], r["kind"], r["name"], r["unit"], r["absorbs"], own_terms(r["terms"]))
         robots[key][r["robot"]].append(r)
     many = {key: group for key, group in robots.items() if len(group) >= FEWEST_ROBOTS}
     tests: dict[tuple[str, str], int] = defaultdict(int)
@@ -74,7 +76,7 @@ def parameter_spreads(records: Sequence[Record], level: float) -> list[Parameter
         values, std = (np.array([r[column] for r in last]) for column in ("value", "std"))
         found = outlying(values, std, tests[key[0], key[1]], level)
         others = np.delete(np.arange(len(values)), [item.number for item in found])
-        model, urdf, kind, name, unit, absorbs = key
+        model, urdf, kind, name, unit, absorbs, terms = key
         spreads.append(
             ParameterSpread(
                 model,
@@ -83,6 +85,7 @@ def parameter_spreads(records: Sequence[Record], level: float) -> list[Parameter
                 name,
                 unit,
                 absorbs,
+                terms,
                 tuple(r["robot"] for r in last),
                 values,
                 std,

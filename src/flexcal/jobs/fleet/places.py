@@ -11,10 +11,11 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from flexcal.errors import InputError
+from flexcal.jobs.recheck import VISITS
 from flexcal.jobs.result_files import RESULTS
 
 ROBOT = "robot.yaml"
-_WANTED = (ROBOT, RESULTS, "estimates.npz")
+_WANTED = (ROBOT, RESULTS, VISITS, "estimates.npz")
 _ENDINGS = (".urdf", ".xml", ".yaml", ".yml")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -12,9 +12,10 @@ from pathlib import Path
 from flexcal.errors import FlexcalError
 from flexcal.files.formats import read_yaml, sha256_of
 from flexcal.jobs.fleet.places import ROBOT
+from flexcal.jobs.recheck import VISITS
 from flexcal.jobs.result_files import ESTIMATES, RESULTS
 from flexcal.model.robot import RobotConfig
-from flexcal.model.urdf import read_elements
+from flexcal.model.urdf import Element, read_elements
 
 _DATE = re.compile(r"(?<!\d)(\d{4}-\d\d-\d\d)(?:[T_ ](\d\d)[-:.]?(\d\d)(?!\d))?(?!\d)")
 
@@ -30,7 +31,7 @@ class Problem:
 @dataclass(frozen=True)
 class Project:
     """A folder with a robot.yaml. `robot` is its serial, or without one its path from the fleet's folder without dates; `model` the name
-    in the URDF and `urdf` the SHA-256 of that.
+    in the URDF and `urdf` the SHA-256 of that; `base` are the joints that are on the base.
     """
 
     folder: Path
@@ -40,6 +41,7 @@ class Project:
     urdf: str
     tolerance: float | None
     estimates: Path
+    base: frozenset[str]
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ def find_results(root: Path) -> tuple[list[ResultFolder], list[Project], list[Pr
     results: list[ResultFolder] = []
     projects: dict[Path, Project | None] = {}
     problems: list[Problem] = []
-    for folder, files in _folders(root):
+    for folder, files in _folders(root, problems):
         if ROBOT in files:
             try:
                 projects[folder] = _project(root, folder)
@@ -69,7 +71,7 @@ def find_results(root: Path) -> tuple[list[ResultFolder], list[Project], list[Pr
         owner = next((at for at in (folder, *folder.parents) if at in projects), None)
         project = None if owner is None else projects[owner]
         own = None if project is None or project.folder != folder else project.estimates
-        if not {ESTIMATES, RESULTS} & set(files) and not (own is not None and own.is_file()):
+        if not {ESTIMATES, RESULTS, VISITS} & set(files) and not (own is not None and own.is_file()):
             continue
         if owner is None:
             problems.append(
@@ -107,13 +109,22 @@ def date_of(parts: tuple[str, ...]) -> datetime | None:
 
 def problem_of(root: Path, place: Path, problem: Exception) -> Problem:
     """An error about a file as a row of the list of problems."""
-    prefix = f"{root}{os.sep}"
-    sentence = str(problem).replace(prefix, "")
-    return Problem(_relative(root, place), sentence)
+    where = _relative(root, place)
+    sentence = str(problem).replace(f"{root}{os.sep}", "")
+    return Problem(where, sentence.removeprefix(f"{where} ").removeprefix(f"{where}: "))
 
 
-def _folders(root: Path) -> Iterator[tuple[Path, list[str]]]:
-    for at, folders, files in os.walk(root):
+def _folders(root: Path, problems: list[Problem]) -> Iterator[tuple[Path, list[str]]]:
+    def refused(problem: OSError) -> None:
+        place = Path(problem.filename or root)
+        problems.append(
+            Problem(
+                _relative(root, place),
+                f"the folder cannot be read ({problem.strerror}); check the rights to it.",
+            )
+        )
+
+    for at, folders, files in os.walk(root, onerror=refused):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         yield Path(at), files
 
@@ -121,7 +132,8 @@ def _folders(root: Path) -> Iterator[tuple[Path, list[str]]]:
 def _project(root: Path, folder: Path) -> Project:
     config = read_yaml(folder / ROBOT, RobotConfig)
     urdf = folder / config.robot
-    model = read_elements(urdf).attributes.get("name") or urdf.stem
+    description = read_elements(urdf)
+    model = description.attributes.get("name") or urdf.stem
     names = [part for part in _parts(root, folder) if date_of((part,)) is None]
     place = "/".join(names) or root.resolve().name
     return Project(
@@ -132,7 +144,36 @@ def _project(root: Path, folder: Path) -> Project:
         sha256_of(urdf),
         config.tolerance,
         folder / config.estimates,
+        _joints_on_base(description, config.locked),
     )
+
+
+def _joints_on_base(description: Element, locked: Container[str]) -> frozenset[str]:
+    """Names of the movable joints that no other movable joint carries."""
+    joints = list(description.all("joint"))
+    moved: set[str] = set()
+    links: dict[str, Element] = {}
+    for joint in joints:
+        child = joint.find("child")
+        if child is not None:
+            links[child.attributes.get("link", "")] = joint
+    for joint in joints:
+        name = joint.attributes.get("name", "")
+        if joint.attributes.get("type") != "fixed" and name not in locked:
+            moved.add(name)
+    first = set()
+    for joint in joints:
+        above, seen = joint, set()
+        while (parent := above.find("parent")) is not None:
+            carrier = links.get(parent.attributes.get("link", ""))
+            if carrier is None or id(carrier) in seen:
+                first.add(joint.attributes.get("name", ""))
+                break
+            if carrier.attributes.get("name") in moved:
+                break
+            seen.add(id(carrier))
+            above = carrier
+    return frozenset(first & moved)
 
 
 def _parts(root: Path, folder: Path) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from flexcal.jobs.recheck import Visit
 from flexcal.units import MILLIMETRE
 
 _MEAN, _NINETIETH = 0.73, 0.95
@@ -16,12 +17,13 @@ with a normal distribution, alike in all directions, whose distances have Maxwel
 
 @dataclass(frozen=True)
 class ResultValue:
-    """A number by its name, with its standard deviation where that is known."""
+    """A number by its name, with its standard deviation where that is known, and words that belong to it."""
 
     name: str
     value: float | None
     std: float | None
     unit: str
+    text: str | None = None
 
 
 def result_values(document: Mapping[str, Any]) -> list[ResultValue]:
@@ -31,6 +33,22 @@ def result_values(document: Mapping[str, Any]) -> list[ResultValue]:
         return []
     trusted = (document.get("verdict") or {}).get("trusted")
     return [*reader(document), ResultValue("trusted", None if trusted is None else float(trusted), None, "1")]
+
+
+def visit_values(visit: Visit) -> list[ResultValue]:
+    """Verdict of a visit of a recheck as `text`, probability that a robot as calibrated looks so, alarms of its cumulative sums, and shifts
+    of every joint as if it alone had shifted.
+    """
+    changed = visit.verdict != "as_calibrated"
+    return [
+        ResultValue("changed", float(changed), None, "1", visit.sentence),
+        ResultValue("probability", visit.probability, None, "1", visit.verdict),
+        ResultValue("alarms", float(len(visit.alarms)), None, "1", " ".join(visit.alarms)),
+        *(
+            ResultValue(f"shift.{item.subject}", item.estimate, math.hypot(item.std, item.common_std), "")
+            for item in visit.shifts
+        ),
+    ]
 
 
 def _verification(document: Mapping[str, Any]) -> list[ResultValue]:

@@ -31,8 +31,10 @@ class Row:
     value: float | None
     std: float | None
     unit: str
+    text: str | None
     identifiable: bool
     prior_share: float | None
+    of_robot: bool | None
     absorbs: str
     terms: str
     data: str

@@ -7,7 +7,17 @@ from typing import Any
 
 import plotly.graph_objects as go
 
-from flexcal.report.layout import AXIS, ELASTIC, NOMINAL, RIGID, as_float32, canvas, millimetre_axis, panels
+from flexcal.report.layout import (
+    AXIS,
+    ELASTIC,
+    NOMINAL,
+    RIGID,
+    as_float32,
+    canvas,
+    millimetre_axis,
+    panels,
+    scaled,
+)
 
 _LOOK = {
     "out": ("out of tolerance", RIGID, "x"),
@@ -63,25 +73,26 @@ def fleet_errors(robots: Sequence[Mapping[str, Any]]) -> go.Figure:
 
 def trend_courses(titles: Sequence[str], trends: Sequence[Mapping[str, Any]]) -> go.Figure:
     """Small panels of values over time with 95 % intervals, and the fitted lines; `trends` as in the document of the verb."""
-    columns = min(3, len(trends))
+    columns = min(2, len(trends))
     rows = -(-len(trends) // columns)
     figure = panels(rows, columns, 90 + 200 * rows, [_text(title) for title in titles], legend=False)
     for k, trend in enumerate(trends):
+        factor, unit = scaled(trend["unit"])
         row, column = k // columns + 1, k % columns + 1
         figure.add_trace(
             go.Scatter(
                 x=list(trend["dates"]),
-                y=as_float32(trend["values"]),
+                y=as_float32([factor * value for value in trend["values"]]),
                 error_y={
                     "type": "data",
-                    "array": as_float32([1.96 * s for s in trend["std"]]),
+                    "array": as_float32([1.96 * factor * std for std in trend["std"]]),
                     "color": AXIS,
                     "thickness": 1,
                     "width": 0,
                 },
                 mode="markers",
                 marker={"color": ELASTIC, "size": 7},
-                hovertemplate=f"%{{x|%Y-%m-%d}}: %{{y:.4g}} {trend['unit']}<extra></extra>",
+                hovertemplate=f"%{{x|%Y-%m-%d}}: %{{y:.4g}} {unit}<extra></extra>",
             ),
             row,
             column,
@@ -89,7 +100,7 @@ def trend_courses(titles: Sequence[str], trends: Sequence[Mapping[str, Any]]) ->
         figure.add_trace(
             go.Scatter(
                 x=[trend["first"], trend["last"]],
-                y=as_float32(trend["line"]),
+                y=as_float32([factor * value for value in trend["line"]]),
                 mode="lines",
                 line={"color": RIGID, "width": 2},
                 hoverinfo="skip",
@@ -98,7 +109,7 @@ def trend_courses(titles: Sequence[str], trends: Sequence[Mapping[str, Any]]) ->
             column,
         )
         figure.update_xaxes(type="date", tickformat="%Y-%m", nticks=4, row=row, col=column)
-        figure.update_yaxes(title_text=trend["unit"], row=row, col=column)
+        figure.update_yaxes(title_text=unit, row=row, col=column)
     return figure
 
 

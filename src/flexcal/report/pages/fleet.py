@@ -45,6 +45,7 @@ def fleet_page(document: Mapping[str, Any]) -> Page:
         verdict=_verdict(document),
         sections=[
             _robots(document),
+            *([_rechecks(document)] if document["counts"]["rechecked"] else []),
             _trends(document),
             _parameters(document),
             *([_problems(document)] if document["problems"] else []),
@@ -122,6 +123,14 @@ def _checks(document: Mapping[str, Any]) -> tuple[Check, ...]:
                 "bad" if counts["out"] else "care" if counts["undecided"] else "good",
             )
         )
+    if counts["rechecked"]:
+        checks.append(
+            Check(
+                "Are the robots as calibrated, by their latest recheck?",
+                f"{counts['changed']} of {counts['rechecked']} are not." if counts["changed"] else "Yes.",
+                "bad" if counts["changed"] else "good",
+            )
+        )
     if document["problems"]:
         checks.append(
             Check(
@@ -171,6 +180,7 @@ def _needs_attention(robot: Mapping[str, Any]) -> bool:
         or robot["drifts"]
         or robot["drifting_parameters"]
         or robot["outlying_parameters"]
+        or (robot["recheck"] is not None and (robot["recheck"]["changed"] or robot["recheck"]["alarms"]))
     )
 
 
@@ -194,6 +204,9 @@ def _robot_row(robot: Mapping[str, Any]) -> tuple[str, ...]:
     for key, words in (("drifting_parameters", "drifts"), ("outlying_parameters", "differs from the others")):
         if robot[key]:
             outlook += f"; {', '.join(robot[key][:3])}{' and others' if len(robot[key]) > 3 else ''}: {words}"
+    if (visit := robot["recheck"]) is not None and (visit["changed"] or visit["alarms"]):
+        said = visit["sentence"] if visit["changed"] else f"slow drift of {', '.join(visit['alarms'])}"
+        outlook += f"; recheck of {visit['date']}: {said}"
     verified = robot["p90_mm"] is not None
     return (
         robot["robot"],
@@ -271,6 +284,36 @@ def _trends(document: Mapping[str, Any]) -> Section:
             )
         )
     return Section("trends", "Drift", words, tuple(blocks))
+
+
+def _rechecks(document: Mapping[str, Any]) -> Section:
+    visited = [robot for robot in document["robots"] if robot["recheck"] is not None]
+    found = [r for r in visited if r["recheck"]["verdict"] != "as_calibrated" or r["recheck"]["alarms"]]
+    found.sort(key=lambda robot: robot["recheck"]["probability"])
+    lead = (
+        f"The latest recheck of {_count(len(visited), 'robot')}. Alone, each is called changed in 1 % of visits where it is not; a change "
+        f"is certain here where it is significant after correction for the number of robots (Holm, {100 * document['level']:.0f} %)."
+    )
+    if not found:
+        return Section("rechecks", "Rechecks", lead, (Text(("All are as calibrated.",)),))
+    table = Table(
+        "table-rechecks",
+        "Robots that were not as calibrated, or whose cumulative sums gave an alarm",
+        ("robot", "visit", "p", "p, corrected", "what the recheck said", "slow drift of"),
+        tuple(
+            (
+                robot["robot"],
+                robot["recheck"]["date"],
+                p_value(robot["recheck"]["probability"]),
+                p_value(robot["recheck"]["adjusted_probability"]),
+                robot["recheck"]["sentence"],
+                ", ".join(robot["recheck"]["alarms"]) or NOTHING,
+            )
+            for robot in found
+        ),
+        text_columns=(1, 4, 5),
+    )
+    return Section("rechecks", "Rechecks", lead, (table,))
 
 
 def _parameters(document: Mapping[str, Any]) -> Section:
@@ -393,7 +436,7 @@ def _spread_row(spread: Mapping[str, Any]) -> tuple[str, ...]:
         str(spread["robots"]),
         f"{mean} ± {mean_std}",
         width,
-        f"{low} to {high}",
+        "below the measurements'" if spread["spread_high"] == 0 else f"{low} to {high}",
         std,
         unit,
     )
