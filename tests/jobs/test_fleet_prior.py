@@ -19,9 +19,18 @@ from simulated_fleet import (
 from flexcal import RobotModel, fit_geometry
 from flexcal.calibration.fit import FleetPrior, GeometricFit, base_errors
 from flexcal.calibration.measurement import predict_measurements
+from flexcal.cli.main import main
 from flexcal.data.poses import PoseSet
+from flexcal.files.formats import write_estimates
 from flexcal.jobs.calibration import calibrate_robot
-from flexcal.jobs.fleet_prior import CalibratedMember, pool_fleet, pooled_prior, read_fleet_prior
+from flexcal.jobs.fleet_prior import (
+    FLEET,
+    CalibratedMember,
+    alike,
+    pool_fleet,
+    pooled_prior,
+    read_fleet_prior,
+)
 
 NOISE = 5e-5
 
@@ -144,7 +153,8 @@ def test_the_file_has_the_prior_and_refuses_other_robots(six: Pooled, tmp_path: 
         calibrate_robot(file, [measured], terms=["kinematic"])
         files.append(file)
     out = tmp_path / "prior.yaml"
-    prior = pool_fleet(files, out)
+    members = [m for file in files if (m := CalibratedMember.read(file.parent.name, file))]
+    prior = pool_fleet(members, out)
     again = read_fleet_prior(out, six.model)
     assert again.names == prior.names
     assert again.robots == ("robot_0", "robot_1", "robot_2")
@@ -170,11 +180,43 @@ def test_the_file_has_the_prior_and_refuses_other_robots(six: Pooled, tmp_path: 
     # a robot with this prior would count the others twice
     calibrate_robot(new, [few], prior=out)
     with refused("E-PRIOR-005", "new"):
-        pool_fleet([*files, new], out)
-    with refused("E-PRIOR-001", "odd"):
-        pool_fleet([*files, odd], out)
-    with refused("E-PRIOR-002", "at least 3"):
-        pool_fleet(files[:2], out)
+        pool_fleet([*members, *([late] if (late := CalibratedMember.read("new", new)) else [])], out)
+    assert CalibratedMember.read("odd", odd) is None
+    with refused("E-PRIOR-002", "at least 3", "2"):
+        pool_fleet(members[:2], out)
+    with refused("E-PRIOR-003", "odd", "robot_0", "joint_3"):
+        pooled_prior([*members, replace(members[1], name="odd", model=RobotModel.from_yaml(odd))])
+
+
+def test_one_robot_that_was_measured_twice_is_named(six: Pooled) -> None:
+    rng = np.random.default_rng(80)
+    robot = six.fleet.robot(rng)
+    twice = [
+        CalibratedMember(name, six.model, fitted(six.model, robot, 30, rng, None).estimate)
+        for name in ("once", "again")
+    ]
+    assert not alike(six.members)
+    assert [pair[:2] for pair in alike([*six.members, *twice])] == [("once", "again")]
+
+
+def test_the_fleet_writes_the_prior_of_its_model(
+    six: Pooled, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for k, member in enumerate(six.members[:4]):
+        file = write_robot(tmp_path / "fleet" / f"cell_{k}")
+        estimate = member.estimate
+        if k == 3:
+            estimate = replace(estimate, provenance={**estimate.provenance, f"input.{FLEET}": "0"})
+        write_estimates(file.parent / "estimates.yaml", "calibration", estimate)
+    out = tmp_path / "prior.yaml"
+    assert (
+        main(["fleet", str(tmp_path / "fleet"), "--out", str(tmp_path / "t.parquet"), "--prior", str(out)])
+        == 0
+    )
+    said = " ".join(capsys.readouterr().out.split())
+    assert "from 3 robots (cell_0, cell_1, cell_2)" in said
+    assert "without cell_3, calibrated with a prior of other robots" in said
+    assert read_fleet_prior(out, six.model).robots == ("cell_0", "cell_1", "cell_2")
 
 
 def test_robots_with_other_terms_are_refused(six: Pooled) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 _SWEEPS, _BURN_IN = 1200, 300
-_FREEDOMS = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0])
+_FREEDOMS = np.array([2.0, 4.0, 8.0, 16.0, 32.0, 64.0])
 """Degrees of freedom, each as probable beforehand as the others, with which the variances of a kind resemble each other."""
 _SMALLEST = 1e-8
 """Least variance of a parameter, relative to its plausible size squared: what rounding leaves."""

@@ -9,7 +9,7 @@ from typing import Annotated
 from tyro.conf import Positional, arg
 
 from flexcal.cli.arguments.invocation import command_line
-from flexcal.cli.arguments.shared_options import Json, MaybeNumber, file_argument
+from flexcal.cli.arguments.shared_options import Json, MaybeNumber, MaybePath, file_argument
 from flexcal.cli.terminal.console import Console
 
 
@@ -33,13 +33,15 @@ class Fleet:
         MaybeNumber, arg(metavar="MM", help_behavior_hint="(default: as each robot.yaml declares)")
     ] = None
     """Largest P90 of errors, mm, for robots whose robot.yaml has no tolerance."""
+    prior: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="")] = None
+    """Write what the calibrated robots tell of their model to this file (.yaml), for 'calibrate --prior' of the next."""
     json: Json = False
 
     def run(self) -> None:
         """Gather, judge, and print every robot that needs attention."""
         from flexcal.cli.tables.fleet import fleet_table
         from flexcal.data.plans import page_beside
-        from flexcal.jobs.fleet import review_fleet
+        from flexcal.jobs.fleet import review_fleet, write_prior
         from flexcal.units import MILLIMETRE
 
         console = Console(self.json)
@@ -52,6 +54,7 @@ class Fleet:
             )
             fleet.write(self.out)
         document = fleet.document()
+        written = None if self.prior is None else write_prior(self.fleet, self.prior)
         console.show(fleet_table(document))
         console.say(document["headline"])
         for remark in document["remarks"]:
@@ -60,4 +63,14 @@ class Fleet:
             console.say(f"{problem['place']}: {problem['sentence']}")
         page = page_beside(self.out)
         console.say(f"wrote {self.out} and {page}: {document['counts']['rows']} rows")
-        console.finish(document, f"open {page}")
+        following = f"open {page}"
+        if written is not None:
+            document = {**document, "prior": written.document()}
+            console.say(written.sentence)
+            for remark in written.remarks:
+                console.say(remark)
+            console.say(f"wrote {self.prior}")
+            following = (
+                f"flexcal calibrate ROBOT POSES… --prior {self.prior}, for the next robot of the model"
+            )
+        console.finish(document, following)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 
 from flexcal.calibration.error_model import TRANSMISSION
 from flexcal.calibration.fit import FleetPrior, base_errors, plausible_size
-from flexcal.errors import FlexcalError, InputError
-from flexcal.estimation import Estimate, population
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Estimate, Measured, population
 from flexcal.files.formats import block_sha256, read_estimates
 from flexcal.jobs.fleet_prior.geometry_information import geometry_information, is_of_cell, is_of_robot
 from flexcal.jobs.fleet_prior.kinematics import difference
@@ -19,11 +20,18 @@ from flexcal.jobs.fleet_prior.prior_file import write_fleet_prior
 from flexcal.model.robot import RobotModel
 
 FEWEST = 3
-"""Least number of robots: of the spread of a parameter two have one degree of freedom, with which the variance of a further robot's
-parameter (a Student distribution) does not exist; three have two, and what parameters of a kind have in common makes it finite.
+"""Least number of robots: two that happen to be alike, or are one that was measured twice, would pass for a model whose robots do not
+differ; of three it shows.
 """
+_ALIKE = 3.0
+"""Largest reduced chi-square of the difference between two measurements of one robot, whose errors are not known exactly."""
+_FAR_APART = 10.0
+"""Factor by which those of other pairs are larger, in the median, where two measurements are of one robot."""
+_FEWEST_COMBINATIONS = 5
 FLEET = "fleet"
 """Entry of the provenance of a calibration that had a prior of other robots."""
+_SAME = 1e-6
+"""Relative singular value of combinations below which both calibrations tell nothing of one."""
 _TOLD = 0.9
 """Variance of a mean, relative to the plausible one, below which the robots tell something of it."""
 
@@ -37,6 +45,19 @@ class CalibratedMember:
     estimate: Estimate
     source: Path | None = None
 
+    @classmethod
+    def read(cls, name: str, robot_file: Path, estimates: Path | None = None) -> CalibratedMember | None:
+        """The robot of a robot.yaml, with the calibration in an estimates file, by default its own; None without one."""
+        model = RobotModel.from_yaml(robot_file, estimates=False)
+        source = estimates or model.path.parent / model.config.estimates
+        calibration = read_estimates(source).get("calibration") if source.exists() else None
+        return None if calibration is None else cls(name, model, calibration, source)
+
+    @property
+    def has_prior(self) -> bool:
+        """Whether it was calibrated with a prior of other robots."""
+        return f"input.{FLEET}" in self.estimate.provenance
+
     @property
     def terms(self) -> tuple[str, ...]:
         """Terms of its calibration, without transmission errors, which are each robot's own."""
@@ -44,12 +65,8 @@ class CalibratedMember:
         return tuple(sorted(term for term in stored if not term.startswith(TRANSMISSION)))
 
 
-def pool_fleet(robot_files: Sequence[Path], out: Path) -> FleetPrior:
-    """Pool the calibrations beside some robot.yaml files, and write the prior to `out`.
-
-    Raises `InputError` for a robot without calibration, and as `pooled_prior` does.
-    """
-    members = [_member(Path(file)) for file in robot_files]
+def pool_fleet(members: Sequence[CalibratedMember], out: Path) -> FleetPrior:
+    """Pool calibrated robots, and write the prior to `out`; raises `FlexcalError` as `pooled_prior` does."""
     prior = pooled_prior(members)
     digests = {m.name: block_sha256(m.source, "calibration") for m in members if m.source is not None}
     write_fleet_prior(out, prior, members[0].model, digests)
@@ -59,17 +76,11 @@ def pool_fleet(robot_files: Sequence[Path], out: Path) -> FleetPrior:
 def pooled_prior(members: Sequence[CalibratedMember]) -> FleetPrior:
     """Prior for a further robot of the model of some calibrated ones (`estimation.population`).
 
-    Raises `InputError` for fewer than three robots, robots of other kinematics or with other terms, and those that were calibrated with
+    Raises `FlexcalError` for fewer than three robots, robots of other kinematics or with other terms, and those that were calibrated with
     such a prior themselves, which would count the others twice.
     """
     _require_alike(members)
-    model = members[0].model
-    base = base_errors(model)
-    named = [item.name for member in members for item in member.estimate.parameters]
-    names = [name for name in dict.fromkeys(named) if is_of_robot(model, name) and name not in base]
-    sizes = np.array([plausible_size(model, name) for name in names])
-    cell = [*base, *(name for name in dict.fromkeys(named) if is_of_cell(name))]
-    measured = [geometry_information(member.estimate, names, cell, sizes) for member in members]
+    names, sizes, measured = _measured(members)
     pooled = population(measured, sizes, [_kind(name) for name in names])
     prior = FleetPrior(
         tuple(names),
@@ -84,23 +95,48 @@ def pooled_prior(members: Sequence[CalibratedMember]) -> FleetPrior:
     return prior.among(name for name, known in zip(names, told, strict=True) if known)
 
 
-def _member(file: Path) -> CalibratedMember:
-    model = RobotModel.from_yaml(file, estimates=False)
-    source = model.path.parent / model.config.estimates
-    calibration = read_estimates(source).get("calibration") if source.exists() else None
-    if calibration is None:
-        raise InputError(
-            "E-PRIOR-001",
-            f"{file}: the robot is not calibrated; run 'flexcal calibrate {file} POSES' first, or leave it out.",
-        )
-    return CalibratedMember(file.parent.resolve().name or file.name, model, calibration, source)
+def alike(members: Sequence[CalibratedMember]) -> list[tuple[str, str, float]]:
+    """Pairs of robots that are as alike as two measurements of one: their names, and how many times as far apart other pairs are.
+
+    By the chi-square of what both calibrations tell against one set of parameters for both; the number of times is the median over pairs of
+    the reduced chi-square over that of the pair, its square root.
+    """
+    _, sizes, measured = _measured(members)
+    found = {}
+    for (i, one), (k, other) in combinations(enumerate(measured), 2):
+        rows = np.concatenate([one.rows, other.rows]) * sizes
+        observed = np.concatenate([one.observed, other.observed])
+        basis, values, _ = np.linalg.svd(rows, full_matrices=False)
+        basis = basis[:, values > _SAME * values[0]]
+        left = observed - basis @ (basis.T @ observed)
+        freedom = len(left) - basis.shape[1]
+        if freedom >= _FEWEST_COMBINATIONS:
+            found[i, k] = float(left @ left) / freedom
+    middle = float(np.median(list(found.values()))) if found else 0.0
+    return [
+        (members[i].name, members[k].name, float(np.sqrt(middle / chi2)))
+        for (i, k), chi2 in found.items()
+        if chi2 < _ALIKE and middle > _FAR_APART * max(chi2, 1.0)
+    ]
+
+
+def _measured(members: Sequence[CalibratedMember]) -> tuple[list[str], np.ndarray, list[Measured]]:
+    """Parameters of the robots themselves, their plausible sizes, and what each calibration tells of them."""
+    model = members[0].model
+    base = base_errors(model)
+    named = [item.name for member in members for item in member.estimate.parameters]
+    names = [name for name in dict.fromkeys(named) if is_of_robot(model, name) and name not in base]
+    sizes = np.array([plausible_size(model, name) for name in names])
+    cell = [*base, *(name for name in dict.fromkeys(named) if is_of_cell(name))]
+    return names, sizes, [geometry_information(member.estimate, names, cell, sizes) for member in members]
 
 
 def _require_alike(members: Sequence[CalibratedMember]) -> None:
     if len(members) < FEWEST:
         raise FlexcalError(
             "E-PRIOR-002",
-            f"{len(members)} calibrated robots of one model do not tell how much such robots differ; a prior needs at least {FEWEST}.",
+            f"a prior needs at least {FEWEST} calibrated robots of a model, and there are {len(members)}"
+            f"{': ' + ', '.join(m.name for m in members) if members else ''}; fewer do not tell how much robots differ.",
         )
     first = members[0]
     for member in members:
@@ -117,7 +153,7 @@ def _require_alike(members: Sequence[CalibratedMember]) -> None:
                 f"{first.name} was calibrated with the terms {' '.join(first.terms)}, and {member.name} with {' '.join(member.terms)}, so "
                 f"their parameters mean different things; calibrate all with --terms {' '.join(every)} {TRANSMISSION}.",
             )
-        if f"input.{FLEET}" in member.estimate.provenance:
+        if member.has_prior:
             raise FlexcalError(
                 "E-PRIOR-005",
                 f"{member.name} was calibrated with a prior of other robots, which would count twice; calibrate it without --prior, on "
