@@ -69,19 +69,19 @@ class ArrowheadFactor:
 
     def half(self, columns: np.ndarray) -> np.ndarray:
         """Forward substitution L⁻¹ C of columns (b + d, k)."""
-        from scipy.linalg import solve_triangular
+        from scipy.linalg.lapack import dtrtrs  # pyright: ignore[reportAttributeAccessIssue]
 
         count = len(self.border)
         upper = _by_blocks(self.inverses, columns[:count])
-        lower = solve_triangular(self.corner, columns[count:] - self.border.T @ upper, lower=True)
+        lower = dtrtrs(self.corner.T, columns[count:] - self.border.T @ upper, trans=1)[0]
         return np.concatenate([upper, lower])
 
     def other_half(self, columns: np.ndarray) -> np.ndarray:
         """Back substitution L⁻ᵀ C of columns (b + d, k)."""
-        from scipy.linalg import solve_triangular
+        from scipy.linalg.lapack import dtrtrs  # pyright: ignore[reportAttributeAccessIssue]
 
         count = len(self.border)
-        lower = solve_triangular(self.corner.T, columns[count:])
+        lower = dtrtrs(self.corner.T, columns[count:])[0]
         return np.concatenate([_by_blocks(self._turned, columns[:count] - self.border @ lower), lower])
 
     def trace(self, other: Arrowhead) -> float:
@@ -111,9 +111,10 @@ class ArrowheadFactor:
     @cached_property
     def _corner_inverse(self) -> np.ndarray:
         """Inverse S⁻¹ (d, d) of the Schur complement."""
-        from scipy.linalg import cho_solve
+        from scipy.linalg.lapack import dpotri  # pyright: ignore[reportAttributeAccessIssue]
 
-        return cho_solve((self.corner, True), np.eye(len(self.corner)))
+        upper = dpotri(self.corner.T)[0]
+        return np.triu(upper) + np.triu(upper, 1).T
 
     @cached_property
     def _eliminated(self) -> np.ndarray:

@@ -33,6 +33,8 @@ _ALWAYS = (ROBOT, *OF_INSTRUMENTS, ORIENTATION)
 """Components that the data need not support: points and orientations scatter."""
 _STILL = 1e-6
 """Change of the deviance, by its slope, below which the maximisation has converged."""
+_TO_ZERO = 0.1
+"""Share of a variance with a prior factor that a step leaves of it at least."""
 _ARMIJO = 1e-4
 """Share of the predicted change that a step must achieve (Armijo 1966)."""
 
@@ -100,7 +102,13 @@ class LinearFit:
             narrow = [*own, *shared]
             tried = np.array([*(sizes[name] for name in narrow), whole])
             alone = self._maximum([*narrow, "share"], tried, None, favour=False)[1]
-            if alone - self._maximum(names, scale, share, favour=False)[1] > _CLEAR_GAIN:
+            # without the prior factor the maximum is this high at least
+            power = np.array([self._favour(name) for name in names])
+            reached = likelihood - 0.5 * float(power @ np.log(variances / scale))
+            if (
+                alone - reached > _CLEAR_GAIN
+                and alone - self._maximum(names, scale, share, favour=False)[1] > _CLEAR_GAIN
+            ):
                 names, scale = [first, *narrow], np.append(totals[first], tried[:-1])
                 narrower, likelihood = self._maximum([*names, "share"], np.append(scale, whole), None)
                 variances, share = narrower[:-1], float(np.sqrt(narrower[-1]))
@@ -200,8 +208,10 @@ class LinearFit:
             slope = at.slopes * scale - favoured / x
             information = at.information * scale * scale[:, None] + np.diag(favoured / x**2)
             step = _step(x, slope, information, largest)
+            # the factor's logarithm is steep near zero: a step that lands there returns by doubling
+            smallest = np.maximum(_SMALLEST, np.where(favoured > 0, _TO_ZERO * x, 0.0))
             for _ in range(_HALVINGS):
-                tried = np.clip(x + step, _SMALLEST, largest)
+                tried = np.clip(x + step, smallest, largest)
                 after = self._at(names, tried * scale, share)
                 if deviance(tried, after) <= deviance(x, at) + _ARMIJO * float(slope @ (tried - x)):
                     break
