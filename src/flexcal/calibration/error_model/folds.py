@@ -6,15 +6,24 @@ import numpy as np
 
 _SAME = 0.01
 """Difference of joint positions, rad or m, below which poses are the same."""
+_SIDES = ((-1.001, "left"), (1.001, "right"))
+"""Both ends of an interval that is wider than this by more than rounding."""
 
 
 def repeated_pose_numbers(q: np.ndarray) -> np.ndarray:
     """Number (N,) of the pose that each row of joint positions `q` (N, n) repeats: those that differ by less than 0.01 rad or m are one."""
     result = np.full(len(q), -1)
+    if not len(q):
+        return result
+    # only those within 0.01 in the coordinate that varies most may be the same
+    along = q[:, np.argmax(np.ptp(q, axis=0))]
+    order = np.argsort(along)
+    first, last = (np.searchsorted(along[order], along + side * _SAME, which) for side, which in _SIDES)
     for row in range(len(q)):
         if result[row] < 0:
-            near = (np.abs(q - q[row]).max(axis=1) < _SAME) & (result < 0)
-            result[near] = row
+            close = order[first[row] : last[row]]
+            near = (np.abs(q[close] - q[row]).max(axis=1) < _SAME) & (result[close] < 0)
+            result[close[near]] = row
     return np.unique(result, return_inverse=True)[1]
 
 

@@ -54,8 +54,7 @@ from flexcal.jobs.inputs import (
 from flexcal.jobs.pages import ReportedResult
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, header, write_arm, write_points
 from flexcal.progress import Progress, silent
-from flexcal.report.checks import Trust
-from flexcal.report.pages import verification_checks
+from flexcal.report.checks import Trust, verification_checks
 from flexcal.units import MILLIMETRE
 
 

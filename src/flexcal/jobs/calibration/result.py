@@ -71,8 +71,13 @@ from flexcal.jobs.result_files import (
 from flexcal.jobs.stiffness import bearing_remarks, bearings_block
 from flexcal.model.kinematics import found_xyz
 from flexcal.model.robot import RobotModel
-from flexcal.report.checks import Trust, misfit_document, misfit_sentences
-from flexcal.report.pages import calibration_checks, inclination_checks
+from flexcal.report.checks import (
+    Trust,
+    calibration_checks,
+    inclination_checks,
+    misfit_document,
+    misfit_sentences,
+)
 from flexcal.units import MILLIMETRE
 
 

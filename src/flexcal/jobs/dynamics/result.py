@@ -34,8 +34,7 @@ from flexcal.jobs.result_files import (
 from flexcal.model.parts import is_physically_consistent
 from flexcal.model.robot import torque_units
 from flexcal.model.torques import motion_batch
-from flexcal.report.checks import Trust
-from flexcal.report.pages import dynamics_checks
+from flexcal.report.checks import Trust, dynamics_checks
 
 
 @dataclass(frozen=True, eq=False, repr=False)

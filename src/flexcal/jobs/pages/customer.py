@@ -8,8 +8,8 @@ from flexcal.data.poses import DEFAULT_SIGMA
 from flexcal.errors import InputError
 from flexcal.jobs.pages.report import calibration_study, missing_key_error
 from flexcal.jobs.result_files import read_points, read_results
-from flexcal.report.checks import Trust
-from flexcal.report.pages import CustomerStudy, calibration_checks, verification_checks, write_customer_report
+from flexcal.report.checks import Trust, calibration_checks, verification_checks
+from flexcal.report.pages import CustomerStudy, write_customer_report
 from flexcal.report.results import MeasurementDetails
 from flexcal.report.sections import input_files
 

@@ -16,7 +16,6 @@ from flexcal.dynamics.diagnostics import TorquePrediction
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, write_estimates
 from flexcal.files.transaction import write_text
-from flexcal.jobs.pages.report import REPORT, report_folder
 from flexcal.jobs.result_files import ESTIMATES, write_predictions, write_results
 from flexcal.model.robot import RobotModel
 from flexcal.report.layout import Page, write_page
@@ -103,6 +102,8 @@ class WrittenResult(SummarisedResult):
         folder : str or Path
             The folder, which is created where it is missing.
         """
+        from flexcal.jobs.pages.report import report_folder
+
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         write_results(folder, self.document())
@@ -122,6 +123,8 @@ class WrittenResult(SummarisedResult):
         Path
             The file.
         """
+        from flexcal.jobs.pages.report import REPORT
+
         path = Path(path)
         with TemporaryDirectory() as folder:
             self.write(folder)

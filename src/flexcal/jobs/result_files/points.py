@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import polars as pl
 
 from flexcal.calibration.diagnostics import GravityLoads
 from flexcal.calibration.verification import (
@@ -24,6 +24,9 @@ from flexcal.files.transaction import atomic_path, current_path
 from flexcal.jobs.result_files.document import AGAIN
 from flexcal.units import LARGEST
 
+if TYPE_CHECKING:
+    import polars as pl
+
 POINTS, ARM, LOADS = "points.csv", "arm.npz", "gravity_loads.npz"
 _MODELS = (DECLARED, NOMINAL, OWN, RIGID, CALIBRATED)
 _TEXTS = ("target", "station", "socket", "holder")
@@ -31,6 +34,8 @@ _TEXTS = ("target", "station", "socket", "holder")
 
 def write_points(folder: Path, points: MeasuredPoints) -> None:
     """Write `points` to points.csv in `folder`, atomically; rad and m."""
+    import polars as pl
+
     poses = points.poses
     columns: dict[str, np.ndarray] = {"pose": poses.pose, "target": poses.target, "station": poses.station}
     if poses.socket is not None and poses.holder is not None:
@@ -61,6 +66,8 @@ def read_points(folder: Path, *, sigma: float) -> MeasuredPoints:
 
     Raises `InputError` where the file is not there or not such a one.
     """
+    import polars as pl
+
     path = folder / POINTS
     try:
         table = pl.read_csv(
@@ -103,6 +110,8 @@ def read_points(folder: Path, *, sigma: float) -> MeasuredPoints:
 
 
 def _numbers(path: Path, columns: pl.DataFrame) -> np.ndarray:
+    import polars as pl
+
     values = columns.cast(pl.Float64).to_numpy()
     if (np.abs(values) > LARGEST).any():
         raise InputError(

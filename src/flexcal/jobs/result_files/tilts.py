@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import polars as pl
 
 from flexcal.calibration.verification import MeasuredTilts
 from flexcal.errors import unreadable
@@ -18,6 +17,8 @@ _MODELS = ("before", "calibrated")
 
 def write_tilts(folder: Path, tilts: MeasuredTilts) -> None:
     """Write `tilts` to tilts.csv in `folder`, atomically: rad, or 1 of components; empty for axes without a reading."""
+    import polars as pl
+
     columns: dict[str, np.ndarray] = {"pose": tilts.pose, "inclinometer": tilts.sensor}
     columns |= {f"q{i + 1}": tilts.q[:, i] for i in range(tilts.q.shape[1])}
     for model in _MODELS:
@@ -29,6 +30,8 @@ def write_tilts(folder: Path, tilts: MeasuredTilts) -> None:
 
 def read_tilts(folder: Path) -> MeasuredTilts | None:
     """Tilts from a file of `write_tilts`; None without it. Raises `InputError` where it is not such a one."""
+    import polars as pl
+
     path = folder / TILTS
     if not current_path(path).is_file():
         return None

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import polars as pl
 
 from flexcal.calibration.verification import CALIBRATED, NOMINAL, OWN, RIGID, MeasuredPoints
 from flexcal.data.poses import PoseSet
@@ -29,6 +28,8 @@ def write_verification(path: Path, run: TwoStageRun) -> None:
     prediction of every model, the distance expected from the covariance of the elastic model's parameters, and whether the flanks are
     certain.
     """
+    import polars as pl
+
     poses, elastic = run.verification_poses, run.elastic_verification
     before = {NOMINAL: run.nominal_verification, OWN: run.own_verification}
     models = before | {CALIBRATED: elastic, RIGID: run.rigid_verification[0]}
@@ -49,6 +50,8 @@ def write_verification(path: Path, run: TwoStageRun) -> None:
 
 def read_verification(path: Path) -> tuple[MeasuredPoints, MeasuredPoints]:
     """Verification poses from a file of `write_verification`, as measured and in truth; raises `InputError` if unreadable."""
+    import polars as pl
+
     try:
         table = pl.read_csv(current_path(path).read_bytes())
 

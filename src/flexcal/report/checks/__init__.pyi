@@ -1,5 +1,6 @@
 from .actuators import actuator_checks
 from .bearing_axes import check_bearings, check_response_bearings
+from .calibration import calibration_checks, in_sockets
 from .drive_gains import gain_checks
 from .dynamics import (
     LARGE,
@@ -13,10 +14,13 @@ from .dynamics import (
     check_unseen_torques,
     check_weight,
     check_weight_shares,
+    dynamics_checks,
+    held_out_recordings,
 )
 from .elastic_model import check_misfit, check_responses, misfit_document, misfit_sentences, read_misfit
 from .excitation import excitation_checks
 from .fleet_prior import check_fleet
+from .inclinations import inclination_checks
 from .measured_responses import limit_of, response_checks, worst_pose
 from .payload import BODILESS, UNLIKE, payload_checks
 from .places import check_places
@@ -41,6 +45,7 @@ from .pose_errors import (
 )
 from .predicted_errors import check_improvement, prediction_checks
 from .verdict import ANSWERS, Trust, verdict_answer
+from .verification import verification_checks
 
 __all__ = [
     "ANSWERS",
@@ -50,6 +55,7 @@ __all__ = [
     "UNLIKE",
     "Trust",
     "actuator_checks",
+    "calibration_checks",
     "check_base",
     "check_bearings",
     "check_bodies",
@@ -83,8 +89,12 @@ __all__ = [
     "check_unseen_torques",
     "check_weight",
     "check_weight_shares",
+    "dynamics_checks",
     "excitation_checks",
     "gain_checks",
+    "held_out_recordings",
+    "in_sockets",
+    "inclination_checks",
     "limit_of",
     "misfit_document",
     "misfit_sentences",
@@ -93,5 +103,6 @@ __all__ = [
     "read_misfit",
     "response_checks",
     "verdict_answer",
+    "verification_checks",
     "worst_pose",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import PurePath
 from typing import Any
 
 from flexcal.report.layout import Check, significant
@@ -141,3 +142,36 @@ def check_external(share: Mapping[str, float]) -> Check:
             question, f"{answer} The external torques are too small to check the sensor by them.", "care"
         )
     return Check(question, answer, "good")
+
+
+def held_out_recordings(results: Mapping[str, Any]) -> str:
+    """The held-out data in words; empty for none."""
+    block = results.get("hold_out", {})
+    if block.get("logs"):
+        return " and ".join(PurePath(log).name for log in block["logs"])
+    return f"the last {100 * block['share']:.0f} % of every recording" if block.get("share") else ""
+
+
+def dynamics_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
+    """The checks behind the verdict; `results` is the document of results.json."""
+    return (
+        check_unseen_torques(results["error_percent"], held_out_recordings(results)).named(
+            "held_out", independent=True
+        ),
+        *([fit.named("torques")] if (fit := check_fit(results["error_percent"]["train"])) else []),
+        check_joints(results["error_percent"]["per_joint"]).named("joints"),
+        check_base(results).named("base_parameters"),
+        check_bodies(results["bodiless_links"]).named("bodies"),
+        check_shown(results["remarks"]).named("drive_terms"),
+        *([check_weight(faults).named("weight")] if (faults := results.get("weight_faults")) else []),
+        *(
+            [check_weight_shares(shares).named("weight_shares")]
+            if (shares := results.get("weight_shares"))
+            else []
+        ),
+        *(
+            [check_external(share).named("external_torques")]
+            if (share := results.get("external_share"))
+            else []
+        ),
+    )

@@ -1,15 +1,15 @@
 from .accuracy_map import MapStudy, map_page
 from .actuators import actuators_page
-from .calibration import CalibrationStudy, calibration_checks, calibration_page
+from .calibration import CalibrationStudy, calibration_page
 from .certificate import CertificateStudy, write_certificate
 from .customer import CustomerStudy, write_customer_report
 from .drive_gains import gains_page
-from .dynamics import DynamicsStudy, dynamics_checks, dynamics_page
+from .dynamics import DynamicsStudy, dynamics_page
 from .excitation import ExcitationStudy, excitation_page
 from .fleet import fleet_page
 from .frequency_design import FrequencyDesignStudy, frequency_page
 from .frequency_response import ResponseStudy, response_page
-from .inclinations import InclinationStudy, inclination_checks, inclination_page
+from .inclinations import InclinationStudy, inclination_page
 from .inertials import InertialsStudy, inertials_checks, inertials_page
 from .payload import PayloadStudy, payload_page
 from .pose_design import PoseStudy, pose_page
@@ -20,7 +20,7 @@ from .run_comparison import comparison_page
 from .stiffness import StiffnessStudy, stiffness_checks, stiffness_page
 from .trajectory_design import trajectory_page
 from .two_stage import two_stage_checks, two_stage_page
-from .verification import VerificationStudy, verification_checks, verification_page
+from .verification import VerificationStudy, verification_page
 
 __all__ = [
     "CalibrationStudy",
@@ -41,16 +41,13 @@ __all__ = [
     "StiffnessStudy",
     "VerificationStudy",
     "actuators_page",
-    "calibration_checks",
     "calibration_page",
     "comparison_page",
-    "dynamics_checks",
     "dynamics_page",
     "excitation_page",
     "fleet_page",
     "frequency_page",
     "gains_page",
-    "inclination_checks",
     "inclination_page",
     "inertials_checks",
     "inertials_page",
@@ -66,7 +63,6 @@ __all__ = [
     "trajectory_page",
     "two_stage_checks",
     "two_stage_page",
-    "verification_checks",
     "verification_page",
     "write_certificate",
     "write_customer_report",

@@ -6,30 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from flexcal.calibration.diagnostics import GravityLoads
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.term_selection import considered_terms
 from flexcal.calibration.verification import CALIBRATED, RIGID, ArmPoses, MeasuredPoints, MeasuredTilts
 from flexcal.estimation import Estimate
-from flexcal.report.checks import (
-    Trust,
-    check_bearings,
-    check_drift,
-    check_error_budget,
-    check_fleet,
-    check_held_out,
-    check_left_out,
-    check_misfit,
-    check_outliers,
-    check_places,
-    check_rank,
-    read_misfit,
-)
+from flexcal.report.checks import Trust, calibration_checks, in_sockets
 from flexcal.report.layout import (
     NOTHING,
-    Check,
     Page,
     Section,
     Table,
@@ -64,7 +48,6 @@ from flexcal.report.sections import (
     uncalibrated_ranges,
     uncalibrated_rows,
 )
-from flexcal.units import MILLIMETRE
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,11 +67,6 @@ class CalibrationStudy:
     tilts: MeasuredTilts | None = None
 
 
-def determined(results: Mapping[str, Any]) -> IdentifiableParameters:
-    """Parameters of the calibrated model."""
-    return IdentifiableParameters.stored(results["identifiability"]["selected"])
-
-
 def calibration_page(study: CalibrationStudy) -> Page:
     """The page before it becomes HTML."""
     results, points = study.results, study.points
@@ -96,7 +74,7 @@ def calibration_page(study: CalibrationStudy) -> Page:
     if results["held_out"] is not None:
         sections.append(held_out_section(results["held_out"]))
     kept = tuple(results["identifiability"]["selected"]["kept"])
-    held = _held(points)
+    held = in_sockets(points)
     if considered:
         sections.append(terms_section(considered, results["term_selection_by"]))
     if results.get("learning_curve"):
@@ -117,7 +95,9 @@ def calibration_page(study: CalibrationStudy) -> Page:
             "Parameters that the measurements do not determine keep their nominal values; the parameters that absorb them are named "
             "beside them.",
             (
-                *identifiability_blocks(determined(results), None),
+                *identifiability_blocks(
+                    IdentifiableParameters.stored(results["identifiability"]["selected"]), None
+                ),
                 *parameter_figures(study.estimate, kept),
                 parameter_table(study.estimate, kept, None),
             ),
@@ -159,11 +139,6 @@ def calibration_verdict(study: CalibrationStudy) -> Verdict:
     )
 
 
-def _held(points: MeasuredPoints) -> bool:
-    """Whether every measurement is of a ball in a socket."""
-    return len(points.poses) > 0 and bool(points.poses.in_socket.all())
-
-
 def _was(before: ErrorStatistics | None, words: MeasuredWords) -> str:
     if before is None:
         return ""
@@ -185,52 +160,9 @@ def _outside(results: Mapping[str, Any]) -> str:
     )
 
 
-def calibration_checks(
-    results: Mapping[str, Any], estimate: Estimate, points: MeasuredPoints
-) -> tuple[Check, ...]:
-    """The checks behind the verdict; `results` is the document of results.json."""
-    identifiable, errors = determined(results), points.statistics(CALIBRATED)
-    validated = results["cross_validation"]
-    left_out = None if validated is None else validated["mean_mm"] * MILLIMETRE
-    share = (identifiable.rank if validated is None else validated["parameters"]) / max(3 * errors.poses, 1)
-    groups, held = results["held_out"], _held(points)
-    remedy = "Run it with --hold-out COLUMN" + (
-        "." if held else ", or measure fresh poses and run flexcal verify, before relying on it."
-    )
-    inside = np.setdiff1d(np.arange(errors.poses), list(estimate.outliers))
-    good = ErrorStatistics.of(points.calibrated[inside]).mean if len(inside) else errors.mean
-    return (
-        *(
-            [check_left_out(good, left_out, share, remedy).named("left_out", independent=True)]
-            if groups is None or left_out is not None
-            else []
-        ),
-        *(
-            []
-            if groups is None
-            else [check_held_out(groups, errors.mean, share).named("groups_left_out", independent=True)]
-        ),
-        check_error_budget(
-            estimate, results["variances"], is_implausible=results["fit"]["is_implausible"], held=held
-        ).named("residual"),
-        check_rank(identifiable.parameters, identifiable.rank, identifiable.gap).named("rank"),
-        *([] if results["drift"] is None else [check_drift(results["drift"]).named("drift")]),
-        check_outliers(len(estimate.outliers), errors).named("outliers"),
-        *([] if results.get("places") is None else [check_places(results["places"])]),
-        *check_bearings(results.get("bearings")),
-        *check_fleet(results.get("fleet")),
-        *_stage_one_checks(results.get("stage1")),
-    )
-
-
-def _stage_one_checks(stage_one: Mapping[str, Any] | None) -> tuple[Check, ...]:
-    """Whether the springs that the calibration began from explain the frequency responses that they came from."""
-    return () if stage_one is None else (check_misfit(read_misfit(stage_one["misfit"])),)
-
-
 def _accuracy_section(study: CalibrationStudy) -> Section:
     points, seen = study.points, study.results["identifiability"]
-    words, held = MeasuredWords.of(points.poses), _held(points)
+    words, held = MeasuredWords.of(points.poses), in_sockets(points)
     ranks = {RIGID: str(seen["rank"]), CALIBRATED: str(seen["selected"]["rank"])}
     rows = [(*row, NOTHING) for row in uncalibrated_rows(points)]
     for model, label in _LABELS.items():

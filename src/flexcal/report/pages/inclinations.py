@@ -8,8 +8,8 @@ from typing import Any
 
 from flexcal.calibration.verification import MILLIRADIAN, MeasuredTilts, TiltStatistics
 from flexcal.estimation import Estimate
-from flexcal.report.checks import Trust, check_held_out_tilts, check_rank, check_residual
-from flexcal.report.layout import Check, Fact, Page, Section, Text, Verdict, sentences, significant
+from flexcal.report.checks import Trust, inclination_checks
+from flexcal.report.layout import Fact, Page, Section, Text, Verdict, sentences, significant
 from flexcal.report.pages.two_stage import HEADLINES
 from flexcal.report.results import IdentifiableParameters
 from flexcal.report.sections import (
@@ -59,21 +59,6 @@ def inclination_page(study: InclinationStudy) -> Page:
         verdict=_verdict(study),
         sections=sections,
         document=results,
-    )
-
-
-def inclination_checks(
-    results: Mapping[str, Any], estimate: Estimate, after: TiltStatistics
-) -> tuple[Check, ...]:
-    """The checks behind the verdict."""
-    seen = IdentifiableParameters.stored(results["identifiability"]["selected"])
-    share = seen.rank / max(after.readings, 1)
-    return (
-        check_held_out_tilts(after.mean / MILLIRADIAN, share, results["held_out"]).named(
-            "left_out", independent=True
-        ),
-        check_residual("Are the residuals noise of the inclinometers?", estimate).named("residual"),
-        check_rank(seen.parameters, seen.rank, seen.gap).named("rank"),
     )
 
 

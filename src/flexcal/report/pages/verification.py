@@ -8,21 +8,12 @@ from typing import Any
 
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.verification import ArmPoses, MeasuredPoints, PredictionErrors
-from flexcal.report.checks import (
-    Trust,
-    check_claimed_uncertainty,
-    check_enough,
-    check_flanks,
-    check_known_points,
-    check_setup_unchanged,
-    check_unseen,
-)
+from flexcal.report.checks import Trust, verification_checks
 from flexcal.report.figures import ErrorSeries, error_distribution, predicted_quantiles, verification_errors
 from flexcal.report.layout import (
     ELASTIC,
     NOMINAL,
     Block,
-    Check,
     FigureBlock,
     Page,
     Section,
@@ -117,28 +108,6 @@ def _refitted(results: Mapping[str, Any]) -> str:
         {"station": "place of the instrument", "point": "measured point"}[w] for w in refit["what"]
     )
     return f" Fitted to these points: {words}; errors are leave-one-out errors, so this tests the geometry alone."
-
-
-def verification_checks(results: Mapping[str, Any], points: MeasuredPoints) -> tuple[Check, ...]:
-    """The checks behind the verdict; `results` is the document of results.json."""
-    verification = points.verification
-    flanks = (check_flanks(verification).named("flanks"),) if results["backlash"] else ()
-    return (
-        check_unseen(results["fitted"]).named("unseen_poses", independent=True),
-        check_enough(verification.all.poses).named("enough_poses"),
-        check_claimed_uncertainty(results["prediction"]).named("claimed_uncertainty", independent=True),
-        *flanks,
-        *(
-            (check_known_points(results["uncalibrated_points"]).named("calibrated_points"),)
-            if results.get("uncalibrated_points")
-            else ()
-        ),
-        *(
-            (check_setup_unchanged(results["refit_proposed"]).named("moved"),)
-            if results.get("refit_proposed")
-            else ()
-        ),
-    )
 
 
 def _errors_section(study: VerificationStudy) -> Section:
