@@ -18,9 +18,10 @@ from flexcal.dynamics.diagnostics import TorquePrediction
 from flexcal.files.formats import read_estimates
 from flexcal.jobs.dynamics import identify_robot_dynamics
 from flexcal.jobs.pages import report_folder
+from flexcal.report.checks import dynamics_checks
 from flexcal.report.figures import torque_traces
 from flexcal.report.layout import significant
-from flexcal.report.pages import DynamicsStudy, dynamics_checks
+from flexcal.report.pages import DynamicsStudy
 from flexcal.report.pages.dynamics import dynamics_verdict
 from flexcal.report.sections import friction_section, signals_table
 from flexcal.report.sections.base_parameters import base_correlation

@@ -6,8 +6,6 @@ import numpy as np
 
 _SAME = 0.01
 """Difference of joint positions, rad or m, below which poses are the same."""
-_SIDES = ((-1.001, "left"), (1.001, "right"))
-"""Both ends of an interval that is wider than this by more than rounding."""
 
 
 def repeated_pose_numbers(q: np.ndarray) -> np.ndarray:
@@ -18,7 +16,9 @@ def repeated_pose_numbers(q: np.ndarray) -> np.ndarray:
     # only those within 0.01 in the coordinate that varies most may be the same
     along = q[:, np.argmax(np.ptp(q, axis=0))]
     order = np.argsort(along)
-    first, last = (np.searchsorted(along[order], along + side * _SAME, which) for side, which in _SIDES)
+    reach = 1.001 * _SAME  # wider by more than rounding
+    first = np.searchsorted(along[order], along - reach)
+    last = np.searchsorted(along[order], along + reach)
     for row in range(len(q)):
         if result[row] < 0:
             close = order[first[row] : last[row]]
