@@ -45,6 +45,7 @@ SUBJECTS = {
     "SERVE": "Server",
     "STIFF": "Stiffness",
     "STUDIO": "Studio",
+    "STUDY": "Studies",
     "TABLE": "Tables",
     "TOOL": "Tool and work object",
     "URDF": "URDF",

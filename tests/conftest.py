@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -50,6 +50,22 @@ def root() -> Path:
 def examples() -> Path:
     """The folder of the examples; read only: tests that write copy what they need to `tmp_path`."""
     return ROOT / "examples"
+
+
+@pytest.fixture(scope="session")
+def dask_cluster() -> Iterator[Any]:
+    """A Dask scheduler with two worker processes, which are started again where they are killed."""
+    import distributed
+
+    started: Any = distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0")
+    with started:
+        yield started
+
+
+@pytest.fixture
+def dask_address(dask_cluster: Any) -> str:
+    """Its address, as `--on` takes it."""
+    return dask_cluster.scheduler_address.replace("tcp://", "dask://")
 
 
 @pytest.fixture(scope="session")

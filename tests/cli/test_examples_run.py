@@ -64,6 +64,18 @@ def foreign_file(folder: Path, examples: Path) -> list[str]:
     return ["import", "completion"]
 
 
+def small_study(folder: Path, examples: Path) -> list[str]:
+    shutil.copytree(examples / "ur5_tracker", folder, dirs_exist_ok=True)
+    text = (
+        (folder / "study.yaml")
+        .read_text("utf-8")
+        .replace("count: 10", "count: 1")
+        .replace("[20, 40]", "[12]")
+    )
+    (folder / "study.yaml").write_text(text, "utf-8")
+    return ["study"]
+
+
 def calibrated_arm(folder: Path, examples: Path) -> list[str]:
     """The real UR5, as if the robot that its calibration found were the real one: what a tracker sees of it is drawn from that."""
     shutil.copytree(examples / "ur5_tracker", folder, dirs_exist_ok=True)
@@ -203,6 +215,7 @@ PROCEDURE += ("identify response", "identify stiffness", "design poses", "calibr
 PLACES = {
     own_robot: {"init"},
     foreign_file: {"import", "completion"},
+    small_study: {"study"},
     calibrated_arm: {
         "identify tool",
         "identify frame",
@@ -231,7 +244,9 @@ def test_every_verb_has_a_place() -> None:
     assert named | {"demo", "serve", "studio"} == {verb.name for verb in VERBS}
 
 
-@pytest.mark.parametrize("place", [own_robot, foreign_file, calibrated_arm], ids=lambda place: place.__name__)
+@pytest.mark.parametrize(
+    "place", [own_robot, foreign_file, small_study, calibrated_arm], ids=lambda place: place.__name__
+)
 def test_quick_examples_run(place, tmp_path: Path, examples: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     here(place, tmp_path, examples, monkeypatch)
 

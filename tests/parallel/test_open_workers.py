@@ -27,8 +27,8 @@ def processes() -> Iterator[Workers]:
 
 
 @pytest.fixture(scope="session")
-def on_dask(cluster: distributed.LocalCluster) -> Iterator[Workers]:
-    with open_workers(cluster.scheduler_address.replace("tcp://", "dask://"), 1) as workers:
+def on_dask(dask_cluster: distributed.LocalCluster) -> Iterator[Workers]:
+    with open_workers(dask_cluster.scheduler_address.replace("tcp://", "dask://"), 1) as workers:
         yield workers
 
 
@@ -82,8 +82,8 @@ def test_a_task_that_kills_every_worker_is_an_error_and_the_others_go_on(tmp_pat
 
 
 @pytest.mark.slow
-def test_also_on_a_cluster(address: str, tmp_path: Path) -> None:
-    check_deadly(address, tmp_path)
+def test_also_on_a_cluster(dask_address: str, tmp_path: Path) -> None:
+    check_deadly(dask_address, tmp_path)
 
 
 def check_deadly(on: str | None, folder: Path) -> None:

@@ -350,6 +350,20 @@ STEPS = (
         ),
     ),
     Step(
+        "Run it many times",
+        (
+            Verb(
+                ("study",),
+                "study",
+                "Study",
+                "many calibrations over seeds, options or resampled data, on all cores or a Dask cluster; a row of a table each",
+                "flexcal study study.yaml --out study",
+                ("tasks.parquet", "results.json", "report.html"),
+                interactive=True,
+            ),
+        ),
+    ),
+    Step(
         "All of it in a window",
         (
             Verb(

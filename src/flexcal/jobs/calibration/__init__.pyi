@@ -1,20 +1,27 @@
+from .fits import Fits, FitSettings, sampled
 from .fitted_measurements import fitted_files, fitted_points, measurement_digests
+from .held_out import held_out_group
 from .ignored_columns import ignored_columns_remarks
 from .job import calibrate_robot
 from .joint_ranges import outside_ranges
-from .procedure import calibrate
+from .procedure import calibrate, requested_terms
 from .result import Calibration
 from .subsample import subsample_document, verification_subsample_remark
 
 __all__ = [
     "Calibration",
+    "FitSettings",
+    "Fits",
     "calibrate",
     "calibrate_robot",
     "fitted_files",
     "fitted_points",
+    "held_out_group",
     "ignored_columns_remarks",
     "measurement_digests",
     "outside_ranges",
+    "requested_terms",
+    "sampled",
     "subsample_document",
     "verification_subsample_remark",
 ]

@@ -83,13 +83,14 @@ def held_out_errors(
     groups = {}
     for name in names:
         own = labels == name
-        groups[str(name)] = _compared(
+        groups[str(name)] = held_out_group(
             calibrated(poses.subset(~own)), poses.subset(own).pointed, set(poses.station[~own])
         )
     return HeldOut(by, groups, left_out)
 
 
-def _compared(model: RobotModel, poses: PoseSet, known: set[str]) -> HeldOutGroup:
+def held_out_group(model: RobotModel, poses: PoseSet, known: set[str]) -> HeldOutGroup:
+    """Errors of a calibrated robot at poses that were left out; stations that are not `known` to it are placed by these."""
     model = model.with_stations(poses.places)
     at = predict_measurements(model, poses)
     errors = poses.position - at.position

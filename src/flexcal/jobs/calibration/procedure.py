@@ -107,7 +107,7 @@ def calibrate(
     nominal, measured = model, poses
     sample = StratifiedSample.of(measured)
     poses = measured if sample is None else measured.subset(sample.rows)
-    requested = _terms(model, terms)
+    requested = requested_terms(model, terms)
     if prior is not None:
         requested = tuple(dict.fromkeys([*prior.terms, *(requested or ()), TRANSMISSION]))
     settings = FitSettings(requested, loss, secant_scale, elasticity, prior)
@@ -183,8 +183,11 @@ def _require_uncalibrated(model: RobotModel) -> None:
         )
 
 
-def _terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str, ...] | None:
-    """Terms to fit; None for those that cross-validation supports."""
+def requested_terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str, ...] | None:
+    """Terms to fit, those of robot.yaml where none are given; None for those that cross-validation supports.
+
+    Raises `FlexcalError` for a term that there is not, and for terms that exclude each other.
+    """
     declared = model.config.geometry.terms
     asked = tuple(given) if given else ((declared,) if isinstance(declared, str) else declared)
     if asked == (AUTO,):

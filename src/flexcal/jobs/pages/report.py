@@ -27,6 +27,7 @@ from flexcal.jobs.result_files import (
     read_predictions,
     read_response_arrays,
     read_results,
+    read_study_rows,
     read_tilts,
     read_verification,
 )
@@ -41,6 +42,7 @@ from flexcal.report.pages import (
     RecheckStudy,
     ResponseStudy,
     StiffnessStudy,
+    StudyReport,
     VerificationStudy,
     actuators_page,
     calibration_page,
@@ -53,10 +55,11 @@ from flexcal.report.pages import (
     recheck_page,
     response_page,
     stiffness_page,
+    study_page,
     two_stage_page,
     verification_page,
 )
-from flexcal.report.results import TX90L_PAPER, TwoStageStudy
+from flexcal.report.results import TX90L_PAPER, StudyTable, TwoStageStudy, study_statistics
 from flexcal.units import MILLIMETRE
 
 REPORT = "report.html"
@@ -112,6 +115,8 @@ def _page(folder: Path, results: Mapping[str, Any], kind: Kind) -> Page:
     if kind == "stiffness":
         stiffness = StiffnessStudy(results, _block(folder, "stiffness"), read_fitted_responses(folder))
         return stiffness_page(stiffness)
+    if kind == "study":
+        return study_page(stored_study(folder, results))
     if kind == "excitation":
         return excitation_page(ExcitationStudy(results, read_response_arrays(folder)))
     if kind == "response":
@@ -159,6 +164,15 @@ def two_stage_study(folder: Path) -> TwoStageStudy:
         exact=exact,
         paper=TX90L_PAPER if results["robot"] == "tx90l" else None,
     )
+
+
+def stored_study(folder: Path, results: Mapping[str, Any]) -> StudyReport:
+    """Study with the statistics of the rows that are stored, of which there are more than when results.json was written while it runs."""
+    frame = read_study_rows(folder).frame
+    failed = int(frame["error"].is_not_null().sum()) if "error" in frame.columns else 0
+    count = {"total": results["tasks"]["total"], "done": len(frame), "failed": failed}
+    table = StudyTable.of(frame, results)
+    return StudyReport({**results, "tasks": count, **study_statistics(table)}, table)
 
 
 def _tilts(folder: Path, results: Mapping[str, Any]) -> MeasuredTilts | None:

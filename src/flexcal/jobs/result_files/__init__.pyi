@@ -17,19 +17,37 @@ from .estimates import ESTIMATES, estimates_target
 from .fitted_responses import read_fitted_responses, write_fitted_responses
 from .points import read_arm, read_loads, read_points, write_arm, write_loads, write_points
 from .response_arrays import read_response_arrays, write_response_arrays
+from .study_tables import (
+    KEY,
+    NUMBER,
+    PARTS,
+    TASKS,
+    StudyRows,
+    has_parts,
+    read_study_rows,
+    remove_parts,
+    write_part,
+    write_tasks,
+)
 from .tilts import read_tilts, write_tilts
 from .torque_predictions import read_predictions, write_predictions
 from .verification_points import VERIFICATION, read_verification, write_verification
 
 __all__ = [
     "ESTIMATES",
+    "KEY",
     "NOT_RECORDED",
+    "NUMBER",
+    "PARTS",
     "RESULTS",
+    "TASKS",
     "VERIFICATION",
     "Kind",
     "RunRecord",
+    "StudyRows",
     "dropped_parameters",
     "estimates_target",
+    "has_parts",
     "header",
     "identifiability_block",
     "identifiability_spectrum",
@@ -42,16 +60,20 @@ __all__ = [
     "read_predictions",
     "read_response_arrays",
     "read_results",
+    "read_study_rows",
     "read_tilts",
     "read_verification",
+    "remove_parts",
     "springs_block",
     "write_arm",
     "write_fitted_responses",
     "write_loads",
+    "write_part",
     "write_points",
     "write_predictions",
     "write_response_arrays",
     "write_results",
+    "write_tasks",
     "write_tilts",
     "write_verification",
 ]

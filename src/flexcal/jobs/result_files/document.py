@@ -37,6 +37,7 @@ Kind = Literal[
     "repeatability",
     "response",
     "stiffness",
+    "study",
     "tool",
     "verification",
 ]

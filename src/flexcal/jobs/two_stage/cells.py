@@ -28,12 +28,20 @@ class KnownCell(Cell, Protocol):
 
 
 def open_cell(
-    kind: CellName, robot_file: Path, nominal: RobotModel, *, truth: Path | None, hidden: Path, seed: int
+    kind: CellName,
+    robot_file: Path,
+    nominal: RobotModel,
+    *,
+    truth: Path | None,
+    hidden: Path,
+    seed: int,
+    config: CellConfig | None = None,
 ) -> KnownCell:
     """Cell with the robot of `robot_file`; the true values of the model's parameters are written to the file `hidden`.
 
-    They are drawn from `seed`, or those of the file `truth`; of a hard robot only those that have a counterpart in the model. Raises
-    `FlexcalError` where the cell cannot hold the robot, and for a `truth` of a hard one.
+    A virtual cell has the settings `config`, by default those of cell.yaml. The values are drawn from `seed`, or those of the file `truth`;
+    of a hard robot only those that have a counterpart in the model. Raises `FlexcalError` where the cell cannot hold the robot, and for a
+    `truth` of a hard one.
     """
     if kind == "hard":
         if truth is not None:
@@ -44,7 +52,7 @@ def open_cell(
         cell = HardCell.drawn(robot_file, seed)
         write_truth(hidden, counterparts(cell.robot))
         return cell
-    config = read_yaml(robot_file.parent / "cell.yaml", CellConfig)
-    cell, values = VirtualCell.drawn(nominal, config, seed, truth)
+    settings = read_yaml(robot_file.parent / "cell.yaml", CellConfig) if config is None else config
+    cell, values = VirtualCell.drawn(nominal, settings, seed, truth)
     write_truth(hidden, values)
     return cell

@@ -62,7 +62,7 @@ from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust
 from flexcal.report.pages import two_stage_checks
 from flexcal.report.results import fitted_responses
-from flexcal.virtual_cell import read_truth
+from flexcal.virtual_cell import CellConfig, read_truth
 
 CALIBRATION_POSES, QUICK_POSES = 40, 25
 RIGID_POSES = (40, 100)
@@ -94,6 +94,7 @@ def run_two_stage(
     seed: int = 0,
     plan: PlanName = "default",
     cell: CellName = "virtual",
+    config: CellConfig | None = None,
     truth: Path | None = None,
     inertias_known: bool = False,
     report: bool = True,
@@ -102,12 +103,12 @@ def run_two_stage(
 ) -> TwoStageRun:
     """Run the two-stage calibration on a simulated robot and write every intermediate file, results.json and report.html in `out`.
 
-    `robot_file` is a robot.yaml with frequency_poses.csv and, for the virtual cell, cell.yaml beside it. The hidden truth is drawn from
-    `seed`, or taken from the file `truth`; it is written to `out`/truth.yaml and read back only after everything has been identified and
-    stored. `inertias_known` gives the identification the true link inertias, to see what CAD costs. The plans `designed` and `quick` are
-    chosen for the robot as stage 0 left it; `quick` takes half the time, and 25 calibration poses instead of 40. The robot of the hard
-    `cell` has other parameters than the model: truth.yaml holds those that have a counterpart. What CAD alone would have found is told for
-    the virtual cell.
+    `robot_file` is a robot.yaml with frequency_poses.csv and, for a virtual cell without `config`, cell.yaml beside it. The hidden truth is
+    drawn from `seed`, or taken from the file `truth`; it is written to `out`/truth.yaml and read back only after everything has been
+    identified and stored. `inertias_known` gives the identification the true link inertias, to see what CAD costs. The plans `designed` and
+    `quick` are chosen for the robot as stage 0 left it; `quick` takes half the time, and 25 calibration poses instead of 40. The robot of
+    the hard `cell` has other parameters than the model: truth.yaml holds those that have a counterpart. What CAD alone would have found is
+    told for the virtual cell.
 
     Raises `FlexcalError` for files that do not fit.
     """
@@ -115,7 +116,7 @@ def run_two_stage(
     nominal = RobotModel.from_yaml(robot_file, estimates=False)
     out.mkdir(parents=True, exist_ok=True)
     hidden = out / "truth.yaml"
-    robot_in_cell = open_cell(cell, robot_file, nominal, truth=truth, hidden=hidden, seed=seed)
+    robot_in_cell = open_cell(cell, robot_file, nominal, truth=truth, hidden=hidden, seed=seed, config=config)
     dynamics = None
     if inertias_known:
         believed = nominal.with_values(_inertias(read_truth(hidden)))

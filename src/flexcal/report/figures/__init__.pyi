@@ -26,6 +26,7 @@ from .residuals import (
     residual_workspace,
 )
 from .robot_arm import arm_poses, links_at
+from .study_distributions import interval_coverage, level_distributions, task_distribution
 from .tilts import tilt_joints, tilt_order
 from .tool_path import program_path
 from .torques import torque_spectra, torque_traces
@@ -47,8 +48,10 @@ __all__ = [
     "error_field",
     "error_histogram",
     "fleet_errors",
+    "interval_coverage",
     "joint_positions",
     "learning_curves",
+    "level_distributions",
     "limit_shares",
     "links_at",
     "loaded_joints",
@@ -73,6 +76,7 @@ __all__ = [
     "singular_values",
     "spring_intervals",
     "swept_paths",
+    "task_distribution",
     "term_label",
     "term_scores",
     "tilt_joints",

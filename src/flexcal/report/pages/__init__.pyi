@@ -18,6 +18,7 @@ from .recheck import RecheckStudy, recheck_page
 from .repeatability import RepeatabilityStudy, repeatability_page
 from .run_comparison import comparison_page
 from .stiffness import StiffnessStudy, stiffness_checks, stiffness_page
+from .study import StudyReport, study_page
 from .trajectory_design import trajectory_page
 from .two_stage import two_stage_checks, two_stage_page
 from .verification import VerificationStudy, verification_page
@@ -39,6 +40,7 @@ __all__ = [
     "RepeatabilityStudy",
     "ResponseStudy",
     "StiffnessStudy",
+    "StudyReport",
     "VerificationStudy",
     "actuators_page",
     "calibration_page",
@@ -60,6 +62,7 @@ __all__ = [
     "response_page",
     "stiffness_checks",
     "stiffness_page",
+    "study_page",
     "trajectory_page",
     "two_stage_checks",
     "two_stage_page",

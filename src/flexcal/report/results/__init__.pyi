@@ -6,10 +6,13 @@ from .particulars import NOT_GIVEN, MeasurementDetails
 from .published_values import TX90L_PAPER, PublishedValues
 from .run_significance import LEVEL, ParameterChanges, parameter_changes
 from .runs import Comparison, Run
+from .study_summary import NOMINAL_COVERAGE, binomial_interval, study_level_rows, study_statistics
+from .study_table import StudyTable
 from .two_stage_study import TwoStageStudy
 
 __all__ = [
     "LEVEL",
+    "NOMINAL_COVERAGE",
     "NOT_GIVEN",
     "TX90L_PAPER",
     "Comparison",
@@ -20,13 +23,17 @@ __all__ = [
     "ParameterChanges",
     "PublishedValues",
     "Run",
+    "StudyTable",
     "TwoStageStudy",
     "amount",
+    "binomial_interval",
     "chance_in_words",
     "change_sentence",
     "explanation_in_words",
     "fitted_responses",
     "parameter_changes",
     "relative_to_diagonal",
+    "study_level_rows",
+    "study_statistics",
     "uncertainty_sentence",
 ]

@@ -19,6 +19,9 @@ from .selected_terms import terms_section
 from .signal_processing import signals_table
 from .springs import hardening_sentence, spring_table, unseen_springs
 from .stiffness import response_blocks, stiffness_section
+from .study_coverage import coverage_range, coverage_section
+from .study_effects import effects_section
+from .study_resampling import resampling_section
 from .tilts import tilts_section
 from .torques import recording_labels, torque_blocks
 from .uncalibrated import uncalibrated_ranges, uncalibrated_rows, uncalibrated_table
@@ -35,6 +38,9 @@ __all__ = [
     "common_origin",
     "comparison_section",
     "coverage",
+    "coverage_range",
+    "coverage_section",
+    "effects_section",
     "error_figures",
     "error_range",
     "exaggeration",
@@ -55,6 +61,7 @@ __all__ = [
     "parameter_table",
     "provenance_section",
     "recording_labels",
+    "resampling_section",
     "residual_blocks",
     "residuals_section",
     "response_blocks",

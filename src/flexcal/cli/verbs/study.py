@@ -1,0 +1,90 @@
+"""`flexcal study`."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from tyro.conf import Positional, arg
+
+from flexcal.cli.arguments.invocation import command_line
+from flexcal.cli.arguments.shared_options import Json, require_at_least
+from flexcal.cli.arguments.verb_table import VERBS
+from flexcal.cli.folders.overwrite_protection import outputs
+from flexcal.cli.terminal.console import Console
+
+
+@dataclass(frozen=True)
+class Study:
+    """Run many tasks: calibrations of virtual robots over seeds and options, or of resampled measurements; each a row of a table.
+
+    Rows are stored as tasks end. An interrupted study goes on with --resume. A failed task is a row with its error. Tasks run in processes
+    of this machine or, with --on, on a Dask cluster, with the same results.
+    """
+
+    study: Annotated[Positional[Path], arg(metavar="STUDY", help="STUDY.yaml: robot, kind of task, options")]
+    out: Annotated[Path, arg(metavar="DIR")] = Path("study")
+    """Folder for tasks.parquet, results.json and report.html, and, while the study runs, parts."""
+    on: Annotated[str | None, arg(metavar="ADDRESS", help_behavior_hint="(default: this machine)")] = None
+    """Dask scheduler, dask://host:port or tls://host:port. Its workers need the same flexcal, and run whatever they are sent: use only a
+    cluster of your own."""
+    jobs: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: one a core)")] = None
+    """Number of processes on this machine."""
+    resume: bool = False
+    """Go on with the study in DIR: only tasks that are not stored yet run."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Run the tasks, and print what they say together."""
+        from flexcal.jobs.study import read_study, run_study
+        from flexcal.parallel import open_workers
+
+        leaves = next(verb.leaves for verb in VERBS if verb.name == "study")
+        if self.jobs is not None:
+            require_at_least(1, jobs=self.jobs)
+        console = Console(self.json)
+        plan = read_study(self.study)
+        jobs = min(self.jobs or os.cpu_count() or 1, len(plan.rows))
+        with open_workers(self.on, jobs) as workers, console.progress() as progress:
+            document = run_study(
+                plan,
+                self.out,
+                workers,
+                resume=self.resume,
+                command=command_line(),
+                progress=progress,
+                publishing=lambda: outputs("study", self.out, leaves),
+            )
+        for line in _lines(document):
+            console.say(line)
+        console.finish(document, f"open {self.out / 'report.html'}")
+
+
+def _lines(document: dict[str, Any]) -> list[str]:
+    count = document["tasks"]
+    lines = [
+        *document["remarks"],
+        f"{count['done']} of {count['total']} tasks have ended, {count['failed']} with an error",
+    ]
+    error = document["errors"].get(document["error"], {}).get("p90_mm")
+    if error and error["tasks"]:
+        lines.append(
+            f"90th percentile of the errors ({document['error']}): median {error['median']:.4f} mm over the tasks, "
+            f"{error['low']:.4f} to {error['high']:.4f} mm in 95 % of them"
+        )
+    covered = document["coverage"]
+    if covered and covered["low"] is not None:
+        lines.append(
+            f"95 % intervals that hold the true value: {100 * covered['share']:.1f} % "
+            f"({100 * covered['low']:.1f} to {100 * covered['high']:.1f} %)"
+        )
+    for item in document["effects"]:
+        if item["share"] is not None:
+            lines.append(
+                f"{item['option']} explains {100 * item['share']:.0f} % of the variance between tasks"
+            )
+    for item in document["failures"][:3]:
+        lines.append(f"failed, {item['tasks']} tasks: {item['error']}")
+    return lines

@@ -1,0 +1,226 @@
+"""The report of a study (`flexcal study`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from flexcal.report.figures import task_distribution
+from flexcal.report.layout import (
+    Check,
+    Fact,
+    FigureBlock,
+    Page,
+    Section,
+    Table,
+    Verdict,
+    document_millimetres,
+    percent,
+    significant,
+    worst,
+)
+from flexcal.report.results import NOMINAL_COVERAGE, StudyTable
+from flexcal.report.sections import (
+    coverage_range,
+    coverage_section,
+    effects_section,
+    provenance_section,
+    resampling_section,
+)
+
+_NAMES = {
+    "verification": "at fresh poses, against the truth",
+    "measured": "at fresh poses, as the instrument reads them",
+    "fit": "at the poses of the fit",
+    "left_out": "at the measurements left out",
+    "rigid": "calibrated as rigid, against the truth",
+    "nominal": "nominal robot, registered, against the truth",
+}
+_KINDS = {
+    "virtual_calibration": "calibrations of virtual robots",
+    "two_stage": "two-stage calibrations of virtual robots",
+    "calibrate": "calibrations on measured poses",
+}
+_LISTED = 100
+"""Largest number of messages in a table."""
+
+
+@dataclass(frozen=True, eq=False)
+class StudyReport:
+    """The document of a study, results.json, with the statistics of the rows of its `table`."""
+
+    results: Mapping[str, Any]
+    table: StudyTable
+
+
+def study_page(study: StudyReport) -> Page:
+    """The page before it becomes HTML."""
+    results = study.results
+    sections = [_errors_section(study)]
+    sections += (
+        []
+        if not results["coverage"] or not results["coverage"]["tasks"]
+        else [coverage_section(results["coverage"])]
+    )
+    sections += [effects_section(results, study.table)] if results["effects"] else []
+    sections += [] if results["resampling"] is None else [resampling_section(results["resampling"])]
+    sections += [_failures_section(results)] if results["failures"] else []
+    sections.append(provenance_section(results["command"], None, {}, results["provenance"]))
+    count = results["tasks"]
+    return Page(
+        title=f"{results['name']}: study of {count['total']} {_KINDS[results['study']]}",
+        subtitle=f"{count['done']} of {count['total']} tasks have ended, {count['failed']} with an error",
+        verdict=_verdict(results),
+        sections=sections,
+        document=results,
+    )
+
+
+def _verdict(results: Mapping[str, Any]) -> Verdict:
+    checks = _checks(results)
+    error = results["errors"].get(results["error"], {}).get("p90_mm")
+    facts = []
+    if error and error["tasks"]:
+        range_ = f"{document_millimetres(error['low'])} to {document_millimetres(error['high'])} mm in 95 % of the tasks."
+        words = _NAMES[results["error"]]
+        facts.append(
+            Fact(
+                f"How large are the errors {words}?",
+                document_millimetres(error["median"]),
+                "mm",
+                f"Median over the tasks of the 90th percentile of the errors; {range_}",
+            )
+        )
+    covered = results["coverage"]
+    if covered and covered["share"] is not None:
+        detail = (
+            f"95 % interval {coverage_range(covered)}."
+            if covered["low"] is not None
+            else "One task alone has no interval of this share."
+        )
+        facts.append(
+            Fact(
+                "Do the 95 % intervals hold the truth?",
+                percent(covered["share"]),
+                "",
+                f"Share of all intervals; {detail}",
+            )
+        )
+    if results["effects"] and results["effects"][0]["share"] is not None:
+        first = results["effects"][0]
+        facts.append(
+            Fact(
+                "What drives the error most?",
+                percent(first["share"]),
+                "",
+                f"of the variance between tasks is explained by {first['option']}.",
+            )
+        )
+    count = results["tasks"]
+    headline = (
+        f"{count['done']} tasks"
+        if count["done"] == count["total"]
+        else f"{count['done']} of {count['total']} tasks; the study is not complete"
+    )
+    sentence = (
+        f"{count['failed']} failed; a failed task is in no statistic." if count["failed"] else "None failed."
+    )
+    seconds = results["seconds"]
+    if seconds["tasks"]:
+        sentence += f" A task takes {significant(seconds['median'], 2)} s (median)."
+    return Verdict(worst(checks), headline, sentence, tuple(facts), (), "", checks)
+
+
+def _checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
+    count, covered = results["tasks"], results["coverage"]
+    missing = count["total"] - count["done"]
+    checks = [
+        Check(
+            "Have all tasks ended?",
+            "Yes." if not missing else f"{missing} have not: 'flexcal study --resume' goes on.",
+            "care" if missing else "good",
+        ),
+        Check(
+            "Did all succeed?",
+            f"{count['failed']} of {count['done']} failed; their messages are below."
+            if count["failed"]
+            else "Yes.",
+            "care" if count["failed"] else "good",
+        ),
+    ]
+    if covered and covered["low"] is not None:
+        holds = covered["low"] <= NOMINAL_COVERAGE <= covered["high"]
+        answer = f"{percent(covered['share'])} of the intervals hold the true value, 95 % interval of this share {coverage_range(covered)}"
+        small = covered["high"] < NOMINAL_COVERAGE
+        answer += (
+            "."
+            if holds
+            else f": the stated uncertainties are too {'small' if small else 'large'} under these options."
+        )
+        checks.append(
+            Check(
+                "Do the 95 % intervals hold the true values in 95 % of cases?",
+                answer,
+                "good" if holds else "bad" if small else "care",
+            )
+        )
+    elif results["has_truth"]:
+        checks.append(
+            Check(
+                "Do the 95 % intervals hold the true values in 95 % of cases?",
+                "Too few tasks to tell.",
+                "unknown",
+            )
+        )
+    return tuple(checks)
+
+
+def _errors_section(study: StudyReport) -> Section:
+    results, rows = study.results, []
+    for name, block in results["errors"].items():
+        for key, label in (("mean_mm", "mean"), ("p90_mm", "90th percentile"), ("max_mm", "maximum")):
+            item = block[key]
+            cells = (document_millimetres(item[what]) for what in ("median", "low", "high"))
+            rows.append((f"{_NAMES.get(name, name)}: {label}", *cells, str(item["tasks"])))
+    columns = ("errors", "median / mm", "2.5 % / mm", "97.5 % / mm", "tasks")
+    curves = {
+        str(_NAMES.get(name, name)): study.table.numbers(f"{name}.p90_mm") for name in results["errors"]
+    }
+    blocks = [
+        Table(
+            "table-errors",
+            "Errors of a task: median over the tasks, and the range of 95 % of them",
+            columns,
+            tuple(rows),
+        ),
+        FigureBlock(
+            "figure-errors",
+            "Distribution over the tasks",
+            task_distribution(curves),
+            "Each task counts once, by the 90th percentile of its errors.",
+            "Cumulative distributions of the errors of tasks.",
+        ),
+    ]
+    return Section("errors", "Errors", "", tuple(blocks))
+
+
+def _failures_section(results: Mapping[str, Any]) -> Section:
+    listed = results["failures"][:_LISTED]
+    rows = tuple(
+        (item["code"] or "unexpected", item["error"], str(item["tasks"]), str(item["first"]))
+        for item in listed
+    )
+    caption = (
+        "Messages of failed tasks"
+        if len(listed) == len(results["failures"])
+        else f"The {_LISTED} most frequent messages of failed tasks"
+    )
+    table = Table(
+        "table-failures",
+        caption,
+        ("code", "message", "tasks", "number of the first"),
+        rows,
+        text_columns=(1,),
+    )
+    return Section("failures", "Failed tasks", "", (table,))

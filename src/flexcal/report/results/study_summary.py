@@ -1,0 +1,199 @@
+"""Statistics of a study: distributions, coverage of intervals, effects of options, agreement of resamples."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from flexcal.estimation import student_quantile
+from flexcal.report.results.study_table import StudyTable
+
+NOMINAL_COVERAGE = 0.95
+_BINS, _FEW = 6, 8
+"""Bins of an option with more numbers than a few."""
+_STATISTICS = ("mean_mm", "p90_mm", "max_mm")
+_SMALLEST = 1e-9
+
+
+def study_statistics(table: StudyTable) -> dict[str, Any]:
+    """Blocks of results.json: `errors`, `coverage`, `effects`, `resampling`, `failures`, `seconds`."""
+    return {
+        "errors": {
+            name: {key: quantiles(table.numbers(f"{name}.{key}")) for key in _STATISTICS}
+            for name in table.errors
+        },
+        "coverage": coverage(table) if table.has_truth else None,
+        "effects": effects(table),
+        "resampling": resampling(table),
+        "failures": failures(table),
+        "seconds": quantiles(table.numbers("seconds")),
+    }
+
+
+def quantiles(values: np.ndarray) -> dict[str, float | int | None]:
+    """Number, mean, median, and the 2.5 %, 90 % and 97.5 % quantiles of the finite values."""
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return {"tasks": 0, "mean": None, "median": None, "low": None, "p90": None, "high": None}
+    low, middle, p90, high = np.quantile(finite, [0.025, 0.5, 0.9, 0.975])
+    return {
+        "tasks": len(finite),
+        "mean": float(finite.mean()),
+        "median": float(middle),
+        "low": float(low),
+    } | {
+        "p90": float(p90),
+        "high": float(high),
+    }
+
+
+def binomial_interval(inside: int, count: int) -> tuple[float, float]:
+    """95 % interval of a probability from `inside` of `count` independent trials (Clopper and Pearson 1934)."""
+    from scipy.special import betaincinv
+
+    tail = (1 - NOMINAL_COVERAGE) / 2
+    low = betaincinv(inside, count - inside + 1, tail) if inside else 0.0
+    high = betaincinv(inside + 1, count - inside, 1 - tail) if inside < count else 1.0
+    return float(low), float(high)
+
+
+def coverage(table: StudyTable, rows: np.ndarray | None = None) -> dict[str, Any]:
+    """How often 95 % intervals hold the true value: of every parameter, with the binomial interval of that share, and of all.
+
+    The intervals of one task share its noise, so that the share of all has an interval from the scatter between tasks. `rows` is a mask.
+    """
+    chosen = np.ones(len(table), bool) if rows is None else rows
+    parameters, held, known = {}, np.zeros(len(table)), np.zeros(len(table))
+    for name in table.parameters:
+        low, high, truth = (table.numbers(f"{name}.{what}") for what in ("low", "high", "truth"))
+        told = np.isfinite(low) & np.isfinite(truth) & chosen
+        count = int(told.sum())
+        if not count:
+            continue
+        inside = told & (low <= truth) & (truth <= high)
+        held += inside
+        known += told
+        bounds = binomial_interval(int(inside.sum()), count)
+        parameters[name] = {
+            "tasks": count,
+            "inside": int(inside.sum()),
+            "share": float(inside.sum() / count),
+        } | {
+            "low": bounds[0],
+            "high": bounds[1],
+        }
+    some = known > 0
+    shares = held[some] / known[some]
+    count = len(shares)
+    mean = float(held.sum() / known.sum()) if count else None
+    half = (
+        float(student_quantile(0.975, count - 1) * shares.std(ddof=1) / np.sqrt(count)) if count > 1 else None
+    )
+    return {
+        "tasks": count,
+        "share": mean,
+        "low": None if mean is None or half is None else max(0.0, mean - half),
+        "high": None if mean is None or half is None else min(1.0, mean + half),
+        "parameters": parameters,
+    }
+
+
+def effects(table: StudyTable) -> list[dict[str, Any]]:
+    """Effect of every option on the logarithm of the 90th percentile of a task's errors.
+
+    `share` is that of the variance between tasks which the levels of the option explain (ε² of Kelley 1935, an adjusted ratio; an option
+    that has no effect has about 0), without interactions; `levels` have the median, and the coverage where the truth is known.
+    """
+    values = table.numbers(f"{table.error}.p90_mm")
+    found = []
+    for name in table.options:
+        labels, order = _levels(table, name)
+        usable = np.isfinite(values) & (values > _SMALLEST) & (labels >= 0)
+        levels = []
+        for number, label in enumerate(order):
+            rows = labels == number
+            own = values[rows & usable]
+            levels.append(
+                {
+                    "value": label,
+                    "tasks": int(rows.sum()),
+                    "median_mm": float(np.median(own)) if len(own) else None,
+                    "coverage": coverage(table, rows)["share"] if table.has_truth else None,
+                }
+            )
+        share = explained_share(np.log(values[usable]), labels[usable])
+        found.append({"option": name.removeprefix("option."), "share": share, "levels": levels})
+    return sorted(found, key=lambda item: -(item["share"] or 0.0))
+
+
+def explained_share(values: np.ndarray, labels: np.ndarray) -> float | None:
+    """Share of the variance of values (N,) between groups of equal labels, adjusted for chance (Kelley's ε²); None for too few."""
+    groups = np.unique(labels)
+    freedom = len(values) - len(groups)
+    if len(groups) < 2 or freedom < 1:
+        return None
+    total = values.var(ddof=1)
+    within = sum(float(((values[labels == g] - values[labels == g].mean()) ** 2).sum()) for g in groups)
+    return max(0.0, float(1 - within / freedom / total)) if total > 0 else 0.0
+
+
+def _levels(table: StudyTable, name: str) -> tuple[np.ndarray, Sequence[Any]]:
+    """Number (N,) of the level of each row, -1 for none, and the levels: values of the option, or bins of equally many."""
+    given = list(table.options[name])
+    numeric = all(isinstance(value, int | float) and not isinstance(value, bool) for value in given)
+    if not numeric or len(given) <= _FEW:
+        numbers = {value: k for k, value in enumerate(sorted(given) if numeric else given)}
+        return np.array([numbers.get(value, -1) for value in table.values(name)], dtype=int), list(numbers)
+    values = table.numbers(name)
+    edges = np.unique(np.quantile(values[np.isfinite(values)], np.linspace(0, 1, _BINS + 1)))
+    bins = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
+    labels = [f"{low:.3g} to {high:.3g}" for low, high in pairwise(edges)]
+    return np.where(np.isfinite(values), bins, -1), labels
+
+
+def resampling(table: StudyTable) -> dict[str, Any] | None:
+    """Spread of every parameter over resampled data sets beside its standard deviation; None where data were not resampled.
+
+    Bootstrap: standard deviation of the estimates; groups left out: the jackknife's √((G − 1)/G Σ (θ − mean)²) (Efron and Tibshirani 1993,
+    chapter 11). `ratio` is the spread over the stated standard deviation. Nothing where options differ, as the spread is theirs too.
+    """
+    names = np.array(table.values("resample"), dtype=object)
+    drawn = np.array([isinstance(n, str) and n not in ("", "all") for n in names], dtype=bool)
+    if not drawn.any() or table.options:
+        return None
+    kind = "bootstrap" if str(names[drawn][0]).startswith("bootstrap ") else "jackknife"
+    parameters = {}
+    for name in table.parameters:
+        estimate, std = table.numbers(f"{name}.estimate"), table.numbers(f"{name}.std")
+        own, whole = estimate[drawn], estimate[names == "all"]
+        own = own[np.isfinite(own)]
+        if len(own) < 2 or not len(whole) or not np.isfinite(whole[0]):
+            continue
+        spread = own.std(ddof=1) if kind == "bootstrap" else np.sqrt((len(own) - 1) * own.var())
+        stated = float(std[names == "all"][0])
+        parameters[name] = {"estimate": float(whole[0]), "std": stated, "spread": float(spread)} | {
+            "ratio": float(spread / stated) if stated > 0 else None,
+            "resamples": len(own),
+        }
+    return {"kind": kind, "resamples": int(drawn.sum()), "parameters": parameters}
+
+
+def study_level_rows(table: StudyTable, name: str) -> list[tuple[Any, np.ndarray]]:
+    """Levels of the column of an option, and the mask (N,) of the rows of each."""
+    labels, order = _levels(table, name)
+    return [(label, labels == number) for number, label in enumerate(order)]
+
+
+def failures(table: StudyTable) -> list[dict[str, Any]]:
+    """Messages of failed tasks, the most frequent first, with the number of tasks and the first of them."""
+    messages, codes, numbers = table.values("error"), table.values("error_code"), table.values("number")
+    told = Counter(message for message in messages if message is not None)
+    return [
+        {"error": message, "code": codes[messages.index(message)], "tasks": count}
+        | {"first": numbers[messages.index(message)]}
+        for message, count in told.most_common()
+    ]

@@ -1,0 +1,58 @@
+"""Rows of a study as columns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import polars
+
+_ESTIMATE = ".estimate"
+
+
+@dataclass(frozen=True, eq=False)
+class StudyTable:
+    """Tasks of a study that have ended: their columns as stored, and what the study declares of them.
+
+    `options` are the values of every option that differs between tasks, by the name of its column; `error` names the errors that are the
+    result of a task.
+    """
+
+    frame: polars.DataFrame
+    options: Mapping[str, Sequence[Any]]
+    error: str
+    has_truth: bool
+
+    @classmethod
+    def of(cls, frame: polars.DataFrame, document: Mapping[str, Any]) -> StudyTable:
+        """The rows of the study that a results.json tells of."""
+        return cls(frame, document["options"], document["error"], document["has_truth"])
+
+    def __len__(self) -> int:
+        return len(self.frame)
+
+    def numbers(self, name: str) -> np.ndarray:
+        """A column (N,) as numbers; NaN where a task has none."""
+        import polars
+
+        if name not in self.frame.columns:
+            return np.full(len(self.frame), np.nan)
+        return self.frame[name].cast(polars.Float64, strict=False).fill_null(np.nan).to_numpy()
+
+    def values(self, name: str) -> list[Any]:
+        """A column as it is."""
+        return self.frame[name].to_list() if name in self.frame.columns else [None] * len(self.frame)
+
+    @property
+    def errors(self) -> tuple[str, ...]:
+        """Kinds of errors that the tasks have, in mm."""
+        return tuple(name.removesuffix(".p90_mm") for name in self.frame.columns if name.endswith(".p90_mm"))
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters that some task has estimated."""
+        return tuple(name.removesuffix(_ESTIMATE) for name in self.frame.columns if name.endswith(_ESTIMATE))

@@ -1,0 +1,43 @@
+"""Resampled estimates of a study beside their stated uncertainty."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from flexcal.report.layout import Section, Table, Text, significant
+
+
+def resampling_section(block: Mapping[str, Any]) -> Section:
+    """Spread of the estimates over resampled data against the stated standard deviation, from `resampling` of results.json."""
+    items = sorted(block["parameters"].items(), key=lambda item: -(item[1]["ratio"] or 0.0))
+    rows = tuple(
+        (
+            name,
+            significant(i["estimate"]),
+            significant(i["std"], 3),
+            significant(i["spread"], 3),
+            significant(i["ratio"], 3),
+        )
+        for name, i in items
+    )
+    ratios = [item["ratio"] for _, item in items if item["ratio"] is not None]
+    middle = f"The median ratio is {significant(float(np.median(ratios)), 3)}. " if ratios else ""
+    how = (
+        "Residuals are drawn anew among those of the same station: errors that are correlated between poses count as independent."
+        if block["kind"] == "bootstrap"
+        else "Groups of measurements are left out one after the other: errors that are common to a group count with it."
+    )
+    words = (
+        f"Spread of the estimates over {block['resamples']} data sets against the standard deviation that the fit states, SI units. "
+        f"{middle}{how}"
+    )
+    columns = ("parameter", "estimate", "stated std", f"{block['kind']} std", "ratio")
+    return Section(
+        "resampling",
+        "Resampled data against stated uncertainty",
+        "",
+        (Text((words,)), Table("table-resampling", "Parameters, the largest ratio first", columns, rows)),
+    )

@@ -1,0 +1,114 @@
+"""What a study file declares, and how it is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from refusals import refused
+from small_study import EXAMPLES, UR5, write_study
+
+from flexcal.jobs.study import read_study
+
+
+def test_every_combination_has_a_row_for_every_seed(tmp_path: Path) -> None:
+    draw = {"count": 3, "options": {"cell.sensors.tracker_noise_m": {"log_uniform": [1e-6, 1e-4]}}}
+    rows = read_study(write_study(tmp_path, draw=draw, seeds={"first": 5, "count": 4})).rows
+    assert len(rows) == len({row.key for row in rows}) == 2 * 3 * 4
+    assert {row.seed for row in rows} == {5, 6, 7, 8} and {row.options["poses"] for row in rows} == {10, 12}
+    noise = {row.options["cell.sensors.tracker_noise_m"] for row in rows}
+    assert len(noise) == 3 and all(1e-6 <= value <= 1e-4 for value in noise)
+
+
+def test_more_seeds_draws_or_values_leave_the_rows_that_there_were(tmp_path: Path) -> None:
+    draw = {
+        "count": 2,
+        "seed": 3,
+        "options": {"cell.spread.angle": {"uniform": [0, 1e-3]}, "plan": {"choice": ["random", "designed"]}},
+    }
+    before = {row.key for row in read_study(write_study(tmp_path, draw=draw)).rows}
+    more = {**draw, "count": 4}
+    after = {
+        row.key
+        for row in read_study(
+            write_study(tmp_path, draw=more, seeds={"count": 3}, grid={"poses": [12, 9, 10]})
+        ).rows
+    }
+    assert before < after
+
+
+def test_groups_and_draws_of_a_data_set(tmp_path: Path) -> None:
+    given = {
+        "kind": "calibrate",
+        "seeds": None,
+        "grid": None,
+        "options": None,
+        "poses": [str(UR5 / "random.csv")],
+    }
+
+    def resamples(**resampling: object) -> list[str]:
+        return [
+            row.resample for row in read_study(write_study(tmp_path, **given, resampling=resampling)).rows
+        ]
+
+    assert resamples(bootstrap=3) == ["all", "bootstrap 1", "bootstrap 2", "bootstrap 3"]
+    assert sorted(resamples(jackknife=3)) == ["all", *(f"without group {k}" for k in (1, 2, 3))]
+    assert len(resamples(leave_one_out="pose")) == 1 + 20
+    with refused("E-STUDY-011", "station"):
+        resamples(leave_one_out="station")
+    assert len(read_study(write_study(tmp_path, **given)).rows) == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "code", "names"),
+    [
+        ({"seed": 3}, "E-YAML-001", ("line 7", "seed")),
+        ({"kind": "calibrat"}, "E-YAML-034", ("line 1", "calibrat")),
+        ({"options": {"terms": ["kinematic"], "losss": "cauchy"}}, "E-YAML-001", ("line 6", "losss")),
+        ({"options": {"cell.sensors.noise": 1}}, "E-YAML-001", ("line 4", "noise")),
+        ({"grid": {"poses": [10, "many"]}}, "E-YAML-028", ("line 6", "many")),
+        ({"grid": {"poses": [10, 1]}}, "E-STUDY-008", ("line 6",)),
+        ({"grid": {"poses": []}}, "E-STUDY-015", ("line 6", "poses")),
+        ({"options": {"poses": 9}}, "E-STUDY-016", ("poses",)),
+        ({"seeds": {"count": 0}}, "E-STUDY-001", ("line 3",)),
+        ({"seeds": {"count": 10_000_000}}, "E-STUDY-014", ("20000000",)),
+        ({"draw": {"count": 2, "options": {"poses": {"uniform": [10, 20]}}}, "grid": None}, "E-YAML-028", ("line 8",)),
+        ({"draw": {"count": 0, "options": {}}}, "E-STUDY-004", ()),
+        ({"draw": {"count": 1, "options": {"poses": {"choice": []}}}, "grid": None}, "E-STUDY-003", ()),
+        ({"draw": {"count": 1, "options": {"cell.spread.angle": {"log_uniform": [0, 1]}}}}, "E-STUDY-002", ()),
+    ],
+)  # fmt: skip
+def test_what_is_refused(changes: dict, code: str, names: tuple[str, ...], tmp_path: Path) -> None:
+    with refused(code, *names):
+        read_study(write_study(tmp_path, **changes))
+
+
+@pytest.mark.parametrize(
+    ("resampling", "code"),
+    [
+        ({}, "E-STUDY-006"),
+        ({"bootstrap": 3, "jackknife": 2}, "E-STUDY-006"),
+        ({"bootstrap": -3}, "E-STUDY-005"),
+        ({"jackknife": 1}, "E-STUDY-007"),
+    ],
+)
+def test_resampling_that_is_refused(resampling: dict, code: str, tmp_path: Path) -> None:
+    given = {
+        "kind": "calibrate",
+        "seeds": None,
+        "grid": None,
+        "options": None,
+        "poses": [str(UR5 / "random.csv")],
+    }
+    with refused(code):
+        read_study(write_study(tmp_path, **given, resampling=resampling))
+
+
+def test_a_two_stage_study_takes_the_robots_own_files(tmp_path: Path) -> None:
+    robot = EXAMPLES / "tx90l" / "robot.yaml"
+    grid = {"cell.mismatch.repeatability": [0.0, 3e-5], "plan": ["default", "quick"]}
+    plan = read_study(write_study(tmp_path, kind="two_stage", robot=str(robot), grid=grid, options=None))
+    assert len(plan.rows) == 8
+    assert {
+        f"input.{name}" for name in ("robot.yaml", "tx90l.urdf", "cell.yaml", "frequency_poses.csv")
+    } < set(plan.tasks.origin)

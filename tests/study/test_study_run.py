@@ -1,0 +1,221 @@
+"""Studies that run, are interrupted, and go on."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import polars
+import pytest
+from polars.testing import assert_frame_equal
+from refusals import assert_refusal, refused
+from small_study import UR5, stored, write_study
+
+from flexcal.cli.main import main
+from flexcal.jobs.study import read_study, run_study
+from flexcal.parallel import ThisProcess, open_workers
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The small study, task after task in this process."""
+    folder = tmp_path_factory.mktemp("whole")
+    run_study(read_study(write_study(folder)), folder / "out", ThisProcess())
+    return folder / "out"
+
+
+def test_processes_and_a_cluster_give_the_same_bits(whole: Path, dask_address: str, tmp_path: Path) -> None:
+    plan = read_study(write_study(tmp_path))
+    for name, on, jobs in (("processes", None, 2), ("dask", dask_address, 1)):
+        with open_workers(on, jobs) as workers:
+            run_study(plan, tmp_path / name, workers)
+        assert_frame_equal(stored(tmp_path / name), stored(whole), check_exact=True)
+
+
+def test_a_row_a_task_and_a_page(whole: Path) -> None:
+    rows = stored(whole)
+    assert rows["number"].to_list() == [0, 1, 2, 3] and rows["error"].null_count() == 4
+    assert rows["option.poses"].to_list() == [10, 10, 12, 12] and rows["seed"].to_list() == [1, 2, 1, 2]
+    document = json.loads((whole / "results.json").read_text())
+    assert document["kind"] == "study" and document["tasks"] == {"total": 4, "done": 4, "failed": 0}
+    name = "elbow_joint.length_x"
+    held = (rows[f"{name}.low"] <= rows[f"{name}.truth"]) & (rows[f"{name}.truth"] <= rows[f"{name}.high"])
+    assert document["coverage"]["parameters"][name]["inside"] == held.sum()
+    page = (whole / "report.html").read_text()
+    assert "Coverage of the 95 % intervals" in page and "What drives the error" in page
+    assert not (whole / "parts").exists()
+
+
+def test_a_task_that_fails_is_a_row(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    study = write_study(tmp_path, grid={"poses": [10, 2]}, seeds={"count": 1})
+    assert main(["study", str(study), "--out", str(tmp_path / "out"), "--jobs", "1"]) == 0
+    said = capsys.readouterr().out
+    rows = stored(tmp_path / "out")
+    assert rows["error"].is_null().to_list() == [True, False]
+    assert rows["error_code"][1].startswith("E-") and rows["error"][1] in said
+    assert rows["error"][1][:40] in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_a_killed_study_goes_on_where_it_stopped(whole: Path, tmp_path: Path) -> None:
+    study = write_study(tmp_path)
+    command = [
+        sys.executable,
+        "-m",
+        "flexcal.cli.main",
+        "study",
+        str(study),
+        "--out",
+        str(tmp_path / "out"),
+        "--jobs",
+        "1",
+    ]
+    program = (
+        "import flexcal.jobs.study.store as store, sys\nstore._EVERY = store._SHARE = 0.0\n"  # a part a task
+    )
+    command[1:3] = ["-c", program + "from flexcal.cli.main import main\nsys.exit(main(sys.argv[1:]))"]
+    process = subprocess.Popen(
+        command, stderr=subprocess.PIPE, text=True, env=os.environ | {"FLEXCAL_PROGRESS": "json"}
+    )
+    assert process.stderr is not None
+    for line in process.stderr:
+        if json.loads(line)["share"] >= 0.5:
+            process.send_signal(signal.SIGKILL)
+            break
+    process.wait()
+    process.stderr.close()
+    parts = list((tmp_path / "out" / "parts").glob("*.parquet"))
+    assert 2 <= len(parts) < 4 and not (tmp_path / "out" / "report.html").exists()
+    assert main(["report", str(tmp_path / "out")]) == 0  # of what there is
+    assert "the study is not complete" in (tmp_path / "out" / "report.html").read_text()
+    before = {path: path.stat().st_mtime_ns for path in parts}
+    ran = counted(tmp_path / "out", study, resume=True)
+    assert ran == 4 - len(before)
+    assert_frame_equal(stored(tmp_path / "out"), stored(whole), check_exact=True)
+
+
+def counted(folder: Path, study: Path, *, resume: bool) -> int:
+    """Number of tasks that ran."""
+    shares: list[float] = []
+    run_study(
+        read_study(study),
+        folder,
+        ThisProcess(),
+        resume=resume,
+        progress=lambda _, share: shares.append(share),
+    )
+    return len(shares) - 1
+
+
+@pytest.mark.parametrize("damage", ["cut", "other", "empty"])
+def test_a_damaged_part_is_named_and_its_tasks_run_again(
+    damage: str, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = interrupted(tmp_path, monkeypatch, after=3)
+    part = sorted((tmp_path / "out" / "parts").glob("*.parquet"))[1]
+    content = part.read_bytes()
+    part.write_bytes({"cut": content[: len(content) // 2], "other": b"x" * 100, "empty": b""}[damage])
+    document = run_study(read_study(study), tmp_path / "out", ThisProcess(), resume=True)
+    assert len(document["remarks"]) == 1 and str(part) in document["remarks"][0]
+    assert_frame_equal(stored(tmp_path / "out"), stored(whole), check_exact=True)
+
+
+def interrupted(folder: Path, monkeypatch: pytest.MonkeyPatch, after: int) -> Path:
+    """A study that Ctrl-C ends after so many tasks, with a part for each."""
+    study = write_study(folder)
+    monkeypatch.setattr("flexcal.jobs.study.store._EVERY", 0.0)
+    monkeypatch.setattr("flexcal.jobs.study.store._SHARE", 0.0)
+    calls = iter(range(100))
+
+    def stop(stage: str, share: float) -> None:
+        if next(calls) == after:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_study(read_study(study), folder / "out", ThisProcess(), progress=stop)
+    return study
+
+
+def test_a_full_disk_loses_nothing_that_was_stored(
+    whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write, calls = polars.DataFrame.write_parquet, iter(range(100))
+
+    def full(frame: polars.DataFrame, *given: object, **options: object) -> None:
+        if next(calls) == 2:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        write(frame, *given, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("flexcal.jobs.study.store._EVERY", 0.0)
+    monkeypatch.setattr("flexcal.jobs.study.store._SHARE", 0.0)
+    monkeypatch.setattr(polars.DataFrame, "write_parquet", full)
+    study = write_study(tmp_path)
+    with refused("E-STUDY-017", "No space left on device", "2", "4", "--resume"):
+        run_study(read_study(study), tmp_path / "out", ThisProcess())
+    assert counted(tmp_path / "out", study, resume=True) == 2
+    assert_frame_equal(stored(tmp_path / "out"), stored(whole), check_exact=True)
+
+
+def test_a_study_goes_on_with_further_rows_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study, out = interrupted(tmp_path, monkeypatch, after=2), tmp_path / "out"
+    with refused("E-STUDY-019", "--resume"):
+        run_study(read_study(study), out, ThisProcess())
+    write_study(tmp_path, options={"verification_poses": 11})
+    with refused("E-STUDY-023", "2"):
+        run_study(read_study(study), out, ThisProcess(), resume=True)
+    robot = tmp_path / "other" / "robot.yaml"
+    robot.parent.mkdir()
+    for file in UR5.iterdir():
+        (robot.parent / file.name).write_bytes(file.read_bytes())
+    robot.write_text(robot.read_text() + "# changed\n")
+    write_study(tmp_path, robot=str(robot))
+    with refused("E-STUDY-022", "input.robot.yaml"):
+        run_study(read_study(study), out, ThisProcess(), resume=True)
+    write_study(tmp_path, grid={"poses": [9, 10, 12]})
+    document = run_study(read_study(study), out, ThisProcess(), resume=True)
+    assert document["tasks"]["done"] == 6
+    assert stored(out)["option.poses"].to_list() == [9, 9, 10, 10, 12, 12]
+
+
+def test_two_studies_in_one_folder_are_refused(tmp_path: Path) -> None:
+    study = read_study(write_study(tmp_path))
+
+    def again(stage: str, share: float) -> None:
+        with refused("E-STUDY-018", str(tmp_path / "out")):
+            run_study(study, tmp_path / "out", ThisProcess())
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_study(study, tmp_path / "out", ThisProcess(), progress=again)
+
+
+def test_results_of_another_verb_stay(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "results.json").write_text('{"kind": "calibration", "schema": 1}')
+    study = write_study(tmp_path)
+    assert main(["study", str(study), "--out", str(out), "--resume"]) == 2
+    assert_refusal(capsys.readouterr().err, "E-STUDY-021", str(out))
+    assert main(["study", str(study), "--out", str(out), "--on", "dask://nowhere"]) == 2
+    assert_refusal(capsys.readouterr().err, "E-WORK-006", "dask://nowhere")
+
+
+def test_a_data_set_that_is_resampled(tmp_path: Path) -> None:
+    given = {
+        "kind": "calibrate",
+        "seeds": None,
+        "grid": None,
+        "options": {"terms": ["offsets"], "loss": "squares"},
+    }
+    study = write_study(tmp_path, **given, poses=[str(UR5 / "random.csv")], resampling={"jackknife": 2})
+    document = run_study(read_study(study), tmp_path / "out", ThisProcess())
+    assert document["tasks"] == {"total": 3, "done": 3, "failed": 0} and document["coverage"] is None
+    rows = stored(tmp_path / "out")
+    assert rows["left_out.p90_mm"].is_null().to_list() == [True, False, False]
+    assert document["resampling"]["kind"] == "jackknife" and document["resampling"]["resamples"] == 2
