@@ -25,7 +25,7 @@ _RECOUNT = 1.0
 _GIVEN_UP = "all worker processes ended while they ran this task (killed, out of memory, or crashed)"
 _one_at_a_time = threading.Lock()
 """Held while a task runs: robots have memory of their own to compute in, and threads of a worker share them."""
-_PATIENCE = 10.0
+_PATIENCE = 30.0
 """Seconds that the scheduler may take to answer, and a first worker to arrive."""
 
 
