@@ -24,7 +24,8 @@ from flexcal.jobs.result_files import (
     write_results,
     write_tasks,
 )
-from flexcal.jobs.study.store import OPTION, StudyStore, exclusive, option_cell
+from flexcal.jobs.study.measured_values import QUANTITIES
+from flexcal.jobs.study.store import FIRST, OPTION, StudyStore, exclusive, option_cell
 from flexcal.jobs.study.study_file import StudyPlan
 from flexcal.jobs.study.tasks import run_row
 from flexcal.parallel import Workers
@@ -75,13 +76,27 @@ class StudyRun:
         return document
 
     def _frame(self) -> polars.DataFrame:
-        """Stored rows in the order of the plan."""
+        """Stored rows in the order of the plan, with columns in an order that does not depend on which task ended first."""
         import polars
 
         numbers = {row.key: number for number, row in enumerate(self.plan.rows)}
         frame = read_study_rows(self.folder).frame
         current = frame[KEY].replace_strict(numbers, default=None, return_dtype=polars.Int64)
-        return frame.with_columns(current.alias(NUMBER)).sort(NUMBER)
+        return (
+            frame.with_columns(current.alias(NUMBER)).sort(NUMBER).select(sorted(frame.columns, key=_place))
+        )
+
+
+def _place(column: str) -> tuple[int, int, str, int]:
+    """Place of a column: what the task is given, its results, then parameters by name."""
+    owner, _, quantity = column.rpartition(".")
+    if column in FIRST:
+        return 0, FIRST.index(column), "", 0
+    if column.startswith(OPTION):
+        return 1, 0, column, 0
+    if quantity in QUANTITIES:
+        return 3, 0, owner, QUANTITIES.index(quantity)
+    return 2, 0, column, 0
 
 
 def run_study(

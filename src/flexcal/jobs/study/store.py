@@ -18,6 +18,8 @@ from flexcal.parallel import Outcome
 _LOCK = ".lock"
 _EVERY, _SHARE = 1.0, 0.01
 """Least seconds between two parts, and least share of the time that the study has run."""
+FIRST = (KEY, NUMBER, "seed", "resample", "seconds", "error_code", "error")
+"""Columns that every row has."""
 OPTION = "option."
 """Prefix of the columns of options."""
 
