@@ -57,7 +57,7 @@ def judged(folder: Path, model: RobotModel, q: np.ndarray, rows: list[dict[str, 
 
 def settle(measuring: Measuring, answers: list[Answer]) -> None:
     deadline = time.monotonic() + 60
-    while measuring.outlook is None:
+    while measuring.outlook is None or len(measuring.judgements) < measuring.series.used.sum():
         assert time.monotonic() < deadline
         for answer in list(answers):
             measuring.answered(answer)

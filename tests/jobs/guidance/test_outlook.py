@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,12 @@ import pytest
 
 from flexcal import PosePlan, PoseRequest, RobotModel, VirtualCell, read_poses
 from flexcal.data.poses import PosePool
-from flexcal.design.poses import WorkingVolume
+from flexcal.design.poses import WorkingVolume, usable
 from flexcal.design.scene import CollisionChecker
 from flexcal.jobs.guidance import GuidedSession
-from flexcal.virtual_cell import CellConfig
+from flexcal.jobs.guidance.outlook import FIRST
+from flexcal.model.kinematics import joint_ranges
+from flexcal.virtual_cell import CellConfig, MismatchConfig
 
 
 def test_a_real_robot_guided_through_its_measured_poses(ur5: RobotModel, examples: Path):
@@ -43,7 +46,7 @@ def tx90l(examples: Path) -> RobotModel:
 
 
 def test_next_poses_can_be_taken(tx90l: RobotModel):
-    cell = VirtualCell.drawn(tx90l, CellConfig(), 1)[0]
+    cell = VirtualCell.drawn(tx90l, CellConfig(mismatch=MismatchConfig(repeatability=6e-5)), 1)[0]
     session = GuidedSession(tx90l)
     first = session.next_poses(25)
     assert not CollisionChecker(tx90l).collides(first).any()
@@ -62,15 +65,33 @@ def test_next_poses_can_be_taken(tx90l: RobotModel):
 
 
 def test_the_desired_error(tx90l: RobotModel):
+    """What is told beforehand to reach it is the number of poses after which it is predicted to be reached."""
     cell = VirtualCell.drawn(tx90l, CellConfig(), 1)[0]
     measured = cell.measure(PosePlan(q=GuidedSession(tx90l).next_poses(25)))
-    for desired, enough in ((1e-3, True), (0.08e-3, False), (1e-6, False)):
-        session = GuidedSession(
-            tx90l, rows=measured, request=PoseRequest(candidates=500, desired_error=desired)
-        )
-        outlook = session.outlook()
-        assert outlook.is_enough == enough
-        assert ("not yet" in outlook.sentence) == (desired == 1e-6)
+    session = GuidedSession(tx90l, rows=measured, request=PoseRequest(candidates=500))
+    prospect = session.prospect()
+    enough = prospect.outlook(desired=1.01 * prospect.p90)
+    assert enough.is_enough and enough.sentence.startswith("stop") and len(enough.q) == 10
+    near = prospect.outlook(desired=0.9 * prospect.p90)
+    count = int(np.flatnonzero(near.p90 <= near.desired)[0])
+    assert not near.is_enough and f"are reached in {count} more pose" in near.sentence and len(near.q) == 10
+    assert near.p90[count - 1] > near.desired
+    far = prospect.outlook(desired=1e-6)
+    assert not far.is_enough and "not yet with 10 more poses" in far.sentence
+
+
+def test_poses_chosen_anywhere_tell_more_than_the_candidates(tx90l: RobotModel):
+    """Moved to neighbours, they predict a smaller error than the best of the candidates, and pass the same checks."""
+    moved = GuidedSession(tx90l).prospect()
+    pool = PosePool(moved.choice.q, moved.choice.pose)
+    fixed = replace(moved, choice=replace(moved.choice, checker=None))
+    free, bound = moved.outlook(FIRST), fixed.outlook(FIRST)
+    assert np.isin(bound.pose, pool.pose).all() and (pool.q[bound.pose - 1] == bound.q).all()
+    assert free.p90[-1] < 0.98 * bound.p90[-1]
+    checker = moved.choice.checker
+    assert checker is not None and usable(checker, free.q, moved.choice.setup, preload=True).all()
+    lower, upper = joint_ranges(tx90l)
+    assert (free.q >= lower).all() and (free.q <= upper).all()
 
 
 def test_the_predicted_error_is_that_of_the_cell(tx90l: RobotModel):

@@ -1,5 +1,5 @@
 from .accuracy_curve import PoseCurve, pose_curve
-from .candidates import random_candidates
+from .candidates import random_candidates, usable
 from .feasibility import PoseCandidates, pose_candidates
 from .geometry_sensitivity import (
     GeometricTolerances,
@@ -48,6 +48,7 @@ __all__ = [
     "select_next_poses",
     "select_poses",
     "tool_error",
+    "usable",
     "working_box",
     "working_points",
     "zero_stds",

@@ -31,13 +31,7 @@ def random_candidates(
     """
     model = checker.model
     lower, upper = joint_ranges(model)
-    checks: dict[str, Callable[[np.ndarray], np.ndarray]] = {
-        "floor": lambda q: above_floor(checker, q, setup.point)
-    }
-    if preload:
-        checks["flank preload"] = lambda q: preloaded(model, q, setup.payload)
-    checks["collision"] = lambda q: ~checker.collides(q)
-    checks["visibility"] = lambda q: visible(checker, q, setup)
+    checks = _checks(checker, setup, preload)
     lost = dict.fromkeys(checks, 0)
     accepted: list[np.ndarray] = []
     have = drawn = 0
@@ -61,6 +55,30 @@ def random_candidates(
         have += len(q)
     progress("candidates", 1.0)
     return np.concatenate(accepted or [np.zeros((0, model.n))])[:count]
+
+
+def usable(
+    checker: CollisionChecker, q: np.ndarray, setup: MeasuringSetup = STANDARD, *, preload: bool = False
+) -> np.ndarray:
+    """Mask (samples,) of configurations `q` (samples, n) that pass the checks of `random_candidates`."""
+    left = np.arange(len(q))
+    for check in _checks(checker, setup, preload).values():
+        left = left[check(q[left])]
+    return np.isin(np.arange(len(q)), left)
+
+
+def _checks(
+    checker: CollisionChecker, setup: MeasuringSetup, preload: bool
+) -> dict[str, Callable[[np.ndarray], np.ndarray]]:
+    """Masks of the configurations that pass each check, by its name; the cheapest first."""
+    checks: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+        "floor": lambda q: above_floor(checker, q, setup.point)
+    }
+    if preload:
+        checks["flank preload"] = lambda q: preloaded(checker.model, q, setup.payload)
+    checks["collision"] = lambda q: ~checker.collides(q)
+    checks["visibility"] = lambda q: visible(checker, q, setup)
+    return checks
 
 
 def above_floor(checker: CollisionChecker, q: np.ndarray, point: str | None = None) -> np.ndarray:

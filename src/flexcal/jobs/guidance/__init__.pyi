@@ -1,7 +1,7 @@
 from .followed_file import FollowedFile, ReadingGoesOn
 from .judgement import Finding, Judgement, JudgementCode
 from .measured_rows import MeasuredRow, MeasuredRows, Source
-from .outlook import Outlook
+from .outlook import Outlook, Prospect
 from .pose_choice import PoseChoice
 from .row_cells import RowReader, cells_of
 from .session import DEFAULT_CHOICE, GuidedSession
@@ -17,6 +17,7 @@ __all__ = [
     "MeasuredRows",
     "Outlook",
     "PoseChoice",
+    "Prospect",
     "ReadingGoesOn",
     "RowReader",
     "Source",

@@ -27,8 +27,8 @@ _CONVERGED = 1e-3
 class SessionEstimate:
     """Estimate from N rows, linearised at its solution.
 
-    `model` has the estimated geometry, `present` (p,) in units of the prior; `change` (p,) is what is estimated beside it, to first order,
-    and `covariance` (p, p) that of the errors.
+    `model` has the estimated parameters, `present` (p,) in units of the prior; `change` (p,) is what is estimated beside them, to first
+    order, and `covariance` (p, p) that of the errors.
     `residual` (N, 3), m, is measured minus predicted, `jacobian` (N, 3, p). `std` (N,), m, is the expected standard deviation of a
     coordinate of every row, `scale` times the one stated; the scale has `freedom` degrees of freedom. `prior_scale` is by how much the
     geometric errors exceed their plausible sizes.
@@ -79,12 +79,10 @@ class SessionEstimate:
             flat = jacobian.reshape(len(weight), -1) * weight[:, None]
             solved = _scaled_solution(flat, left.ravel() * weight, there, scale, prior_scale)
             change, covariance, scale, prior_scale, freedom = solved
-            step, steps = change[: unknowns.geometric], steps + 1
+            step, steps = unknowns.within_reach(present + change[:size]) - present, steps + 1
             if np.abs(step).max(initial=0.0) < _CONVERGED or steps == _STEPS:
                 break
-            model = unknowns.moved(model, change[:size])
-            present = present.copy()
-            present[: unknowns.geometric] += step
+            model, present = unknowns.moved(model, step), present + step
         residual = left - jacobian @ change
         return cls(
             model, rows, unknowns, present, change, covariance, residual, jacobian, scale * stated,

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from flexcal.data.poses import PoseSet
-from flexcal.design.optimality import TraceOptimal, exchange_on_shortlist, greedy
-from flexcal.estimation import Parameter, Parameters, Sensitivity
+from flexcal.jobs.guidance.batch_design import BatchDesign, OpenPoses
 from flexcal.jobs.guidance.estimate import ROBOT_STD, SessionEstimate
 from flexcal.jobs.guidance.pose_choice import PoseChoice
 from flexcal.jobs.guidance.unknowns import Unknowns
@@ -79,7 +79,7 @@ class Outlook:
     def sentence(self) -> str:
         """Whether to stop, and why."""
         now, then = self.p90[0] / MILLIMETRE, self.p90[-1] / MILLIMETRE
-        more = f"{len(self.q)} more poses"
+        more = _more_poses(len(self.q))
         if not self.is_known:
             return f"go on: too few rows yet to say how accurate the robot will be; {more} predict a p90 of {then:.3f} mm."
         floor = ""
@@ -89,7 +89,7 @@ class Outlook:
         if self.desired is not None and not self.is_enough:
             wanted = np.flatnonzero(self.p90 <= self.desired)
             reach = (
-                f"in {int(wanted[0])} more poses" if len(wanted) else f"not yet with {more} ({then:.3f} mm)"
+                f"in {_more_poses(int(wanted[0]))}" if len(wanted) else f"not yet with {more} ({then:.3f} mm)"
             )
             return f"go on: p90 predicted {now:.3f} mm{where}, {self.desired / MILLIMETRE:.3f} mm are reached {reach}{floor}."
         if self.is_enough:
@@ -99,11 +99,12 @@ class Outlook:
 
 @dataclass(frozen=True, eq=False)
 class Prospect:
-    """What is known of the robot now: `model`, `unknowns`, and the `covariance` (p, p) of their errors.
+    """What is known of the robot now: `model`, `unknowns`, and the `covariance` (p, p) of their errors; and the `choice` of poses.
 
     `share` of the instrument's stated noise is there, and the `scatter`, m, of the robot beside it.
     """
 
+    choice: PoseChoice
     model: RobotModel
     unknowns: Unknowns
     covariance: np.ndarray
@@ -119,48 +120,66 @@ class Prospect:
         """Prospect after `rows` with their `estimate`, or before any with the plausible sizes."""
         if estimate is not None:
             return cls(
-                estimate.model, estimate.unknowns, estimate.geometry_covariance, estimate.rows, estimate.instrument_share,
+                choice, estimate.model, estimate.unknowns, estimate.geometry_covariance, estimate.rows, estimate.instrument_share,
                 estimate.robot_std, True,
             )  # fmt: skip
         unknowns = Unknowns.of(model, choice.rows(model, choice.working, rows))
-        return cls(model, unknowns, np.eye(len(unknowns)), rows, 1.0, ROBOT_STD, False)
+        return cls(choice, model, unknowns, np.eye(len(unknowns)), rows, 1.0, ROBOT_STD, False)
 
-    def outlook(self, choice: PoseChoice, count: int, desired: float | None) -> Outlook:
-        """The next `count` poses of a choice and the errors predicted after them."""
-        free = np.ones(len(choice.q), bool)
-        if self.like is not None:
-            apart = np.abs(choice.q[:, None] - self.like.q[None]).max(axis=2)
-            free = apart.min(axis=1) > _APART
-        index = np.flatnonzero(free)
-        count = min(count, len(index))
-        rows = choice.rows(self.model, choice.q[index], self.like)
-        std = np.hypot(self.share * np.sqrt((rows.sigma**2).mean(axis=1)), self.scatter)
-        columns = self.unknowns.columns(self.model, rows)[1] / std[:, None, None]
-        working = self.unknowns.columns(self.model, choice.rows(self.model, choice.working, self.like))[1]
+    def outlook(self, count: int = AHEAD, desired: float | None = None) -> Outlook:
+        """The next `count` poses and the errors predicted after them, up to the `desired` one, m."""
+        choice, working = self.choice, self._working
         information = np.linalg.inv(self.covariance)
-        flat = working.reshape(-1, working.shape[2])
-        items = Parameters(Parameter(name, "1", 0.0) for name in self.unknowns.names)
-        sensitivity = Sensitivity(columns, items, (information + information.T) / 2)
-        error = TraceOptimal(flat.T @ flat / len(working), "c")
-        horizon = min(max(count, FIRST - (0 if self.like is None else len(self.like))), len(index))
-        together = exchange_on_shortlist(sensitivity, horizon, error).chosen.astype(int)
-        chosen = together[greedy(sensitivity.subset(together), count, error).chosen.astype(int)]
-        p90 = []
-        for number in range(count + 1):
-            added = columns[chosen[:number]].reshape(-1, columns.shape[2])
-            covariance = np.linalg.inv(information + added.T @ added)
-            p90.append(_quantile(working, covariance, self.scatter))
-        alone = _quantile(working[:, :, :1] * 0, np.eye(1), self.scatter)
+        design = BatchDesign(choice, (information + information.T) / 2, working, self._open)
+        poses = self._open(choice.q, choice.pose)
+
+        def error(batch: OpenPoses, number: int) -> float:
+            return _quantile(working, np.linalg.inv(information + batch.information(number)), self.scatter)
+
+        measured = 0 if self.like is None else len(self.like)
+        horizon = min(max(count, FIRST - measured), len(poses))
+        batch = design.best(poses, horizon)
+        if desired is not None and self.is_known:
+            every = design.ordered(batch, horizon)
+            enough = next((k for k in range(horizon) if error(every, k) <= desired), horizon)
+            batch = design.best(poses, max(enough, 1))
+        ahead = design.ordered(design.moved(batch), min(count, len(batch)))
+        if len(ahead) < count:
+            ahead = ahead.with_further(design.after(ahead, poses, count - len(ahead)))
         return Outlook(
-            choice.q[index[chosen]],
-            choice.pose[index[chosen]],
-            0 if self.like is None else len(self.like),
-            np.array(p90),
-            alone,
+            ahead.q,
+            ahead.pose,
+            measured,
+            np.array([error(ahead, number) for number in range(len(ahead) + 1)]),
+            _quantile(working[:, :, :1] * 0, np.eye(1), self.scatter),
             desired,
             self.is_known,
             choice.anywhere,
         )
+
+    @property
+    def p90(self) -> float:
+        """Predicted 90 % quantile, m, as of an `Outlook`, without further poses."""
+        return _quantile(self._working, self.covariance, self.scatter)
+
+    @cached_property
+    def _working(self) -> np.ndarray:
+        """Derivatives (W, 3, p), m, of the points at the working poses."""
+        rows = self.choice.rows(self.model, self.choice.working, self.like)
+        return self.unknowns.columns(self.model, rows)[1]
+
+    def _open(self, q: np.ndarray, pose: np.ndarray) -> OpenPoses:
+        """Those of poses `q` (M, n) with numbers `pose` (M,) that are not measured."""
+        if self.like is not None:
+            apart = np.abs(q[:, None] - self.like.q[None]).max(axis=2).min(axis=1) > _APART
+            q, pose = q[apart], pose[apart]
+        rows = self.choice.rows(self.model, q, self.like)
+        std = np.hypot(self.share * np.sqrt((rows.sigma**2).mean(axis=1)), self.scatter)
+        return OpenPoses(q, pose, self.unknowns.columns(self.model, rows)[1] / std[:, None, None])
+
+
+def _more_poses(count: int) -> str:
+    return f"{count} more pose{'s' * (count != 1)}"
 
 
 def _quantile(columns: np.ndarray, covariance: np.ndarray, scatter: float) -> float:
@@ -168,6 +187,7 @@ def _quantile(columns: np.ndarray, covariance: np.ndarray, scatter: float) -> fl
     rng = np.random.default_rng(0)
     values, vectors = np.linalg.eigh(covariance)
     draws = rng.standard_normal((len(values), _DRAWS))
-    changes = vectors @ (np.sqrt(np.maximum(values, 0.0))[:, None] * draws)
+    root = vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T  # so that it changes little with the covariance
+    changes = root @ draws
     errors = columns @ changes + scatter * rng.standard_normal((len(columns), 3, _DRAWS))
     return float(np.quantile(np.linalg.norm(errors, axis=1), _QUANTILE))

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.data.poses import DEFAULT_SIGMA, PosePool, PoseSet
-from flexcal.design.poses import measuring_noise, random_candidates
+from flexcal.design.poses import measuring_noise, random_candidates, usable
 from flexcal.design.scene import CollisionChecker, MeasuringSetup, visible
 from flexcal.jobs.experiments import PoseRequest
+from flexcal.model.kinematics import joint_ranges
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 
@@ -22,7 +23,8 @@ class PoseChoice:
     """Candidates `q` (M, n) with their numbers `pose` (M,), and `working` poses (W, n), at which the tool error counts: `anywhere` in the
     workspace, or in the working volume.
 
-    All are within the joint limits and free of collision, and the instrument sees the target at the candidates.
+    All are within the joint limits and free of collision, and the instrument sees the target at the candidates. `checker` finds that of
+    further poses; None where only the candidates may be measured.
     """
 
     q: np.ndarray
@@ -30,6 +32,7 @@ class PoseChoice:
     working: np.ndarray
     anywhere: bool
     setup: MeasuringSetup
+    checker: CollisionChecker | None = None
 
     @classmethod
     def of(cls, model: RobotModel, request: PoseRequest, progress: Progress = silent) -> PoseChoice:
@@ -45,7 +48,25 @@ class PoseChoice:
             pool = PosePool(q, np.arange(1, len(q) + 1))
         anywhere = replace(setup, acceptance=None, measure=None)
         working = random_candidates(checker, _WORKING, rng, anywhere) if place is None else place.q[:_WORKING]
-        return cls(pool.q, pool.pose, working, place is None, setup)
+        free = None if isinstance(given, PosePool) else checker
+        return cls(pool.q, pool.pose, working, place is None, setup, free)
+
+    def neighbours(
+        self, q: np.ndarray, count: int, share: float, rng: np.random.Generator
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Poses (K, n) that can be measured, up to `count` near each of `q` (M, n), and the indices (K,) of these.
+
+        Their distance is normal with a standard deviation of `share` of the range of every joint. There are none where only the candidates
+        may be measured.
+        """
+        if self.checker is None:
+            return q[:0], np.zeros(0, dtype=int)
+        lower, upper = joint_ranges(self.checker.model)
+        beside = np.repeat(np.arange(len(q)), count)
+        near = q[beside] + share * (upper - lower) * rng.standard_normal((len(beside), q.shape[1]))
+        near = np.clip(near, lower, upper)
+        passed = usable(self.checker, near, self.setup, preload=True)
+        return near[passed], beside[passed]
 
     def rows(self, model: RobotModel, q: np.ndarray, like: PoseSet | None) -> PoseSet:
         """Rows that would be measured at `q` (M, n), with target, station and payload as the last row of those measured.

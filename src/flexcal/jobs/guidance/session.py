@@ -86,9 +86,13 @@ class GuidedSession:
                 "E-STUDIO-006", f"{len(row)} rows are given to be judged; judge them one by one."
             )
         session = self.with_rows(row)
-        analysis = session.analysis
+        return session.last_judgement(self), session
+
+    def last_judgement(self, before: GuidedSession) -> Judgement:
+        """Judgement of the last row beside those `before`, the session without it."""
+        analysis = self.analysis
         assert analysis is not None
-        return RowJudge(self.model, self.analysis, analysis, self.plan).judgement(), session
+        return RowJudge(self.model, before.analysis, analysis, self.plan).judgement()
 
     def with_rows(self, rows: PoseSet) -> GuidedSession:
         """Session with further rows; raises `InputError` for measurements that are not of points."""
@@ -106,9 +110,17 @@ class GuidedSession:
 
         Raises `FlexcalError` where too few candidates pass the checks.
         """
-        estimate = None if self.analysis is None else self.analysis.estimate
-        prospect = Prospect.of(self.model, self.candidates, self.rows, estimate)
-        return prospect.outlook(self.candidates, count, self.request.desired_error)
+        return self.prospect().outlook(count, self.request.desired_error)
+
+    def prospect(self, choice: PoseChoice | None = None) -> Prospect:
+        """What is known of the robot now, to look ahead with among the poses of a `choice`, the session's own by default.
+
+        Raises `FlexcalError` as `outlook` does.
+        """
+        choice = choice or self.candidates
+        return Prospect.of(
+            self.model, choice, self.rows, None if self.analysis is None else self.analysis.estimate
+        )
 
     def next_poses(self, count: int = 1) -> np.ndarray:
         """The next poses (count, n), rad or m, the best first; raises `FlexcalError` as `outlook` does."""

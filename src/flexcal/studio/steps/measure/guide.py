@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from flexcal.data.plans import PosePlan
     from flexcal.data.poses import PoseSet
     from flexcal.jobs.experiments import PoseRequest
-    from flexcal.jobs.guidance import Finding, GuidedSession, Judgement, Outlook, PoseChoice
+    from flexcal.jobs.guidance import Finding, GuidedSession, Judgement, Outlook, PoseChoice, Prospect
     from flexcal.model.robot import RobotModel
 
 RowKey = tuple[str, ...]
@@ -56,16 +56,16 @@ class Question:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What is known so far of a question: judgements (up to N), and from the outlook on all of it.
+    """What is known so far of a question: judgements by row, the last row's first, and from the outlook on what that needs of all rows.
 
     `course` has the predicted error, m, by number of rows; `problem` says why there is no more.
     """
 
     question: Question
-    judgements: tuple[Judgement, ...]
+    judgements: Mapping[int, Judgement]
     findings: tuple[Finding, ...] = ()
     outlook: Outlook | None = None
-    course: dict[int, float] = field(default_factory=dict)
+    course: Mapping[int, float] = field(default_factory=dict)
     problem: Exception | None = None
 
     def for_further(self, question: Question) -> Answer | None:
@@ -77,7 +77,7 @@ class Answer:
             or mine.before is not question.before
         ):
             return None
-        return Answer(question, self.judgements[: _begin_alike(mine.keys, question.keys)])
+        return Answer(question, _of_first(self.judgements, _begin_alike(mine.keys, question.keys)))
 
 
 class Guide:
@@ -113,97 +113,116 @@ class Guide:
             try:
                 self._answer(answered)
             except Exception as problem:
-                self._tell(Answer(answered, tuple(self._known.judgements), problem=problem))
+                self._tell(Answer(answered, dict(self._known.judgements), problem=problem))
                 self._known = _Known()
 
     def _answer(self, question: Question) -> None:
         known = self._known
         known.begin(question)
-        self._tell(Answer(question, tuple(known.judgements)))
-        told = time.monotonic()
-        while known.judge_next(question):
-            if self._latest is not question:
-                return
-            if len(known.judgements) == len(question.keys) or time.monotonic() - told > _PAUSE:
-                self._tell(Answer(question, tuple(known.judgements)))
+        known.judge_last(question)
+        self._tell(Answer(question, dict(known.judgements)))
+        answer = Answer(question, {})
+        if question.request is not None and self._latest is question:
+            answer = replace(answer, findings=known.findings(question), outlook=known.outlook(question))
+        told = -_PAUSE
+        while self._latest is question:
+            more = known.look_back(question)
+            if not more or time.monotonic() - told > _PAUSE:
+                self._tell(replace(answer, judgements=dict(known.judgements), course=known.course))
                 told = time.monotonic()
-        if question.request is None:
-            return
-        findings, outlook = known.sessions[-1].findings, known.outlook(question)
-        if self._latest is not question:
-            return
-        answer = Answer(question, tuple(known.judgements), findings, outlook, known.course(question))
-        self._tell(answer)
-        while known.extend_course(question):
-            if self._latest is not question:
+            if not more:
                 return
-        self._tell(replace(answer, course=known.course(question)))
 
 
 class _Known:
-    """Sessions after none, one, two, … of the rows of a question, with their judgements and predicted errors."""
+    """Judgements and predicted errors of the rows of a question; sessions of all of these and of those looked at last."""
 
     def __init__(self) -> None:
-        self.sessions: list[GuidedSession] = []
-        self.judgements: list[Judgement] = []
-        self._keys: list[RowKey] = []
+        self.judgements: dict[int, Judgement] = {}
+        self._errors: dict[int, float] = {}
+        self._sessions: dict[int, GuidedSession] = {}
+        self._keys: tuple[RowKey, ...] = ()
         self._of: tuple[object, ...] = ()
         self._choice: tuple[object, PoseChoice] | None = None
-        self._errors: dict[int, float] = {}
 
     def begin(self, question: Question) -> None:
         """Forget what is not of the question."""
-        from flexcal.jobs.guidance import GuidedSession
-
         of = (question.model, question.plan, question.before)
-        if not self._of or any(a is not b for a, b in zip(of, self._of, strict=True)):
-            self.sessions = [GuidedSession(question.model, question.plan, question.before)]
-            self.judgements, self._keys, self._of, self._errors = [], [], of, {}
-        same = _begin_alike(self._keys, question.keys)
-        del self.sessions[same + 1 :], self.judgements[same:], self._keys[same:]
-        self._errors = {count: error for count, error in self._errors.items() if count <= same}
+        alike = bool(self._of) and all(a is b for a, b in zip(of, self._of, strict=True))
+        same = _begin_alike(self._keys, question.keys) if alike else 0
+        self.judgements = _of_first(self.judgements, same)
+        self._errors = {count: error for count, error in self._errors.items() if 0 < count <= same}
+        self._sessions = {count: one for count, one in self._sessions.items() if alike and count <= same}
+        self._keys, self._of = question.keys, of
 
-    def judge_next(self, question: Question) -> bool:
-        """Judge the next row; False where there is none."""
-        done = len(self.judgements)
-        if question.rows is None or done == len(question.keys):
-            return False
-        judgement, session = self.sessions[done].judged(question.rows.subset([done]))
-        self.sessions.append(session)
-        self.judgements.append(judgement)
-        self._keys.append(question.keys[done])
-        return True
+    def judge_last(self, question: Question) -> None:
+        """Judge the last row, where there is one that is not judged."""
+        if question.keys and len(question.keys) - 1 not in self.judgements:
+            self._judge(question, len(question.keys))
+
+    def look_back(self, question: Question) -> bool:
+        """Judge the latest row that is not judged, or predict the error after it; False where all is known."""
+        for count in range(len(question.keys), 0, -1):
+            if count - 1 not in self.judgements:
+                self._judge(question, count)
+                return True
+            if question.request is not None and count not in self._errors:
+                self._predict(question, count)
+                return True
+        return False
+
+    def findings(self, question: Question) -> tuple[Finding, ...]:
+        """What is wrong with the series of all rows."""
+        return self._session(question, len(question.keys)).findings
 
     def outlook(self, question: Question) -> Outlook:
         """Outlook after all rows."""
-        outlook = self._aimed(question, len(self.judgements)).outlook()
-        if outlook.is_known:
-            self._errors[len(self.judgements)] = float(outlook.p90[0])
-        return outlook
+        assert question.request is not None
+        return self._predict(question, len(question.keys)).outlook(desired=question.request.desired_error)
 
-    def extend_course(self, question: Question) -> bool:
-        """Predict the error after fewer rows, the latest first; False where all are known."""
-        for count in range(len(self.judgements) - 1, 0, -1):
-            if count not in self._errors:
-                outlook = self._aimed(question, count).outlook(1)
-                self._errors[count] = float(outlook.p90[0]) if outlook.is_known else np.nan
-                return outlook.is_known
-        return False
-
-    def course(self, question: Question) -> dict[int, float]:
+    @property
+    def course(self) -> dict[int, float]:
         """Predicted error, m, by number of rows."""
         return {count: error for count, error in sorted(self._errors.items()) if np.isfinite(error)}
 
-    def _aimed(self, question: Question, count: int) -> GuidedSession:
-        """Session after so many rows, which looks for the poses of the question."""
+    def _judge(self, question: Question, count: int) -> None:
+        """Judge the last of `count` rows."""
+        after = self._session(question, count)
+        self.judgements[count - 1] = after.last_judgement(self._session(question, count - 1))
+
+    def _session(self, question: Question, count: int) -> GuidedSession:
+        """Session after so many rows."""
+        from flexcal.jobs.guidance import GuidedSession
+
+        if count not in self._sessions:
+            session = GuidedSession(question.model, question.plan, question.before)
+            if question.rows is not None and count:
+                session = session.with_rows(question.rows.subset(slice(0, count)))
+            near = {len(question.keys), count + 1}
+            self._sessions = {one: self._sessions[one] for one in self._sessions if one in near} | {
+                count: session
+            }
+        return self._sessions[count]
+
+    def _predict(self, question: Question, count: int) -> Prospect:
+        """Predict the error after so many rows; return what it was predicted with."""
         from flexcal.jobs.guidance import PoseChoice
 
         request = question.request
         assert request is not None
         if self._choice is None or self._choice[0] is not request:
-            self._choice = (request, PoseChoice.of(question.model, request))
-            self._errors = {}
-        return replace(self.sessions[count], request=request, choice=self._choice[1])
+            choice = PoseChoice.of(question.model, request)
+            if self._choice is None or not np.array_equal(choice.working, self._choice[1].working):
+                self._errors = {}
+            self._choice = (request, choice)
+        prospect = self._session(question, count).prospect(self._choice[1])
+        self._errors[count] = prospect.p90 if prospect.is_known else np.nan
+        return prospect
+
+
+def _of_first(judgements: Mapping[int, Judgement], count: int) -> dict[int, Judgement]:
+    """Those of the first `count` rows."""
+    return {row: one for row, one in judgements.items() if row < count}
 
 
 def _begin_alike(first: Sequence[RowKey], second: Sequence[RowKey]) -> int:

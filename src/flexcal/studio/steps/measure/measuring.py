@@ -101,9 +101,9 @@ class Measuring:
     @property
     def judgements(self) -> dict[int, Judgement]:
         """Judgements so far, by row: of each as it came, or as the rows after it tell."""
-        known, series = () if self.answer is None else self.answer.judgements, self.series
+        known, series = {} if self.answer is None else self.answer.judgements, self.series
         used = np.flatnonzero(series.used).tolist()
-        judged = dict(zip(used, known, strict=False))
+        judged = {used[k]: judgement for k, judgement in sorted(known.items())}
         for one in self.findings:
             row = used[one.row] if one.row < len(used) else -1
             if (one.kind == "outlier" and row in judged and judged[row].is_good) or (

@@ -51,7 +51,7 @@ def outlook_text(measuring: Measuring) -> str | None:
     answer, outlook = measuring.answer, measuring.outlook
     if answer is None or outlook is None:
         return None
-    last, judged = len(answer.judgements) - 1, list(measuring.judgements.values())
+    last, judged = len(answer.question.keys) - 1, list(measuring.judgements.values())
     said = {judgement.sentence for judgement in judged[-1:]}
     told = _large(paragraph(outlook.sentence, "good" if outlook.is_enough else "plain"))
     found = [
