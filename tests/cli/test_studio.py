@@ -37,7 +37,7 @@ def test_a_word_of_warning_where_others_are_let_in(tmp_path: Path) -> None:
 
 def test_what_cannot_be_opened(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["studio", str(tmp_path / "absent")]) == 2
-    assert_refusal(capsys.readouterr().err, "E-STUDIO-005", str(tmp_path / "absent"))
+    assert_refusal(capsys.readouterr().err, "E-STUDIO-040", str(tmp_path / "absent"))
     for arguments, code, name in (
         (["--host", "192.0.2.77"], "E-STUDIO-003", "192.0.2.77"),
         (["--host", "no.such.name.invalid"], "E-STUDIO-003", "no.such.name.invalid"),

@@ -12,7 +12,6 @@ from tyro.conf import Positional, arg
 
 from flexcal.cli.arguments.shared_options import Json
 from flexcal.cli.terminal.console import Console
-from flexcal.errors import InputError
 
 if TYPE_CHECKING:
     from flexcal.studio.server import StudioServer
@@ -51,8 +50,6 @@ class Studio:
         """Serve until stopped."""
         from flexcal.studio import run_studio
 
-        if not self.folder.is_dir():
-            raise InputError("E-STUDIO-005", f"{self.folder} is no folder; make it, or give another.")
         run_studio(self.folder, self.host, self.port, self._ready)
         console = Console(self.json)
         console.say("the studio is closed")

@@ -7,6 +7,7 @@ import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -174,7 +175,8 @@ class MeasuredRows:
         self._write(_Table(table.columns, tuple(rows), table.head), entry)
 
     def _write(self, table: _Table, entry: Mapping[str, Any]) -> None:
-        journal = "".join(json.dumps(one, ensure_ascii=False) + "\n" for one in [*self._entries(), entry])
+        before = _text(self.history)
+        journal = f"{before.rstrip()}\n".lstrip() + json.dumps(entry, ensure_ascii=False) + "\n"
         with atomic_paths(self.path, self.history) as (rows, history):
             rows.write_bytes(table.text().encode())
             history.write_bytes(journal.encode())
@@ -190,7 +192,7 @@ class MeasuredRows:
             ) from problem
 
     def _table(self) -> _Table:
-        return _Table.parsed(self.path, _text(self.path))
+        return _parsed(self.path, _text(self.path))
 
     def _changed(self) -> InputError:
         return InputError(
@@ -240,6 +242,12 @@ class _Table:
         for row in self.rows:
             writer.writerow([row.excluded if name == EXCLUDED else row.cells[name] for name in columns])
         return stream.getvalue()
+
+
+@lru_cache(maxsize=4)
+def _parsed(path: Path, text: str) -> _Table:
+    """As `_Table.parsed`; a text is asked for several times until it changes."""
+    return _Table.parsed(path, text)
 
 
 def split_line(line: str) -> list[str]:

@@ -187,7 +187,7 @@ def _quantile(columns: np.ndarray, covariance: np.ndarray, scatter: float) -> fl
     rng = np.random.default_rng(0)
     values, vectors = np.linalg.eigh(covariance)
     draws = rng.standard_normal((len(values), _DRAWS))
-    root = vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T  # so that it changes little with the covariance
-    changes = root @ draws
+    # the symmetric root, which changes little where the covariance does
+    changes = vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T @ draws
     errors = columns @ changes + scatter * rng.standard_normal((len(columns), 3, _DRAWS))
     return float(np.quantile(np.linalg.norm(errors, axis=1), _QUANTILE))

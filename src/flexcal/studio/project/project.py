@@ -58,7 +58,7 @@ class Project:
         """Project of a folder; raises `InputError` where there is none."""
         if not folder.is_dir():
             raise InputError(
-                "E-STUDIO-040", f"{folder} is not a folder; give the folder of the robot's files."
+                "E-STUDIO-040", f"{folder} is no folder; make it, or give that of the robot's files."
             )
         return cls(folder.resolve())
 
