@@ -87,6 +87,7 @@ def write_verification(
     poses: int = 40,
     freedom: float | None = None,
     fitted: bool = False,
+    moved: bool = False,
 ) -> None:
     """results.json of a verification with this P90, mm; `calibration` stands for the block that it verified."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -99,6 +100,7 @@ def write_verification(
         "verification": {"measured": errors},
         "rms_mm": {"parameters": 0.1, "expected": 0.7 * p90_mm, "measured": 0.7 * p90_mm},
         "prediction": None if freedom is None else {"freedom": freedom},
+        "refit_proposed": {"what": ["station"]} if moved else None,
         "fitted": ["poses.csv"] if fitted else [],
         "verdict": {"trusted": True, "reasons": []},
         "provenance": {

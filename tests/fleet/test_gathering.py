@@ -77,6 +77,16 @@ def test_tolerance_is_judged_with_the_uncertainty_of_the_p90(tmp_path: Path) -> 
     assert robot_named(judged, "bad")["tolerance_from"] == "robot.yaml"
 
 
+def test_moved_instrument_is_no_bad_robot(tmp_path: Path) -> None:
+    """verify found the instrument elsewhere: its errors say nothing of the robot, nor of a trend."""
+    write_robot(tmp_path / "arm", tolerance=2e-4)
+    write_visits(tmp_path / "arm", (0.1, 0.1, 0.1), name="a")
+    assert robot_named(review_fleet(tmp_path), "arm")["state"] == "within"
+    write_verification(tmp_path / "arm" / DAYS[3], 5.0, data="moved", moved=True)
+    arm = robot_named(review_fleet(tmp_path), "arm")
+    assert arm["state"] == "not_judged" and "station" in arm["reason"] and arm["trend"]["visits"] == 3
+
+
 def test_date_of_a_growing_error(tmp_path: Path) -> None:
     """0.02 mm a half-year, from 0.10 mm: 0.2 mm after another half-year; a flat robot has no date, nor one with undated visits."""
     write_robot(tmp_path / "grows", tolerance=2e-4)

@@ -10,7 +10,7 @@ import numpy as np
 
 FEWEST = 3
 """Least number of visits of a trend."""
-_FEWEST_COURSES = 6
+_FEWEST_COURSES = 10
 """Least number of courses whose scatter says something of the others'."""
 _CAUTION = 1.645
 """Standard errors by which variances are taken to differ more between courses than they seem to (one-sided 95 %)."""

@@ -50,13 +50,12 @@ def robot_accuracies(
 ) -> list[RobotAccuracy]:
     """Accuracy of all robots, whose model and tolerance (m) are given by name; drifts are significant at the `level`."""
     verified: dict[str, list[Record]] = defaultdict(list)
-    fitted: dict[str, int] = defaultdict(int)
+    left_out: dict[str, list[Record]] = defaultdict(list)
+    moved = {r["file"]: r["text"] for r in records if r["name"] == "moved" and r["value"]}
     for r in records:
         if r["kind"] == "verification" and r["name"] == "error.p90" and r["value"] is not None and r["std"]:
-            if r["independent"]:
-                verified[r["robot"]].append(r)
-            else:
-                fitted[r["robot"]] += 1
+            usable = r["independent"] and r["file"] not in moved
+            (verified if usable else left_out)[r["robot"]].append(r)
     last = {robot: latest(group) for robot, group in verified.items()}
     same = {
         robot: [r for r in group if r["calibration"] == last[robot]["calibration"]]
@@ -66,7 +65,14 @@ def robot_accuracies(
     found = []
     for robot, (model, tolerance) in robots.items():
         verification, drift = last.get(robot), drifts.get(robot)
-        state, reason = _state(verification, tolerance, fitted[robot])
+        newest = latest([*verified[robot], *left_out[robot]]) if robot in {*verified, *left_out} else None
+        if newest is not None and newest["file"] in moved:
+            state, reason = (
+                "not_judged",
+                f"by the latest verification the {moved[newest['file']]} moved since the calibration; repeat it with --refit",
+            )
+        else:
+            state, reason = _state(verification, tolerance, len(left_out[robot]))
         reaches, outlook = _outlook(same.get(robot, []), drift, tolerance, state, level)
         found.append(
             RobotAccuracy(robot, model, tolerance, verification, state, reason, drift, reaches, outlook)

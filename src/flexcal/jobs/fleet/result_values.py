@@ -62,6 +62,9 @@ def _verification(document: Mapping[str, Any]) -> list[ResultValue]:
         _length("error.rms", rms["measured"], 1 / math.sqrt(2 * freedom)),
         _length("error.expected_rms", rms["expected"]),
     ]
+    moved = document["refit_proposed"]
+    what = "" if moved is None else " and ".join(moved["what"])
+    values.append(ResultValue("moved", float(moved is not None), None, "1", what))
     own = document["before"]["own"] or document["before"]["registered"]
     if own is not None:
         values.append(_length("uncalibrated.p90", own["p90_mm"]))
