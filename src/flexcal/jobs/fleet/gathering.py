@@ -10,8 +10,10 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from flexcal.errors import FlexcalError
-from flexcal.estimation import Estimate, Parameter
+from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, read_estimates, sha256_of
 from flexcal.jobs.fleet.parameter_owners import is_of_robot
 from flexcal.jobs.fleet.places import local_fleet
@@ -171,28 +173,26 @@ def _block(common: Row, project: Project, block: Block, estimate: Estimate) -> _
         terms=estimate.provenance.get("option.terms", ""),
         data=_data(estimate.provenance),
     )
-    rows = [
-        replace(
-            common,
-            name=item.name,
-            value=None if item.name in held else float(item.value),
-            std=None if item.name in held else estimate.std(item.name),
-            unit=item.unit,
-            identifiable=item.name not in held and estimate.std(item.name) is not None,
-            prior_share=None if item.name in held else _prior_share(estimate, item),
-            of_robot=is_of_robot(item.name, absorbed.get(item.name, ()), project.base),
-            absorbs=" ".join(sorted(absorbed.get(item.name, ()))),
+    parameters = estimate.parameters
+    deviation = np.sqrt(np.diag(estimate.covariance))
+    std = parameters.natural_slope(parameters.coordinates()) * deviation
+    rows = []
+    for k, item in enumerate(parameters):
+        known = item.name not in held
+        rows.append(
+            replace(
+                common,
+                name=item.name,
+                value=float(item.value) if known else None,
+                std=float(std[k]) if known and estimate.identifiable[k] else None,
+                unit=item.unit,
+                identifiable=known and estimate.identifiable[k],
+                prior_share=min(1.0, float(deviation[k] / item.prior_std) ** 2) if known else None,
+                of_robot=is_of_robot(item.name, absorbed.get(item.name, ()), project.base),
+                absorbs=" ".join(sorted(absorbed.get(item.name, ()))),
+            )
         )
-        for item in estimate.parameters
-    ]
     return _Result(rows)
-
-
-def _prior_share(estimate: Estimate, item: Parameter) -> float:
-    """Share of the information on a parameter that its prior has."""
-    number = estimate.parameters.index(item.name)
-    variance = float(estimate.covariance[number, number])
-    return min(1.0, variance / item.prior_std**2) if item.prior_std > 0 else 1.0
 
 
 def _values(common: Row, project: Project, path: Path) -> Iterator[_Result]:
