@@ -37,7 +37,8 @@ def integer(value: Any) -> int:
 def text(value: Any) -> str:
     """A text."""
     if not isinstance(value, str):
-        raise Fault("E-YAML-030", f"a text is expected, not {describe(value)}")
+        quotes = "; write it in quotes" if isinstance(value, int | float) else ""
+        raise Fault("E-YAML-030", f"a text is expected, not {describe(value)}{quotes}")
     return value
 
 
