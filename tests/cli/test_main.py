@@ -50,6 +50,17 @@ def test_help_imports_nothing_heavy() -> None:
     assert done.stderr.split() == []
 
 
+def test_no_argument_needs_a_type_checker() -> None:
+    program = (
+        "import contextlib, io, sys\nfrom flexcal.cli.main import main\n"
+        "from flexcal.cli.arguments.verb_table import VERBS\n"
+        "for verb in VERBS:\n"
+        "    with contextlib.redirect_stdout(io.StringIO()): main([*verb.words, '--help'])\n"
+        "    assert 'typeguard' not in sys.modules, verb.name"
+    )
+    subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+
+
 @pytest.mark.parametrize("verb", VERBS, ids=lambda verb: verb.name)
 def test_every_verb_explains_itself(run, verb) -> None:
     page = run(*verb.words, "--help")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, Literal, Optional
+from typing import Annotated, Any, Optional
 
 from tyro.conf import Positional, arg
 from tyro.constructors import PrimitiveConstructorSpec
@@ -14,15 +14,19 @@ from flexcal.errors import InputError
 MaybePath = Optional[Path]  # noqa: UP045
 MaybeText = Optional[str]  # noqa: UP045
 MaybeNumber = Optional[float]  # noqa: UP045
+MaybeCount = Optional[int]  # noqa: UP045
 """Of `Path | None` tyro would ask a type checker, which takes longer to load than some fits; not so of these, nor of `Paths` below."""
 Robot = Annotated[Positional[Path], arg(metavar="ROBOT", help="robot.yaml")]
 
 
-def _any_number(metavar: str, kind: Callable[[str], Any]) -> PrimitiveConstructorSpec:
-    """Any number of values."""
+def any_number(
+    metavar: str, kind: Callable[[str], Any] = str, choices: tuple[str, ...] | None = None
+) -> PrimitiveConstructorSpec:
+    """Any number of values of a `kind`, or of the `choices`."""
     return PrimitiveConstructorSpec(
         nargs="*",
         metavar=metavar,
+        choices=choices,
         instance_from_str=lambda texts: tuple(kind(text) for text in texts),
         is_instance=lambda value: isinstance(value, tuple),
         str_from_instance=lambda values: [str(value) for value in values],
@@ -34,9 +38,9 @@ def file_argument(metavar: str, text: str) -> Any:
     return arg(metavar=metavar, help=text, help_behavior_hint="")
 
 
-Paths = Annotated[tuple, _any_number("FILE...", Path)]
-Numbers = Annotated[tuple, _any_number("X...", float)]
-Texts = Annotated[tuple, _any_number("TEXT...", str)]
+Paths = Annotated[tuple, any_number("FILE...", Path)]
+Numbers = Annotated[tuple, any_number("X...", float)]
+Texts = Annotated[tuple, any_number("TEXT...")]
 PoseFiles = Annotated[
     Positional[Paths],
     file_argument("POSES...", "files of measured poses (CSV or Parquet), one or several"),
@@ -58,7 +62,8 @@ Estimates = Annotated[
     ),
 ]
 Accept = Annotated[
-    tuple[Literal["weight"], ...],
+    tuple,
+    any_number("weight", choices=("weight",)),
     arg(
         metavar="weight",
         help="weight: go on where the torques do not hold the weight of the links, as of guessed masses or an arm that springs balance.",

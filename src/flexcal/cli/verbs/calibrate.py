@@ -13,8 +13,10 @@ from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import (
     Json,
     MaybePath,
+    MaybeText,
     PoseFiles,
     Robot,
+    Texts,
     require_at_least,
     require_robot_and_files,
 )
@@ -60,7 +62,7 @@ class Calibrate:
     robot: Robot
     poses: PoseFiles
     terms: Annotated[
-        tuple[str, ...], arg(metavar="TERM...", help_behavior_hint="(default: as robot.yaml declares)")
+        Texts, arg(metavar="TERM...", help_behavior_hint="(default: as robot.yaml declares)")
     ] = ()
     """auto, or some of: kinematic (or offsets or lengths), backlash, gravity_compliance, lateral_compliance, transmission, ratio;
     JOINT.gravity_compliance is that of one joint. auto: those that cross-validation supports, and transmission."""
@@ -70,7 +72,7 @@ class Calibrate:
     """Relative 1σ of the ratio of a drive's secant stiffness under gravity to its stiffness in the frequency response; 0.1 is usual."""
     elasticity: Literal["reestimated", "marginalised"] = "reestimated"
     """Treatment of the uncertainty of stiffness and inertia; both give the same geometry to first order."""
-    hold_out: Annotated[str | None, arg(metavar="COLUMN", help_behavior_hint="")] = None
+    hold_out: Annotated[MaybeText, arg(metavar="COLUMN", help_behavior_hint="")] = None
     """Column of POSES: the measurements with each of its values are left out of a further calibration in turn, and compared with it."""
     prior: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="")] = None
     """Prior of the geometry from other robots of the model, as 'flexcal fleet --prior' writes it: fewer poses are then enough."""

@@ -9,7 +9,15 @@ from typing import Annotated, Literal
 from tyro.conf import arg
 
 from flexcal.cli.arguments.invocation import command_line
-from flexcal.cli.arguments.shared_options import Json, Robot, require_at_least, require_robot
+from flexcal.cli.arguments.shared_options import (
+    Json,
+    MaybeCount,
+    MaybeNumber,
+    MaybePath,
+    Robot,
+    require_at_least,
+    require_robot,
+)
 from flexcal.cli.arguments.suggested_commands import measure_command
 from flexcal.cli.terminal.console import Console
 from flexcal.errors import InputError
@@ -29,11 +37,11 @@ class DesignFrequency:
     """default: payload as declared, 1.5° of reference motion; paper: no payload, 3°; designed: as default, with poses and amplitudes
     optimised for the springs; quick: the same in half the time."""
     poses: Annotated[
-        Path | None,
+        MaybePath,
         arg(metavar="FILE", help_behavior_hint="(default: frequency_poses.csv beside robot.yaml)"),
     ] = None
     """Poses of the experiments: CSV with plan, pose, q1_deg, q2_deg and so on."""
-    choose: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 6)")] = None
+    choose: Annotated[MaybeCount, arg(metavar="N", help_behavior_hint="(default: 6)")] = None
     """Number of poses for designed and quick."""
     candidates: Annotated[int, arg(metavar="N")] = 300
     """Number of random candidate poses for designed and quick."""
@@ -44,7 +52,7 @@ class DesignFrequency:
         ),
     ] = None
     """The same torque on every line, or more where the response depends on the springs."""
-    std: Annotated[float | None, arg(metavar="SHARE", help_behavior_hint="(default: as the plan has it)")] = (
+    std: Annotated[MaybeNumber, arg(metavar="SHARE", help_behavior_hint="(default: as the plan has it)")] = (
         None
     )
     """Required relative standard deviation of every stiffness, 0.01 for 1 %; determines realisations and periods."""

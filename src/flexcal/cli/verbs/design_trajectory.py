@@ -9,7 +9,16 @@ from typing import Annotated, Literal
 from tyro.conf import arg
 
 from flexcal.cli.arguments.invocation import command_line
-from flexcal.cli.arguments.shared_options import Json, Robot, require_at_least, require_robot
+from flexcal.cli.arguments.shared_options import (
+    Json,
+    MaybeNumber,
+    MaybePath,
+    Numbers,
+    Robot,
+    Texts,
+    require_at_least,
+    require_robot,
+)
 from flexcal.cli.arguments.suggested_commands import measure_command
 from flexcal.cli.terminal.console import Console
 from flexcal.errors import InputError
@@ -33,14 +42,14 @@ class DesignTrajectory:
     posterior: masses, centres of mass and rotors, with robot.yaml's prior; c: variances of the parameters --of, with it.
     Of the base parameters without prior: condition number of the column-scaled observation matrix, log det (D), least eigenvalue of the
     information (E), trace of the covariance (A)."""
-    of: Annotated[tuple[str, ...], arg(metavar="NAME...", help_behavior_hint="")] = ()
+    of: Annotated[Texts, arg(metavar="NAME...", help_behavior_hint="")] = ()
     """Parameters of the criterion c, such as link_3.mass or payload.mass."""
     sequence: Annotated[
         Literal["links", "axes", "kinds"] | None,
         arg(metavar="{links,axes,kinds}", help_behavior_hint="(default: none)"),
     ] = None
     """One trajectory for each link from the last on, for wrist and main axes, or for inertia, gravity and friction; with --criterion D."""
-    after: Annotated[Path | None, arg(metavar="PLAN", help_behavior_hint="")] = None
+    after: Annotated[MaybePath, arg(metavar="PLAN", help_behavior_hint="")] = None
     """A plan that is already recorded; its information is added."""
     kind: Literal["fourier", "spline"] = "fourier"
     """Fourier series, or cyclic B-splines with three control points for each of the harmonics."""
@@ -52,7 +61,7 @@ class DesignTrajectory:
     """Number of multiples of the base frequency."""
     rest: bool = False
     """Every period begins and ends at rest."""
-    start: Annotated[tuple[float, ...], arg(metavar="Q", help_behavior_hint="(default: optimised)")] = ()
+    start: Annotated[Numbers, arg(metavar="Q", help_behavior_hint="(default: optimised)")] = ()
     """Joint positions, rad or m, where every period begins and ends at rest."""
     share: Annotated[float, arg(metavar="SHARE")] = 0.8
     """Fraction of the limits of velocities, accelerations and torques that a motion may use; the controller needs the rest."""
@@ -63,7 +72,7 @@ class DesignTrajectory:
     steps: Annotated[int, arg(metavar="N")] = 20
     """Iterations at each level of the barrier; 40 nearly converge."""
     rate: Annotated[
-        float | None, arg(metavar="HZ", help_behavior_hint="(default: 100, more for fast motions)")
+        MaybeNumber, arg(metavar="HZ", help_behavior_hint="(default: 100, more for fast motions)")
     ] = None
     """Timed joint positions a second; the cycle of a controller that takes one position each."""
     seed: Annotated[int, arg(metavar="N")] = 0

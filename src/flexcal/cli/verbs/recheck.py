@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, Optional
+from typing import Annotated, Optional
 
 from tyro.conf import Positional, arg
 
@@ -16,6 +16,7 @@ from flexcal.cli.arguments.shared_options import (
     MaybeText,
     Paths,
     Robot,
+    any_number,
     file_argument,
     require_robot,
     require_robot_and_files,
@@ -43,7 +44,9 @@ class Recheck:
     """Choose N poses for the reference visit and those after it, and write plan.yaml."""
     estimates: Estimates = None
     refit: Annotated[
-        tuple[Literal["station"], ...], arg(metavar="station", help_behavior_hint="(default: where evident)")
+        tuple,
+        any_number("station", choices=("station",)),
+        arg(metavar="station", help_behavior_hint="(default: where evident)"),
     ] = ()
     """station: the instrument stands elsewhere than at the calibration or the reference visit; its place is fitted to the poses."""
     reference: bool = False

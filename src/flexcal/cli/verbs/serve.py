@@ -9,7 +9,15 @@ from typing import Annotated, ClassVar
 
 from tyro.conf import arg
 
-from flexcal.cli.arguments.shared_options import Estimates, Json, MaybePath, Robot, Temperature, require_robot
+from flexcal.cli.arguments.shared_options import (
+    Estimates,
+    Json,
+    MaybeCount,
+    MaybePath,
+    Robot,
+    Temperature,
+    require_robot,
+)
 from flexcal.cli.terminal.console import Console
 from flexcal.errors import InputError
 
@@ -27,7 +35,7 @@ class Serve:
     robot: Robot
     unix: Annotated[MaybePath, arg(metavar="SOCKET", help_behavior_hint="(or --port)")] = None
     """Unix socket to make."""
-    port: Annotated[int | None, arg(metavar="N", help_behavior_hint="(or --unix)")] = None
+    port: Annotated[MaybeCount, arg(metavar="N", help_behavior_hint="(or --unix)")] = None
     """TCP port of 127.0.0.1; 0 takes any free one."""
     token: Annotated[Path, arg(metavar="FILE")] = Path("flexcal.token")
     """File of the token that clients of --port begin with, {"token": "…"}; made where it is absent."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import Positional, arg
 
-from flexcal.cli.arguments.shared_options import Json
+from flexcal.cli.arguments.shared_options import Json, MaybeCount
 from flexcal.cli.terminal.console import Console
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ class Studio:
     host: Annotated[str, arg(metavar="ADDRESS")] = _LOOPBACK
     """Address of this machine to listen on; all but 127.0.0.1 let others in who know the address, unencrypted. 0.0.0.0: all."""
     port: Annotated[
-        int | None,
+        MaybeCount,
         arg(metavar="N", help_behavior_hint="(default: 8080, or the next that is free)"),
     ] = None
     """TCP port; 0 takes any free one."""

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from tyro.conf import Positional, arg
 
 from flexcal.cli.arguments.invocation import command_line
-from flexcal.cli.arguments.shared_options import Json, require_at_least
+from flexcal.cli.arguments.shared_options import Json, MaybeCount, MaybeText, require_at_least
 from flexcal.cli.arguments.verb_table import VERBS
 from flexcal.cli.folders.overwrite_protection import outputs
 from flexcal.cli.terminal.console import Console
@@ -27,10 +27,10 @@ class Study:
     study: Annotated[Positional[Path], arg(metavar="STUDY", help="STUDY.yaml: robot, kind of task, options")]
     out: Annotated[Path, arg(metavar="DIR")] = Path("study")
     """Folder for tasks.parquet, results.json and report.html, and, while the study runs, parts."""
-    on: Annotated[str | None, arg(metavar="ADDRESS", help_behavior_hint="(default: this machine)")] = None
+    on: Annotated[MaybeText, arg(metavar="ADDRESS", help_behavior_hint="(default: this machine)")] = None
     """Dask scheduler, dask://host:port or tls://host:port. Its workers need the same flexcal, and run whatever they are sent: use only a
     cluster of your own."""
-    jobs: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: one a core)")] = None
+    jobs: Annotated[MaybeCount, arg(metavar="N", help_behavior_hint="(default: one a core)")] = None
     """Number of processes on this machine."""
     resume: bool = False
     """Go on with the study in DIR: only tasks that are not stored yet run."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
@@ -15,6 +15,7 @@ from flexcal.cli.arguments.shared_options import (
     PoseFiles,
     Robot,
     Temperature,
+    any_number,
     require_robot_and_files,
 )
 from flexcal.cli.arguments.suggested_commands import estimates_option
@@ -33,7 +34,8 @@ class Verify:
     poses: PoseFiles
     estimates: Estimates = None
     refit: Annotated[
-        tuple[Literal["station", "point"], ...],
+        tuple,
+        any_number("{station,point}...", choices=("station", "point")),
         arg(metavar="{station,point}...", help_behavior_hint="(default: nothing)"),
     ] = ()
     """Fit the placement of the instrument, or the measured point, to these poses, where it was moved or replaced since the

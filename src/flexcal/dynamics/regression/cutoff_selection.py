@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
-from scipy.fft import next_fast_len
 
 from flexcal.data.recordings import Decimation, Recording
 from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
@@ -260,6 +259,8 @@ class _Filters:
     """Samples in the frequency domain, where low-pass, differences and decimation are products."""
 
     def __init__(self, piece: ContinuousSamples, highest_hz: float) -> None:
+        from scipy.fft import next_fast_len
+
         self._step, count = piece.time_step, len(piece.q)
         self._factor = max(1, int(1.0 / (self._step * highest_hz)))
         self._beyond = min(count - 1, int(_SPAN / self._step))

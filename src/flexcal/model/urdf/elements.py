@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -17,6 +16,10 @@ from flexcal.units import LARGEST
 _DEEPEST = 50
 _QUOTED = 60
 """Largest number of characters of an attribute that a message quotes."""
+_REFERENCES = str.maketrans(
+    {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\n": "&#10;", "\r": "&#13;", "\t": "&#9;"}
+)
+"""What an attribute's value cannot hold as it is; xml.sax.saxutils does the same and loads a client of HTTP."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,9 @@ class Element:
 
     def text(self) -> str:
         """XML text of the element with attributes and children alone: no text, comments, entities or encoding."""
-        attributes = "".join(f" {name}={quoteattr(value)}" for name, value in self.attributes.items())
+        attributes = "".join(
+            f' {name}="{value.translate(_REFERENCES)}"' for name, value in self.attributes.items()
+        )
         inside = "".join(child.text() for child in self.children)
         return f"<{self.tag}{attributes}>{inside}</{self.tag}>" if inside else f"<{self.tag}{attributes}/>"
 
