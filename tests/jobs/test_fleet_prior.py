@@ -62,19 +62,26 @@ def poses_of(q: np.ndarray, position: np.ndarray) -> PoseSet:
 
 
 def fitted(
-    model: RobotModel, robot: SimulatedRobot, count: int, rng: np.random.Generator, prior: FleetPrior | None
+    model: RobotModel,
+    robot: SimulatedRobot,
+    count: int,
+    rng: np.random.Generator,
+    prior: FleetPrior | None,
+    terms: Sequence[str] = ("kinematic",),
 ) -> GeometricFit:
     q = random_poses(count, rng)
     return fit_geometry(
-        model, poses_of(q, robot.measured(q, NOISE, rng)), terms=["kinematic"], loss="squares", fleet=prior
+        model, poses_of(q, robot.measured(q, NOISE, rng)), terms=terms, loss="squares", fleet=prior
     )
 
 
-def pooled(folder: Path, robots: int, poses: int, seed: int, spread: float) -> Pooled:
+def pooled(
+    folder: Path, robots: int, poses: int, seed: int, spread: float, terms: Sequence[str] = ("kinematic",)
+) -> Pooled:
     rng = np.random.default_rng(seed)
     model = RobotModel.from_yaml(write_robot(folder))
-    fleet = Fleet.drawn(rng, spread)
-    fits = [fitted(model, fleet.robot(rng), poses, rng, None) for _ in range(robots)]
+    fleet = Fleet.drawn(rng, spread, soft=len(terms) > 1)
+    fits = [fitted(model, fleet.robot(rng), poses, rng, None, terms) for _ in range(robots)]
     members = [CalibratedMember(f"robot_{k}", model, fit.estimate) for k, fit in enumerate(fits)]
     return Pooled(fleet, model, members, pooled_prior(members))
 
@@ -172,6 +179,13 @@ def test_the_file_has_the_prior_and_refuses_other_robots(six: Pooled, tmp_path: 
     assert any("prior of 3 other robots" in remark for remark in result.document()["remarks"])
     assert (tmp_path / "out" / "report.html").exists()
 
+    stranger = Fleet.drawn(rng).robot(rng)
+    unlike = write_poses(tmp_path / "unlike.csv", q, stranger.measured(q, NOISE, rng))
+    told = calibrate_robot(new, [unlike], prior=out, out=tmp_path / "unlike")
+    assert told.trust.document() == {"trusted": False, "reasons": ["fleet"]}
+    assert "the prior of other robots does not fit this one" in told.trust.sentence
+    assert any("the prior does not fit this robot" in remark for remark in told.document()["remarks"])
+
     odd = write_robot(tmp_path / "odd")
     urdf = odd.parent / "arm.urdf"
     urdf.write_text(urdf.read_text().replace('xyz="0.42', 'xyz="0.43'))
@@ -228,16 +242,16 @@ def test_robots_with_other_terms_are_refused(six: Pooled) -> None:
 
 @pytest.mark.slow
 def test_a_fleet_of_thirty_tells_the_next_robot(tmp_path: Path) -> None:
-    """Robots that differ by a tenth of the errors of their type: far better than without the others, and intervals that are true."""
+    """Of soft robots that differ by 5 % of what their type is off, 15 poses are about as good as 40 without the others."""
+    soft = ["kinematic", "gravity_compliance", "lateral_compliance"]
+    batch = pooled(tmp_path, robots=30, poses=40, seed=24, spread=0.05, terms=soft)
+    rng = np.random.default_rng(124)
     alone, few, inside = [], [], []
-    for seed in (11, 12):
-        batch = pooled(tmp_path / str(seed), robots=30, poses=40, seed=seed, spread=0.1)
-        rng = np.random.default_rng(seed + 100)
-        for _ in range(8):
-            robot = batch.fleet.robot(rng)
-            alone.append(errors_elsewhere(fitted(batch.model, robot, 15, rng, None), robot, rng)[0])
-            p90, covered = errors_elsewhere(fitted(batch.model, robot, 15, rng, batch.prior), robot, rng)
-            few.append(p90)
-            inside.append(covered)
-    assert np.mean(few) < 0.75 * np.mean(alone)
-    assert 0.9 < np.mean(inside) < 0.99
+    for _ in range(8):
+        robot = batch.fleet.robot(rng)
+        alone.append(errors_elsewhere(fitted(batch.model, robot, 40, rng, None, soft), robot, rng)[0])
+        p90, covered = errors_elsewhere(fitted(batch.model, robot, 15, rng, batch.prior, soft), robot, rng)
+        few.append(p90)
+        inside.append(covered)
+    assert np.mean(few) < 1.25 * np.mean(alone)
+    assert 0.92 < np.mean(inside) < 0.99

@@ -17,7 +17,7 @@ from flexcal.files.formats import block_sha256, read_estimates
 from flexcal.jobs.fleet_prior.geometry_information import geometry_information, is_of_cell, is_of_robot
 from flexcal.jobs.fleet_prior.kinematics import difference
 from flexcal.jobs.fleet_prior.prior_file import write_fleet_prior
-from flexcal.model.robot import RobotModel
+from flexcal.model.robot import RobotModel, unit_in
 
 FEWEST = 3
 """Least number of robots: two that happen to be alike, or are one that was measured twice, would pass for a model whose robots do not
@@ -81,7 +81,7 @@ def pooled_prior(members: Sequence[CalibratedMember]) -> FleetPrior:
     """
     _require_alike(members)
     names, sizes, measured = _measured(members)
-    pooled = population(measured, sizes, [_kind(name) for name in names])
+    pooled = population(measured, sizes, [_kind(members[0].model, name) for name in names])
     prior = FleetPrior(
         tuple(names),
         pooled.mean,
@@ -161,10 +161,10 @@ def _require_alike(members: Sequence[CalibratedMember]) -> None:
             )
 
 
-def _kind(name: str) -> str:
-    """Parameters whose spreads resemble each other."""
-    key = name.rpartition(".")[2]
+def _kind(model: RobotModel, name: str) -> str:
+    """Parameters whose spreads resemble each other: errors of one sort and unit."""
+    key, unit = name.rpartition(".")[2], unit_in(model, name)
     for kind in ("length", "origin", "misalignment", "gravity_compliance_", "ratio"):
         if key.startswith(kind):
-            return "length" if kind == "origin" else kind
-    return key
+            return f"{'length' if kind == 'origin' else kind}, {unit}"
+    return f"{key}, {unit}"

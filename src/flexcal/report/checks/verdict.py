@@ -160,6 +160,10 @@ PHRASES: dict[str, dict[str, str]] = {
         "good": "the bearings tilt about the right axes",
         "else": "the data fit other bearing axes than the declared ones",
     },
+    "fleet": {
+        "good": "the robot is like those that its prior is from",
+        "else": "the prior of other robots does not fit this one",
+    },
     "outliers": {"good": "there are no outliers", "else": "there are outliers"},
     "places": {
         "good": "the places of the fixture agree",
