@@ -2,8 +2,6 @@
 
 from pathlib import Path
 
-import distributed
-import joblib
 import numpy as np
 import pytest
 from refusals import refused
@@ -17,6 +15,7 @@ from flexcal.dynamics.signals import JointLog, Motion, Window, joint_log
 from flexcal.jobs.dynamics.remarks import dynamics_remarks
 from flexcal.jobs.logs import LogSegment, Preprocessing, assemble_log_systems, read_logs
 from flexcal.jobs.logs.regression_systems import split_hold_out
+from flexcal.parallel import ThisProcess, Workers, open_workers
 from flexcal.progress import silent
 
 STEP = 1 / 200
@@ -57,14 +56,16 @@ def test_blocks_give_the_whole(
         np.testing.assert_allclose(estimates[0].covariance, estimates[1].covariance, rtol=1e-8, atol=1e-18)
 
 
-def systems(logs: list[Path], observation: Observation, scratch: Path, jobs: int) -> list[ExperimentSystem]:
+def systems(
+    logs: list[Path], observation: Observation, scratch: Path, workers: Workers
+) -> list[ExperimentSystem]:
     """Those of the first 70 % and of the rest of every log."""
     treatment, parts = Preprocessing(10.0, Decimation(4), True), []
-    for log in read_logs(logs, observation.model, treatment, scratch, jobs=jobs):
+    for log in read_logs(logs, observation.model, treatment, scratch, workers=workers):
         early, late = split_hold_out(log, treatment, 0.3)
         assert late is not None
         parts += [LogSegment(log, early), LogSegment(log, late)]
-    return assemble_log_systems(parts, observation, treatment, batches=16, jobs=jobs, progress=silent)
+    return assemble_log_systems(parts, observation, treatment, batches=16, workers=workers, progress=silent)
 
 
 def check_equal(found: list[ExperimentSystem], expected: list[ExperimentSystem]) -> None:
@@ -76,21 +77,9 @@ def check_equal(found: list[ExperimentSystem], expected: list[ExperimentSystem])
 
 
 def test_processes_change_nothing(logs: list[Path], observation: Observation, tmp_path: Path) -> None:
-    check_equal(systems(logs, observation, tmp_path, 2), systems(logs, observation, tmp_path, 1))
-
-
-def test_the_same_call_on_dask(logs: list[Path], observation: Observation, tmp_path: Path) -> None:
-    with (
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, dashboard_address=None, local_directory=str(tmp_path / "dask")
-        ) as cluster,
-        distributed.Client(cluster),
-        joblib.parallel_config(backend="dask"),
-    ):
-        found = systems(logs, observation, tmp_path, 2)
-        done = sum(moved[2] == "memory" for moved in cluster.scheduler.transition_log)
-    assert done >= 3 * len(logs)  # every log is read, and both its parts are reduced
-    check_equal(found, systems(logs, observation, tmp_path, 1))
+    with open_workers(None, 2) as workers:
+        found = systems(logs, observation, tmp_path, workers)
+    check_equal(found, systems(logs, observation, tmp_path, ThisProcess()))
 
 
 def test_a_window_reads_no_more_than_it_needs(swing: Motion, observation: Observation) -> None:

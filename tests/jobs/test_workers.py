@@ -14,9 +14,8 @@ import pytest
 PROGRAM = """
 import os, sys, time
 from pathlib import Path
-from joblib import Parallel, delayed
 from flexcal.jobs.logs import scratch_folder
-from flexcal.parallel import WorkerTask, start_workers
+from flexcal.parallel import open_workers
 
 def work(folder):
     Path(folder, f"pid_{os.getpid()}").touch()
@@ -24,8 +23,8 @@ def work(folder):
 
 with scratch_folder() as scratch:
     Path(sys.argv[1], scratch.name).touch()
-    start_workers(2)
-    Parallel(n_jobs=2)(delayed(WorkerTask(work))(sys.argv[1]) for _ in range(2))
+    with open_workers(None, 2) as workers:
+        list(workers.values(work, [sys.argv[1]] * 2))
 """
 
 

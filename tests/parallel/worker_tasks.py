@@ -35,3 +35,18 @@ def killing(number: int, folder: Path, deadly: int, times: int) -> int:
     if number == deadly and tries < times:
         os.kill(os.getpid(), signal.SIGKILL)
     return number
+
+
+def letter(number: int) -> str:
+    """A letter for each number."""
+    return "abcdefghijklmnop"[number]
+
+
+def paired(left: str, right: str) -> str:
+    """Both in brackets, which show the tree."""
+    return f"({left}{right})"
+
+
+def unpaired(left: str, right: str) -> str:
+    """No value."""
+    raise InputError("E-CAL-901", f"{left} and {right} do not go together; part them.")

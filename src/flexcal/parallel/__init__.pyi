@@ -1,9 +1,10 @@
 from .dask_cluster import DaskCluster
 from .local_processes import LocalProcesses
 from .opening import open_workers
+from .ordered import consecutive_groups
 from .outcome import Outcome, TaskError
 from .this_process import ThisProcess
-from .worker_processes import WorkerTask, start_workers
+from .worker_processes import WorkerTask
 from .workers import Workers
 
 __all__ = [
@@ -14,6 +15,6 @@ __all__ = [
     "ThisProcess",
     "WorkerTask",
     "Workers",
+    "consecutive_groups",
     "open_workers",
-    "start_workers",
 ]

@@ -6,11 +6,12 @@ import math
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from flexcal.errors import FlexcalError, InputError
+from flexcal.parallel.ordered import value_of, values_in_order
 from flexcal.parallel.outcome import Outcome, TaskError, run_task
 from flexcal.parallel.workers import Workers
 
@@ -119,6 +120,65 @@ class DaskCluster(Workers):
             if client.status == "running":
                 client.cancel([*running, shared])
 
+    def values(self, function: Callable[..., V], tasks: Iterable[Any], *common: Any) -> Iterator[V]:
+        """As `Workers.values`; raises `FlexcalError` as `results` does."""
+        return values_in_order(self.results(function, tasks, *common))
+
+    def reduced(
+        self,
+        function: Callable[..., V],
+        groups: Sequence[Sequence[Any]],
+        combine: Callable[[V, V], V],
+        *common: Any,
+    ) -> Iterator[V]:
+        """As `Workers.reduced`: a graph of futures, of which only the value of each group comes here.
+
+        Raises `FlexcalError` as `results` does.
+        """
+        client, name = self.client, f"flexcal-{uuid.uuid4().hex}"
+        shared = client.submit(_together, function, combine, *common, key=f"{name}-common")
+        roots: list[Future] = []
+        try:
+            for index, group in enumerate(groups):
+                level = [
+                    client.submit(_leaf, shared, task, key=f"{name}-{index}-{leaf}", pure=False)
+                    for leaf, task in enumerate(group)
+                ]
+                while len(level) > 1:
+                    pairs = [
+                        client.submit(_combined, shared, left, right, pure=False)
+                        for left, right in zip(level[::2], level[1::2], strict=False)
+                    ]
+                    level = pairs + level[2 * len(pairs) :]
+                roots += level
+            while roots:
+                yield self._value(roots[0])
+                del roots[0]
+        finally:
+            if client.status == "running":
+                client.cancel(roots)  # what only they need goes with them
+
+    def _value(self, root: Future) -> Any:
+        from concurrent.futures import CancelledError
+
+        from distributed import KilledWorker
+
+        try:
+            return value_of(root.result())
+        except CancelledError as problem:
+            raise self._lost() from problem
+        except KilledWorker as problem:
+            raise FlexcalError("E-WORK-008", f"{_GIVEN_UP}; give the workers more memory.") from problem
+        except ImportError:
+            self._require_same_version()
+            raise
+
+    def _lost(self) -> FlexcalError:
+        return FlexcalError(
+            "E-WORK-003",
+            f"the connection to the scheduler at {self.address} was lost; start it again, and go on.",
+        )
+
     def _ahead(self) -> int:
         """Tasks that may be under way; workers that came in the last second may be missing."""
         if time.monotonic() > self._counted + _RECOUNT:
@@ -138,10 +198,7 @@ class DaskCluster(Workers):
         if status == "finished":
             return result
         if status != "error":  # cancelled, as all are when the connection ends
-            raise FlexcalError(
-                "E-WORK-003",
-                f"the connection to the scheduler at {self.address} was lost; start it again, and go on.",
-            )
+            raise self._lost()
         problem = result[1]  # of type, exception, traceback
         if isinstance(problem, KilledWorker):
             return None
@@ -190,3 +247,16 @@ def _run(shared: tuple[Any, ...], index: int, task: Any) -> Outcome[Any]:
     function, *common = shared
     with _one_at_a_time:
         return run_task(function, index, task, tuple(common))
+
+
+def _leaf(shared: tuple[Any, ...], task: Any) -> Outcome[Any]:
+    function, _, *common = shared
+    return _run((function, *common), 0, task)
+
+
+def _combined(shared: tuple[Any, ...], left: Outcome[Any], right: Outcome[Any]) -> Outcome[Any]:
+    """Both values as one; the error of the earlier task where one has none."""
+    for part in (left, right):
+        if part.error is not None:
+            return part
+    return _run((shared[1], right.value), 0, left.value)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any, TypeVar
 
 from flexcal.parallel.common_values import CommonValues
+from flexcal.parallel.ordered import combined_groups, values_in_order
 from flexcal.parallel.outcome import Outcome, TaskError, run_task
 from flexcal.parallel.worker_processes import WorkerTask, interrupts_left_to_this_process
 from flexcal.parallel.workers import Workers
@@ -79,6 +81,20 @@ class LocalProcesses(Workers):
         finally:
             if running:
                 self.close()
+
+    def values(self, function: Callable[..., V], tasks: Iterable[Any], *common: Any) -> Iterator[V]:
+        """As `Workers.values`."""
+        return values_in_order(self.results(function, tasks, *common))
+
+    def reduced(
+        self,
+        function: Callable[..., V],
+        groups: Sequence[Sequence[Any]],
+        combine: Callable[[V, V], V],
+        *common: Any,
+    ) -> Iterator[V]:
+        """As `Workers.reduced`; values are combined in this process, as they come."""
+        return combined_groups(self.values(function, chain.from_iterable(groups), *common), groups, combine)
 
     def close(self) -> None:
         """As `Workers.close`; what still runs is killed."""

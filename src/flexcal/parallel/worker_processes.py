@@ -32,14 +32,6 @@ class WorkerTask(Generic[P, T]):
         return self.function(*arguments, **options)
 
 
-def start_workers(jobs: int) -> None:
-    """Start joblib worker processes that leave Ctrl-C, sent to all processes of a terminal, to this process."""
-    from joblib import Parallel, delayed
-
-    with interrupts_left_to_this_process():
-        Parallel(n_jobs=jobs)(delayed(WorkerTask(int))() for _ in range(jobs))
-
-
 @contextmanager
 def interrupts_left_to_this_process() -> Iterator[None]:
     """Within the block, processes are started that ignore Ctrl-C."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, TypeVar
 
 from flexcal.parallel.outcome import Outcome
@@ -26,6 +26,24 @@ class Workers(ABC):
         Tasks are taken from the iterable as workers become free. `common` is sent to every worker once, not with every task. An
         exception in a task is its outcome. The tasks that ran in a worker that was killed run again, and are counted once. Where the
         iterator is closed before its end, the tasks that are left are cancelled.
+        """
+
+    @abstractmethod
+    def values(self, function: Callable[..., V], tasks: Iterable[Any], *common: Any) -> Iterator[V]:
+        """`function(task, *common)` of every task, in their order. The error of a task is raised here."""
+
+    @abstractmethod
+    def reduced(
+        self,
+        function: Callable[..., V],
+        groups: Sequence[Sequence[Any]],
+        combine: Callable[[V, V], V],
+        *common: Any,
+    ) -> Iterator[V]:
+        """Values of every group of tasks, none empty, as one: combined pair by pair in a tree, where the tasks run.
+
+        The tree depends on the number of tasks alone: neighbours are combined, then their pairs, and so on. On a cluster no worker and not
+        this process hold more than a few values at a time. The error of a task is raised here.
         """
 
     @abstractmethod

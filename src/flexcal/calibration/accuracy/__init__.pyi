@@ -1,4 +1,4 @@
-from .nominal_robot import distance_to_nominal
+from .nominal_robot import Registration, distance_to_nominal
 from .pose_drift import VISITS_PER_SET, PoseDrift, common_displacement, pose_drifts
 from .pose_repeatability import CYCLES, PoseRepeatability, noise_repeatability, visit_statistics
 from .source_contributions import error_sources
@@ -10,6 +10,7 @@ __all__ = [
     "PoseDrift",
     "PoseRepeatability",
     "PredictedAccuracy",
+    "Registration",
     "common_displacement",
     "distance_to_nominal",
     "error_sources",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -39,6 +39,20 @@ class PredictedAccuracy:
     def scaled(self, factor: float) -> PredictedAccuracy:
         """Prediction with every error multiplied by `factor`."""
         return PredictedAccuracy(self.q, self.position, factor * self.mean, factor * self.p95)
+
+    def part(self, rows: np.ndarray) -> PredictedAccuracy:
+        """Poses with these indices, in their order."""
+        return PredictedAccuracy(self.q[rows], self.position[rows], self.mean[rows], self.p95[rows])
+
+    @classmethod
+    def joined(cls, parts: Sequence[PredictedAccuracy]) -> PredictedAccuracy:
+        """Poses of all parts, one after the other."""
+        return cls(
+            *(
+                np.concatenate(rows)
+                for rows in zip(*((p.q, p.position, p.mean, p.p95) for p in parts), strict=True)
+            )
+        )
 
 
 def predicted_accuracy(

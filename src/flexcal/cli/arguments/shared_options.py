@@ -70,6 +70,15 @@ Accept = Annotated[
         help_behavior_hint="",
     ),
 ]
+On = Annotated[
+    MaybeText,
+    arg(
+        metavar="ADDRESS",
+        help="Dask scheduler whose workers compute, dask://host:port or tls://host:port; a cluster of your own, as it runs any code.",
+        help_behavior_hint="(default: this machine)",
+    ),
+]
+Processes = Annotated[int, arg(metavar="N", help="Number of processes on this machine.")]
 Jobs = Annotated[int, arg(metavar="N", help="Number of logs read in parallel, each in its own process.")]
 EstimatesFolder = Annotated[
     MaybePath,

@@ -16,7 +16,9 @@ from flexcal.cli.arguments.shared_options import (
     MaybeNumber,
     MaybePath,
     MaybeText,
+    On,
     Paths,
+    Processes,
     Robot,
     require_at_least,
     require_robot,
@@ -69,7 +71,7 @@ class DesignPoses:
     criterion: Literal["c", "A", "D", "E", "O1", "O2", "O3", "O4", "O5"] = "c"
     """c: smallest predicted tool error; A, D, E: criteria of the parameter covariance; O1-O5: observability indices."""
     candidates: Annotated[int, arg(metavar="N")] = 4000
-    """Number of random candidate poses, without --from; 100000 take seconds more."""
+    """Number of random candidate poses, without --from; of more than 50000 the best of every block are compared (a million: a minute)."""
     payload: Annotated[
         MaybeNumber, arg(metavar="KG", help_behavior_hint="(default: as robot.yaml declares)")
     ] = None
@@ -80,12 +82,14 @@ class DesignPoses:
     """What will measure: a name under measurements: of robot.yaml that says where it stands, or pose for a tracker of orientations too."""
     seed: Annotated[int, arg(metavar="N")] = 0
     """Seed of the random poses."""
+    jobs: Processes = 1
+    on: On = None
     json: Json = False
 
     def run(self) -> None:
         """Choose the poses, and print the predicted tool error."""
         require_robot(self.robot)
-        require_at_least(1, count=self.count, candidates=self.candidates)
+        require_at_least(1, count=self.count, candidates=self.candidates, jobs=self.jobs)
         require_at_least(0, seed=self.seed, payload=self.payload)
         if self.wanted is not None and not self.wanted > 0:
             raise InputError("E-CLI-022", f"--wanted is {self.wanted:g}; it must be a positive number of mm.")
@@ -93,6 +97,11 @@ class DesignPoses:
             raise InputError("E-CLI-023", "--random and --from exclude each other; give one of them.")
         if self.measure is not None and (self.random or self.measured or self.pool is not None):
             raise InputError("E-CLI-042", "--measure goes with none of --random, --measured and --from.")
+        if (self.on is not None or self.jobs > 1) and (self.random or self.measured or self.pool is not None):
+            raise InputError(
+                "E-CLI-046",
+                "--on and --jobs share out random candidates, and go with none of --random, --measured and --from.",
+            )
         if self.random and self.measured:
             raise InputError("E-CLI-024", "--random and --measured exclude each other; give one of them.")
         console = Console(self.json)
@@ -139,7 +148,7 @@ class DesignPoses:
     def _choose(self, console: Console) -> None:
         from flexcal.jobs.experiments import plan_calibration_poses
 
-        design = self._planned(console, plan_calibration_poses)
+        design = self._planned(console, partial(plan_calibration_poses, on=self.on, jobs=self.jobs))
         document = design.document()
         seen = document["identifiability"]
         console.say(

@@ -14,6 +14,7 @@ from flexcal.cli.arguments.shared_options import (
     EstimatesFolder,
     Jobs,
     Json,
+    On,
     Paths,
     Robot,
     file_argument,
@@ -65,6 +66,7 @@ class IdentifyDynamics:
     learn_residual: Annotated[bool, arg(help=_LEARNING)] = False
     accept: Accept = ()
     jobs: Jobs = 1
+    on: On = None
     out: EstimatesFolder = None
     json: Json = False
 
@@ -99,6 +101,7 @@ class IdentifyDynamics:
                 out=self.out,
                 command=command_line(),
                 jobs=self.jobs,
+                on=self.on,
                 progress=progress,
             )
         document = dynamics.document()

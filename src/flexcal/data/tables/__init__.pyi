@@ -10,6 +10,7 @@ from .signals import (
     standard_columns,
     timestamp_columns,
 )
+from .streaming import streamed_table
 from .tabular_file import Table, TableFile, open_table, tables_in, write_table
 from .timestamps import STAMP, seconds_of, with_seconds
 
@@ -29,6 +30,7 @@ __all__ = [
     "open_table",
     "seconds_of",
     "standard_columns",
+    "streamed_table",
     "tables_in",
     "timestamp_columns",
     "with_seconds",

@@ -1,7 +1,7 @@
 from .condition_criteria import ConditionNumberCriterion, SmoothMinimumEigenvalue, condition_number
 from .criteria import Criterion, DOptimal, SpectralCriterion, TraceOptimal, observability
 from .exchange_algorithm import exchange
-from .lower_bound import trace_lower_bound
+from .lower_bound import TraceBound, trace_lower_bound
 from .rank_updates import Selection, greedy
 from .shortlist import exchange_on_shortlist
 
@@ -12,6 +12,7 @@ __all__ = [
     "Selection",
     "SmoothMinimumEigenvalue",
     "SpectralCriterion",
+    "TraceBound",
     "TraceOptimal",
     "condition_number",
     "exchange",

@@ -27,19 +27,26 @@ _LIGHT = 1e-3
 
 
 def exchange_on_shortlist(
-    sensitivity: Sensitivity, count: int, criterion: Criterion, *, progress: Progress = silent
+    sensitivity: Sensitivity,
+    count: int,
+    criterion: Criterion,
+    *,
+    start: np.ndarray | None = None,
+    progress: Progress = silent,
 ) -> Selection:
     """Exchange from any number of candidates, as `exchange`; above 5000 it considers 1000 at a time.
 
-    It begins among candidates drawn at random (always the same ones), then goes on among those that promise most beside the set found,
-    until that set stays or after six rounds. Raises `FlexcalError` as `exchange` does.
+    It begins with the set `start` (count,), without one among candidates drawn at random (always the same ones), then goes on among those
+    that promise most beside the set found, until that set stays or after six rounds. Raises `FlexcalError` as `exchange` does.
     """
     if len(sensitivity) <= MANY:
-        return exchange(sensitivity, count, criterion, progress=progress)
+        return exchange(sensitivity, count, criterion, start=start, progress=progress)
     short = min(len(sensitivity), max(SHORT, 4 * count))
-    listed = np.random.default_rng(0).choice(len(sensitivity), short, replace=False)
-    selection = exchange(sensitivity.subset(listed), count, criterion)
-    chosen, history = listed[selection.chosen], [selection.merit]
+    chosen, history = np.asarray(start), []
+    if start is None:
+        listed = np.random.default_rng(0).choice(len(sensitivity), short, replace=False)
+        selection = exchange(sensitivity.subset(listed), count, criterion)
+        chosen, history = listed[selection.chosen], [selection.merit]
     for number in range(ROUNDS):
         progress(SELECTION_STAGE, (number + 1) / (ROUNDS + 1))
         promise = predicted_gains(sensitivity, chosen, criterion)
@@ -54,7 +61,7 @@ def exchange_on_shortlist(
         if set(chosen) == set(before):
             break
     progress(SELECTION_STAGE, 1.0)
-    return Selection(chosen, selection.merit, tuple(history))
+    return Selection(chosen, history[-1], tuple(history))
 
 
 def predicted_gains(sensitivity: Sensitivity, chosen: np.ndarray, criterion: Criterion) -> np.ndarray:

@@ -1,4 +1,5 @@
 from .accuracy_curve import PoseCurve, pose_curve
+from .candidate_blocks import BLOCK, BlockedCandidates, ChosenOfBlock
 from .candidates import random_candidates, usable
 from .feasibility import PoseCandidates, pose_candidates
 from .geometry_sensitivity import (
@@ -14,6 +15,7 @@ from .selection import (
     CriterionName,
     PoseDesign,
     choose_poses,
+    criterion_named,
     fewest_poses,
     random_poses,
     select_poses,
@@ -24,7 +26,10 @@ from .working_volume import WorkingVolume, working_box, working_points
 from .zero_accuracy import UNKNOWN_ZERO, zero_stds
 
 __all__ = [
+    "BLOCK",
     "UNKNOWN_ZERO",
+    "BlockedCandidates",
+    "ChosenOfBlock",
     "CriterionName",
     "GeometricTolerances",
     "MeasurementOrder",
@@ -35,6 +40,7 @@ __all__ = [
     "WorkingVolume",
     "base_sensitivity",
     "choose_poses",
+    "criterion_named",
     "fewest_poses",
     "geometry_jacobian",
     "measurement_order",

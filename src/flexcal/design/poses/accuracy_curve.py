@@ -48,7 +48,8 @@ def pose_curve(
     The chosen sets are nested (each adds the best candidate), so they lie slightly above what an exchange for that count reaches.
     """
     sensitivity = design.base.sensitivity
-    total, rows, size = sensitivity.jacobian.shape
+    total = design.sample
+    _, rows, size = sensitivity.jacobian.shape
     least = -(-size // rows)
     if not len(counts):
         most = min(total, 4 * len(design.plan))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.data.poses import PosePool
+from flexcal.design.optimality import TraceBound, TraceOptimal, trace_lower_bound
 from flexcal.design.poses.camera_setup import CameraSetup
 from flexcal.design.poses.candidates import random_candidates
 from flexcal.design.poses.geometry_sensitivity import (
@@ -23,6 +24,7 @@ from flexcal.design.poses.instruments import declared_instrument
 from flexcal.design.poses.tilt_setup import TiltSetup
 from flexcal.design.scene import STANDARD, CollisionChecker, MeasuringSetup, visible
 from flexcal.errors import FlexcalError
+from flexcal.estimation import Sensitivity
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import gravity_torque
@@ -39,6 +41,9 @@ class PoseCandidates:
     `base` holds the rows of all poses of the `pool`; `tool_error_weight` (rank, rank), m², turns a covariance into the mean square of the
     tool error over the working poses. `hidden` are the numbers of a given pool's poses that the instrument does not see; `unseen`, m, is
     the root mean square of the tool error due to what no pose tells, as the size of the robot at contacts, by the tolerances.
+
+    The pool may be what is left of `looked_at` candidates (None: of no more than these): its first `sample` poses are then a random sample
+    of them, `start` the numbers of a good set, and `bound` with `largest` holds for all of them.
     """
 
     model: RobotModel
@@ -48,6 +53,18 @@ class PoseCandidates:
     tool_error_weight: np.ndarray
     hidden: np.ndarray
     unseen: float = 0.0
+    looked_at: int | None = None
+    sample: int | None = None
+    start: np.ndarray | None = None
+    bound: TraceBound | None = None
+    largest: float = 0.0
+
+    def least_errors(self, counts: np.ndarray) -> np.ndarray:
+        """Lower bounds (K,) of the tool error, m, of any choice of `counts` (K,) candidates (see `TraceBound`)."""
+        if self.bound is not None:
+            return self.bound.least(counts, self.largest) ** 0.5
+        trace = TraceOptimal(self.tool_error_weight, "c")
+        return trace_lower_bound(self.base.sensitivity, trace, counts) ** 0.5
 
 
 def pose_candidates(
@@ -79,13 +96,12 @@ def pose_candidates(
         hidden = candidates.pose[~seen]
         pool = _usable(checker, candidates, seen, least, setup)
     else:
-        q = random_candidates(checker, candidates, rng, setup, preload=True, progress=progress)
+        q = drawn_configurations(checker, candidates, rng, setup, progress=progress)
         if setup.measure is not None:
-            q = _at_instrument(checker, q, least, setup)
+            _require_reached(checker.model, q, least, setup.measure)
         pool, hidden = PosePool(q, np.arange(1, len(q) + 1)), np.zeros(0, dtype=int)
     _check_flanks(model, pool.q, setup.payload)
-    sensitivity = pose_sensitivity if setup.measure is None else instrument_sensitivity
-    full = sensitivity(model, pool.q, setup)
+    full = full_sensitivity(model, pool.q, setup)
     base = base_sensitivity(full)
     if working is None:
         anywhere = replace(setup, acceptance=None, measure=None)
@@ -97,14 +113,38 @@ def pose_candidates(
     )
 
 
-def _at_instrument(checker: CollisionChecker, q: np.ndarray, least: int, setup: MeasuringSetup) -> np.ndarray:
-    """Configurations (M, n) at contact with the instrument, from some near by; raises `FlexcalError` where they are too few."""
+def drawn_configurations(
+    checker: CollisionChecker,
+    count: int,
+    rng: np.random.Generator,
+    setup: MeasuringSetup,
+    *,
+    progress: Progress = silent,
+) -> np.ndarray:
+    """Random configurations, as of `random_candidates` with preload: (count, n), or of so many those (M, n) that reach the instrument that
+    is to measure. Raises `FlexcalError` as `random_candidates` does.
+    """
+    q = random_candidates(checker, count, rng, setup, preload=True, progress=progress)
+    if setup.measure is None:
+        return q
     model, target = checker.model, checker.model.point(setup.point).name
-    instrument = declared_instrument(model, str(setup.measure))
+    instrument = declared_instrument(model, setup.measure)
     q = instrument.reached(model, q, target)
     if instrument.touched:
         q = q[~checker.collides(q)]
         q = q[preloaded(model, q, setup.payload)]
+    return q
+
+
+def full_sensitivity(model: RobotModel, q: np.ndarray, setup: MeasuringSetup) -> Sensitivity:
+    """Rows of poses `q` (N, n) in all geometric errors, as the instrument that is to measure reads them."""
+    sensitivity = pose_sensitivity if setup.measure is None else instrument_sensitivity
+    return sensitivity(model, q, setup)
+
+
+def _require_reached(model: RobotModel, q: np.ndarray, least: int, measure: str) -> None:
+    """Raise `FlexcalError` where the configurations at the instrument are too few."""
+    instrument = declared_instrument(model, measure)
     if len(q) < least and isinstance(instrument, CameraSetup):
         nearest, farthest = instrument.band
         raise FlexcalError(
@@ -125,7 +165,6 @@ def _at_instrument(checker: CollisionChecker, q: np.ndarray, least: int, setup: 
             f"only {len(q)} poses reach {instrument.name} where robot.yaml puts it, and {least} are to be chosen; correct its place, or "
             "give more --candidates.",
         )
-    return q
 
 
 def tool_motions(

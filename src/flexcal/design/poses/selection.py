@@ -18,7 +18,6 @@ from flexcal.design.optimality import (
     exchange_on_shortlist,
     greedy,
     observability,
-    trace_lower_bound,
 )
 from flexcal.design.poses.candidates import random_candidates
 from flexcal.design.poses.feasibility import PoseCandidates, pose_candidates
@@ -42,7 +41,9 @@ class PoseDesign:
     `candidates` are what there was to choose from, `selection` what was chosen by `criterion`; `base` holds the rows of all candidates;
     `tool_error_weight` (rank, rank), m², turns a covariance into the mean square of the tool error over the working poses; `flank`
     (N, joints with backlash) is the sign of the gravity torque at `flank_joints`; `hidden` are the numbers of given poses that the
-    instrument does not see; `unseen`, m, is the tool error due to what no pose tells.
+    instrument does not see; `unseen`, m, is the tool error due to what no pose tells; `least_possible`, m, is a lower bound of the tool
+    error for any choice of as many candidates. The candidates may be what is left of `looked_at` ones; their first `sample` are then
+    random.
     """
 
     plan: PosePlan
@@ -54,7 +55,10 @@ class PoseDesign:
     flank_joints: tuple[str, ...]
     flank: np.ndarray
     hidden: np.ndarray
-    unseen: float = 0.0
+    unseen: float
+    least_possible: float
+    looked_at: int
+    sample: int
 
     @classmethod
     def of(
@@ -74,6 +78,9 @@ class PoseDesign:
             flank=np.sign(gravity_torque(candidates.model, chosen, candidates.setup.payload))[:, loose],
             hidden=candidates.hidden,
             unseen=candidates.unseen,
+            least_possible=float(candidates.least_errors(np.array([len(chosen)]))[0]),
+            looked_at=candidates.looked_at or len(candidates.pool),
+            sample=candidates.sample or len(candidates.pool),
         )
 
     def in_order(self, order: np.ndarray) -> PoseDesign:
@@ -102,12 +109,6 @@ class PoseDesign:
         From the instrument's noise alone; what deflection, backlash near its crossing or repeatability add is not in it.
         """
         return tool_error(self.base, self.tool_error_weight, self.selection.chosen)
-
-    @property
-    def least_possible(self) -> float:
-        """Lower bound of the tool error, m, for any choice of as many candidates (see `trace_lower_bound`)."""
-        trace = TraceOptimal(self.tool_error_weight, "c")
-        return float(trace_lower_bound(self.base.sensitivity, trace, np.array([len(self.plan)]))[0] ** 0.5)
 
     @property
     def criteria(self) -> dict[CriterionName, float]:
@@ -190,7 +191,10 @@ def choose_poses(
             f"choose at least {-(-rank // rows)}, better twice as many.",
         )
     optimality = criterion_named(criterion, candidates.tool_error_weight)
-    selection = exchange_on_shortlist(candidates.base.sensitivity, count, optimality, progress=progress)
+    start = candidates.start if candidates.start is not None and len(candidates.start) == count else None
+    selection = exchange_on_shortlist(
+        candidates.base.sensitivity, count, optimality, start=start, progress=progress
+    )
     return PoseDesign.of(candidates, optimality, selection, rng)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -77,6 +78,10 @@ class CollisionChecker:
         pairs = [pair for pair in pairs if pair not in overlap]
         near = self._always_touching(pairs, [margin] * len(pairs))
         self._checked = self._set_pairs(pairs, [0.0 if pair in near else margin for pair in pairs])
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Made anew in another process: Pinocchio's and coal's objects do not travel."""
+        return partial(CollisionChecker, margin=self.margin, floor=self.floor), (self.model,)
 
     @property
     def shapes(self) -> tuple[Shape, ...]:

@@ -1,5 +1,13 @@
 from .assembly import RegressionData, Subsystem, assemble_regression, batches_each
-from .batches import Batch, ExperimentSystem, batch_length, batched, experiment_system, reduced
+from .batches import (
+    Batch,
+    ExperimentSystem,
+    batch_length,
+    batched,
+    experiment_system,
+    joined_systems,
+    reduced,
+)
 from .blocks import RegressionBlock, regression_blocks
 from .covariance import (
     BatchCovariance,
@@ -37,6 +45,7 @@ __all__ = [
     "experiment_system",
     "fold_numbers",
     "folds",
+    "joined_systems",
     "mixed_covariance",
     "offset_scores",
     "parameter_rows",

@@ -136,6 +136,18 @@ def reduced(systems: list[np.ndarray]) -> np.ndarray:
     return stack if len(stack) <= stack.shape[1] else triangular(stack)
 
 
+def joined_systems(first: ExperimentSystem, second: ExperimentSystem) -> ExperimentSystem:
+    """Equations of both experiments as one batch: factors R of their factors stacked, as one factorisation of all rows has them but for
+    signs (TSQR).
+    """
+    batches = (*first.batches, *second.batches)
+    rows = sum(batch.rows for batch in batches)
+    factors = tuple(reduced(list(each)) for each in zip(*(batch.factors for batch in batches), strict=True))
+    return ExperimentSystem(
+        (Batch(0, rows, factors),), rows, max(first.duration, second.duration), first.masked + second.masked
+    )
+
+
 def _split(block: RegressionBlock, length: int) -> list[RegressionBlock]:
     """Splits by batch."""
     numbers = block.number // length

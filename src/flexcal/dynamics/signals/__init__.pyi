@@ -1,5 +1,5 @@
 from .arm_side import ArmSide
-from .bandwidth import motion_bandwidth
+from .bandwidth import MotionBandwidth, motion_bandwidth
 from .experiment import Experiment, Window, slowest_speeds
 from .external_torques import external_torque
 from .joint_log import JointLog, log_blocks
@@ -16,6 +16,7 @@ __all__ = [
     "JointLog",
     "LogFaults",
     "Motion",
+    "MotionBandwidth",
     "PeriodicMotion",
     "RepeatedMotion",
     "Window",

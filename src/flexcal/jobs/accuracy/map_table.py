@@ -56,20 +56,34 @@ class MapTable:
             MILLIMETRE * columns[_UNCALIBRATED] if _UNCALIBRATED in columns else None,
         )
 
-    def write(self, path: Path) -> None:
-        """Write it as CSV or Parquet, by the suffix."""
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        """Columns by the names in the file."""
         predicted = self.predicted
         columns = {name: predicted.position[:, i] for i, name in enumerate("xyz")}
         columns |= {f"q{i + 1}": predicted.q[:, i] for i in range(predicted.q.shape[1])}
         columns |= {"mean_mm": predicted.mean / MILLIMETRE, "p95_mm": predicted.p95 / MILLIMETRE}
         if self.uncalibrated is not None:
             columns[_UNCALIBRATED] = self.uncalibrated / MILLIMETRE
-        write_table(path, columns)
+        return columns
+
+    def write(self, path: Path) -> None:
+        """Write it as CSV or Parquet, by the suffix."""
+        write_table(path, self.columns)
 
 
 def worst_places(predicted: PredictedAccuracy) -> np.ndarray:
     """Rows of the worst places, apart from each other, the worst first."""
-    least = _APART * float(np.linalg.norm(np.ptp(predicted.position, axis=0)))
+    return places_apart(predicted, least_distance(predicted))
+
+
+def least_distance(predicted: PredictedAccuracy) -> float:
+    """Distance, m, from which two of the worst places are apart."""
+    return _APART * float(np.linalg.norm(np.ptp(predicted.position, axis=0)))
+
+
+def places_apart(predicted: PredictedAccuracy, least: float) -> np.ndarray:
+    """Rows of the worst places, at least `least` m from each other, the worst first."""
     chosen: list[int] = []
     for k in np.argsort(-predicted.p95, kind="stable"):
         if all(np.linalg.norm(predicted.position[k] - predicted.position[c]) >= least for c in chosen):

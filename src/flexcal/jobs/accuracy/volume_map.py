@@ -11,6 +11,7 @@ import numpy as np
 
 from flexcal.calibration.accuracy import (
     PredictedAccuracy,
+    Registration,
     distance_to_nominal,
     error_sources,
     predicted_accuracy,
@@ -28,10 +29,13 @@ from flexcal.calibration.verification import (
 )
 from flexcal.data.plans import page_beside
 from flexcal.data.poses import PoseSet
+from flexcal.data.tables import streamed_table
 from flexcal.design.scene import CollisionChecker
 from flexcal.errors import FlexcalError, InputError, naming
 from flexcal.files.formats import provenance
-from flexcal.jobs.accuracy.map_table import MapTable, worst_places
+from flexcal.jobs.accuracy.error_quantiles import RELATIVE_ERROR
+from flexcal.jobs.accuracy.map_blocks import BLOCK, MapBlocks, MapSummary
+from flexcal.jobs.accuracy.map_table import MapTable, least_distance, worst_places
 from flexcal.jobs.accuracy.registration_refit import proposed_refit, refit_remarks
 from flexcal.jobs.accuracy.verification import verification_poses
 from flexcal.jobs.calibration import fitted_files, fitted_points, outside_ranges
@@ -45,6 +49,7 @@ from flexcal.jobs.inputs import (
 )
 from flexcal.jobs.pages import PlottedResult
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord
+from flexcal.parallel import Workers, open_workers
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust, prediction_checks
 from flexcal.report.layout import Page
@@ -53,6 +58,8 @@ from flexcal.units import MILLIMETRE
 
 _SOURCE_POSES = 200
 """Number of poses over which the sources of the error are averaged."""
+_SHARES = (0.5, 0.9, 1.0)
+"""Shares of the poses up to the quantiles of the errors."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -66,14 +73,14 @@ class AccuracyMap(PlottedResult):
     reach : Propagation
         Poses of the map, and how parameters act on the tool there.
     predicted : PredictedAccuracy
-        Predicted errors: `position` (N, 3), `mean` and `p95` (N,), m.
+        Predicted errors: `position` (N, 3), `mean` and `p95` (N,), m; of very many random poses, in blocks, those of the first block.
     uncalibrated : ndarray or None
         Distance (N,), m, of the tool of the uncalibrated robot, best-fit registered, from that of the calibrated one; None for fewer than
         four poses.
     box : ndarray or None
         Working volume, smallest and largest x, y, z (2, 3), m; None for given poses or anywhere.
-    worst : ndarray
-        Rows of the largest errors.
+    worst : PredictedAccuracy
+        The places of the largest errors.
     sources : dict of float
         Share (0 to 1) of the error's variance by kind of parameter, over all poses; correlated kinds do not add up to one.
     worst_sources : dict of ndarray
@@ -94,13 +101,15 @@ class AccuracyMap(PlottedResult):
         Which of very many verification points were taken.
     record : RunRecord
         What the result comes from.
+    whole : MapSummary or None
+        Quantiles over all poses, where `predicted` has only the first of them.
     """
 
     reach: Propagation
     predicted: PredictedAccuracy
     uncalibrated: np.ndarray | None
     box: np.ndarray | None
-    worst: np.ndarray
+    worst: PredictedAccuracy
     sources: dict[str, float]
     worst_sources: dict[str, np.ndarray]
     scale: ErrorScale | None
@@ -111,13 +120,20 @@ class AccuracyMap(PlottedResult):
     outside: str
     sample: StratifiedSample | None = None
     record: RunRecord = NOT_RECORDED
+    whole: MapSummary | None = None
+
+    @property
+    def poses(self) -> int:
+        """Number of poses."""
+        return len(self.predicted.q) if self.whole is None else self.whole.poses
 
     @property
     def headline(self) -> str:
         """Median and largest 95 % bound of the error."""
-        bound = _quantiles(self.predicted.p95)
+        bound = self._errors()["p95"]
+        assert bound is not None
         return (
-            f"95 % bound of the tool's error at {len(self.predicted.q)} poses: median {bound['median_mm']:.3f}, "
+            f"95 % bound of the tool's error at {self.poses} poses: median {bound['median_mm']:.3f}, "
             f"largest {bound['worst_mm']:.3f} mm"
         )
 
@@ -163,29 +179,26 @@ class AccuracyMap(PlottedResult):
 
     def document(self) -> dict[str, Any]:
         """The JSON document."""
-        predicted, scale = self.predicted, self.scale
+        worst, scale = self.worst, self.scale
         return {
-            "poses": len(predicted.q),
+            "poses": self.poses,
             "target": self.reach.target,
             "station": self.reach.station,
             "payload_kg": self.reach.payload,
             "box_m": self.box,
             "before": None if self.before is None else self.before.document(),
-            "predicted": {
-                "uncalibrated": None if self.uncalibrated is None else _quantiles(self.uncalibrated),
-                "mean": _quantiles(predicted.mean),
-                "p95": _quantiles(predicted.p95),
-            },
+            "predicted": self._errors(),
+            "quantile_error_percent": 0.0 if self.whole is None else 100 * RELATIVE_ERROR,
             "sources": self.sources,
             "worst": [
                 {
-                    "position_m": predicted.position[k],
-                    "q": predicted.q[k],
-                    "mean_mm": predicted.mean[k] / MILLIMETRE,
-                    "p95_mm": predicted.p95[k] / MILLIMETRE,
+                    "position_m": worst.position[row],
+                    "q": worst.q[row],
+                    "mean_mm": worst.mean[row] / MILLIMETRE,
+                    "p95_mm": worst.p95[row] / MILLIMETRE,
                     "sources": {kind: float(shares[row]) for kind, shares in self.worst_sources.items()},
                 }
-                for row, k in enumerate(self.worst)
+                for row in range(len(worst.q))
             ],
             "verification": None
             if scale is None
@@ -197,6 +210,23 @@ class AccuracyMap(PlottedResult):
             "verdict": self.trust.document(),
             "remarks": list(self.remarks),
             **self.record.document(),
+        }
+
+    def _errors(self) -> dict[str, dict[str, float] | None]:
+        """Median, P90 and maximum of every error over the poses, mm; None where it is not known."""
+        predicted, whole = self.predicted, self.whole
+        if whole is None:
+            each = {"uncalibrated": self.uncalibrated, "mean": predicted.mean, "p95": predicted.p95}
+            return {
+                name: None
+                if values is None
+                else _millimetres(*(float(value) for value in np.quantile(values, _SHARES)))
+                for name, values in each.items()
+            }
+        counts = {"uncalibrated": whole.uncalibrated, "mean": whole.mean, "p95": whole.p95}
+        return {
+            name: None if values is None else _millimetres(*(values.quantile(share) for share in _SHARES))
+            for name, values in counts.items()
         }
 
 
@@ -292,7 +322,7 @@ def _checked_map(
         q = random_poses_in(reach, count, rng, box, progress)
     scale = None if check is None else check.scale
     predicted = predicted_accuracy(reach, q, progress=progress).scaled(error_scale_factor(scale))
-    worst = worst_places(predicted)
+    worst = predicted.part(worst_places(predicted))
     some = q[rng.permutation(len(q))[:_SOURCE_POSES]]
     return AccuracyMap(
         model,
@@ -302,7 +332,7 @@ def _checked_map(
         box,
         worst,
         {kind: float(values.mean()) for kind, values in error_sources(reach, some).items()},
-        error_sources(reach, q[worst]),
+        error_sources(reach, worst.q),
         scale,
         None if check is None else check.before,
         None if check is None else check.errors,
@@ -328,9 +358,14 @@ def map_accuracy(
     estimates: Path | None = None,
     seed: int = 0,
     command: str = "",
+    on: str | None = None,
+    jobs: int = 1,
     progress: Progress = silent,
 ) -> AccuracyMap:
     """`accuracy_map` of the robot of a robot.yaml, written to `out`, a page (.html), or a table (.csv, .parquet) with the page beside it.
+
+    Very many random poses go block by block through memory, in `jobs` processes or `on` the Dask cluster of an address: then quantiles of
+    the errors are right to 0.1 %, and the page's figures, sources and remarks are of the first block.
 
     `working` is a box "x:X,y:Y,z:Z", m, base frame, or a file as `read_working` reads it; None for what robot.yaml declares, else anywhere.
     `verification` are files of measured poses. Raises `FlexcalError` where there is no calibration, files do not fit, and as
@@ -352,7 +387,13 @@ def map_accuracy(
         q = working_volume(CollisionChecker(robot.model), working, seed).q
     elif working is not None:
         box = box_corners(working)
-    accuracy = _checked_map(robot, check, box, q, count, payload, temperature, seed, progress)
+    first = _checked_map(
+        robot, check, box, q, min(count, BLOCK), payload, temperature, seed, progress
+    )
+    accuracy = first if q is not None or count <= BLOCK else None
+    if accuracy is None:
+        with open_workers(on, jobs) as workers:
+            accuracy = _of_blocks(first, robot, count, temperature, seed, out, workers, progress)
     origin = provenance(
         [robot_file, robot.nominal.urdf, *verification, *(() if place is None else (place,))],
         {"seed": seed},
@@ -361,10 +402,38 @@ def map_accuracy(
     )
     fitted = fitted_files(robot, verification) or accuracy.fitted
     result = replace(accuracy, fitted=fitted, record=RunRecord(origin, command))
-    if out != page_beside(out):
+    if out != page_beside(out) and result.whole is None:
         MapTable(result.predicted, result.uncalibrated).write(out)
     result.report(page_beside(out))
     return result
+
+
+def _of_blocks(
+    first: AccuracyMap,
+    robot: CalibratedRobot,
+    count: int,
+    temperature: float | None,
+    seed: int,
+    out: Path,
+    workers: Workers,
+    progress: Progress,
+) -> AccuracyMap:
+    """Map of `count` poses of which `first` has a block; its table, if any, is written to `out`."""
+    predicted, reach = first.predicted, first.reach
+    place = Registration.of(
+        first.model, robot.with_points, predicted.q, reach.target, reach.payload, temperature
+    )
+    apart = least_distance(predicted)
+    factor = error_scale_factor(first.scale)
+    blocks = MapBlocks(reach, first.box, count, seed, factor, place, apart, BLOCK)
+    start = MapSummary.of(predicted, first.uncalibrated, apart)
+    if out == page_beside(out):
+        whole = blocks.summarised(start, workers, None, progress)
+    else:
+        with streamed_table(out) as append:
+            append(MapTable(predicted, first.uncalibrated).columns)
+            whole = blocks.summarised(start, workers, append, progress)
+    return replace(first, whole=whole, worst=whole.worst, worst_sources=error_sources(reach, whole.worst.q))
 
 
 @dataclass(frozen=True, eq=False)
@@ -392,7 +461,9 @@ class _Check:
         return cls(errors, before, error_scale(errors, covariance), fitted_points(robot, poses), sample)
 
 
-def _quantiles(values: np.ndarray) -> dict[str, float]:
-    """Median, P90 and maximum over the poses, mm."""
-    median, most, worst = (float(v) / MILLIMETRE for v in np.quantile(values, [0.5, 0.9, 1.0]))
-    return {"median_mm": median, "p90_mm": most, "worst_mm": worst}
+def _millimetres(median: float, most: float, worst: float) -> dict[str, float]:
+    return {
+        "median_mm": median / MILLIMETRE,
+        "p90_mm": most / MILLIMETRE,
+        "worst_mm": worst / MILLIMETRE,
+    }

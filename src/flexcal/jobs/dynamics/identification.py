@@ -29,9 +29,12 @@ from flexcal.jobs.logs import (
     weight_faults,
 )
 from flexcal.model.robot import DynamicsConfig, RobotModel
+from flexcal.parallel import open_workers
 from flexcal.progress import Progress, silent
 
 _DEFAULT = WLS()
+_FACTORS_SUFFICE = ("wls", "ols", "sdp")
+"""Estimators that go through no log again."""
 
 
 def identify_dynamics(
@@ -46,6 +49,7 @@ def identify_dynamics(
     learn_residual: bool = False,
     accept_weight: bool = False,
     jobs: int = 1,
+    on: str | None = None,
     progress: Progress = silent,
 ) -> DynamicsIdentification:
     """Fit link inertials, rotor inertias and friction of a robot to joint logs.
@@ -76,6 +80,9 @@ def identify_dynamics(
         Whether torques unlike the links' weight are accepted, as of balanced arms and guessed masses.
     jobs : int
         Number of logs read in parallel, each in its own process.
+    on : str, optional
+        Address of a Dask scheduler, dask://host:port, whose workers read the logs instead. They find the files of logs and robot under the
+        same paths; where they do not see this machine's temporary files, they filter each log anew for every pass.
     progress : Progress
         Called with the stage and the share of it that is done.
 
@@ -105,12 +112,12 @@ def identify_dynamics(
         _require_rigid_and_learnable(flexible)
     begun = time.perf_counter()
     model = model_for_logs(model, [*logs, *validate])
-    with scratch_folder() as folder:
+    with scratch_folder() as folder, open_workers(on, jobs) as workers:
         files, others = log_files(logs, folder, "log"), log_files(validate, folder, "validation")
         require_distinct_files(files, others)
         springs = require_flexible_drives(model, [*files, *others], estimator.name) if flexible else ()
         bearings = require_flexible_bearings(model, [*files, *others]) if flexible else ()
-        preprocessing = choose_preprocessing(model, files, flexible=flexible)
+        preprocessing = choose_preprocessing(model, files, flexible=flexible, workers=workers)
         divided = HoldOutLogs.read(
             files,
             others,
@@ -119,7 +126,8 @@ def identify_dynamics(
             preprocessing,
             folder,
             accept_weight=accept_weight,
-            jobs=jobs,
+            joined=estimator.name in _FACTORS_SUFFICE and not learn_residual,
+            workers=workers,
             progress=progress,
         )
         declared = (model.config.dynamics if friction is None else DynamicsConfig(friction=friction)).friction

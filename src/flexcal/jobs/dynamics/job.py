@@ -30,6 +30,7 @@ def identify_robot_dynamics(
     out: Path | None = None,
     command: str = "",
     jobs: int = 1,
+    on: str | None = None,
     progress: Progress = silent,
 ) -> DynamicsIdentification:
     """`identify_dynamics` of the robot of a robot.yaml, and storing of the block `dynamics`.
@@ -54,6 +55,7 @@ def identify_robot_dynamics(
         learn_residual=learn_residual,
         accept_weight=accept_weight,
         jobs=jobs,
+        on=on,
         progress=progress,
     )
     options = {

@@ -9,9 +9,13 @@ import numpy as np
 
 from flexcal.data.poses import PosePool, read_pose_pool, read_working
 from flexcal.design.poses import (
+    BLOCK,
+    BlockedCandidates,
+    ChosenOfBlock,
     CriterionName,
     PoseCandidates,
     WorkingVolume,
+    criterion_named,
     pose_candidates,
     working_box,
     working_points,
@@ -20,6 +24,7 @@ from flexcal.design.scene import CollisionChecker, MeasuringSetup
 from flexcal.errors import InputError
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.robot import RobotModel
+from flexcal.parallel import Workers
 from flexcal.progress import Progress
 
 MOST_GIVEN = 20_000
@@ -95,7 +100,46 @@ class CandidatePoses:
         progress: Progress,
     ) -> CandidatePoses:
         """Candidates, at least as many as requested; raises `FlexcalError` as `pose_candidates` and `working_box` do."""
-        checker, given = CollisionChecker(model), request.candidates
+        return cls._among(model, request, request.candidates, rng, progress)
+
+    @classmethod
+    def best_of_blocks(
+        cls,
+        model: RobotModel,
+        request: PoseRequest,
+        rng: np.random.Generator,
+        workers: Workers,
+        progress: Progress,
+    ) -> CandidatePoses:
+        """As `of`; of very many random ones, what `BlockedCandidates` keeps of their blocks, each looked at by one of the `workers`.
+
+        The result does not depend on the workers. Raises `FlexcalError` as `of` and `exchange` do, and where a worker fails.
+        """
+        total = request.candidates
+        if isinstance(total, PosePool) or total <= BLOCK:
+            return cls.of(model, request, rng, progress)
+        whole = cls._among(model, request, BLOCK, rng, progress)
+        criterion = criterion_named(request.criterion, whole.candidates.tool_error_weight)
+        blocked = BlockedCandidates.of(
+            whole.candidates, whole.checker, criterion, request.count, total, request.seed, BLOCK
+        )
+        chosen = [blocked.chosen_of_first()]
+        numbers = blocked.blocks
+        for one in workers.values(_chosen_of_block, numbers, blocked.without_first()):
+            chosen.append(one)
+            progress("candidates", len(chosen) / (len(numbers) + 1))
+        return replace(whole, candidates=blocked.united(chosen))
+
+    @classmethod
+    def _among(
+        cls,
+        model: RobotModel,
+        request: PoseRequest,
+        given: int | PosePool,
+        rng: np.random.Generator,
+        progress: Progress,
+    ) -> CandidatePoses:
+        checker = CollisionChecker(model)
         place = request.volume(checker)
         candidates = pose_candidates(
             model,
@@ -108,6 +152,10 @@ class CandidatePoses:
             progress=progress,
         )
         return cls(checker, candidates, given if isinstance(given, PosePool) else None, place)
+
+
+def _chosen_of_block(number: int, blocked: BlockedCandidates) -> ChosenOfBlock:
+    return blocked.chosen(number)
 
 
 @dataclass(frozen=True)

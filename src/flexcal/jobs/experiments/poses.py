@@ -38,6 +38,7 @@ from flexcal.jobs.inputs import robot_provenance
 from flexcal.jobs.pages import PlottedResult
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, identifiability_block
 from flexcal.model.robot import RobotModel
+from flexcal.parallel import ThisProcess, open_workers
 from flexcal.progress import Progress, silent
 from flexcal.report.layout import Page, write_page
 from flexcal.report.pages import PoseStudy, pose_page
@@ -153,7 +154,7 @@ class DesignedPoses(PlottedResult):
             | pool_block(design, self.pool, self.seed)
             | {
                 "criterion": design.criterion.name,
-                "candidates": len(design.candidates),
+                "candidates": design.looked_at,
                 "tool_error_mm": design.tool_error / MILLIMETRE,
                 "least_possible_mm": design.least_possible / MILLIMETRE,
                 "measure": self.measure,
@@ -249,7 +250,8 @@ def design_poses(
     12
     """
     rng = np.random.default_rng([request.seed, 2])
-    return _designed(CandidatePoses.of(model, request, rng, progress), request, rng, progress)
+    choice = CandidatePoses.best_of_blocks(model, request, rng, ThisProcess(), progress)
+    return _designed(choice, request, rng, progress)
 
 
 def _designed(
@@ -295,17 +297,21 @@ def plan_calibration_poses(
     files: PoseRequestFiles,
     *,
     command: str = "",
+    on: str | None = None,
+    jobs: int = 1,
     progress: Progress = silent,
 ) -> DesignedPoses:
     """`design_poses` for the robot of a robot.yaml; the plan goes to `out`, its page beside it.
 
-    Raises `FlexcalError` as `design_poses` and reading the `files` do.
+    Very many candidates are looked at by `jobs` processes, or `on` the Dask cluster of an address. Raises `FlexcalError` as `design_poses`
+    and reading the `files` do.
     """
     model = RobotModel.from_yaml(robot_file)
     request = files.read(model, request)
     rng = np.random.default_rng([request.seed, 2])
-    with nullcontext() if files.pool is None else naming(files.pool):
-        choice = CandidatePoses.of(model, request, rng, progress)
+    naming_pool = nullcontext() if files.pool is None else naming(files.pool)
+    with naming_pool, open_workers(on, jobs) as workers:
+        choice = CandidatePoses.best_of_blocks(model, request, rng, workers, progress)
     designed = _designed(choice, request, rng, progress)
     result = replace(designed, file=out, record=RunRecord(robot_provenance(model, files.paths), command))
     write_plan(out, result.plan)

@@ -27,6 +27,7 @@ from flexcal.jobs.logs import (
     scratch_folder,
 )
 from flexcal.model.robot import RobotModel
+from flexcal.parallel import open_workers
 from flexcal.progress import Progress, silent
 
 
@@ -82,17 +83,22 @@ def identify_gains(
     """
     robot = model_for_logs(model, logs)
     declared = _declared(robot)
-    with scratch_folder() as folder:
+    with scratch_folder() as folder, open_workers(None, jobs) as workers:
         files = log_files(logs, folder, "log")
         require_distinct_files(files)
-        preprocessing = choose_preprocessing(robot, files)
+        preprocessing = choose_preprocessing(robot, files, workers=workers)
         observation = Observation(robot, CLASSIC)
-        read = read_logs(files, robot, preprocessing, folder, jobs=jobs)
+        read = read_logs(files, robot, preprocessing, folder, workers=workers)
         payloads = payload_masses(read, robot)
         require_no_wrenches(read)
         parts = [LogSegment(log, Window()) for log in read]
         systems = assemble_log_systems(
-            parts, observation, preprocessing, batches=batches_each(len(files)), jobs=jobs, progress=progress
+            parts,
+            observation,
+            preprocessing,
+            batches=batches_each(len(files)),
+            workers=workers,
+            progress=progress,
         )
     base = BaseParameters.of(observation)
     return GainsIdentification(

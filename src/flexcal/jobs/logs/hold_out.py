@@ -17,21 +17,27 @@ from flexcal.jobs.logs.checks import require_joint_torques, require_unloaded, re
 from flexcal.jobs.logs.preprocessing import Preprocessing
 from flexcal.jobs.logs.regression_systems import (
     LogSegment,
+    assemble_joined_systems,
     assemble_log_systems,
-    read_logs,
     split_hold_out,
     with_progress,
 )
 from flexcal.jobs.logs.torque_predictions import predict_log_torques
+from flexcal.jobs.logs.worker_logs import read_logs
 from flexcal.model.robot import RobotModel
+from flexcal.parallel import Workers
 from flexcal.progress import Progress
+
+MOST_EXPERIMENTS = 128
+"""Number of logs above which they may be joined, to so many groups."""
 
 
 @dataclass(frozen=True, eq=False)
 class HoldOutLogs:
     """Logs, filtered, with their `fitted` and `unseen` parts, and the time in s `borders` between both in each log.
 
-    Equations are made by so many `jobs` (processes).
+    Equations are made by the `workers`. Where `joined`, very many logs count as groups of consecutive ones, each a single experiment, so
+    that what is kept does not grow with their number: the noise of a joint is then that of a group.
     """
 
     logs: tuple[JointLog, ...]
@@ -39,7 +45,8 @@ class HoldOutLogs:
     fitted: tuple[LogSegment, ...]
     unseen: tuple[LogSegment, ...]
     preprocessing: Preprocessing
-    jobs: int
+    joined: bool
+    workers: Workers
     progress: Progress
 
     @classmethod
@@ -53,7 +60,8 @@ class HoldOutLogs:
         scratch: Path,
         *,
         accept_weight: bool = False,
-        jobs: int,
+        joined: bool = False,
+        workers: Workers,
         progress: Progress,
     ) -> HoldOutLogs:
         """Split the last share `hold_out` of the time of every log to `fit` off as unseen, together with the logs `validate`.
@@ -62,7 +70,7 @@ class HoldOutLogs:
         has the torques of motors without a map, unless they are to be accepted (`accept_weight`).
         """
         seen, others = (
-            read_logs(paths, model, preprocessing, scratch, jobs=jobs) for paths in (fit, validate)
+            read_logs(paths, model, preprocessing, scratch, workers=workers) for paths in (fit, validate)
         )
         require_unloaded([*seen, *others], model)
         if not accept_weight:
@@ -77,7 +85,8 @@ class HoldOutLogs:
             tuple(LogSegment(log, early) for log, (early, _) in zip(seen, windows, strict=True)),
             (*late, *(LogSegment(log, Window()) for log in others)),
             preprocessing,
-            jobs,
+            joined,
+            workers,
             progress,
         )
 
@@ -101,14 +110,33 @@ class HoldOutLogs:
         """Torque predictions of all logs, for the report."""
         predicted = [(observation, estimate.parameters.coordinates())] * len(self.logs)
         return predict_log_torques(
-            self.logs, self.borders, predicted, self.preprocessing, progress=self.progress
+            self.logs,
+            self.borders,
+            predicted,
+            self.preprocessing,
+            workers=self.workers,
+            progress=self.progress,
         )
 
     def _systems(
         self, parts: Sequence[LogSegment], observation: Observation, batches: int
     ) -> list[ExperimentSystem]:
+        if self.joined and len(parts) > MOST_EXPERIMENTS:
+            return assemble_joined_systems(
+                parts,
+                observation,
+                self.preprocessing,
+                most=MOST_EXPERIMENTS,
+                workers=self.workers,
+                progress=self.progress,
+            )
         return assemble_log_systems(
-            parts, observation, self.preprocessing, batches=batches, jobs=self.jobs, progress=self.progress
+            parts,
+            observation,
+            self.preprocessing,
+            batches=batches,
+            workers=self.workers,
+            progress=self.progress,
         )
 
     def _rows(

@@ -9,9 +9,11 @@ from typing import Any
 
 from flexcal.data.recordings import Decimation
 from flexcal.dynamics.regression import ContinuousSamples, CutoffChoice, choose_cutoff, pieces
-from flexcal.dynamics.signals import JointLog, log_blocks, motion_bandwidth
+from flexcal.dynamics.signals import JointLog, MotionBandwidth, log_blocks, motion_bandwidth
 from flexcal.errors import InputError
+from flexcal.jobs.logs.worker_paths import worker_paths
 from flexcal.model.robot import RobotModel
+from flexcal.parallel import ThisProcess, Workers
 
 _PASSED = 20.0
 """Ratio of cut-off and row rate to the bandwidth of the motion: ten times twice of it, since products of two velocities have twice its
@@ -23,6 +25,7 @@ _REVERSALS = 0.1
 """Least ratio of cut-off to sampling rate if springs are identified."""
 _ROWS = 4.0
 """Rows per second, relative to a cut-off chosen by cross-validation: twice the passed bandwidth."""
+_HERE = ThisProcess()
 _SAMPLES = 40_000
 """Largest number of samples, over all logs, used by cross-validation."""
 
@@ -42,7 +45,12 @@ class Preprocessing:
 
 
 def choose_preprocessing(
-    model: RobotModel, logs: Sequence[Path], *, flexible: bool = False, loaded: Sequence[bool] | None = None
+    model: RobotModel,
+    logs: Sequence[Path],
+    *,
+    flexible: bool = False,
+    loaded: Sequence[bool] | None = None,
+    workers: Workers = _HERE,
 ) -> Preprocessing:
     """Preprocessing as declared, or proposed from the fastest motion and the lowest sampling rate of `logs`.
 
@@ -54,7 +62,8 @@ def choose_preprocessing(
     declared = model.config.dynamics
     if declared.cutoff_hz is not None and declared.decimation is not None:
         return Preprocessing(declared.cutoff_hz, Decimation(declared.decimation), declared.mask_standstill)
-    bandwidths = [motion_bandwidth(log_blocks(log, model)) for log in logs]
+    there = worker_paths(logs, workers)
+    bandwidths = list(workers.values(_bandwidth, there, model))
     for log, motion in zip(logs, bandwidths, strict=True):
         if motion.frequency_hz == 0:
             raise InputError(
@@ -67,7 +76,7 @@ def choose_preprocessing(
     if flexible:
         cutoff_hz = max(cutoff_hz, _REVERSALS * rate)
     elif declared.cutoff_hz is None:
-        choice = _chosen(model, logs, cutoff_hz, loaded)
+        choice = _chosen(model, there, cutoff_hz, loaded, workers)
         if choice is not None:
             cutoff_hz, rows_hz = choice.cutoff_hz, min(rows_hz, _ROWS * choice.cutoff_hz)
     proposed = tuple(key for key in ("cutoff_hz", "decimation") if getattr(declared, key) is None)
@@ -81,15 +90,28 @@ def choose_preprocessing(
 
 
 def _chosen(
-    model: RobotModel, logs: Sequence[Path], proposed_hz: float, loaded: Sequence[bool] | None
+    model: RobotModel,
+    logs: Sequence[Path],
+    proposed_hz: float,
+    loaded: Sequence[bool] | None,
+    workers: Workers,
 ) -> CutoffChoice | None:
     """Preprocessing chosen by cross-validation within the logs of each load."""
     loads: dict[tuple[bool, float | None], list[ContinuousSamples]] = {}
-    for number, log in enumerate(logs):
-        for piece in pieces(log_blocks(log, model), _SAMPLES // len(logs), proposed_hz):
+    each = workers.values(_pieces, logs, model, _SAMPLES // len(logs), proposed_hz)
+    for number, own in enumerate(each):
+        for piece in own:
             load = (bool(loaded and loaded[number]), piece.payload)
             loads.setdefault(load, []).append(piece)
     return choose_cutoff(model, list(loads.values()), proposed_hz)
+
+
+def _bandwidth(log: Path, model: RobotModel) -> MotionBandwidth:
+    return motion_bandwidth(log_blocks(log, model))
+
+
+def _pieces(log: Path, model: RobotModel, samples: int, proposed_hz: float) -> list[ContinuousSamples]:
+    return list(pieces(log_blocks(log, model), samples, proposed_hz))
 
 
 def preprocessing_document(preprocessing: Preprocessing, logs: Sequence[JointLog]) -> dict[str, Any]:

@@ -1,23 +1,23 @@
-"""Regression systems of joint logs, assembled one after the other or in several processes."""
+"""Regression systems of joint logs, assembled where the workers are."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from flexcal.dynamics.inverse_model import Observation
-from flexcal.dynamics.regression import ExperimentSystem, experiment_system
+from flexcal.dynamics.regression import ExperimentSystem, experiment_system, joined_systems
 from flexcal.dynamics.signals import JointLog, Window
 from flexcal.jobs.logs.preprocessing import Preprocessing
-from flexcal.model.robot import RobotModel
-from flexcal.parallel import WorkerTask, start_workers
+from flexcal.jobs.logs.worker_logs import present_log
+from flexcal.jobs.logs.worker_paths import worker_paths
+from flexcal.parallel import ThisProcess, Workers, consecutive_groups
 from flexcal.progress import Progress
 
+_STAGE = "reading"
 _LEAST = 1e-6
 """Least fitted share of a log whose progress is reported."""
 
@@ -30,56 +30,41 @@ class LogSegment:
     window: Window
 
 
-def read_logs(
-    paths: Sequence[Path], model: RobotModel, preprocessing: Preprocessing, scratch: Path, *, jobs: int
-) -> list[JointLog]:
-    """Logs filtered into files of the folder `scratch`, by `jobs` processes in parallel.
-
-    Raises `InputError` and `FlexcalError` as `JointLog.read` does.
-    """
-    if jobs == 1:
-        return [JointLog.read(path, model, preprocessing.cutoff_hz, scratch) for path in paths]
-    from joblib import Parallel, delayed
-
-    start_workers(jobs)
-    read: Any = Parallel(n_jobs=jobs)(
-        delayed(WorkerTask(JointLog.read))(path, model, preprocessing.cutoff_hz, scratch) for path in paths
-    )
-    return read
-
-
 def assemble_log_systems(
     parts: Sequence[LogSegment],
     observation: Observation,
     preprocessing: Preprocessing,
     *,
     batches: int,
-    jobs: int,
+    workers: Workers,
     progress: Progress,
 ) -> list[ExperimentSystem]:
-    """Regression systems of every part, in their order, independent of the number of processes `jobs`.
+    """Regression systems of every part, in their order, independent of the `workers`.
 
     Each part has at most about so many `batches`. Raises `FlexcalError` as `experiment_system` does.
     """
-    if jobs == 1:
-        progress("reading", 0.0)
-        assembled = [
-            _log_system(part, observation, preprocessing, batches)
-            for part in with_progress(parts, "reading", progress)
-        ]
-        progress("reading", 1.0)
-        return assembled
-    from joblib import Parallel, delayed
+    tasks = _tasks(parts, workers, progress)
+    systems = workers.values(_log_system, tasks, observation, preprocessing, batches)
+    return _reported(systems, len(parts), workers, progress)
 
-    systems = Parallel(n_jobs=jobs, return_as="generator")(
-        delayed(WorkerTask(_log_system))(part, observation, preprocessing, batches) for part in parts
-    )
-    progress("reading", 0.0)
-    assembled = []
-    for system in systems:
-        assembled.append(system)
-        progress("reading", len(assembled) / len(parts))
-    return assembled
+
+def assemble_joined_systems(
+    parts: Sequence[LogSegment],
+    observation: Observation,
+    preprocessing: Preprocessing,
+    *,
+    most: int,
+    workers: Workers,
+    progress: Progress,
+) -> list[ExperimentSystem]:
+    """Regression systems of at most `most` groups of consecutive parts, independent of the `workers`.
+
+    Each group is one batch: a tree of `joined_systems`, which are the QR decomposition of tall and skinny matrices (TSQR; Demmel, Grigori,
+    Hoemmen & Langou, SIAM J. Sci. Comput. 34, 2012). Raises `FlexcalError` as `experiment_system` does.
+    """
+    groups = consecutive_groups(_tasks(parts, workers, progress), most)
+    systems = workers.reduced(_log_system, groups, joined_systems, observation, preprocessing, 1)
+    return _reported(systems, len(groups), workers, progress)
 
 
 def split_hold_out(
@@ -107,14 +92,36 @@ def with_progress(parts: Sequence[LogSegment], stage: str, progress: Progress) -
     return watched_parts
 
 
+def _tasks(parts: Sequence[LogSegment], workers: Workers, progress: Progress) -> list[LogSegment]:
+    """Parts as the workers take them; in this process they report how far each is."""
+    if isinstance(workers, ThisProcess):
+        return with_progress(parts, _STAGE, progress)
+    paths = worker_paths([part.log.path for part in parts], workers)
+    return [replace(part, log=replace(part.log, path=path)) for part, path in zip(parts, paths, strict=True)]
+
+
+def _reported(
+    systems: Iterable[ExperimentSystem], count: int, workers: Workers, progress: Progress
+) -> list[ExperimentSystem]:
+    progress(_STAGE, 0.0)
+    assembled = []
+    for system in systems:
+        assembled.append(system)
+        if not isinstance(workers, ThisProcess):
+            progress(_STAGE, len(assembled) / count)
+    progress(_STAGE, 1.0)
+    return assembled
+
+
 def _log_system(
     part: LogSegment, observation: Observation, preprocessing: Preprocessing, batches: int
 ) -> ExperimentSystem:
-    return experiment_system(
-        observation,
-        part.log,
-        preprocessing.decimation,
-        part.window,
-        mask_standstill=preprocessing.mask_standstill,
-        batches=batches,
-    )
+    with present_log(part.log, observation.model) as log:
+        return experiment_system(
+            observation,
+            log,
+            preprocessing.decimation,
+            part.window,
+            mask_standstill=preprocessing.mask_standstill,
+            batches=batches,
+        )

@@ -15,6 +15,7 @@ from flexcal.dynamics.signals import JointLog, Window
 from flexcal.estimation import Estimate
 from flexcal.jobs.logs import LogSegment, Preprocessing, assemble_log_systems, predict_log_torques
 from flexcal.model.robot import RobotModel
+from flexcal.parallel import ThisProcess
 from flexcal.progress import silent
 
 
@@ -55,7 +56,7 @@ class PayloadLogEquations:
                 wide,
                 preprocessing,
                 batches=batches_each(len(logs)),
-                jobs=1,
+                workers=ThisProcess(),
                 progress=silent,
             )
         assert model.payload is not None

@@ -32,6 +32,7 @@ from flexcal.jobs.logs import (
 from flexcal.jobs.payload.equations import PayloadLogEquations
 from flexcal.jobs.payload.result import PayloadIdentification
 from flexcal.model.robot import PAYLOAD_FRAME, RobotModel, last_frame, with_payload
+from flexcal.parallel import open_workers
 from flexcal.progress import Progress, silent
 
 _ROUGH = 2
@@ -126,7 +127,8 @@ def identify_payload(
         carrying = [True] * len(loaded) + [False] * len(unloaded)
         preprocessing = choose_preprocessing(robot, files, flexible=bool(robot.elastic), loaded=carrying)
         preprocessing = _slow(preprocessing, robot, files)
-        read = read_logs(files, robot, preprocessing, folder, jobs=jobs)
+        with open_workers(None, jobs) as workers:
+            read = read_logs(files, robot, preprocessing, folder, workers=workers)
         _require_payloads(read, carrying)
         require_no_wrenches(read)
         faults = tuple(weight_faults(read, robot))
