@@ -6,7 +6,7 @@ import math
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from itertools import islice
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -78,7 +78,9 @@ class DaskCluster(Workers):
         """As `Workers.count`: threads of all workers."""
         return sum(self.client.nthreads().values())
 
-    def results(self, function: Callable[..., V], tasks: Iterable[Any], *common: Any) -> Iterator[Outcome[V]]:
+    def results(
+        self, function: Callable[..., V], tasks: Iterable[Any], *common: Any
+    ) -> Generator[Outcome[V], None, None]:
         """As `Workers.results`.
 
         Raises `FlexcalError` where the scheduler is lost, and `InputError` where a worker that came later has another flexcal or none.

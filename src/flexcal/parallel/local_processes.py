@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from dataclasses import dataclass
 from itertools import chain
@@ -47,7 +47,9 @@ class LocalProcesses(Workers):
         """As `Workers.count`."""
         return self._jobs
 
-    def results(self, function: Callable[..., V], tasks: Iterable[Any], *common: Any) -> Iterator[Outcome[V]]:
+    def results(
+        self, function: Callable[..., V], tasks: Iterable[Any], *common: Any
+    ) -> Generator[Outcome[V], None, None]:
         """As `Workers.results`."""
         shared = CommonValues.of((function, *common))
         waiting = (_Numbered(index, task) for index, task in enumerate(tasks))

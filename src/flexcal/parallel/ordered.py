@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from itertools import pairwise
 from typing import Any, TypeVar
 
@@ -24,15 +25,16 @@ def value_of(outcome: Outcome[V]) -> V:
     )
 
 
-def values_in_order(outcomes: Iterable[Outcome[V]]) -> Iterator[V]:
-    """Values of all outcomes by their index; the error of the first that has none is raised."""
+def values_in_order(outcomes: Generator[Outcome[V], None, None]) -> Iterator[V]:
+    """Values of all outcomes by their index; the error of the first that has none is raised, and the iterator closed."""
     early: dict[int, Outcome[V]] = {}
     following = 0
-    for outcome in outcomes:
-        early[outcome.index] = outcome
-        while following in early:
-            yield value_of(early.pop(following))
-            following += 1
+    with closing(outcomes):  # at once: the garbage collector would, at any time, cancel what is left
+        for outcome in outcomes:
+            early[outcome.index] = outcome
+            while following in early:
+                yield value_of(early.pop(following))
+                following += 1
 
 
 def consecutive_groups(tasks: Sequence[V], most: int) -> list[Sequence[V]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from itertools import chain
 from typing import Any, TypeVar
 
@@ -21,7 +21,9 @@ class ThisProcess(Workers):
         """As `Workers.count`: 1."""
         return 1
 
-    def results(self, function: Callable[..., V], tasks: Iterable[Any], *common: Any) -> Iterator[Outcome[V]]:
+    def results(
+        self, function: Callable[..., V], tasks: Iterable[Any], *common: Any
+    ) -> Generator[Outcome[V], None, None]:
         """As `Workers.results`, in the order of the tasks."""
         for index, task in enumerate(tasks):
             yield run_task(function, index, task, common)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from typing import Any, TypeVar
 
 from flexcal.parallel.outcome import Outcome
@@ -20,7 +20,9 @@ class Workers(ABC):
         """Number of tasks that run at the same time."""
 
     @abstractmethod
-    def results(self, function: Callable[..., V], tasks: Iterable[Any], *common: Any) -> Iterator[Outcome[V]]:
+    def results(
+        self, function: Callable[..., V], tasks: Iterable[Any], *common: Any
+    ) -> Generator[Outcome[V], None, None]:
         """Outcomes of `function(task, *common)`, one for every task, in the order in which they end.
 
         Tasks are taken from the iterable as workers become free. `common` is sent to every worker once, not with every task. An

@@ -27,6 +27,7 @@ from flexcal.jobs.logs import (
     preprocessing_document,
     scratch_folder,
     weight_faults,
+    worker_robot,
 )
 from flexcal.model.robot import DynamicsConfig, RobotModel
 from flexcal.parallel import open_workers
@@ -113,6 +114,7 @@ def identify_dynamics(
     begun = time.perf_counter()
     model = model_for_logs(model, [*logs, *validate])
     with scratch_folder() as folder, open_workers(on, jobs) as workers:
+        model = worker_robot(model, workers)
         files, others = log_files(logs, folder, "log"), log_files(validate, folder, "validation")
         require_distinct_files(files, others)
         springs = require_flexible_drives(model, [*files, *others], estimator.name) if flexible else ()

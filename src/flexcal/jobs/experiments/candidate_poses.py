@@ -22,6 +22,7 @@ from flexcal.design.poses import (
 )
 from flexcal.design.scene import CollisionChecker, MeasuringSetup
 from flexcal.errors import InputError
+from flexcal.jobs.logs import worker_robot
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.robot import RobotModel
 from flexcal.parallel import Workers
@@ -118,7 +119,7 @@ class CandidatePoses:
         total = request.candidates
         if isinstance(total, PosePool) or total <= BLOCK:
             return cls.of(model, request, rng, progress)
-        whole = cls._among(model, request, BLOCK, rng, progress)
+        whole = cls._among(worker_robot(model, workers), request, BLOCK, rng, progress)
         criterion = criterion_named(request.criterion, whole.candidates.tool_error_weight)
         blocked = BlockedCandidates.of(
             whole.candidates, whole.checker, criterion, request.count, total, request.seed, BLOCK

@@ -5,6 +5,7 @@ from .preprocessing import Preprocessing, choose_preprocessing, preprocessing_do
 from .regression_systems import LogSegment, assemble_joined_systems, assemble_log_systems
 from .scratch import scratch_folder
 from .torque_predictions import predict_log_torques
+from .worker_files import worker_robot
 from .worker_logs import read_logs
 
 __all__ = [
@@ -27,4 +28,5 @@ __all__ = [
     "require_no_wrenches",
     "scratch_folder",
     "weight_faults",
+    "worker_robot",
 ]

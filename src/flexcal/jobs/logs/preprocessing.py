@@ -11,7 +11,7 @@ from flexcal.data.recordings import Decimation
 from flexcal.dynamics.regression import ContinuousSamples, CutoffChoice, choose_cutoff, pieces
 from flexcal.dynamics.signals import JointLog, MotionBandwidth, log_blocks, motion_bandwidth
 from flexcal.errors import InputError
-from flexcal.jobs.logs.worker_paths import worker_paths
+from flexcal.jobs.logs.worker_files import worker_paths
 from flexcal.model.robot import RobotModel
 from flexcal.parallel import ThisProcess, Workers
 

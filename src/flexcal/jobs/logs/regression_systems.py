@@ -12,8 +12,8 @@ from flexcal.dynamics.inverse_model import Observation
 from flexcal.dynamics.regression import ExperimentSystem, experiment_system, joined_systems
 from flexcal.dynamics.signals import JointLog, Window
 from flexcal.jobs.logs.preprocessing import Preprocessing
+from flexcal.jobs.logs.worker_files import worker_paths
 from flexcal.jobs.logs.worker_logs import present_log
-from flexcal.jobs.logs.worker_paths import worker_paths
 from flexcal.parallel import ThisProcess, Workers, consecutive_groups
 from flexcal.progress import Progress
 

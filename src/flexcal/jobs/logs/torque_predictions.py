@@ -11,8 +11,8 @@ from flexcal.dynamics.diagnostics import TorquePrediction, predict_torques
 from flexcal.dynamics.inverse_model import Observation
 from flexcal.dynamics.signals import JointLog
 from flexcal.jobs.logs.preprocessing import Preprocessing
+from flexcal.jobs.logs.worker_files import worker_paths
 from flexcal.jobs.logs.worker_logs import present_log
-from flexcal.jobs.logs.worker_paths import worker_paths
 from flexcal.parallel import ThisProcess, Workers
 from flexcal.progress import Progress
 

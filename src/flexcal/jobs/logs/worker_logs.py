@@ -10,7 +10,7 @@ from pathlib import Path
 from flexcal.dynamics.signals import JointLog
 from flexcal.jobs.logs.preprocessing import Preprocessing
 from flexcal.jobs.logs.scratch import scratch_folder
-from flexcal.jobs.logs.worker_paths import worker_paths
+from flexcal.jobs.logs.worker_files import worker_paths
 from flexcal.model.robot import RobotModel
 from flexcal.parallel import Workers
 
