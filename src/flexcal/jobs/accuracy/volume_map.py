@@ -164,6 +164,11 @@ class AccuracyMap(PlottedResult):
             remarks.append(
                 f"of {self.sample.total} verification points {len(self.sample.rows)} test the map, drawn evenly over positions and stations"
             )
+        if self.whole is not None:
+            remarks.append(
+                f"computed in blocks: median and P90 are right to {100 * RELATIVE_ERROR:g} %; figures, sources and the registration of the "
+                f"uncalibrated robot are those of the first {len(self.predicted.q)} poses"
+            )
         if self.outside:
             remarks.append(self.outside)
         if self.fitted:
@@ -387,9 +392,7 @@ def map_accuracy(
         q = working_volume(CollisionChecker(robot.model), working, seed).q
     elif working is not None:
         box = box_corners(working)
-    first = _checked_map(
-        robot, check, box, q, min(count, BLOCK), payload, temperature, seed, progress
-    )
+    first = _checked_map(robot, check, box, q, min(count, BLOCK), payload, temperature, seed, progress)
     accuracy = first if q is not None or count <= BLOCK else None
     if accuracy is None:
         with open_workers(on, jobs) as workers:

@@ -153,21 +153,22 @@ def _numbers(study: MapStudy) -> Section:
 
 
 def _space(study: MapStudy) -> Section:
-    accuracy = study.map
+    accuracy, poses = study.map, study.results["poses"]
     drawn = min(len(accuracy.q), SHOWN)
+    behind = "all poses" if len(accuracy.q) == poses else f"the first {len(accuracy.q)} of {poses} poses"
     blocks: tuple[Block, ...] = (
         FigureBlock(
             "figure-views",
             "Three views of the volume",
             accuracy_views(accuracy),
-            "Colour: 95 % bound of the error, averaged over all poses behind a cell.",
+            f"Colour: 95 % bound of the error, averaged over {behind} behind a cell.",
             "Predicted error in three views of the volume.",
         ),
         FigureBlock(
             "figure-space",
             "In three dimensions",
             accuracy_space(accuracy),
-            f"{drawn} of {len(accuracy.q)} poses, each in its own orientation of the tool. Drag to turn.",
+            f"{drawn} of {poses} poses, each in its own orientation of the tool. Drag to turn.",
             f"Predicted error of {drawn} poses in space.",
         ),
     )
