@@ -43,12 +43,12 @@ def tx40(examples: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Robo
 
 @pytest.mark.parametrize("most", [hold_out.MOST_EXPERIMENTS, 2])
 def test_logs_on_dask_give_the_same_estimate(
-    tx40: tuple[RobotModel, list[Path]], address: str, most: int, monkeypatch: pytest.MonkeyPatch
+    tx40: tuple[RobotModel, list[Path]], dask_address: str, most: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(hold_out, "MOST_EXPERIMENTS", most)
     model, logs = tx40
     here = identify_dynamics(model, logs[:-1], validate=logs[-1:])
-    there = identify_dynamics(model, logs[:-1], validate=logs[-1:], on=address)
+    there = identify_dynamics(model, logs[:-1], validate=logs[-1:], on=dask_address)
     assert len(there.train.batches) == min(most, LOGS - 1)
     one, other = here.estimate, there.estimate
     np.testing.assert_array_equal(other.parameters.coordinates(), one.parameters.coordinates())
@@ -103,14 +103,14 @@ def ur5(examples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_candidates_in_blocks(
-    ur5: Path, address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ur5: Path, dask_address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """On Dask as here; better than one block alone, at most 1 % worse than all candidates at once; and the bound is below all."""
     total, count, block = 12_000, 20, 2000
     monkeypatch.setattr(candidate_poses, "BLOCK", block)
     request, nothing = PoseRequest(count=count, candidates=total), PoseRequestFiles()
     here = plan_calibration_poses(ur5, tmp_path / "here.yaml", request, nothing)
-    there = plan_calibration_poses(ur5, tmp_path / "there.yaml", request, nothing, on=address)
+    there = plan_calibration_poses(ur5, tmp_path / "there.yaml", request, nothing, on=dask_address)
     np.testing.assert_array_equal(there.plan.q, here.plan.q)
     document = here.document()
     assert document["candidates"] == total
@@ -130,12 +130,14 @@ def test_candidates_in_blocks(
     assert here.design.least_possible < here.design.tool_error
 
 
-def test_a_map_in_blocks(ur5: Path, address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_map_in_blocks(
+    ur5: Path, dask_address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """On Dask as here; quantiles against those of the table's columns."""
     monkeypatch.setattr(volume_map, "BLOCK", 300)
     count = 1000
     here = map_accuracy(ur5, tmp_path / "here.parquet", count=count)
-    there = map_accuracy(ur5, tmp_path / "there.parquet", count=count, on=address)
+    there = map_accuracy(ur5, tmp_path / "there.parquet", count=count, on=dask_address)
     table, other = (pl.read_parquet(tmp_path / f"{name}.parquet") for name in ("here", "there"))
     assert table.equals(other) and len(table) == count and table["q1"].n_unique() == count
     document = here.document()

@@ -13,8 +13,8 @@ from flexcal.parallel import ThisProcess, Workers, consecutive_groups, open_work
 
 
 @pytest.fixture(params=["this process", "processes", "Dask"], scope="session")
-def workers(request: pytest.FixtureRequest, cluster: distributed.LocalCluster) -> Iterator[Workers]:
-    address = cluster.scheduler_address.replace("tcp://", "dask://")
+def workers(request: pytest.FixtureRequest, dask_cluster: distributed.LocalCluster) -> Iterator[Workers]:
+    address = dask_cluster.scheduler_address.replace("tcp://", "dask://")
     with open_workers(
         address if request.param == "Dask" else None, 1 + (request.param == "processes")
     ) as one:
