@@ -14,12 +14,12 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one process a core below
 import argparse
 import tempfile
 import time
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks._tasks import in_parallel
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.compensation import motor_commands
 from flexcal.data.plans import PosePlan
@@ -171,11 +171,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=2)
     parser.add_argument("--keep", type=Path)
     given = parser.parse_args()
-    with ProcessPoolExecutor(os.cpu_count()) as pool:
-        waiting = [
-            pool.submit(one_seed, seed, given.keep) for seed in range(given.first, given.first + given.count)
-        ]
-        print(summary([future.result() for future in waiting]))
+    print(summary(in_parallel(one_seed, range(given.first, given.first + given.count), given.keep)))
 
 
 if __name__ == "__main__":

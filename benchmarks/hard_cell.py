@@ -13,13 +13,12 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one process a core below
 import argparse
 import json
 import tempfile
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from benchmarks._tasks import in_parallel
 from flexcal.calibration.fit import fit_geometry
 from flexcal.calibration.verification import prediction_errors
 from flexcal.data.plans import PosePlan
@@ -154,22 +153,9 @@ def like_for_like(seed: int) -> dict[str, dict[str, float]]:
     return found
 
 
-def in_parallel(function: Any, tasks: list[tuple[Any, ...]], processes: int, done: Any) -> list[Any]:
-    """The results of all tasks in their order, each shown as it comes."""
-    with ProcessPoolExecutor(processes) as pool:
-        waiting = [pool.submit(function, *task) for task in tasks]
-        results = []
-        for future in waiting:
-            results.append(future.result())
-            print(done(results[-1]), flush=True)
-        return results
-
-
 def run() -> list[tuple[str, float, str]]:
     """Share of measured points inside their 95 % bounds, over hard robots whose verdict is not a no."""
-    runs = in_parallel(
-        one_seed, [(seed,) for seed in range(2000, 2020)], os.cpu_count() or 1, lambda r: r.seed
-    )
+    runs = in_parallel(one_seed, range(2000, 2020), show=lambda r: r.seed)
     print(table(runs))
     accepted = [r.inside for r in runs if r.trusted is not False]
     wrong = sum(r.confidently_wrong for r in runs)
@@ -196,14 +182,12 @@ def main() -> None:
     given = parser.parse_args()
     seeds = range(given.first, given.first + given.count)
     if given.like_for_like:
-        runs = in_parallel(like_for_like, [(seed,) for seed in seeds], given.processes, str)
+        runs = in_parallel(like_for_like, seeds, processes=given.processes, show=str)
         for meaning in PER_VISIT:
             p90, largest = (float(np.median([r[meaning][key] for r in runs])) for key in ("p90_mm", "max_mm"))
             print(f"0.1 mm as {meaning}: P90 {p90:.3f}, max {largest:.3f} mm (paper {PAPER[0]}, {PAPER[1]})")
         return
-    runs = in_parallel(
-        one_seed, [(seed,) for seed in seeds], given.processes, lambda r: table([r]).splitlines()[1]
-    )
+    runs = in_parallel(one_seed, seeds, processes=given.processes, show=lambda r: table([r]).splitlines()[1])
     print(table(runs))
     if given.save:
         given.save.write_text(json.dumps([asdict(r) for r in runs]))

@@ -13,12 +13,12 @@ import argparse
 import shutil
 import tempfile
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks._tasks import in_parallel
 from flexcal.calibration.diagnostics import Drift
 from flexcal.jobs.two_stage import run_two_stage
 
@@ -43,8 +43,9 @@ class Outcome:
     geometry: tuple[float, ...]
 
 
-def one(label: str, seed: int) -> Outcome:
-    """The demonstration with one mismatch."""
+def one(case: tuple[str, int]) -> Outcome:
+    """The demonstration with one mismatch and seed."""
+    label, seed = case
     with tempfile.TemporaryDirectory() as folder:
         robot = Path(folder) / "robot"
         shutil.copytree(EXAMPLE, robot)
@@ -80,20 +81,20 @@ def run() -> list[tuple[str, float, str]]:
 
 def collect(seeds: range) -> Iterator[tuple[str, float, str]]:
     """All mismatches on all seeds, one process a core."""
-    with ProcessPoolExecutor(os.cpu_count()) as pool:
-        waiting = {label: [pool.submit(one, label, seed) for seed in seeds] for label in MISMATCHES}
-        for label, futures in waiting.items():
-            rows = [future.result() for future in futures]
-            springs = np.abs([z for row in rows for z in row.springs])
-            geometry = np.abs([w for row in rows for w in row.geometry])
-            first, second = np.mean([row.chi2 for row in rows], axis=0)
-            named = {flag: sum(flag in row.flags for row in rows) for flag in ("stage 1", "stage 2", "drift")}
-            note = (
-                f"χ² stage 1 {first:.2f}, stage 2 {second:.2f}; flagged {sum(bool(row.flags) for row in rows)}/{len(rows)} "
-                f"({', '.join(f'{flag} {count}' for flag, count in named.items())}); "
-                f"inside: springs {100 * np.mean(springs < 1.96):.0f} %, geometry {100 * np.mean(geometry < 1.96):.0f} %"
-            )
-            yield label, float(np.mean(np.concatenate([springs, geometry]) < 1.96)) / 0.95, note
+    cases = [(label, seed) for label in MISMATCHES for seed in seeds]
+    outcomes = in_parallel(one, cases)
+    for label in MISMATCHES:
+        rows = [row for (own, _), row in zip(cases, outcomes, strict=True) if own == label]
+        springs = np.abs([z for row in rows for z in row.springs])
+        geometry = np.abs([w for row in rows for w in row.geometry])
+        first, second = np.mean([row.chi2 for row in rows], axis=0)
+        named = {flag: sum(flag in row.flags for row in rows) for flag in ("stage 1", "stage 2", "drift")}
+        note = (
+            f"χ² stage 1 {first:.2f}, stage 2 {second:.2f}; flagged {sum(bool(row.flags) for row in rows)}/{len(rows)} "
+            f"({', '.join(f'{flag} {count}' for flag, count in named.items())}); "
+            f"inside: springs {100 * np.mean(springs < 1.96):.0f} %, geometry {100 * np.mean(geometry < 1.96):.0f} %"
+        )
+        yield label, float(np.mean(np.concatenate([springs, geometry]) < 1.96)) / 0.95, note
 
 
 if __name__ == "__main__":

@@ -12,13 +12,13 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one process a core below
 import argparse
 import json
 import tempfile
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
 
+from benchmarks._tasks import in_parallel
 from flexcal.design.frequency import PlannedResponses
 from flexcal.elasticity.response_model import (
     CovarianceWeighting,
@@ -216,9 +216,7 @@ def collect(
     seeds: range, plan: PlanName, inertias_known: bool, half_gap: float | None
 ) -> list[dict[str, Any]]:
     """All seeds, one process a core."""
-    with ProcessPoolExecutor(os.cpu_count()) as pool:
-        waiting = [pool.submit(one_seed, seed, plan, inertias_known, half_gap) for seed in seeds]
-        return [future.result() for future in waiting]
+    return in_parallel(one_seed, seeds, plan, inertias_known, half_gap)
 
 
 def main() -> None:

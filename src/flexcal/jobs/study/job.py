@@ -51,14 +51,13 @@ class StudyRun:
     def document(self, frame: polars.DataFrame) -> dict[str, Any]:
         """The content of results.json with the rows that are stored."""
         plan, tasks = self.plan, self.plan.tasks
-        varied = _varied(plan)
         failed = int(frame["error"].is_not_null().sum()) if "error" in frame.columns else 0
         document = {
             **header("study"),
             "study": plan.config.kind,
             "name": plan.path.stem,
             "tasks": {"total": len(plan.rows), "done": len(frame), "failed": failed},
-            "options": {name: values for name, values in varied.items()},
+            "options": _varied(plan),
             "has_truth": tasks.has_truth,
             "error": tasks.error,
             "remarks": list(self.remarks),
@@ -217,10 +216,10 @@ def _require_rows(plan: StudyPlan, folder: Path, known: set[str]) -> None:
         )
 
 
-def _varied(plan: StudyPlan) -> dict[str, list[Any]]:
-    """Values of every option that differs between rows, in the order in which they come; of resamples nothing."""
-    values: dict[str, dict[Any, None]] = {}
+def _varied(plan: StudyPlan) -> list[str]:
+    """Columns of the options that differ between rows."""
+    values: dict[str, set[Any]] = {}
     for row in plan.rows:
         for name, value in row.options.items():
-            values.setdefault(name, {})[option_cell(value)] = None
-    return {f"{OPTION}{name}": list(given) for name, given in values.items() if len(given) > 1}
+            values.setdefault(name, set()).add(option_cell(value))
+    return [f"{OPTION}{name}" for name, given in values.items() if len(given) > 1]

@@ -143,7 +143,7 @@ def explained_share(values: np.ndarray, labels: np.ndarray) -> float | None:
 
 def _levels(table: StudyTable, name: str) -> tuple[np.ndarray, Sequence[Any]]:
     """Number (N,) of the level of each row, -1 for none, and the levels: values of the option, or bins of equally many."""
-    given = list(table.options[name])
+    given = list(dict.fromkeys(value for value in table.values(name) if value is not None))
     numeric = all(isinstance(value, int | float) and not isinstance(value, bool) for value in given)
     if not numeric or len(given) <= _FEW:
         numbers = {value: k for k, value in enumerate(sorted(given) if numeric else given)}

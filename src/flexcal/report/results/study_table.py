@@ -18,12 +18,11 @@ _ESTIMATE = ".estimate"
 class StudyTable:
     """Tasks of a study that have ended: their columns as stored, and what the study declares of them.
 
-    `options` are the values of every option that differs between tasks, by the name of its column; `error` names the errors that are the
-    result of a task.
+    `options` are the columns of the options that differ between tasks; `error` names the errors that are the result of a task.
     """
 
     frame: polars.DataFrame
-    options: Mapping[str, Sequence[Any]]
+    options: Sequence[str]
     error: str
     has_truth: bool
 

@@ -1,0 +1,120 @@
+"""Statistics of studies against other programs, closed forms and drawn numbers whose distribution is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import polars
+import pytest
+from scipy.stats import binomtest
+
+from flexcal.report.layout import write_page
+from flexcal.report.pages import StudyReport, study_page
+from flexcal.report.results import StudyTable, binomial_interval, study_statistics
+
+
+@pytest.mark.parametrize(("inside", "count"), [(0, 7), (7, 7), (93, 100), (1, 2), (1900, 2000)])
+def test_the_binomial_interval_is_that_of_scipy(inside: int, count: int) -> None:
+    expected = binomtest(inside, count).proportion_ci(0.95, "exact")
+    assert binomial_interval(inside, count) == pytest.approx((expected.low, expected.high), abs=1e-12)
+
+
+def table(columns: dict[str, object], options: tuple[str, ...] = (), *, truth: bool = True) -> StudyTable:
+    count = len(next(iter(columns.values())))  # type: ignore[arg-type]
+    none = dict.fromkeys(("error", "error_code"), [None] * count)
+    frame = polars.DataFrame(
+        {"number": range(count), "resample": [""] * count, "seconds": [0.1] * count} | none | columns
+    )
+    return StudyTable(frame, options, "verification", truth)
+
+
+def intervals(errors: np.ndarray, std: float) -> dict[str, np.ndarray]:
+    columns = {}
+    for k, error in enumerate(errors.T):
+        ends = {
+            "estimate": error,
+            "std": np.full(len(error), std),
+            "low": error - 1.96 * std,
+            "high": error + 1.96 * std,
+        }
+        columns |= {
+            f"p{k}.{name}": values for name, values in {**ends, "truth": np.zeros(len(error))}.items()
+        }
+    return columns
+
+
+def test_coverage_of_intervals_that_are_right_and_of_those_that_are_too_small() -> None:
+    rng = np.random.default_rng(4)
+    errors = rng.standard_normal((2000, 3))
+    right = study_statistics(table(intervals(errors, 1.0)))["coverage"]
+    assert right["low"] < 0.95 < right["high"] and right["tasks"] == 2000
+    small = study_statistics(table(intervals(errors, 0.5)))["coverage"]
+    assert small["share"] == pytest.approx(0.6729, abs=0.015) and small["high"] < 0.95  # 2 Φ(0.98) − 1
+    assert set(small["parameters"]) == {"p0", "p1", "p2"}
+
+
+def test_the_interval_of_the_share_of_all_knows_that_those_of_a_task_are_not_independent() -> None:
+    """Ten parameters with one common error tell as much as one."""
+    error = np.random.default_rng(5).standard_normal((400, 1))
+    one = study_statistics(table(intervals(error, 1.0)))["coverage"]
+    ten = study_statistics(table(intervals(np.repeat(error, 10, axis=1), 1.0)))["coverage"]
+    assert ten["high"] - ten["low"] == pytest.approx(one["high"] - one["low"])
+
+
+def test_the_share_of_an_option_is_that_of_the_variance_it_makes() -> None:
+    rng = np.random.default_rng(6)
+    count = 6000
+    poses, cell = rng.choice([10, 20, 40], count), rng.choice(["a", "b <script>"], count)
+    drawn = rng.uniform(0, 1, count)
+    log = 0.5 * np.log(poses) + 2.0 * drawn + 0.4 * rng.standard_normal(count)
+    total = 0.25 * np.var(np.log([10, 20, 40])) + 4 / 12 + 0.16
+    columns = {
+        "option.poses": poses,
+        "option.cell": cell,
+        "option.drawn": drawn,
+        "verification.p90_mm": np.exp(log),
+    }
+    for name in ("mean_mm", "max_mm"):
+        columns[f"verification.{name}"] = np.exp(log)
+    studied = table(columns, ("option.poses", "option.cell", "option.drawn"), truth=False)
+    found = {item["option"]: item for item in study_statistics(studied)["effects"]}
+    assert found["poses"]["share"] == pytest.approx(0.25 * np.var(np.log([10, 20, 40])) / total, abs=0.03)
+    assert found["drawn"]["share"] == pytest.approx((1 - 1 / 36) * 4 / 12 / total, abs=0.03)  # of six bins
+    assert found["cell"]["share"] < 0.003
+    assert [level["value"] for level in found["poses"]["levels"]] == [10, 20, 40]
+
+
+def test_a_jackknife_of_means_gives_their_standard_error() -> None:
+    """Means of all but one of n numbers: exactly s / √n."""
+    values = np.random.default_rng(7).standard_normal(12)
+    means = [values.mean(), *(np.delete(values, k).mean() for k in range(12))]
+    names = ["all", *(f"without {k}" for k in range(12))]
+    std = values.std(ddof=1) / np.sqrt(12)
+    studied = table({"resample": names, "a.estimate": means, "a.std": [std] * 13}, truth=False)
+    block = study_statistics(studied)["resampling"]
+    assert block["kind"] == "jackknife" and block["parameters"]["a"]["ratio"] == pytest.approx(1.0, rel=1e-12)
+    names = ["all", *(f"bootstrap {k}" for k in range(12))]
+    block = study_statistics(
+        table({"resample": names, "a.estimate": means, "a.std": [1.0] * 13}, truth=False)
+    )["resampling"]
+    assert block["parameters"]["a"]["spread"] == pytest.approx(np.std(means[1:], ddof=1))
+
+
+def test_names_and_messages_are_text_in_the_page(tmp_path) -> None:
+    errors = {f"verification.{name}": [0.1, None, 0.3] for name in ("mean_mm", "p90_mm", "max_mm")}
+    failed = {"error": [None, "a <script>alert(1)</script>.", None], "error_code": [None, "E-CAL-900", None]}
+    studied = table(
+        {"option.terms": ["a", "b <i>", "b <i>"]} | errors | failed, ("option.terms",), truth=False
+    )
+    results = {
+        "study": "virtual_calibration",
+        "name": "<b>",
+        "error": "verification",
+        "has_truth": False,
+        "command": "",
+        "provenance": {},
+    }
+    results |= {"tasks": {"total": 4, "done": 3, "failed": 1}, **study_statistics(studied)}
+    write_page(tmp_path / "page.html", study_page(StudyReport(results, studied)))
+    page = (tmp_path / "page.html").read_text()
+    assert "<script>alert(1)" not in page and "b <i>" not in page.split("<body")[1].split("<script")[0]
+    assert "E-CAL-900" in page and "1 have not" in page
