@@ -61,7 +61,8 @@ def detection_limits(test: GlobalTest, shift: float) -> tuple[DetectionLimit, ..
                 _bound(test.freedom) / length,
             )
         )
-    return tuple([*seen, *unseen])
+    order = [joint.name for joint in test.errors.model.motor_joints]
+    return tuple(sorted([*seen, *unseen], key=lambda limit: order.index(limit.subject)))
 
 
 def power(test: GlobalTest, effect: np.ndarray) -> float:

@@ -100,7 +100,7 @@ def errors_from_calibration(model: RobotModel, poses: PoseSet, *, placed: bool) 
         first,
         groups.mean(every).ravel(),
         _independent(covariance, model),
-        roots @ roots.T,
+        roots @ roots.T + _of_the_day(model, len(first)),
         covariance.freedom,
         "calibration",
         "calibration",
@@ -166,8 +166,9 @@ def planned_errors(
     covariance = prediction_errors_with_covariance(model, first)[1]
     independent = _independent(covariance, model)
     roots = covariance.roots.reshape(3 * len(first), -1)
-    common = roots @ roots.T if compared == "calibration" else independent / rounds
-    freedom = covariance.freedom if compared == "calibration" else _scatter_freedom(covariance)
+    absolute = compared == "calibration"
+    common = roots @ roots.T + _of_the_day(model, len(first)) if absolute else independent / rounds
+    freedom = covariance.freedom if absolute else _scatter_freedom(covariance)
     return VisitErrors(
         model,
         first,
@@ -283,6 +284,15 @@ def _independent(covariance: ErrorCovariance, model: RobotModel) -> np.ndarray:
     for k in range(count):
         whole[k, :, k] = covariance.independent[k]
     return whole.reshape(3 * count, 3 * count)
+
+
+def _of_the_day(model: RobotModel, count: int) -> np.ndarray:
+    """Covariance (3 K, 3 K), m², of a displacement of all points of a visit, of the size of the calibration's model error.
+
+    Part of that is common to a stretch of the measuring order, as of a robot that warms up, and a visit is such a stretch.
+    """
+    moved = model.value("scatter.model") * np.tile(np.eye(3), (count, 1))
+    return moved @ moved.T
 
 
 def _scatter_freedom(covariance: ErrorCovariance) -> float:
