@@ -90,7 +90,7 @@ CELL = """controller: {substeps: 2, rate_filter_hz: 200}
 sensors: {encoder_counts: 262144, torque_noise: 0.1, tracker_noise_m: 15e-6, tracker_noise_per_m: 6e-6}
 friction: {scale: 1.0, coulomb_velocity: 0.01}
 spread: {mass: 0.02, com: 0.002, rotor_inertia: 0.02, length: 0.3e-3, angle: 0.5e-3, stiffness: 0.1}
-mismatch: {cubic_stiffness: 0, hysteresis: 0, elastic_wrist: 0, repeatability: 0, temperature_drift: 0}
+mismatch: {cubic_stiffness: 0, hysteresis: 0, elastic_wrist: 0, repeatability: 0, link_growth: 0, temperature_profile: linear}
 """
 PLAN = """kind: multisine
 name: small

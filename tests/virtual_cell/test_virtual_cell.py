@@ -182,6 +182,8 @@ def test_mismatch_moves_what_is_measured(truth: RobotModel, rng: np.random.Gener
         (MismatchConfig(hysteresis=5e-5), 5e-5),
         (MismatchConfig(repeatability=35e-6), 35e-6),
         (MismatchConfig(temperature_drift=1e-4), 1e-4),
+        (MismatchConfig(link_growth=1e-5, temperature_profile="cycling"), 1e-4),
+        (MismatchConfig(zero_drift=1e-5, temperature_profile="warming"), 1e-4),
     ):
         seen = VirtualCell(truth, CellConfig(sensors=sensors, mismatch=mismatch)).measure(plan)
         largest = np.linalg.norm(seen.position - exact, axis=1).max()

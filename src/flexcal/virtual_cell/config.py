@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from flexcal.errors import FlexcalError
 
@@ -123,7 +123,12 @@ class MismatchConfig:
     `cubic_stiffness`: relative stiffening of every drive at 1 mrad of twist; `hysteresis`: Dahl hysteresis of every drive, its torque
     over the drive stiffness (rad), reached over `hysteresis_width` (rad); `elastic_wrist`: stiffness (N m/rad) of drive springs at the
     otherwise rigid joints, whose motors are braked unless they are excited; `repeatability`: m, 1σ an axis, of the point from visit to
-    visit; `temperature_drift`: m that the point has drifted in one direction when the last pose is measured, `temperature_rise` K later.
+    visit.
+
+    With temperature, which rises by up to `temperature_rise` (K) from 20 °C in a `temperature_profile`, linearly over the poses, as an arm
+    that warms up, or up and down twice: `temperature_drift`, m that the point drifts in one direction over the whole rise;
+    `link_growth`, 1/K, by which all lengths from the base on grow; `zero_drift`, rad/K, 1σ of what joints move with their motors still.
+    The temperature is then measured, with `temperature_noise`, K, 1σ.
     """
 
     cubic_stiffness: float = 0.0
@@ -133,6 +138,10 @@ class MismatchConfig:
     repeatability: float = 0.0
     temperature_drift: float = 0.0
     temperature_rise: float = 10.0
+    temperature_profile: Literal["linear", "warming", "cycling"] = "linear"
+    temperature_noise: float = 0.0
+    link_growth: float = 0.0
+    zero_drift: float = 0.0
 
     def __post_init__(self) -> None:
         _not_negative(self)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from flexcal.virtual_cell.config import CellConfig
 from flexcal.virtual_cell.equilibrium import rest
 from flexcal.virtual_cell.plant import build_plant
 from flexcal.virtual_cell.sensors import read_encoder, read_torque, tracker_sigma
+from flexcal.virtual_cell.warming import COLD, INTERVAL, changes_with_temperature, temperature_share
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,15 +61,24 @@ def measured_poses(
 ) -> PoseSet:
     """Measured poses of a plan from encoders, torque sensors and the tracker at the first station."""
     sensors, mismatch = config.sensors, config.mismatch
-    true = true_poses(truth, config, plan, rng)
+    share = temperature_share(mismatch, len(plan.q))
+    rise = mismatch.temperature_rise * share
+    drift = np.zeros(truth.n)
+    if mismatch.zero_drift > 0:
+        drift = mismatch.zero_drift * rng.standard_normal(truth.n)
+    true = true_poses(truth, config, replace(plan, q=plan.q + np.outer(rise, drift)), rng)
     size = len(true.q)
     band = config.friction.scale * np.nan_to_num(truth.drives.coulomb) * (1 + config.friction.stribeck)
     torque = read_torque(sensors, true.torque + band * rng.uniform(-1, 1, true.torque.shape), rng)
-    point = true.point + mismatch.repeatability * rng.standard_normal(true.point.shape)
-    temperature = None
+    grown = true.point * (1 + mismatch.link_growth * rise)[:, None]
+    point = grown + mismatch.repeatability * rng.standard_normal(true.point.shape)
+    temperature, time = None, None
+    if changes_with_temperature(mismatch):
+        temperature, time = COLD + rise, INTERVAL * np.arange(size)
+    if temperature is not None and mismatch.temperature_noise > 0:
+        temperature = temperature + mismatch.temperature_noise * rng.standard_normal(size)
     if mismatch.temperature_drift > 0:
-        share, direction = np.linspace(0, 1, size), rng.standard_normal(3)
-        temperature = mismatch.temperature_rise * share
+        direction = rng.standard_normal(3)
         point = point + share[:, None] * mismatch.temperature_drift * direction / np.linalg.norm(direction)
     station = truth.config.stations.get(truth.stations.names[0])
     seen = in_instrument(truth, point)
@@ -79,7 +89,7 @@ def measured_poses(
     # what the tracker says of its noise is by the distance that it measured
     sigma = tracker_sigma(sensors, np.linalg.norm(position - stand, axis=1))
     return PoseSet(
-        q=read_encoder(sensors, true.q),
+        q=read_encoder(sensors, plan.q),
         position=position,
         sigma=np.repeat(sigma[:, None], 3, axis=1),
         torque=torque,
@@ -87,5 +97,6 @@ def measured_poses(
         target=np.full(size, truth.point().name),
         station=np.full(size, truth.stations.names[0]),
         temperature=temperature,
+        time=time,
         pose=plan.numbers,
     )

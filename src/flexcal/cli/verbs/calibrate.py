@@ -64,8 +64,9 @@ class Calibrate:
     terms: Annotated[
         Texts, arg(metavar="TERM...", help_behavior_hint="(default: as robot.yaml declares)")
     ] = ()
-    """auto, or some of: kinematic (or offsets or lengths), backlash, gravity_compliance, lateral_compliance, transmission, ratio;
-    JOINT.gravity_compliance is that of one joint. auto: those that cross-validation supports, and transmission."""
+    """auto, or some of: kinematic (or offsets or lengths), backlash, gravity_compliance, lateral_compliance, transmission, ratio,
+    thermal, thermal_links, thermal_drift, thermal_stations; JOINT.gravity_compliance is that of one joint. auto: those that
+    cross-validation supports, and transmission."""
     loss: Literal["auto", "squares", "huber", "cauchy"] = "auto"
     """Loss function; cauchy is robust and lists outliers; auto uses it where there are outliers."""
     secant_scale: Annotated[float, arg(metavar="STD")] = 0.0

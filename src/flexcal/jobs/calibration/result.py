@@ -56,6 +56,7 @@ from flexcal.jobs.calibration.prior_of_fleet import fleet_document, fleet_remark
 from flexcal.jobs.calibration.remarks import calibration_remarks, floor_remark, outliers_of
 from flexcal.jobs.calibration.sockets import base_remark, place_remarks, scale_document, scale_remark
 from flexcal.jobs.calibration.subsample import calibration_subsample_remark, subsample_document
+from flexcal.jobs.calibration.thermal import thermal_document
 from flexcal.jobs.inputs import CalibratedRobot
 from flexcal.jobs.pages import Identification
 from flexcal.jobs.result_files import (
@@ -313,6 +314,7 @@ class Calibration(Identification):
             "scale": scale,
             "bearings": bearings_block(self.bearings),
             "fleet": fleet,
+            "temperature": thermal_document(selected),
             "stage1": None if self.stiffness is None else {"misfit": misfit_document(self.stiffness.misfit)},
             "remarks": [
                 *calibration_subsample_remark(self.sample, self.everywhere),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from flexcal.calibration.fit import GeometricFit, TemperatureEvidence
 from flexcal.model.robot import EXPANSION
 
@@ -34,6 +36,27 @@ def thermal_remarks(fit: GeometricFit) -> tuple[str, ...]:
             f"{told.attenuation:.0%} too small; the intervals include it"
         )
     return tuple(remarks)
+
+
+def thermal_document(fit: GeometricFit) -> dict[str, Any] | None:
+    """Block `temperature` of results.json; None for a robot that does not change with it."""
+    told = fit.temperature
+    if told is None:
+        return None
+    return {
+        "reference": told.reference,
+        "lowest": told.lowest,
+        "highest": told.highest,
+        "timed": told.timed,
+        "correlation": told.correlation,
+        "confounded": told.confounded,
+        "drift_p": told.probability,
+        "sensor_std": told.scatter,
+        "attenuation": told.attenuation,
+        "parameters": {
+            name: {"std": told.wide[name], "std_without_time": narrow} for name, narrow in told.narrow.items()
+        },
+    }
 
 
 def _expansion(fit: GeometricFit, told: TemperatureEvidence) -> str:

@@ -263,7 +263,7 @@ def compensate_robot(
             table=table,
         )
     commands = result.commands
-    reached = targets.subset(commands.reached)
+    reached = replace(targets, temperature=result.targets.temperature).subset(commands.reached)
     rows = ToolTargets(
         reached.pose,
         reached.target,

@@ -27,6 +27,7 @@ from .residuals import (
 )
 from .robot_arm import arm_poses, links_at
 from .study_distributions import interval_coverage, level_distributions, task_distribution
+from .temperature import residual_growth
 from .tilts import tilt_joints, tilt_order
 from .tool_path import program_path
 from .torques import torque_spectra, torque_traces
@@ -65,6 +66,7 @@ __all__ = [
     "predicted_springs",
     "prior_gains",
     "program_path",
+    "residual_growth",
     "residual_joints",
     "residual_torque",
     "residual_trend",

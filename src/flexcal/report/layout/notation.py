@@ -17,6 +17,9 @@ _SCALED = {
     "N m/rad": (1e-3, "kN m/rad"),
     "N m s/rad": (1.0, "N m s/rad"),
     "rad/(N m)": (1e6, "µrad/(N m)"),
+    "1/K": (1e6, "µm/m/K"),
+    "rad/K": (1e6, "µrad/K"),
+    "m/K": (1e6, "µm/K"),
 }
 
 

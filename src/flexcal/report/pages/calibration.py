@@ -43,6 +43,7 @@ from flexcal.report.sections import (
     parameter_table,
     provenance_section,
     residuals_section,
+    temperature_section,
     terms_section,
     tilts_section,
     uncalibrated_ranges,
@@ -79,6 +80,8 @@ def calibration_page(study: CalibrationStudy) -> Page:
         sections.append(terms_section(considered, results["term_selection_by"]))
     if results.get("learning_curve"):
         sections.append(learning_section(results["learning_curve"]))
+    if results.get("temperature"):
+        sections.append(temperature_section(results["temperature"], study.estimate, points))
     sections += [
         residuals_section(
             results["joints"],

@@ -22,6 +22,7 @@ from .stiffness import response_blocks, stiffness_section
 from .study_coverage import coverage_range, coverage_section
 from .study_effects import effects_section
 from .study_resampling import resampling_section
+from .temperature import temperature_section
 from .tilts import tilts_section
 from .torques import recording_labels, torque_blocks
 from .uncalibrated import uncalibrated_ranges, uncalibrated_rows, uncalibrated_table
@@ -68,6 +69,7 @@ __all__ = [
     "signals_table",
     "spring_table",
     "stiffness_section",
+    "temperature_section",
     "terms_section",
     "tilts_section",
     "torque_blocks",

@@ -128,9 +128,9 @@ _CONDITIONS = (
     ),
     (
         "temperature",
-        "temperature, as in the file",
-        "No term of the model depends on the temperature. A slope indicates thermal expansion of arm or instrument; measure warm, or "
-        "calibrate again at working temperature.",
+        "temperature / °C",
+        "A slope is a drift of arm or instrument with temperature that the model lacks: calibrate with poses at several temperatures, or "
+        "at the working temperature.",
     ),
 )
 
