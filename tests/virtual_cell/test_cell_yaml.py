@@ -49,6 +49,8 @@ def changed(config: Any, path: tuple[str, ...]) -> Any:
         other = not value
     elif isinstance(value, tuple):
         other = tuple(1.5 * v for v in value)
+    elif isinstance(value, str):
+        other = {"linear": "warming"}[value]
     else:
         other = 2 * value if value else 1e5 if path[0] == "elastic_wrist" else 0.1
     return replace(config, **{path[0]: other})

@@ -112,10 +112,6 @@ def at_temperature(model: RobotModel, temperature: float) -> RobotModel:
         if joint.kind == "prismatic":
             errors[i, 0] *= 1 + grown
             ratios[i, i] += grown
-    ends = {point.joint: point for point in reversed(model.points.values())}
-    for i in set(ends) - {joint.parent for joint in model.joints}:
-        # the last link is as long as to the frame that its first point is on
-        errors[i, 3:] += own[i] * (ends[i].translation + geometry.errors[i, 3:])
     for i in model.branching:
         parent = model.joints[i].parent
         if parent >= 0:
