@@ -66,6 +66,7 @@ from .jobs.experiments import (
     exciting_plan,
     frequency_plan,
 )
+from .jobs.fleet import Fleet, FleetTable, review_fleet
 from .jobs.gains import GainsIdentification, identify_gains
 from .jobs.inertials import InertialsIdentification, identify_inertials
 from .jobs.inputs import CalibratedRobot
@@ -108,6 +109,8 @@ __all__ = [
     "Estimate",
     "Estimator",
     "FilteredProgram",
+    "Fleet",
+    "FleetTable",
     "FlexcalError",
     "FrequencyRequest",
     "FrequencyResponse",
@@ -172,6 +175,7 @@ __all__ = [
     "read_yaml",
     "recheck",
     "repeatability",
+    "review_fleet",
     "rigid_motion",
     "tool_at_rest",
     "verify",

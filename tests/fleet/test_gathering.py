@@ -103,7 +103,7 @@ def test_date_of_a_growing_error(tmp_path: Path) -> None:
     assert "2026-05" < grows["reaches"]["date"] < "2026-09"
     for name in ("flat", "undated"):
         assert not robot_named(fleet, name)["drifts"] and robot_named(fleet, name)["reaches"] is None
-    assert "0 dated" in robot_named(fleet, "undated")["outlook"]
+    assert "0 of 3 dated" in robot_named(fleet, "undated")["outlook"]
     assert any("no date" in remark for remark in fleet.document()["remarks"])
 
 

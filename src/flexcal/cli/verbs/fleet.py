@@ -12,6 +12,9 @@ from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import Json, MaybeNumber, MaybePath, file_argument
 from flexcal.cli.terminal.console import Console
 
+_LISTED = 10
+"""Largest number of problems that are printed."""
+
 
 @dataclass(frozen=True)
 class Fleet:
@@ -59,8 +62,10 @@ class Fleet:
         console.say(document["headline"])
         for remark in document["remarks"]:
             console.say(remark)
-        for problem in document["problems"]:
+        for problem in document["problems"][:_LISTED]:
             console.say(f"{problem['place']}: {problem['sentence']}")
+        if len(document["problems"]) > _LISTED:
+            console.say(f"{len(document['problems']) - _LISTED} more problems are on the page")
         page = page_beside(self.out)
         console.say(f"wrote {self.out} and {page}: {document['counts']['rows']} rows")
         following = f"open {page}"

@@ -9,7 +9,7 @@ from datetime import datetime
 from typing import Literal
 
 from flexcal.fleet import Crossing, crossing
-from flexcal.jobs.fleet.courses import FEWEST_VISITS, Record, date_at, latest, years
+from flexcal.jobs.fleet.courses import FEWEST_VISITS, Record, date_at, latest, visits_of, years
 from flexcal.jobs.fleet.drifts import Drift, error_drifts
 
 _ONE_SIDED = 1.645
@@ -101,10 +101,12 @@ def _outlook(
 ) -> tuple[Crossing | None, str]:
     """When the tolerance is reached, where the data say it, and a sentence on the trend."""
     if drift is None:
-        dated = sum(r["date"] is not None for r in verifications)
-        return None, (
-            f"no trend: {dated} dated verification{'' if dated == 1 else 's'} of the present calibration; "
-            f"{FEWEST_VISITS} on different days are needed"
+        if not verifications:
+            return None, "no trend"
+        dated = len(visits_of(verifications).dates)
+        return (
+            None,
+            f"no trend yet: {dated} of {FEWEST_VISITS} dated verifications of the present calibration",
         )
     if drift.probability > level:
         return None, "no significant trend"

@@ -199,6 +199,14 @@ def _remarks(
 ) -> list[str]:
     remarks = []
     frame = gathered.table.frame
+    bare = len({item.robot for item in accuracies} - set(frame["robot"]))
+    if bare:
+        subject = (
+            "1 robot has no results in its folder"
+            if bare == 1
+            else f"{bare} robots have no results in their folders"
+        )
+        remarks.append(f"{subject}: give calibrate and verify an --out there")
     undated = frame.filter(frame["date"].is_null())["folder"].n_unique()
     if undated:
         subject = "1 folder of results has" if undated == 1 else f"{undated} folders of results have"

@@ -88,7 +88,13 @@ class Fleet(SummarisedResult):
         )
 
     def write(self, out: Path) -> None:
-        """Write the table (.parquet), and the page beside it."""
+        """Write the table as Parquet, and the page (.html) of the same name beside it.
+
+        Parameters
+        ----------
+        out : Path
+            The table.
+        """
         self.gathered.table.write(out)
         write_page(page_beside(out), fleet_page(self.document()))
 
@@ -122,6 +128,15 @@ def review_fleet(
     ------
     InputError
         Where there is no such folder, the address cannot be read, or no robot of it can.
+
+    Examples
+    --------
+    >>> from flexcal import review_fleet
+    >>> fleet = review_fleet("examples", tolerance=2e-4)
+    >>> len(fleet.accuracies)
+    6
+    >>> fleet.gathered.table.frame.filter(name="error.p90", kind="verification").height
+    0
     """
     gathered = gather_fleet(place, progress)
     robots: dict[str, tuple[str, float | None]] = {}

@@ -46,13 +46,30 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class FleetTable:
-    """The table: `frame` has a column for every field of `Row`."""
+    """Table of a fleet, one row a value of a result.
+
+    Attributes
+    ----------
+    frame : polars.DataFrame
+        The columns of the documentation's table.
+    """
 
     frame: pl.DataFrame
 
     @classmethod
     def of(cls, rows: Iterable[Row]) -> FleetTable:
-        """Table of rows."""
+        """Table of rows.
+
+        Parameters
+        ----------
+        rows : iterable of Row
+            The rows.
+
+        Returns
+        -------
+        FleetTable
+            The table.
+        """
         import polars as pl
 
         kinds = {
@@ -68,6 +85,12 @@ class FleetTable:
         return cls(pl.DataFrame({n: [getattr(row, n) for row in data] for n in names}, schema=schema))
 
     def write(self, path: Path) -> None:
-        """Write it as Parquet, atomically."""
+        """Write it as Parquet, atomically.
+
+        Parameters
+        ----------
+        path : Path
+            The file.
+        """
         with atomic_path(path) as file:
             self.frame.write_parquet(file)

@@ -89,8 +89,11 @@ def _verdict(document: Mapping[str, Any]) -> Verdict:
             else "No trend says so.",
         ),
     )
+    status = worst(checks)
+    if status == "good" and counts["robots"] == counts["not_judged"]:
+        status = "unknown"
     return Verdict(
-        worst(checks), document["headline"], " ".join(sentences(document["remarks"])), facts, (), "", checks
+        status, document["headline"], " ".join(sentences(document["remarks"])), facts, (), "", checks
     )
 
 
@@ -123,6 +126,18 @@ def _checks(document: Mapping[str, Any]) -> tuple[Check, ...]:
                 "bad" if counts["out"] else "care" if counts["undecided"] else "good",
             )
         )
+    tested = len(_with_trends(document))
+    checks.append(
+        Check(
+            "Does any robot drift?",
+            f"{counts['drifting']} of {tested} with trends do."
+            if counts["drifting"]
+            else f"No significant trend of {_count(tested, 'robot')}."
+            if tested
+            else "No robot has three dated visits.",
+            "care" if counts["drifting"] else "good" if tested else "unknown",
+        )
+    )
     if counts["rechecked"]:
         checks.append(
             Check(
