@@ -179,6 +179,11 @@ def test_the_file_has_the_prior_and_refuses_other_robots(six: Pooled, tmp_path: 
     assert any("prior of 3 other robots" in remark for remark in result.document()["remarks"])
     assert (tmp_path / "out" / "report.html").exists()
 
+    with refused("E-PRIOR-010", "25", "25", "robot_0"):
+        calibrate_robot(files[0], [files[0].parent / "poses.csv"], prior=out)
+    with refused("E-PRIOR-011", "kinematic", "offsets"):
+        calibrate_robot(new, [few], terms=["offsets"], prior=out)
+
     stranger = Fleet.drawn(rng).robot(rng)
     unlike = write_poses(tmp_path / "unlike.csv", q, stranger.measured(q, NOISE, rng))
     told = calibrate_robot(new, [unlike], prior=out, out=tmp_path / "unlike")
@@ -200,6 +205,26 @@ def test_the_file_has_the_prior_and_refuses_other_robots(six: Pooled, tmp_path: 
         pool_fleet(members[:2], out)
     with refused("E-PRIOR-003", "odd", "robot_0", "joint_3"):
         pooled_prior([*members, replace(members[1], name="odd", model=RobotModel.from_yaml(odd))])
+
+
+def test_calibrations_that_tell_nothing_of_the_arm_are_refused(six: Pooled) -> None:
+    members = []
+    for member in six.members[:3]:
+        stations = [n for n in member.estimate.parameters.names if n.startswith("station.")]
+        parameters, covariance = (
+            member.estimate.parameters.subset(stations),
+            member.estimate.marginal(stations)[1],
+        )
+        own = replace(
+            member.estimate,
+            parameters=parameters,
+            covariance=covariance,
+            dropped=(),
+            identifiable=(True,) * len(stations),
+        )
+        members.append(replace(member, estimate=own))
+    with refused("E-PRIOR-012", "robot_0", "robot_1", "robot_2"):
+        pooled_prior(members)
 
 
 def test_one_robot_that_was_measured_twice_is_named(six: Pooled) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ class FleetPrior:
 
     `mean` (p,) of the parameters `names` is known with the covariance `uncertainty` (p, p); robots differ from it by `spread` (p,), 1σ,
     which is known with `freedom` (p,) degrees of freedom. All are in natural units, as deviations from the URDF. `terms` are those fitted
-    to the `robots`, the folders' names; `source` says where the prior was read.
+    to the `robots`, the folders' names; `measurements` are the digests of theirs, `source` says where the prior was read.
     """
 
     names: tuple[str, ...]
@@ -26,6 +26,7 @@ class FleetPrior:
     freedom: np.ndarray
     terms: tuple[str, ...]
     robots: tuple[str, ...]
+    measurements: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     source: str = ""
 
     @property

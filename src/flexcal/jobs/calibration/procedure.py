@@ -109,7 +109,8 @@ def calibrate(
     poses = measured if sample is None else measured.subset(sample.rows)
     requested = requested_terms(model, terms)
     if prior is not None:
-        requested = tuple(dict.fromkeys([*prior.terms, *(requested or ()), TRANSMISSION]))
+        _require_others(prior, measured)
+        requested = _with_prior(prior, requested)
     settings = FitSettings(requested, loss, secant_scale, elasticity, prior)
     fits = Fits.of(nominal, poses, settings, progress=progress)
     held_out = None
@@ -216,3 +217,30 @@ def requested_terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str
             f"each of {', '.join(LEVELS)} has those before it in it; give one, not {' and '.join(levels)}.",
         )
     return tuple(dict.fromkeys([*(levels or ["kinematic"]), *asked]))
+
+
+def _require_others(prior: FleetPrior, poses: PoseSet) -> None:
+    """Raise `FlexcalError` where measurements are of a robot that the prior is from."""
+    own = measurement_digests(poses)
+    for robot, digests in prior.measurements.items():
+        again = len(set(digests).intersection(own))
+        if again:
+            raise FlexcalError(
+                "E-PRIOR-010",
+                f"{again} of these {len(own)} measurements are of {robot}, which the prior is from, and would count twice; calibrate it "
+                "without --prior, or pool the other robots alone.",
+            )
+
+
+def _with_prior(prior: FleetPrior, requested: Sequence[str] | None) -> tuple[str, ...]:
+    """Terms of a fit with a prior: those of the prior, and those asked for beside them."""
+    further = [term for term in requested or () if term not in prior.terms]
+    levels = [term for term in further if term in LEVELS]
+    if levels and levels[0] != "kinematic":
+        raise FlexcalError(
+            "E-PRIOR-011",
+            f"the prior is of robots with the terms {', '.join(prior.terms)}, so {levels[0]} alone cannot be fitted with it; leave "
+            f"{levels[0]} out, or leave out --prior.",
+        )
+    further = [term for term in further if term not in LEVELS]
+    return tuple(dict.fromkeys([*prior.terms, *further, TRANSMISSION]))

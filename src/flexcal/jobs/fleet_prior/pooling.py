@@ -81,6 +81,12 @@ def pooled_prior(members: Sequence[CalibratedMember]) -> FleetPrior:
     """
     _require_alike(members)
     names, sizes, measured = _measured(members)
+    if not names or not any(len(own.observed) for own in measured):
+        raise FlexcalError(
+            "E-PRIOR-012",
+            f"the calibrations of {', '.join(member.name for member in members)} tell nothing of the robots that does not depend on where "
+            "they stand and what they carry; calibrate them by measured points.",
+        )
     pooled = population(measured, sizes, [_kind(members[0].model, name) for name in names])
     prior = FleetPrior(
         tuple(names),
@@ -90,6 +96,7 @@ def pooled_prior(members: Sequence[CalibratedMember]) -> FleetPrior:
         pooled.freedom,
         members[0].terms,
         tuple(member.name for member in members),
+        {member.name: member.estimate.measurements for member in members},
     )
     told = np.diag(pooled.uncertainty) < _TOLD * sizes**2
     return prior.among(name for name, known in zip(names, told, strict=True) if known)

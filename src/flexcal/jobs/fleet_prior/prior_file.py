@@ -43,6 +43,7 @@ class StoredPrior:
     joints: dict[str, NominalJoint]
     parameters: dict[str, StoredParameter]
     correlation: tuple[tuple[float, ...], ...]
+    measurements: dict[str, str] = field(default_factory=dict)
     provenance: dict[str, str] = field(default_factory=dict)
 
 
@@ -67,6 +68,7 @@ def write_fleet_prior(path: Path, prior: FleetPrior, model: RobotModel, digests:
             for k, name in enumerate(prior.names)
         },
         tuple(tuple(float(c) for c in correlation[k, :k]) for k in range(1, len(prior.names))),
+        {name: " ".join(digests) for name, digests in prior.measurements.items()},
         provenance() | {f"calibration.{name}": digest for name, digest in digests.items()},
     )
     write_yaml(path, stored)
@@ -111,5 +113,6 @@ def read_fleet_prior(path: Path, model: RobotModel) -> FleetPrior:
         np.array([item.freedom for item in items]),
         stored.terms,
         stored.robots,
+        {name: tuple(digests.split()) for name, digests in stored.measurements.items()},
         str(path),
     )
