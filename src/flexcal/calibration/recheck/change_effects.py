@@ -99,18 +99,30 @@ def _tool(model: RobotModel, at: PredictedMeasurements, target: str) -> Possible
     )
 
 
+WHOLE_TOOL = "the tool"
+"""Subject of a motion of all points on the tool together."""
+
+
 def _whole_tool(model: RobotModel, at: PredictedMeasurements) -> list[PossibleChange]:
-    """Motion of all points on the tool together, where several in one frame were measured."""
+    """Motion of all points on the tool together, about the first, where several in one frame were measured."""
     targets = at.poses.targets
     if len(targets) < 2 or len({model.points[name].frame for name in targets}) > 1:
         return []
     columns = np.zeros((3 * len(at.poses), 6))
-    for target in targets:
+    for target, place in zip(targets, _places(model, at), strict=True):
         moved = _tool(model, at, target).columns
-        turned = np.cross(np.eye(3), model.points[target].xyz).T
-        columns += np.hstack([moved, moved @ turned])
+        columns += np.hstack([moved, moved @ np.cross(np.eye(3), place).T])
     names = tuple(f"tool.{key}" for key in STATION)
-    return [PossibleChange("tool_bumped", "the tool", names, ("m",) * 3 + ("rad",) * 3, columns)]
+    return [PossibleChange("tool_bumped", WHOLE_TOOL, names, ("m",) * 3 + ("rad",) * 3, columns)]
+
+
+def _places(model: RobotModel, at: PredictedMeasurements) -> np.ndarray:
+    """Places (T, 3), m, of the calibrated points relative to the first, in the axes of their frame."""
+    targets = at.poses.targets
+    together = at.poses.subset(np.zeros(len(targets), dtype=int))
+    there = predict_measurements(model, replace(together, target=np.array(targets)), jacobians=True)
+    axes = there.jacobian(_place(model, targets[0]))[0]
+    return (there.position - there.position[0]) @ axes
 
 
 def _payload(model: RobotModel, at: PredictedMeasurements) -> list[PossibleChange]:

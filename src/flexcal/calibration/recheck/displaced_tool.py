@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from flexcal.calibration.measurement import PredictedMeasurements, predict_measurements
-from flexcal.calibration.recheck.change_effects import possible_changes
+from flexcal.calibration.recheck.change_effects import WHOLE_TOOL, possible_changes
 from flexcal.calibration.recheck.judged_visit import Suspect
 from flexcal.data.poses import DEFAULT_SIGMA, PoseSet
 from flexcal.model.kinematics import joint_limits, random_configurations
@@ -44,18 +44,22 @@ class TellingPose:
 
 
 def moved_tool(
-    model: RobotModel, ranges: Mapping[str, tuple[float, float]], suspect: Suspect, target: str
+    model: RobotModel, ranges: Mapping[str, tuple[float, float]], suspect: Suspect, targets: Sequence[str]
 ) -> MovedTool:
-    """Displacement of `target` by a suspected change; none by an instrument that moved, or a wrong reading."""
-    at = _random_points(model, ranges, target)
+    """Displacement of the first of the measured `targets` by a suspected change, or of those that it concerns; none by an instrument that
+    moved, or a wrong reading.
+    """
+    at = _random_points(model, ranges, _concerned(suspect, targets))
     columns = _columns(model, at, suspect)
     if columns is None:
         nothing = (0.0, 0.0)
         return MovedTool(0.0, nothing, 0.0, nothing, at.poses.q[0], 0.0)
     distance = _distances(columns @ suspect.estimate)
-    root = np.linalg.cholesky(suspect.covariance + 1e-30 * np.eye(len(suspect.std)))
-    drawn = suspect.estimate + np.random.default_rng(2).standard_normal((_DRAWS, len(suspect.std))) @ root.T
-    spread = np.stack([_distances(columns @ values) for values in drawn])
+    # two points on a tool do not show its rotation about the line through them: the covariance may be singular
+    values, vectors = np.linalg.eigh(suspect.covariance)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    drawn = suspect.estimate + np.random.default_rng(2).standard_normal((_DRAWS, len(values))) @ root.T
+    spread = np.stack([_distances(columns @ change) for change in drawn])
     mean, p95 = spread.mean(axis=1), np.quantile(spread, 0.95, axis=1)
     farthest = int(distance.argmax())
     return MovedTool(
@@ -72,10 +76,10 @@ def telling_pose(
     model: RobotModel,
     ranges: Mapping[str, tuple[float, float]],
     suspects: tuple[Suspect, Suspect],
-    target: str,
+    targets: Sequence[str],
 ) -> TellingPose | None:
     """The pose at which two suspects differ most; None where one of them is of the instrument or a reading."""
-    at = _random_points(model, ranges, target)
+    at = _random_points(model, ranges, targets)
     columns = [_columns(model, at, suspect) for suspect in suspects]
     if columns[0] is None or columns[1] is None:
         return None
@@ -85,7 +89,7 @@ def telling_pose(
 
 
 def _random_points(
-    model: RobotModel, ranges: Mapping[str, tuple[float, float]], target: str
+    model: RobotModel, ranges: Mapping[str, tuple[float, float]], targets: Sequence[str]
 ) -> PredictedMeasurements:
     limits = np.clip(joint_limits(model), -_TURN, _TURN)
     for k, name in enumerate(model.motor_names):
@@ -93,16 +97,17 @@ def _random_points(
             low, high = ranges[name]
             limits[:, k] = max(limits[0, k], low), min(limits[1, k], high)
     q = random_configurations(model, _POSES, np.random.default_rng(0), limits[0], limits[1])
+    count = _POSES * len(targets)
     poses = PoseSet(
-        q=q,
-        position=np.zeros((_POSES, 3)),
-        sigma=np.full((_POSES, 3), DEFAULT_SIGMA),
+        q=np.tile(q, (len(targets), 1)),
+        position=np.zeros((count, 3)),
+        sigma=np.full((count, 3), DEFAULT_SIGMA),
         torque=None,
         payload=None,
-        target=np.full(_POSES, target),
-        station=np.full(_POSES, model.stations.names[0]),
+        target=np.repeat(list(targets), _POSES),
+        station=np.full(count, model.stations.names[0]),
         temperature=None,
-        pose=np.arange(_POSES),
+        pose=np.tile(np.arange(_POSES), len(targets)),
     )
     at_base = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
     return predict_measurements(at_base, poses, jacobians=True)
@@ -112,13 +117,18 @@ def _columns(model: RobotModel, at: PredictedMeasurements, suspect: Suspect) -> 
     if suspect.change.kind in ("instrument_moved", "wrong_reading"):
         return None
     return next(
-        (
-            change.columns
-            for change in possible_changes(at.model, at)
-            if (change.kind, change.subject) == (suspect.change.kind, suspect.change.subject)
-        ),
-        None,
+        change.columns
+        for change in possible_changes(at.model, at)
+        if (change.kind, change.subject) == (suspect.change.kind, suspect.change.subject)
     )
+
+
+def _concerned(suspect: Suspect, targets: Sequence[str]) -> Sequence[str]:
+    """Points that a change is shown at: its own, all of a tool that moved, else the first."""
+    subject = suspect.change.subject
+    if subject == WHOLE_TOOL:
+        return targets
+    return [subject] if subject in targets else targets[:1]
 
 
 def _distances(displacement: np.ndarray) -> np.ndarray:

@@ -64,7 +64,13 @@ def telling_sentence(judged: JudgedVisit, telling: TellingPose | None, noise: fl
         pose = next(s.change.subject for s in judged.suspects[:2] if s.change.kind == "wrong_reading")
         return f"what tells {first} from {second}: pose {pose} measured again"
     if judged.suspects[1].same:
-        return f"no pose of this point tells {first} from {second}; a second point on the tool does, measured at the same poses"
+        subjects = {suspect.change.subject for suspect in judged.suspects[:2]}
+        if len(judged.test.errors.poses.targets) > 1 or not subjects & set(judged.test.errors.poses.targets):
+            return f"no pose of these points tells {first} from {second}; look at how the tool is mounted"
+        return (
+            f"no pose of this point tells {first} from {second}; a second point on the tool, measured at the same poses, tells whether one "
+            "point alone moved"
+        )
     if telling is None:
         return ""
     q = ", ".join(f"{value:.3f}" for value in telling.q)
@@ -108,7 +114,8 @@ def suspect_in_words(suspect: Suspect) -> str:
     half = suspect.quantile * float(np.sqrt(along @ suspect.covariance[:3, :3] @ along))
     told = f"{size / MILLIMETRE:.3f} ± {half / MILLIMETRE:.3f} mm"
     if change.kind == "tool_bumped":
-        return f"tool bumped: {change.subject} moved by {told}"
+        turned = f" and turned by {np.linalg.norm(values[3:]) * 1e3:.2f} mrad" if len(values) > 3 else ""
+        return f"tool bumped: {change.subject} moved by {told}{turned}"
     if change.kind == "wrong_reading":
         return f"pose {change.subject} disagrees on its own, by {told}: measure it again"
     turned = float(np.linalg.norm(values[3:]))

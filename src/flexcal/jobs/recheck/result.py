@@ -374,7 +374,7 @@ def recheck(
             against_reference, placed=refit or set(poses.stations) != set(reference.stations)
         )
     judged = relative or absolute
-    ranges, target = robot.blocks["calibration"].ranges, poses.targets[0]
+    ranges, targets = robot.blocks["calibration"].ranges, poses.targets
     suspects = judged.suspects
     whole = absolute.test.errors.covariance
     return Recheck(
@@ -383,8 +383,8 @@ def recheck(
         judged=judged,
         absolute=absolute if relative is not None else None,
         limits=detection_limits(judged.test, SHIFT),
-        tools=tuple(moved_tool(model, ranges, suspect, target) for suspect in suspects),
-        telling=telling_pose(model, ranges, (suspects[0], suspects[1]), target)
+        tools=tuple(moved_tool(model, ranges, suspect, targets) for suspect in suspects),
+        telling=telling_pose(model, ranges, (suspects[0], suspects[1]), targets)
         if len(suspects) > 1
         else None,
         expected=float(np.sqrt(3 * np.trace(whole) / len(whole))),
