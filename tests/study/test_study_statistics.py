@@ -60,6 +60,11 @@ def test_the_interval_of_the_share_of_all_knows_that_those_of_a_task_are_not_ind
     assert ten["high"] - ten["low"] == pytest.approx(one["high"] - one["low"])
 
 
+def test_few_tasks_say_little_even_where_all_intervals_hold_the_truth() -> None:
+    covered = study_statistics(table(intervals(np.zeros((3, 25)), 1.0)))["coverage"]
+    assert covered["share"] == 1.0 and covered["low"] < 0.1 and covered["high"] == 1.0
+
+
 def test_the_share_of_an_option_is_that_of_the_variance_it_makes() -> None:
     rng = np.random.default_rng(6)
     count = 6000

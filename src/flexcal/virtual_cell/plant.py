@@ -94,6 +94,10 @@ class Plant:
         return np.flatnonzero(self.springs[:, 0] > 0)
 
 
+_LIGHT = 1e-6
+"""Mass (kg) and inertia (kg m²) of a link that has none."""
+
+
 @dataclass(frozen=True, eq=False)
 class PlantLinearisation:
     """M q̈ + D q̇ + K q about a position: mass, damping, stiffness (d, d) with gravity's share, and the force of gravity (d,)."""
@@ -128,6 +132,11 @@ def build_plant(
     spec = mjcf_spec(model, q=q, free=free, payload=payload)
     for sensor in sensors:
         spec.body(model.joints[sensor.joint].link).add_site(name=sensor_site(sensor), pos=sensor.xyz)
+    for body in spec.bodies:
+        if (
+            body.explicitinertial and body.mass == 0
+        ):  # of a URDF without inertials; MuJoCo has no link without mass
+            body.mass, body.fullinertia = _LIGHT, [_LIGHT, _LIGHT, _LIGHT, 0, 0, 0]
     spec.compiler.fusestatic = True
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
     bits = (getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}", None) for name in _UNWANTED)

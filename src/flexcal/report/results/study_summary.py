@@ -13,6 +13,7 @@ from flexcal.estimation import student_quantile
 from flexcal.report.results.study_table import StudyTable
 
 NOMINAL_COVERAGE = 0.95
+_NORMAL_QUANTILE = 1.959963984540054
 _BINS, _FEW = 6, 8
 """Bins of an option with more numbers than a few."""
 _STATISTICS = ("mean_mm", "p90_mm", "max_mm")
@@ -51,12 +52,12 @@ def quantiles(values: np.ndarray) -> dict[str, float | int | None]:
     }
 
 
-def binomial_interval(inside: int, count: int) -> tuple[float, float]:
-    """95 % interval of a probability from `inside` of `count` independent trials (Clopper and Pearson 1934)."""
+def binomial_interval(inside: float, count: float) -> tuple[float, float]:
+    """95 % interval of a probability from `inside` of `count` independent trials (Clopper and Pearson 1934), also of effective numbers."""
     from scipy.special import betaincinv
 
     tail = (1 - NOMINAL_COVERAGE) / 2
-    low = betaincinv(inside, count - inside + 1, tail) if inside else 0.0
+    low = betaincinv(inside, count - inside + 1, tail) if inside > 0 else 0.0
     high = betaincinv(inside + 1, count - inside, 1 - tail) if inside < count else 1.0
     return float(low), float(high)
 
@@ -64,7 +65,7 @@ def binomial_interval(inside: int, count: int) -> tuple[float, float]:
 def coverage(table: StudyTable, rows: np.ndarray | None = None) -> dict[str, Any]:
     """How often 95 % intervals hold the true value: of every parameter, with the binomial interval of that share, and of all.
 
-    The intervals of one task share its noise, so that the share of all has an interval from the scatter between tasks. `rows` is a mask.
+    The intervals of one task share its noise: the share of all has an interval from the scatter between tasks. `rows` (N,) is a mask.
     """
     chosen = np.ones(len(table), bool) if rows is None else rows
     parameters, held, known = {}, np.zeros(len(table)), np.zeros(len(table))
@@ -87,19 +88,33 @@ def coverage(table: StudyTable, rows: np.ndarray | None = None) -> dict[str, Any
             "high": bounds[1],
         }
     some = known > 0
-    shares = held[some] / known[some]
-    count = len(shares)
-    mean = float(held.sum() / known.sum()) if count else None
-    half = (
-        float(student_quantile(0.975, count - 1) * shares.std(ddof=1) / np.sqrt(count)) if count > 1 else None
-    )
+    bounds = _clustered_interval(held[some], known[some])
     return {
-        "tasks": count,
-        "share": mean,
-        "low": None if mean is None or half is None else max(0.0, mean - half),
-        "high": None if mean is None or half is None else min(1.0, mean + half),
+        "tasks": int(some.sum()),
+        "share": float(held.sum() / known.sum()) if some.any() else None,
+        "low": None if bounds is None else bounds[0],
+        "high": None if bounds is None else bounds[1],
         "parameters": parameters,
     }
+
+
+def _clustered_interval(held: np.ndarray, known: np.ndarray) -> tuple[float, float] | None:
+    """95 % interval of a share from `held` of `known` trials (T,) of every task, which are not independent within a task; None for one.
+
+    Clopper and Pearson's for the number of independent trials that the scatter between tasks amounts to (Korn and Graubard 1998); that is
+    the number of tasks where all or none are held.
+    """
+    count = len(known)
+    if count < 2:
+        return None
+    total = known.sum()
+    share = held.sum() / total
+    variance = ((held - share * known) ** 2).sum() * count / (count - 1) / total**2
+    trials = share * (1 - share) / variance if variance > 0 else float(count)
+    trials = min(
+        total, trials * (_NORMAL_QUANTILE / student_quantile(1 - (1 - NOMINAL_COVERAGE) / 2, count - 1)) ** 2
+    )
+    return binomial_interval(share * trials, trials)
 
 
 def effects(table: StudyTable) -> list[dict[str, Any]]:
