@@ -33,7 +33,9 @@ if TYPE_CHECKING:
     from flexcal.report.results import Comparison
 
 _UNCHANGED = (
-    "Next: nothing has to be done; the earlier calibration still holds. A few fresh poses would verify it."
+    "Next: the earlier calibration still holds as far as these points tell; a few fresh poses would verify it. They do not tell what looks "
+    "like an instrument that stands elsewhere, such as another zero of the first joint or a base that was shifted, nor another zero of the "
+    "last joint where the point is near its axis: after a crash, approach a known point of the cell too."
 )
 
 

@@ -85,7 +85,11 @@ class Exports(Step):
     def _tell_loss(self, run: CommandRun) -> None:
         """What the file does not carry, as the command's document says."""
         self._told = _loss(run.document, complete_formats(self.window.project))
-        self._outcome.content = self._told
+        self._show_anew(run)
+
+    def _show_anew(self, _: CommandRun) -> None:
+        """Show the links anew at the refresh that follows a command, whatever kinds of files it wrote."""
+        self._shown = None
 
     def _links(self) -> str:
         folder = self.window.project.folder
@@ -119,7 +123,7 @@ class Exports(Step):
 
         for field in fields.values():
             field.on_update(lambda _: window.post(show))
-        window.button("Write the customer's report", lambda: window.command(arguments()))
+        window.button("Write the customer's report", lambda: window.command(arguments(), self._show_anew))
         show()
         if (window.project.folder / folder / _CUSTOMER).is_file():
             gui.add_html(file_link(f"{folder}/{_CUSTOMER}", f"open {folder}/{_CUSTOMER}"))

@@ -1,0 +1,63 @@
+"""Compensation of a typed target and of a file, and the customer's report, from the page."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import calibrated_ur5
+import polars as pl
+import pytest
+from browser import studio
+from page_elements import WAIT, fill, go_to, press, see
+
+from flexcal import read_poses
+from flexcal.jobs.inputs import CalibratedRobot
+
+_TYPE_WHILE_BUSY = """([field, text]) => setTimeout(() => {
+    const until = performance.now() + 400, set = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set
+    while (performance.now() < until) {}
+    for (let end = 1; end <= text.length; end++) {
+        set.call(field, text.slice(0, end))
+        field.dispatchEvent(new Event('input', {bubbles: true}))
+    }
+}, 0)"""
+"""A page that looks at the keys of a number, and at the press of a button after it, only when it is no longer busy."""
+
+
+def test_targets_are_compensated_and_the_customer_gets_a_report(page: Any, tmp_path: Path) -> None:
+    pytest.importorskip("viser", reason="viser is absent: pip install 'flexcal[studio]'")
+    folder = calibrated_ur5.make(tmp_path / "ur5")
+    robot = CalibratedRobot.from_yaml(folder / "robot.yaml", folder / "calibration")
+    poses = read_poses(folder / "random.csv", robot.model)
+    targets = pl.DataFrame({"pose": poses.pose[:5]} | {f"q{k + 1}": poses.q[:5, k] for k in range(6)})
+    targets.write_csv(folder / "targets.csv")
+    with studio(folder) as running:
+        page.goto(running.url)
+        go_to(page, "Verify")
+        press(page, "Compensate")
+
+        correct = page.get_by_role("button", name="Correct the command")
+        correct.wait_for(timeout=WAIT)
+        place = correct.bounding_box()
+        field = page.locator("input[inputmode=decimal]").first
+        page.evaluate(_TYPE_WHILE_BUSY, [field.element_handle(), "453"])
+        page.mouse.click(place["x"] + place["width"] / 2, place["y"] + place["height"] / 2)
+        see(page, "With the nominal command")
+        chosen = json.loads((folder / ".studio.json").read_text())
+        assert chosen["target position"][0] == 453.0
+
+        see(page, "flexcal compensate robot.yaml targets.csv")
+        press(page, "Compensate the file")
+        see(page, "Commands for 5 of 5 targets")
+        page.get_by_role("link", name="open commands.csv").wait_for(timeout=WAIT)
+        commands = pl.read_csv(folder / "commands.csv")
+        assert commands["pose"].to_list() == poses.pose[:5].tolist()
+
+        press(page, "Export")
+        fill(page, "Robot no.", "<b>UR5-7</b>")
+        see(page, "--robot-serial")
+        press(page, "Write the customer's report")
+        page.get_by_role("link", name="open calibration/customer.html").wait_for(timeout=WAIT)
+        assert "&lt;b&gt;UR5-7&lt;/b&gt;" in (folder / "calibration" / "customer.html").read_text("utf-8")
