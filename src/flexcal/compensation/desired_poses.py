@@ -22,7 +22,7 @@ def desired_pose(model: RobotModel, nominal: RobotModel, targets: ToolTargets) -
     frame are brought to the base frame by where `model` has its station. Raises `FlexcalError` for an orientation asked of an arm whose
     joints are all needed for the position, or beside another arm.
     """
-    counts = {name: joints_before(model, name) for name in targets.target.tolist()}
+    counts = {name: joints_before(model, name) for name in set(targets.target.tolist())}
     short = [name for name, count in counts.items() if count < _POSE]
     if targets.rotation is not None and short and not _POINT < min(counts.values()) == max(counts.values()):
         raise FlexcalError(

@@ -54,10 +54,15 @@ class RegressionBlock:
         return np.array([(projection @ parameters[felt]) @ own[:-1] for felt, projection, own in equations])
 
     def where(self, keep: np.ndarray) -> RegressionBlock:
-        """Rows of the mask `keep` (M,)."""
+        """Rows of the mask `keep` (M,); those that follow each other share their memory with these."""
         if keep.all():
             return self
-        reduced = [own[:, keep] for own in self.reduced]
+        rows = np.flatnonzero(keep)
+        if len(rows) and rows[-1] - rows[0] == len(rows) - 1:
+            run = slice(rows[0], rows[-1] + 1)
+            reduced = [own[:, run] for own in self.reduced]
+        else:
+            reduced = [own.take(rows, axis=1) for own in self.reduced]
         return RegressionBlock(self.number[keep], self.time[keep], self.still[keep], reduced, self.projection)
 
     def weighted(self, weights: np.ndarray) -> RegressionBlock:
