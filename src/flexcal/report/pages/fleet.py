@@ -132,10 +132,12 @@ def _checks(document: Mapping[str, Any]) -> tuple[Check, ...]:
             "Does any robot drift?",
             f"{counts['drifting']} of {tested} with trends do."
             if counts["drifting"]
-            else f"No significant trend of {_count(tested, 'robot')}."
+            else f"No significant trend of the errors of {_count(counts['error_trends_tested'], 'robot')}."
+            if counts["error_trends_tested"]
+            else "No single parameter has a significant trend, but no robot has three dated verifications of one calibration."
             if tested
             else "No robot has three dated visits.",
-            "care" if counts["drifting"] else "good" if tested else "unknown",
+            "care" if counts["drifting"] else "good" if counts["error_trends_tested"] else "unknown",
         )
     )
     if counts["rechecked"]:
