@@ -187,3 +187,14 @@ def test_an_arm_without_expansion_hardly_ever_gets_a_term(measured: Callable) ->
         model, poses, _ = measured(seed, growth=0.0)
         found += any("thermal" in term for term in calibrate(model, poses).selected.terms)
     assert found <= 3
+
+
+def test_an_expansion_of_no_material_is_said(measured: Callable) -> None:
+    """As of a sensor that warms up by a third of what the arm does."""
+    model, poses, _ = measured(25)
+    assert poses.temperature is not None
+    third = replace(poses, temperature=COLD + (poses.temperature - COLD) / 3)
+    remarks = calibrate(model, third, terms=["kinematic", "thermal"]).document()["remarks"]
+    assert any("which no arm's material does" in remark for remark in remarks)
+    plain = calibrate(model, poses, terms=["kinematic", "thermal"]).document()["remarks"]
+    assert any("per kelvin" in remark for remark in plain) and not any("material" in r for r in plain)

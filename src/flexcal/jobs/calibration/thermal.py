@@ -8,6 +8,8 @@ from flexcal.calibration.fit import GeometricFit, TemperatureEvidence
 from flexcal.model.robot import EXPANSION
 
 _MICRO = 1e-6
+_METALS = 30.0
+"""Expansion, µm/m/K, above that of aluminium and magnesium."""
 _WORTH = 0.02
 """Attenuation from which it has a sentence."""
 
@@ -68,9 +70,16 @@ def _expansion(fit: GeometricFit, told: TemperatureEvidence) -> str:
     interval = fit.estimate.interval(EXPANSION) if EXPANSION in fit.estimate.parameters else None
     if interval is None:
         return f"the robot changes with temperature: {where}"
-    middle, half = (interval[0] + interval[1]) / 2 / _MICRO, (interval[1] - interval[0]) / 2 / _MICRO
+    low, high = (limit / _MICRO for limit in interval)
     of = "longest link" if any(name.endswith(".thermal_expansion") for name in told.narrow) else "arm"
-    return f"the {of} expands by {middle:.1f} ± {half:.1f} µm/m/K (95 %); {where}"
+    odd = ""
+    if low > _METALS or high < 0:
+        odd = (
+            ", which no arm's material does: the column is not the temperature of the links, or something else goes with it, as the scale "
+            "of the instrument"
+        )
+    size = f"{(low + high) / 2:.1f} ± {(high - low) / 2:.1f} µm/m"
+    return f"the {of} expands by {size} per kelvin of the column 'temperature' (95 %){odd}; {where}"
 
 
 def _confounded(told: TemperatureEvidence) -> str:
