@@ -104,6 +104,27 @@ def test_a_jackknife_of_means_gives_their_standard_error() -> None:
     assert block["parameters"]["a"]["spread"] == pytest.approx(np.std(means[1:], ddof=1))
 
 
+@pytest.mark.parametrize(("factor", "status"), [(1.0, "good"), (3.0, "care"), (0.25, "care")])
+def test_a_spread_unlike_the_stated_one_is_said(factor: float, status: str) -> None:
+    rng = np.random.default_rng(8)
+    names = ["all", *(f"bootstrap {k}" for k in range(60))]
+    columns: dict[str, object] = {"resample": names}
+    for k in range(9):
+        columns |= {f"p{k}.estimate": factor * rng.standard_normal(61), f"p{k}.std": np.ones(61)}
+    studied = table(columns, truth=False)
+    results = {
+        "study": "calibrate",
+        "name": "s",
+        "error": "fit",
+        "has_truth": False,
+        "command": "",
+        "provenance": {},
+    }
+    results |= {"tasks": {"total": 61, "done": 61, "failed": 0}, **study_statistics(studied)}
+    checks = study_page(StudyReport(results, studied)).verdict.checks
+    assert [check.status for check in checks] == ["good", "good", status]
+
+
 def test_names_and_messages_are_text_in_the_page(tmp_path) -> None:
     errors = {f"verification.{name}": [0.1, None, 0.3] for name in ("mean_mm", "p90_mm", "max_mm")}
     failed = {"error": [None, "a <script>alert(1)</script>.", None], "error_code": [None, "E-CAL-900", None]}

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 PROGRESS = "FLEXCAL_PROGRESS"
 _WIDTH = 120
 """Columns where the output is no terminal."""
+_PERIOD = 600.0
+"""Seconds over which the time left is estimated: a task of a study may take minutes."""
 _STEP = 0.01
 """Smallest share between two lines of progress."""
 
@@ -72,7 +74,7 @@ class Console:
             TimeElapsedColumn(),
             TimeRemainingColumn(),
         )
-        with Bars(*columns, console=rich) as bars:
+        with Bars(*columns, console=rich, speed_estimate_period=_PERIOD) as bars:
 
             def advance(stage: str, share: float) -> None:
                 if stage not in tasks:

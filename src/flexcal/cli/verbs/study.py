@@ -70,10 +70,9 @@ def _lines(document: dict[str, Any]) -> list[str]:
     ]
     error = document["errors"].get(document["error"], {}).get("p90_mm")
     if error and error["tasks"]:
-        lines.append(
-            f"90th percentile of the errors ({document['error']}): median {error['median']:.4f} mm over the tasks, "
-            f"{error['low']:.4f} to {error['high']:.4f} mm in 95 % of them"
-        )
+        middle = f"90th percentile of the errors ({document['error']}): median {error['median']:.4f} mm over the tasks"
+        span = f", {error['low']:.4f} to {error['high']:.4f} mm in 95 % of them" if error["tasks"] > 1 else ""
+        lines.append(middle + span)
     covered = document["coverage"]
     if covered and covered["low"] is not None:
         lines.append(

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from flexcal.report.figures import task_distribution
 from flexcal.report.layout import (
     Check,
@@ -42,6 +44,8 @@ _KINDS = {
     "two_stage": "two-stage calibrations of virtual robots",
     "calibrate": "calibrations on measured poses",
 }
+_FEWEST_RESAMPLES, _RATIO = 8, 1.25
+"""Least number of resamples that tell a spread, and ratio of two spreads that are about alike."""
 _LISTED = 100
 """Largest number of messages in a table."""
 
@@ -173,7 +177,23 @@ def _checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
                 "unknown",
             )
         )
+    checks += [] if results["resampling"] is None else _resampling_check(results["resampling"])
     return tuple(checks)
+
+
+def _resampling_check(block: Mapping[str, Any]) -> list[Check]:
+    """Whether the spread over resamples is that which the fit states, as far as so many resamples tell."""
+    ratios = [item["ratio"] for item in block["parameters"].values() if item["ratio"] is not None]
+    if not ratios or block["resamples"] < _FEWEST_RESAMPLES:
+        return []
+    middle = float(np.median(ratios))
+    tolerated = _RATIO + 2 / np.sqrt(2 * (block["resamples"] - 1))
+    answer = f"The spread over {block['resamples']} data sets is {significant(middle, 3)} times the stated one (median over the parameters)"
+    question = "Do resampled data spread the estimates as their standard deviations say?"
+    if 1 / tolerated <= middle <= tolerated:
+        return [Check(question, f"{answer}.", "good")]
+    size = "small" if middle > 1 else "large"
+    return [Check(question, f"{answer}: the stated uncertainties are too {size} for these data.", "care")]
 
 
 def _errors_section(study: StudyReport) -> Section:
