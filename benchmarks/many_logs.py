@@ -40,6 +40,8 @@ FILES, SAMPLES, DECIMATION = 10, 1_000_000, 10
 LIMIT_MB, SCALING = 400.0, 1.8
 _PART = 20_000
 _TASKS, _MOVED_MB = 1000, 50
+_TOGETHER = 8
+"""Systems that a task joins on a cluster."""
 _NETWORK = 1.25e9
 """Bytes a second of the network of the model: 10 Gbit/s."""
 _WORKERS = np.unique(np.geomspace(1, 1000, 61).round().astype(int))
@@ -74,7 +76,8 @@ class Run:
 @dataclass(frozen=True)
 class Costs:
     """Measured costs, s: of a log of a million samples to be `simulated`, `read` and filtered, and `reduced` to factors (each pass); of
-    joining two systems of `size` bytes, of a task of the scheduler, of the way of a small value between workers, and of the fit.
+    joining two systems of `size` bytes, of a task for the scheduler (processor time), of the way of a small value between workers, and of
+    the fit.
 
     `bandwidth` is that between two workers of this machine, bytes a second.
     """
@@ -93,20 +96,23 @@ class Costs:
         """Seconds (W,) of `logs` logs of a million samples on so many `workers` (W,), by their cause.
 
         Logs are shared out whole; one is read once and reduced in every one of the `passes` (four where friction is chosen). The scheduler
-        starts one task at a time. The groups' trees are as deep as the logarithm of the logs in a group, every step a join after a way
-        over the network; the groups' factors arrive here one after the other. Simulation is no part of it.
+        starts one task at a time, of which one combines eight systems. The groups' trees are as deep as the logarithm to that base of the
+        logs in a group, every step after a way over the network; the groups' factors arrive here one after the other. Simulation is no part
+        of it.
         """
         groups = min(logs, MOST_EXPERIMENTS)
-        depth = int(np.ceil(np.log2(-(-logs // groups))))
+        depth = int(np.ceil(np.log2(-(-logs // groups)) / np.log2(_TOGETHER)))
         rounds = -(-logs // workers)
-        joins = (logs - groups) / np.minimum(workers, groups) + depth
+        joins = (logs - groups) / np.minimum(workers, groups) + depth * (_TOGETHER - 1)
         each = np.ones(len(workers))
         return {
             "computing": rounds * (self.read + passes * self.reduced),
             "joining": passes * joins * self.joined,
             "transfer": each * passes * (groups + depth) * self.size / _NETWORK,
             "latency": each * passes * (1 + depth) * self.latency,
-            "scheduler": each * (logs + passes * (2 * logs - groups)) * self.task,
+            "scheduler": each
+            * (logs + passes * (logs + (logs - groups) / (_TOGETHER - 1) + groups))
+            * self.task,
             "fit": each * self.fit,
         }
 
@@ -171,9 +177,7 @@ def measured_costs(observation: Observation, files: int) -> Costs:
     )
     fit, _ = _timed(lambda: weighted_least_squares(data))
     with _cluster(2) as workers:
-        started = time.perf_counter()
-        list(workers.values(abs, range(_TASKS)))
-        task = (time.perf_counter() - started) / _TASKS
+        task = _timed(lambda: list(workers.reduced(abs, [range(_TASKS)], max)))[0] / (_TASKS * 8 / 7)
         latency, bandwidth = _network(workers)
     return Costs(simulated, read, reducing, joining, len(pickle.dumps(full)), task, latency, bandwidth, fit)
 
@@ -200,6 +204,7 @@ def _network(workers: DaskCluster) -> tuple[float, float]:
 
 def _on_cluster(observation: Observation, count: int, files: int, samples: int) -> Run:
     with _cluster(count) as workers:
+        reduced(workers, observation, 2 * count, _PART)  # which loads the modules
         before = workers.client.run(_usage)
         begun, spent = time.perf_counter(), time.process_time()
         estimate = reduced(workers, observation, files, samples)

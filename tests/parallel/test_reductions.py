@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import distributed
 import pytest
 from refusals import refused
-from worker_tasks import failing, letter, paired, unpaired
+from worker_tasks import failing, letter, paired, process, unpaired
 
 from flexcal.parallel import ThisProcess, Workers, consecutive_groups, open_workers
 
@@ -36,6 +36,13 @@ def test_neighbours_are_combined_first(workers: Workers) -> None:
 def test_groups_are_of_neighbours() -> None:
     assert consecutive_groups(range(7), 3) == [range(2), range(2, 5), range(5, 7)]
     assert consecutive_groups("ab", 3) == ["a", "b"]
+
+
+def test_few_long_tasks_are_shared_out(workers: Workers) -> None:
+    """The first worker has what tasks have in common: for the scheduler that must not be a reason to give it all of them."""
+    each = list(workers.values(process, range(4)))
+    joined = list(workers.reduced(process, [range(4)], set.union))
+    assert len(set.union(*each)) == len(joined[0]) == workers.count
 
 
 def test_values_come_in_the_order_of_the_tasks(workers: Workers) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +46,12 @@ def letter(number: int) -> str:
 def paired(left: str, right: str) -> str:
     """Both in brackets, which show the tree."""
     return f"({left}{right})"
+
+
+def process(number: int) -> set[int]:
+    """The process that the task ran in, after a while."""
+    time.sleep(0.5)
+    return {os.getpid()}
 
 
 def unpaired(left: str, right: str) -> str:

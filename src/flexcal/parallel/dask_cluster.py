@@ -11,7 +11,7 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from flexcal.errors import FlexcalError, InputError
-from flexcal.parallel.ordered import value_of, values_in_order
+from flexcal.parallel.ordered import combined_groups, value_of, values_in_order
 from flexcal.parallel.outcome import Outcome, TaskError, run_task
 from flexcal.parallel.workers import Workers
 
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 V = TypeVar("V")
 _AHEAD = 2
 """Tasks a thread that are sent before the last has ended, so that none waits for the next."""
+_TOGETHER = 8
+"""Neighbours that one task combines, a power of two: the tree is the same, with fewer tasks for the scheduler."""
 _RECOUNT = 1.0
 """Seconds between two counts of the workers."""
 _GIVEN_UP = "all worker processes ended while they ran this task (killed, out of memory, or crashed)"
@@ -89,7 +91,7 @@ class DaskCluster(Workers):
 
         name = f"flexcal-{uuid.uuid4().hex}"
         client, numbered = self.client, iter(enumerate(tasks))
-        shared = client.submit(_together, function, *common, key=f"{name}-common")
+        shared = client.submit(_together, function, *common, key=f"common-{name}")
         waiting = as_completed(loop=client.loop, with_results=True, raise_errors=False)
         running: dict[Future, tuple[int, Any]] = {}
         suspects: list[tuple[int, Any]] = []  # each ran beside a killed worker, or killed it
@@ -138,7 +140,7 @@ class DaskCluster(Workers):
         Raises `FlexcalError` as `results` does.
         """
         client, name = self.client, f"flexcal-{uuid.uuid4().hex}"
-        shared = client.submit(_together, function, combine, *common, key=f"{name}-common")
+        shared = client.submit(_together, function, combine, *common, key=f"common-{name}")
         roots: list[Future] = []
         try:
             for index, group in enumerate(groups):
@@ -147,11 +149,8 @@ class DaskCluster(Workers):
                     for leaf, task in enumerate(group)
                 ]
                 while len(level) > 1:
-                    pairs = [
-                        client.submit(_combined, shared, left, right, pure=False)
-                        for left, right in zip(level[::2], level[1::2], strict=False)
-                    ]
-                    level = pairs + level[2 * len(pairs) :]
+                    parts = [level[first : first + _TOGETHER] for first in range(0, len(level), _TOGETHER)]
+                    level = [client.submit(_combined, shared, *part, pure=False) for part in parts]
                 roots += level
             while roots:
                 yield self._value(roots[0])
@@ -256,9 +255,13 @@ def _leaf(shared: tuple[Any, ...], task: Any) -> Outcome[Any]:
     return _run((function, *common), 0, task)
 
 
-def _combined(shared: tuple[Any, ...], left: Outcome[Any], right: Outcome[Any]) -> Outcome[Any]:
-    """Both values as one; the error of the earlier task where one has none."""
-    for part in (left, right):
+def _combined(shared: tuple[Any, ...], *parts: Outcome[Any]) -> Outcome[Any]:
+    """All values as one; the error of the first task where one has none."""
+    for part in parts:
         if part.error is not None:
             return part
-    return _run((shared[1], right.value), 0, left.value)
+    return _run((_tree, shared[1]), 0, [part.value for part in parts])
+
+
+def _tree(values: list[Any], combine: Callable[[Any, Any], Any]) -> Any:
+    return next(combined_groups(iter(values), [values], combine))
