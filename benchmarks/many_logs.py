@@ -42,6 +42,8 @@ _PART = 20_000
 _TASKS, _MOVED_MB = 1000, 50
 _TOGETHER = 8
 """Systems that a task joins on a cluster."""
+_LATENCY = 1e-3
+"""Least time of a way that is believed, s: on one machine it is lost in that of the tasks."""
 _NETWORK = 1.25e9
 """Bytes a second of the network of the model: 10 Gbit/s."""
 _WORKERS = np.unique(np.geomspace(1, 1000, 61).round().astype(int))
@@ -198,8 +200,8 @@ def _network(workers: DaskCluster) -> tuple[float, float]:
             begun = time.perf_counter()
             client.submit(len, there, workers=[other], pure=False).result()
             tried.append(time.perf_counter() - begun - stayed)
-        seconds.append(max(min(tried), 1e-5))
-    return seconds[0], _MOVED_MB * 2**20 / max(seconds[1] - seconds[0], 1e-5)
+        seconds.append(min(tried))
+    return max(seconds[0], _LATENCY), _MOVED_MB * 2**20 / max(seconds[1] - seconds[0], _LATENCY)
 
 
 def _on_cluster(observation: Observation, count: int, files: int, samples: int) -> Run:

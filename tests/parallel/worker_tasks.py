@@ -50,7 +50,7 @@ def paired(left: str, right: str) -> str:
 
 def process(number: int) -> set[int]:
     """The process that the task ran in, after a while."""
-    time.sleep(0.5)
+    time.sleep(2.0)
     return {os.getpid()}
 
 
