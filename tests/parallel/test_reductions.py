@@ -38,16 +38,6 @@ def test_groups_are_of_neighbours() -> None:
     assert consecutive_groups("ab", 3) == ["a", "b"]
 
 
-def test_the_scheduler_tells_tasks_from_what_they_have_in_common(
-    dask_cluster: distributed.LocalCluster,
-) -> None:
-    """It moves no task to an idle worker whose kind took microseconds before."""
-    with open_workers(dask_cluster.scheduler_address.replace("tcp://", "dask://"), 1) as workers:
-        list(workers.values(letter, range(2)))
-        list(workers.reduced(letter, [range(2)], paired))
-    assert {"common", "flexcal"} <= set(dask_cluster.scheduler.task_prefixes)
-
-
 @pytest.mark.slow
 def test_few_long_tasks_are_shared_out(workers: Workers) -> None:
     """The first worker has what tasks have in common: for the scheduler that must not be a reason to give it all of them."""
