@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from flexcal.calibration.measurement import PredictedMeasurements, predict_measurements
-from flexcal.data.poses import DEFAULT_SIGMA, PoseSet
+from flexcal.calibration.measurement import PredictedMeasurements
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
-from flexcal.model.kinematics import joint_limits, random_configurations
+from flexcal.model.kinematics import joint_limits, rigid_motion_columns
 from flexcal.model.robot import RobotModel
 
 _TURN = 2 * np.pi
@@ -40,33 +38,6 @@ def common_ranges(model: RobotModel, estimates: Sequence[Estimate]) -> np.ndarra
     return limits
 
 
-def random_poses(model: RobotModel, limits: np.ndarray, targets: Sequence[str], count: int) -> PoseSet:
-    """`count` poses for every target, uniform within the limits (2, n), the same in every call."""
-    q = random_configurations(model, count, np.random.default_rng(0), limits[0], limits[1])
-    return poses_of(model, np.tile(q, (len(targets), 1)), np.repeat(list(targets), count))
-
-
-def poses_of(model: RobotModel, q: np.ndarray, target: np.ndarray) -> PoseSet:
-    """Poses at joint positions (N, n) of targets (N,), seen from the first station."""
-    return PoseSet(
-        q=q,
-        position=np.zeros((len(q), 3)),
-        sigma=np.full((len(q), 3), DEFAULT_SIGMA),
-        torque=None,
-        payload=None,
-        target=target,
-        station=np.full(len(q), model.stations.names[0]),
-        temperature=None,
-        pose=np.arange(len(q)),
-    )
-
-
-def seen_from_base(model: RobotModel, poses: PoseSet, *, jacobians: bool = False) -> PredictedMeasurements:
-    """Points in the robot's base frame, with the deflection of its springs."""
-    at_base = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
-    return predict_measurements(at_base, poses, jacobians=jacobians)
-
-
 def columns(at: PredictedMeasurements, names: Sequence[str]) -> np.ndarray:
     """Derivatives (3 N, p) of the points by the named parameters, in natural units."""
     return at.jacobian(names).reshape(3 * len(at.poses), len(names))
@@ -74,9 +45,7 @@ def columns(at: PredictedMeasurements, names: Sequence[str]) -> np.ndarray:
 
 def rigid_motions(points: np.ndarray) -> np.ndarray:
     """Orthonormal basis (3 N, 6) of the displacements of points (N, 3) by small motions of the whole robot."""
-    turned = np.cross(np.eye(3)[None], (points - points.mean(axis=0))[:, None]).swapaxes(1, 2)
-    moved = np.broadcast_to(np.eye(3), turned.shape)
-    return np.linalg.qr(np.concatenate([moved, turned], axis=2).reshape(-1, 6))[0]
+    return np.linalg.qr(rigid_motion_columns(points - points.mean(axis=0)).reshape(-1, 6))[0]
 
 
 def moving_names(model: RobotModel, estimates: Sequence[Estimate]) -> list[str]:

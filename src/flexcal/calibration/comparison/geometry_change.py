@@ -15,9 +15,7 @@ from flexcal.calibration.comparison.common_poses import (
     columns,
     common_ranges,
     moving_names,
-    random_poses,
     rigid_motions,
-    seen_from_base,
 )
 from flexcal.calibration.comparison.explanations import LEVEL, Explanation, candidates_of, chance_of, explain
 from flexcal.calibration.comparison.joint_covariance import (
@@ -27,6 +25,7 @@ from flexcal.calibration.comparison.joint_covariance import (
 )
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.fit import plausible_size
+from flexcal.calibration.measurement import random_poses, seen_from_base
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate, Parameters, analyse
 from flexcal.model.robot import GEOMETRY, RobotModel, declared_parameter, unit_in

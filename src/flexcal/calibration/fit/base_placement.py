@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexcal.model.kinematics import joint_limits, point_kinematics, random_configurations
+from flexcal.model.kinematics import (
+    joint_limits,
+    point_kinematics,
+    random_configurations,
+    rigid_motion_columns,
+)
 from flexcal.model.robot import GEOMETRY, RobotModel
 
 _POSES = 40
@@ -26,9 +31,7 @@ def base_errors(model: RobotModel) -> tuple[str, ...]:
     at = [point_kinematics(model, q, point=name) for name in model.points]
     own = np.concatenate([a.geometry_jacobian[:, :3][:, :, columns] for a in at]).reshape(-1, len(names))
     position = np.concatenate([a.position for a in at])
-    rigid = np.zeros((len(position), 3, 6))
-    rigid[:, :, :3], rigid[:, :, 3:] = np.eye(3), np.cross(np.eye(3)[:, None], position).transpose(1, 2, 0)
-    flat = rigid.reshape(-1, 6)
+    flat = rigid_motion_columns(position).reshape(-1, 6)
     left = own - flat @ np.linalg.lstsq(flat, own, rcond=None)[0]
     as_one = np.linalg.norm(left, axis=0) <= _AS_ONE * np.linalg.norm(own, axis=0)
     return tuple(name for name, one in zip(names, as_one, strict=True) if one)

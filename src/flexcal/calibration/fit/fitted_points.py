@@ -57,6 +57,7 @@ from flexcal.calibration.measurement import (
     stated_sigma,
     with_camera_places,
     with_places_of,
+    with_stations_at_base,
     with_target_axes,
 )
 from flexcal.data.poses import PoseSet
@@ -133,7 +134,7 @@ class PointFit:
         model = model.with_lenses({name: lens.values for name, lens in poses.lenses.items()})
         if any(term.rpartition(".")[2] in THERMAL for term in terms):
             model = with_reference_temperature(model, poses)
-        bare = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
+        bare = with_stations_at_base(model)
         start = register(model, poses, predict_measurements(bare, poses, elastic=elastic).located)
         zeroed = register_with_zeros(start, poses)
         far_zeros = zeroed is not None

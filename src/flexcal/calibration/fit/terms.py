@@ -12,6 +12,7 @@ from flexcal.calibration.kinds import ANGULAR, KINDS, declared_level, kind_of
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameter, Parameters
+from flexcal.model.kinematics import rigid_motion_columns
 from flexcal.model.parts import LOOP
 from flexcal.model.robot import (
     GEOMETRY,
@@ -147,8 +148,7 @@ def _moving_parts(model: RobotModel, poses: PoseSet, names: Sequence[str]) -> li
     """Those of the `names` that do not move the whole robot as one, as an offset of the first joint does."""
     at = predict_measurements(model, poses, elastic=False, jacobians=True)
     point = at.kinematics.position
-    rigid = np.zeros((len(point), 3, 6))
-    rigid[:, :, :3], rigid[:, :, 3:] = np.eye(3), np.cross(np.eye(3)[:, None], point).transpose(1, 2, 0)
+    rigid = rigid_motion_columns(point)
     columns = np.matmul(at.base.swapaxes(1, 2), at.jacobian(names)).reshape(3 * len(point), -1)
     flat = rigid.reshape(3 * len(point), 6)
     left = columns - flat @ np.linalg.lstsq(flat, columns, rcond=None)[0]

@@ -1,4 +1,5 @@
 from .backlash_flanks import OneFlank, ambiguous_poses, require_both_flanks
+from .base_frame import random_poses, seen_from_base, with_stations_at_base
 from .hand_eye import with_camera_places
 from .joint_zeros import register_with_zeros, with_places_of
 from .prediction import (
@@ -27,13 +28,16 @@ __all__ = [
     "predict_measurements",
     "predicted_positions",
     "propagation",
+    "random_poses",
     "register",
     "register_with_zeros",
     "require_both_flanks",
     "require_orientations",
     "require_points",
+    "seen_from_base",
     "stated_sigma",
     "with_camera_places",
     "with_places_of",
+    "with_stations_at_base",
     "with_target_axes",
 ]

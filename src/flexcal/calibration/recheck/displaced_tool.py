@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.measurement import PredictedMeasurements, predict_measurements
+from flexcal.calibration.measurement import PredictedMeasurements, random_poses, seen_from_base
 from flexcal.calibration.recheck.change_effects import WHOLE_TOOL, possible_changes
 from flexcal.calibration.recheck.judged_visit import Suspect
-from flexcal.data.poses import DEFAULT_SIGMA, PoseSet
-from flexcal.model.kinematics import joint_limits, random_configurations
+from flexcal.model.kinematics import joint_limits
 from flexcal.model.robot import RobotModel
 
 _POSES = 300
 _DRAWS = 400
 _TURN = 2 * np.pi
+"""Largest joint position, rad or m, of joints without a limit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,21 +96,7 @@ def _random_points(
         if name in ranges:
             low, high = ranges[name]
             limits[:, k] = max(limits[0, k], low), min(limits[1, k], high)
-    q = random_configurations(model, _POSES, np.random.default_rng(0), limits[0], limits[1])
-    count = _POSES * len(targets)
-    poses = PoseSet(
-        q=np.tile(q, (len(targets), 1)),
-        position=np.zeros((count, 3)),
-        sigma=np.full((count, 3), DEFAULT_SIGMA),
-        torque=None,
-        payload=None,
-        target=np.repeat(list(targets), _POSES),
-        station=np.full(count, model.stations.names[0]),
-        temperature=None,
-        pose=np.tile(np.arange(_POSES), len(targets)),
-    )
-    at_base = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
-    return predict_measurements(at_base, poses, jacobians=True)
+    return seen_from_base(model, random_poses(model, limits, targets, _POSES), jacobians=True)
 
 
 def _columns(model: RobotModel, at: PredictedMeasurements, suspect: Suspect) -> np.ndarray | None:

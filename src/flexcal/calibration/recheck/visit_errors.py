@@ -10,7 +10,12 @@ from typing import Literal
 import numpy as np
 
 from flexcal.calibration.error_model import SAME_COMMAND, group_numbers
-from flexcal.calibration.measurement import PredictedMeasurements, predict_measurements, require_points
+from flexcal.calibration.measurement import (
+    PredictedMeasurements,
+    predict_measurements,
+    require_points,
+    with_stations_at_base,
+)
 from flexcal.calibration.verification import (
     ErrorCovariance,
     prediction_errors_with_covariance,
@@ -249,7 +254,7 @@ def _needs_place(model: RobotModel, poses: PoseSet) -> bool:
 
 def _placed(model: RobotModel, poses: PoseSet) -> RobotModel:
     """Robot with the instrument where its points fit best."""
-    at_base = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
+    at_base = with_stations_at_base(model)
     placement = rigid_placement(poses, predict_measurements(at_base, poses).position)
     return model.with_values(placement.values(model))
 

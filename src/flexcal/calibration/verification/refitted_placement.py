@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from flexcal.calibration.measurement import predict_measurements, require_points
+from flexcal.calibration.measurement import predict_measurements, require_points, with_stations_at_base
 from flexcal.calibration.verification.best_fit_registration import best_placement, rigid_placement
 from flexcal.calibration.verification.unseen_poses import (
     ErrorCovariance,
@@ -108,9 +108,7 @@ def _placed(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) -> RobotMo
     """Robot with the refitted placement from all poses."""
     if "station" not in what:
         return _points_found(model, poses)
-    base = predict_measurements(
-        replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose))), poses
-    )
+    base = predict_measurements(with_stations_at_base(model), poses)
     at, turned = base.position, base.kinematics.orientation
     placement = best_placement(poses, at, turned) if "point" in what else rigid_placement(poses, at)
     return model.with_values(placement.values(model))

@@ -8,14 +8,19 @@ point on the tool (3 a point) are fitted, and no geometric parameter of the robo
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.kinds import kind_of
-from flexcal.calibration.measurement import predict_measurements, predicted_positions, register
+from flexcal.calibration.measurement import (
+    predict_measurements,
+    predicted_positions,
+    register,
+    with_stations_at_base,
+)
 from flexcal.calibration.verification.best_fit_registration import (
     best_placement,
     can_register,
@@ -99,7 +104,7 @@ def uncalibrated_model(model: RobotModel, poses: PoseSet) -> UncalibratedRobot:
     poses = poses.pointed.without_orientations()
     if not len(poses):
         return UncalibratedRobot(None, None, None)
-    at_base = replace(model, stations=replace(model.stations, pose=np.zeros_like(model.stations.pose)))
+    at_base = with_stations_at_base(model)
     if not (poses.located | poses.in_socket).all():
         return _placed_by_readings(at_base, poses)
     declared = _declared(at_base, poses)

@@ -25,7 +25,7 @@ from flexcal.design.poses.tilt_setup import TiltSetup
 from flexcal.design.scene import STANDARD, CollisionChecker, MeasuringSetup, visible
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Sensitivity
-from flexcal.model.kinematics import point_kinematics
+from flexcal.model.kinematics import point_kinematics, rigid_motion_columns
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import gravity_torque
 from flexcal.progress import Progress, silent
@@ -207,9 +207,7 @@ def _wherever_the_base_is(
 ) -> np.ndarray:
     """Motions (W, 3, p) of the tool without what moves all working poses as one body."""
     at = point_kinematics(model, working, point=point, jacobians=False).position
-    rigid = np.zeros((len(at), 3, 6))
-    rigid[:, :, :3], rigid[:, :, 3:] = np.eye(3), np.cross(np.eye(3)[:, None], at).transpose(1, 2, 0)
-    basis = np.linalg.qr(rigid.reshape(-1, 6))[0]
+    basis = np.linalg.qr(rigid_motion_columns(at).reshape(-1, 6))[0]
     flat = rows.reshape(len(basis), -1)
     return (flat - basis @ (basis.T @ flat)).reshape(rows.shape)
 

@@ -6,6 +6,7 @@ from .link_poses import joint_origins, link_frames
 from .link_surface import LinkSurface, capsule_axes, link_capsules
 from .placements import bearing_placement, found_xyz, joint_placement, link_placement, point_placement
 from .relative import carrier_kinematics, relative_kinematics, relative_motion
+from .rigid_motion import rigid_motion_columns
 from .thermal_expansion import (
     Ends,
     at_temperature,
@@ -58,6 +59,7 @@ __all__ = [
     "reach_points",
     "relative_kinematics",
     "relative_motion",
+    "rigid_motion_columns",
     "rotation_freedom",
     "temperature_rise",
 ]
