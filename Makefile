@@ -17,6 +17,7 @@ $(VENV)/.created:
 $(VENV)/.installed: $(VENV)/.created $(SOURCES)
 	$(BIN)/python -m pip install --quiet "scikit-build-core>=0.11" "nanobind>=2.7" "cmake>=3.18" ninja
 	$(BIN)/python -m pip install --quiet --no-build-isolation --editable .
+	$(BIN)/python -m compileall -q src  # else every process compiles it where PYTHONDONTWRITEBYTECODE is set
 	touch $@
 
 $(VENV)/.developer: $(VENV)/.installed

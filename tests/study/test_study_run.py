@@ -61,6 +61,24 @@ def test_a_task_that_fails_is_a_row(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert rows["error"][1][:40] in (tmp_path / "out" / "report.html").read_text()
 
 
+def test_a_study_whose_tasks_all_fail_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    study = write_study(tmp_path, grid={"poses": [2]}, seeds={"count": 2})
+    assert main(["study", str(study), "--out", str(tmp_path / "out"), "--jobs", "1"]) == 2
+    assert_refusal(capsys.readouterr().err, "E-STUDY-024", "all 2 tasks")
+    assert stored(tmp_path / "out")["error"].null_count() == 0
+
+
+def test_ctrl_c_says_how_to_go_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupt(*given: object, **options: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("flexcal.jobs.study.run_study", interrupt)
+    assert main(["study", str(write_study(tmp_path)), "--out", str(tmp_path / "out"), "--jobs", "1"]) == 130
+    assert "--resume" in capsys.readouterr().out
+
+
 def test_a_killed_study_goes_on_where_it_stopped(whole: Path, tmp_path: Path) -> None:
     study = write_study(tmp_path)
     command = [

@@ -14,6 +14,7 @@ from flexcal.cli.arguments.shared_options import Json, MaybeCount, MaybeText, re
 from flexcal.cli.arguments.verb_table import VERBS
 from flexcal.cli.folders.overwrite_protection import outputs
 from flexcal.cli.terminal.console import Console
+from flexcal.errors import FlexcalError
 
 
 @dataclass(frozen=True)
@@ -48,18 +49,27 @@ class Study:
         plan = read_study(self.study)
         jobs = min(self.jobs or os.cpu_count() or 1, len(plan.rows))
         with open_workers(self.on, jobs) as workers, console.progress() as progress:
-            document = run_study(
-                plan,
-                self.out,
-                workers,
-                resume=self.resume,
-                command=command_line(),
-                progress=progress,
-                publishing=lambda: outputs("study", self.out, leaves),
-            )
+            try:
+                document = run_study(
+                    plan,
+                    self.out,
+                    workers,
+                    resume=self.resume,
+                    command=command_line(),
+                    progress=progress,
+                    publishing=lambda: outputs("study", self.out, leaves),
+                )
+            except KeyboardInterrupt:
+                console.say(f"tasks that have ended are stored in {self.out}; go on with --resume")
+                raise
         for line in _lines(document):
             console.say(line)
         console.finish(document, f"open {self.out / 'report.html'}")
+        if document["tasks"]["failed"] == document["tasks"]["total"]:
+            raise FlexcalError(
+                "E-STUDY-024",
+                f"all {document['tasks']['total']} tasks failed; correct what their errors name, and run the study with another --out.",
+            )
 
 
 def _lines(document: dict[str, Any]) -> list[str]:
