@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-FEWEST = 3
+FEWEST_VISITS = 3
 """Least number of visits of a trend."""
 _FEWEST_COURSES = 10
 """Least number of courses whose scatter says something of the others'."""

@@ -8,19 +8,14 @@ from typing import Any
 from rich.table import Table
 
 from flexcal.cli.tables.results import NOTHING
+from flexcal.report.results import TOLERANCE_STATES, tolerance_kept
 
 _LISTED = 20
-STATES = {
-    "out": "out of tolerance",
-    "within": "within",
-    "undecided": "too near to tell",
-    "not_judged": "not judged",
-}
 
 
 def fleet_table(document: Mapping[str, Any]) -> Table:
     """Robots with their P90 and trend, those that need attention first, twenty at most."""
-    order = list(STATES)
+    order = list(TOLERANCE_STATES)
     robots = sorted(
         document["robots"], key=lambda r: (not r["drifts"] and r["state"] != "out", order.index(r["state"]))
     )
@@ -42,7 +37,7 @@ def fleet_table(document: Mapping[str, Any]) -> Table:
             robot["verified"] or NOTHING,
             NOTHING if p90 is None else f"{p90:.3f} ± {robot['p90_std_mm']:.3f}",
             NOTHING if tolerance is None else f"{tolerance:.3f}",
-            STATES[robot["state"]] if robot["state"] != "not_judged" else f"not judged: {robot['reason']}",
+            tolerance_kept(robot),
             robot["outlook"]
             if reaches is None
             else f"out by {reaches['date']} ({reaches['low']} to {reaches['high']})",

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Literal
 
-from flexcal.fleet import Crossing, crossing
-from flexcal.jobs.fleet.courses import FEWEST_VISITS, Record, date_at, latest, visits_of, years
+from flexcal.fleet import FEWEST_VISITS, Crossing, crossing
+from flexcal.jobs.fleet.courses import Record, date_at, latest, visits_of, years
 from flexcal.jobs.fleet.drifts import Drift, error_drifts
 
 _ONE_SIDED = 1.645

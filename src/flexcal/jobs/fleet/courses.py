@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.fleet import Course
+from flexcal.fleet import FEWEST_VISITS, Course
 
 _YEAR = timedelta(days=365.25)
 _EPOCH = datetime(2000, 1, 1)
-FEWEST_VISITS = 3
 
 Record = dict[str, Any]
 """A row of the table by column."""

@@ -13,6 +13,8 @@ from flexcal.jobs.fleet.drifts import Drift
 from flexcal.jobs.fleet.gathering import GatheredFleet
 from flexcal.jobs.fleet.parameters import ParameterSpread, own_terms
 from flexcal.jobs.fleet.rechecks import LatestRecheck
+from flexcal.report.layout import counted
+from flexcal.report.results import TOLERANCE_STATES
 from flexcal.units import MILLIMETRE
 
 
@@ -86,18 +88,10 @@ def fleet_document(
 
 
 def _headline(robots: Sequence[Mapping[str, Any]], states: Mapping[str, int]) -> str:
-    many = f"{len(robots)} robot{'' if len(robots) == 1 else 's'}"
+    many = counted(len(robots), "robot")
     if all(robot["tolerance_mm"] is None for robot in robots):
         return f"{many}; no tolerance is stated, so none is judged"
-    words = [
-        f"{states.get(state, 0)} {label}"
-        for state, label in (
-            ("out", "out of tolerance"),
-            ("within", "within"),
-            ("undecided", "too near to tell"),
-            ("not_judged", "not judged"),
-        )
-    ]
+    words = [f"{states.get(state, 0)} {label}" for state, label in TOLERANCE_STATES.items()]
     return f"{many}: {', '.join(words)}"
 
 

@@ -21,7 +21,7 @@ from flexcal.jobs.fleet.projects import Problem, Project, ResultFolder, find_res
 from flexcal.jobs.fleet.result_values import ResultValue, result_values, visit_values
 from flexcal.jobs.fleet.table import FleetTable, Row
 from flexcal.jobs.recheck import VISITS, read_visits
-from flexcal.jobs.result_files import ESTIMATES, RESULTS, read_results
+from flexcal.jobs.result_files import RESULTS, read_results
 from flexcal.progress import Progress, silent
 
 _MODEL_FILES = (".yaml", ".yml", ".urdf", ".xml")
@@ -106,8 +106,7 @@ def gather_fleet(place: str | Path, progress: Progress = silent) -> GatheredFlee
 
 def _results(root: Path, folder: ResultFolder, problems: list[Problem]) -> Iterator[_Result]:
     at, project = folder.folder, folder.project
-    estimates = project.estimates if at == project.folder else at / ESTIMATES
-    for path, read in ((estimates, _estimates), (at / RESULTS, _values), (at / VISITS, _visits)):
+    for path, read in ((folder.estimates, _estimates), (at / RESULTS, _values), (at / VISITS, _visits)):
         if not path.is_file():
             continue
         try:

@@ -13,7 +13,6 @@ from flexcal.errors import FlexcalError, InputError
 from flexcal.jobs.fleet.places import ROBOT, local_fleet
 from flexcal.jobs.fleet.projects import find_results
 from flexcal.jobs.fleet_prior import FEWEST, CalibratedMember, alike, pool_fleet
-from flexcal.jobs.result_files import ESTIMATES
 
 
 @dataclass(frozen=True)
@@ -89,8 +88,7 @@ def _members(root: Path) -> tuple[list[CalibratedMember], list[str]]:
     latest: dict[str, tuple[tuple[bool, datetime], CalibratedMember]] = {}
     remarks: list[str] = []
     for folder in folders:
-        project = folder.project
-        source = project.estimates if folder.folder == project.folder else folder.folder / ESTIMATES
+        project, source = folder.project, folder.estimates
         if not source.is_file():
             continue
         try:

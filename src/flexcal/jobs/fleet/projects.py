@@ -52,6 +52,11 @@ class ResultFolder:
     folder: Path
     date: datetime | None
 
+    @property
+    def estimates(self) -> Path:
+        """Its file of estimates, whether it is there or not; beside robot.yaml the one that this names."""
+        return self.project.estimates if self.folder == self.project.folder else self.folder / ESTIMATES
+
 
 def find_results(root: Path) -> tuple[list[ResultFolder], list[Project], list[Problem]]:
     """Folders with results below `root`, their projects and the problems, in the order of their paths.

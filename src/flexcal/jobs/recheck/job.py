@@ -9,7 +9,7 @@ from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
-from flexcal.calibration.recheck import drift_sums
+from flexcal.calibration.recheck import ShiftAtVisit, drift_sums
 from flexcal.data.poses import DEFAULT_SIGMA, PoseSet, read_poses, tables_of
 from flexcal.errors import InputError
 from flexcal.files.formats import block_sha256, provenance, sha256_of
@@ -75,8 +75,11 @@ def recheck_robot(
     judged = replace(
         judged, dates=tuple(v.date for v in history), drifts=drift_sums([v.shifts for v in history])
     )
-    visit = _visit(judged, poses, when, digests, calibration, shifts)
-    visit = replace(visit, reference=reference or (base is None and absolute.verdict == "as_calibrated"))
+    visit = replace(
+        history[-1],
+        reference=reference or (base is None and absolute.verdict == "as_calibrated"),
+        alarms=[item.subject for item in judged.alarms],
+    )
     progress("writing", 0.5)
     judged.write(out)
     write_visits(out, robot.nominal.name, with_visit(stored, visit))
@@ -85,8 +88,14 @@ def recheck_robot(
 
 
 def _visit(
-    judged: Recheck, poses: PoseSet, when: str, digests: dict[str, str], calibration: str, shifts: list
+    judged: Recheck,
+    poses: PoseSet,
+    when: str,
+    digests: dict[str, str],
+    calibration: str,
+    shifts: list[ShiftAtVisit],
 ) -> Visit:
+    """The visit as it is stored, before its cumulative sums are known."""
     return Visit(
         date=when,
         files=digests,
@@ -97,7 +106,7 @@ def _visit(
         probability=judged.judged.probability,
         shifts=shifts,
         readings=Readings.of(poses),
-        alarms=[item.subject for item in judged.alarms],
+        alarms=[],
         suspects=judged.numbers["suspects"],
     )
 

@@ -23,8 +23,8 @@ from flexcal.design.poses import measurement_order, measuring_noise, random_cand
 from flexcal.design.scene import CollisionChecker, MeasuringSetup
 from flexcal.errors import FlexcalError
 from flexcal.jobs.inputs import CalibratedRobot, robot_provenance
+from flexcal.jobs.recheck.document import SHIFT, UNSEEN, power_block
 from flexcal.jobs.recheck.pose_choice import best_poses
-from flexcal.jobs.recheck.result import SHIFT, UNSEEN, power_block
 from flexcal.jobs.result_files import RunRecord
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent

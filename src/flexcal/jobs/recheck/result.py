@@ -12,13 +12,11 @@ import numpy as np
 
 from flexcal.calibration.recheck import (
     AVERAGE_RUN,
-    FALSE_ALARM,
     LEAST_MATCHED,
     DetectionLimit,
     DriftSum,
     JudgedVisit,
     MovedTool,
-    Suspect,
     TellingPose,
     VisitErrors,
     detection_limits,
@@ -33,21 +31,15 @@ from flexcal.errors import FlexcalError
 from flexcal.jobs.calibration import ignored_columns_remarks, outside_ranges
 from flexcal.jobs.inputs import CalibratedRobot, is_station_identified
 from flexcal.jobs.pages import REPORT, PlottedResult
+from flexcal.jobs.recheck.document import SHIFT, UNSEEN, drift_block, recheck_block
 from flexcal.jobs.recheck.judgement_words import (
     effect_sentence,
     judgement_sentence,
-    suspect_in_words,
     telling_sentence,
 )
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, header, write_results
 from flexcal.report.layout import Page
 from flexcal.report.pages import RecheckStudy, recheck_page
-from flexcal.units import MILLIMETRE
-
-SHIFT = 0.05e-3
-"""Shift of a joint, rad (of sliding joints m), whose probability of being found is stated."""
-UNSEEN = 20e-3
-"""Shift, rad or m, above which a joint counts as not seen."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -203,7 +195,7 @@ class Recheck(PlottedResult):
             **header("recheck"),
             "robot": self.model.name,
             "recheck": self.numbers,
-            "drift": self._drift(),
+            "drift": drift_block(self.drifts, self.dates),
             "sentence": self.headline,
             "power_sentence": self.power_sentence,
             "remarks": list(self.remarks),
@@ -213,108 +205,15 @@ class Recheck(PlottedResult):
     @cached_property
     def numbers(self) -> dict[str, Any]:
         """Block `recheck` of the document."""
-        judged, errors = self.judged, self.judged.test.errors
-        size = np.linalg.norm(errors.errors.reshape(-1, 3), axis=1) / MILLIMETRE
-        noise = np.sqrt(np.trace(_blocks(errors.covariance), axis1=1, axis2=2)) / MILLIMETRE
-        return {
-            "verdict": judged.verdict,
-            "probability": judged.probability,
-            "false_alarm": FALSE_ALARM,
-            "compared": errors.compared,
-            "reference": self.reference_date,
-            "noise": errors.noise,
-            "instrument": judged.instrument,
-            "poses": len(errors.poses),
-            "suspects": [
-                _suspect_block(s, tool) for s, tool in zip(judged.suspects, self.tools, strict=True)
-            ],
-            "together": judged.together,
-            "telling_pose": None
-            if self.telling is None
-            else {"q": self.telling.q, "apart_mm": self.telling.apart / MILLIMETRE},
-            "against_calibration": None
-            if self.absolute is None
-            else {"verdict": self.absolute.verdict, "probability": self.absolute.probability},
-            "expected_mm": self.expected / MILLIMETRE,
-            "power": power_block(self.limits),
-            "each": [
-                {"pose": int(pose), "target": str(target), "distance_mm": float(d), "expected_mm": float(e)}
-                for pose, target, d, e in zip(
-                    errors.poses.pose, errors.poses.target, size, noise, strict=True
-                )
-            ],
-        }
-
-    def _drift(self) -> dict[str, Any]:
-        return {
-            "average_run": AVERAGE_RUN,
-            "limit": self.drifts[0].limit if self.drifts else None,
-            "visits": list(self.dates),
-            "sums": {
-                item.subject: {
-                    "upward": item.upward,
-                    "downward": item.downward,
-                    "alarm": item.alarm,
-                    "since": item.since,
-                    "drifts": item.gradual,
-                }
-                for item in self.drifts
-            },
-        }
-
-
-def power_block(limits: Sequence[DetectionLimit]) -> dict[str, Any]:
-    """Block of a JSON document on the shifts of joints that a visit finds; null where a joint is not seen."""
-    return {
-        "shift": SHIFT,
-        "joints": {
-            limit.subject: {
-                "unit": limit.unit,
-                "std": limit.std if limit.found < UNSEEN else None,
-                "power": limit.power,
-                "found_95_percent": limit.found if limit.found < UNSEEN else None,
-                "least_possible": limit.bound if limit.found < UNSEEN else None,
-            }
-            for limit in limits
-        },
-    }
-
-
-def _suspect_block(suspect: Suspect, tool: MovedTool) -> dict[str, Any]:
-    change = suspect.change
-    return {
-        "kind": change.kind,
-        "subject": change.subject,
-        "words": suspect_in_words(suspect),
-        "changes": {
-            name: {
-                "estimate": float(value),
-                "std": float(std),
-                "low": float(value - suspect.quantile * std),
-                "high": float(value + suspect.quantile * std),
-                "unit": unit,
-            }
-            for name, unit, value, std in zip(
-                change.names, change.units, suspect.estimate, suspect.std, strict=True
-            )
-        },
-        "remainder": suspect.remainder,
-        "same_at_these_poses": suspect.same,
-        "tool_mm": {
-            "mean": tool.mean / MILLIMETRE,
-            "mean_interval": [v / MILLIMETRE for v in tool.mean_interval],
-            "p95": tool.p95 / MILLIMETRE,
-            "p95_interval": [v / MILLIMETRE for v in tool.p95_interval],
-            "largest": tool.largest / MILLIMETRE,
-            "at": tool.farthest,
-        },
-    }
-
-
-def _blocks(covariance: np.ndarray) -> np.ndarray:
-    """Blocks (K, 3, 3) on the diagonal of a covariance (3 K, 3 K)."""
-    count = len(covariance) // 3
-    return covariance.reshape(count, 3, count, 3)[np.arange(count), :, np.arange(count)]
+        return recheck_block(
+            self.judged,
+            self.absolute,
+            self.reference_date,
+            self.tools,
+            self.telling,
+            self.expected,
+            self.limits,
+        )
 
 
 def recheck(

@@ -19,6 +19,7 @@ from .dynamics import (
 )
 from .elastic_model import check_misfit, check_responses, misfit_document, misfit_sentences, read_misfit
 from .excitation import excitation_checks
+from .fleet import fleet_checks
 from .fleet_prior import check_fleet
 from .inclinations import inclination_checks
 from .measured_responses import limit_of, response_checks, worst_pose
@@ -91,6 +92,7 @@ __all__ = [
     "check_weight_shares",
     "dynamics_checks",
     "excitation_checks",
+    "fleet_checks",
     "gain_checks",
     "held_out_recordings",
     "in_sockets",

@@ -18,12 +18,13 @@ from flexcal.report.layout import (
     panels,
     scaled,
 )
+from flexcal.report.results import TOLERANCE_STATES
 
 _LOOK = {
-    "out": ("out of tolerance", RIGID, "x"),
-    "undecided": ("too near to tell", RIGID, "circle-open"),
-    "within": ("within", ELASTIC, "circle"),
-    "not_judged": ("not judged", NOMINAL, "circle-open"),
+    "out": (RIGID, "x"),
+    "undecided": (RIGID, "circle-open"),
+    "within": (ELASTIC, "circle"),
+    "not_judged": (NOMINAL, "circle-open"),
 }
 
 
@@ -31,7 +32,7 @@ def fleet_errors(robots: Sequence[Mapping[str, Any]]) -> go.Figure:
     """P90 (mm, log scale) of verified robots in the order of its size, with 95 % intervals, and their tolerances."""
     ordered = sorted(robots, key=lambda robot: robot["p90_mm"])
     figure = canvas(420)
-    for state, (label, colour, symbol) in _LOOK.items():
+    for state, (colour, symbol) in _LOOK.items():
         places = [k for k, robot in enumerate(ordered, 1) if robot["state"] == state]
         if not places:
             continue
@@ -49,7 +50,7 @@ def fleet_errors(robots: Sequence[Mapping[str, Any]]) -> go.Figure:
                 },
                 mode="markers",
                 marker={"color": colour, "symbol": symbol, "size": 7},
-                name=label,
+                name=TOLERANCE_STATES[state],
                 text=[_text(robot["robot"]) for robot in shown],
                 hovertemplate="%{text}: P90 %{y:.3f} mm<extra></extra>",
             )

@@ -19,6 +19,7 @@ from .blocks import (
 from .figure_style import as_float32, canvas, log_ticks, millimetre_axis, panels, positive
 from .notation import (
     NOTHING,
+    counted,
     document_millimetres,
     millimetres,
     p_value,
@@ -62,6 +63,7 @@ __all__ = [
     "Verdict",
     "as_float32",
     "canvas",
+    "counted",
     "dark_colours",
     "document_millimetres",
     "log_ticks",

@@ -43,6 +43,11 @@ def statistics_cells(statistics: ErrorStatistics | None) -> tuple[str, str, str]
     return (millimetres(statistics.mean), millimetres(statistics.p90), millimetres(statistics.max))
 
 
+def counted(number: int, noun: str) -> str:
+    """A number of things, the `noun` in the plural where it is not one."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
 def scaled(unit: str) -> tuple[float, str]:
     """Factor and unit in which an SI value is printed."""
     return _SCALED.get(unit, (1.0, unit))

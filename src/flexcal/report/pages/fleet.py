@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from flexcal.report.figures import fleet_errors, trend_courses
+from flexcal.report.checks import fleet_checks
+from flexcal.report.figures import fleet_errors
 from flexcal.report.layout import (
     NOTHING,
-    Check,
     Fact,
     FigureBlock,
     Page,
@@ -16,24 +16,18 @@ from flexcal.report.layout import (
     Table,
     Text,
     Verdict,
+    counted,
     document_millimetres,
     p_value,
-    scaled,
     sentences,
     significant,
     worst,
 )
 from flexcal.report.layout import Block as PageBlock
-from flexcal.report.sections import provenance_section
+from flexcal.report.results import tolerance_kept, with_trends
+from flexcal.report.sections import parameter_spreads_section, provenance_section, trends_section
 
 _LISTED = 300
-_PANELS = 12
-_STATES = {
-    "out": "out of tolerance",
-    "within": "within",
-    "undecided": "too near to tell",
-    "not_judged": "not judged",
-}
 
 
 def fleet_page(document: Mapping[str, Any]) -> Page:
@@ -41,13 +35,13 @@ def fleet_page(document: Mapping[str, Any]) -> Page:
     counts = document["counts"]
     return Page(
         title="Fleet",
-        subtitle=f"{_count(counts['robots'], 'robot')} of {_count(counts['models'], 'model')} in {document['place']}",
+        subtitle=f"{counted(counts['robots'], 'robot')} of {counted(counts['models'], 'model')} in {document['place']}",
         verdict=_verdict(document),
         sections=[
             _robots(document),
             *([_rechecks(document)] if document["counts"]["rechecked"] else []),
-            _trends(document),
-            _parameters(document),
+            trends_section(document),
+            parameter_spreads_section(document),
             *([_problems(document)] if document["problems"] else []),
             provenance_section(document["command"], None, {}, {}),
         ],
@@ -57,7 +51,7 @@ def fleet_page(document: Mapping[str, Any]) -> Page:
 
 def _verdict(document: Mapping[str, Any]) -> Verdict:
     counts = document["counts"]
-    checks = _checks(document)
+    checks = fleet_checks(document)
     out = [robot["robot"] for robot in document["robots"] if robot["state"] == "out"]
     soon = [robot for robot in document["robots"] if robot["reaches"] is not None]
     facts = (
@@ -75,7 +69,7 @@ def _verdict(document: Mapping[str, Any]) -> Verdict:
         Fact(
             "How many drift?",
             str(counts["drifting"]),
-            f"of {len(_with_trends(document))} with trends",
+            f"of {len(with_trends(document))} with trends",
             _named(sorted(r["robot"] for r in document["robots"] if r["drifts"] or r["drifting_parameters"]))
             or "None significantly, after correction for the number of tests.",
         ),
@@ -95,68 +89,6 @@ def _verdict(document: Mapping[str, Any]) -> Verdict:
     return Verdict(
         status, document["headline"], " ".join(sentences(document["remarks"])), facts, (), "", checks
     )
-
-
-def _checks(document: Mapping[str, Any]) -> tuple[Check, ...]:
-    counts = document["counts"]
-    many = counts["robots"]
-    unknown = many - sum(robot["tolerance_mm"] is not None for robot in document["robots"])
-    unverified = sum(robot["p90_mm"] is None for robot in document["robots"])
-    checks = [
-        Check(
-            "Has every robot a tolerance?",
-            "Yes."
-            if not unknown
-            else f"{unknown} of {many} have none: give tolerance: in robot.yaml, or --tolerance.",
-            "good" if not unknown else "unknown" if unknown == many else "care",
-        ),
-        Check(
-            "Was every robot verified at poses outside its calibration?",
-            "Yes." if not unverified else f"{unverified} of {many} were not.",
-            "good" if not unverified else "care",
-        ),
-    ]
-    if counts["out"] or counts["within"] or counts["undecided"]:
-        checks.append(
-            Check(
-                "Do all that could be judged keep their tolerance?",
-                f"{counts['out']} do not; {counts['undecided']} are too near to tell."
-                if counts["out"] or counts["undecided"]
-                else "Yes.",
-                "bad" if counts["out"] else "care" if counts["undecided"] else "good",
-            )
-        )
-    tested = len(_with_trends(document))
-    checks.append(
-        Check(
-            "Does any robot drift?",
-            f"{counts['drifting']} of {tested} with trends do."
-            if counts["drifting"]
-            else f"No significant trend of the errors of {_count(counts['error_trends_tested'], 'robot')}."
-            if counts["error_trends_tested"]
-            else "No single parameter has a significant trend, but no robot has three dated verifications of one calibration."
-            if tested
-            else "No robot has three dated visits.",
-            "care" if counts["drifting"] else "good" if counts["error_trends_tested"] else "unknown",
-        )
-    )
-    if counts["rechecked"]:
-        checks.append(
-            Check(
-                "Are the robots as calibrated, by their latest recheck?",
-                f"{counts['changed']} of {counts['rechecked']} are not." if counts["changed"] else "Yes.",
-                "bad" if counts["changed"] else "good",
-            )
-        )
-    if document["problems"]:
-        checks.append(
-            Check(
-                "Could everything be read?",
-                f"No: {len(document['problems'])} files or folders could not be used; they are listed below.",
-                "care",
-            )
-        )
-    return tuple(checks)
 
 
 def _robots(document: Mapping[str, Any]) -> Section:
@@ -231,76 +163,11 @@ def _robot_row(robot: Mapping[str, Any]) -> tuple[str, ...]:
         if verified
         else NOTHING,
         document_millimetres(robot["tolerance_mm"]) + ("*" if robot["tolerance_from"] == "option" else ""),
-        _STATES[robot["state"]] if robot["state"] != "not_judged" else f"not judged: {robot['reason']}",
+        tolerance_kept(robot),
         outlook,
         robot["verified"] or ("no date" if verified else NOTHING),
         robot["model"],
     )
-
-
-def _trends(document: Mapping[str, Any]) -> Section:
-    counts, level = document["counts"], document["level"]
-    drifting = [robot for robot in document["robots"] if robot["drifts"]]
-    parameters = document["parameter_drifts"]
-    words = (
-        f"Trends need three dated visits or more. Tested: the errors of {counts['error_trends_tested']} robots since their latest "
-        f"calibration, and {counts['parameter_trends_tested']} parameters of {counts['robots_with_parameter_trends']} robots over their "
-        "calibrations. "
-        f"P-values are corrected for the number of tests (Holm): if nothing drifts, any robot is named for its errors in "
-        f"{100 * level:.0f} % of fleets at most, and in as many for its parameters."
-    )
-    blocks: list[PageBlock] = []
-    if drifting:
-        shown = sorted(drifting, key=lambda r: r["trend"]["adjusted_probability"])[:_PANELS]
-        blocks.append(
-            FigureBlock(
-                "figure-trends",
-                "Errors that changed over time",
-                trend_courses([r["robot"] for r in shown], [r["trend"] for r in shown]),
-                f"P90 with 95 % intervals, mm, and the fitted line{'' if len(shown) == len(drifting) else f'; the {_PANELS} clearest'}.",
-                f"Courses of the P90 of {len(shown)} robots over time.",
-            )
-        )
-    if parameters:
-        shown = parameters[:_PANELS]
-        blocks.append(
-            Table(
-                "table-drifts",
-                "Parameters that changed over time",
-                (
-                    "robot",
-                    "parameter",
-                    "visits",
-                    "from",
-                    "to",
-                    "change per year, 95 % interval",
-                    "unit",
-                    "p, corrected",
-                ),
-                tuple(_drift_row(item) for item in parameters[:_LISTED]),
-                text_columns=(1, 3, 4, 6),
-            )
-        )
-        blocks.append(
-            FigureBlock(
-                "figure-parameters",
-                "Parameters that changed over time",
-                trend_courses([f"{p['robot']}: {p['name']}" for p in shown], shown),
-                "Estimates with 95 % intervals, and the fitted line.",
-                f"Courses of {len(shown)} parameters over time.",
-            )
-        )
-    if not blocks:
-        blocks.append(
-            Text(
-                (
-                    "No significant trend."
-                    if counts["error_trends_tested"] or counts["parameter_trends_tested"]
-                    else "No robot has three dated visits, so nothing can be said of drift.",
-                )
-            )
-        )
-    return Section("trends", "Drift", words, tuple(blocks))
 
 
 def _rechecks(document: Mapping[str, Any]) -> Section:
@@ -308,7 +175,7 @@ def _rechecks(document: Mapping[str, Any]) -> Section:
     found = [r for r in visited if r["recheck"]["verdict"] != "as_calibrated" or r["recheck"]["alarms"]]
     found.sort(key=lambda robot: robot["recheck"]["probability"])
     lead = (
-        f"The latest recheck of {_count(len(visited), 'robot')}. Alone, each is called changed in 1 % of visits where it is not; a change "
+        f"The latest recheck of {counted(len(visited), 'robot')}. Alone, each is called changed in 1 % of visits where it is not; a change "
         f"is certain here where it is significant after correction for the number of robots (Holm, {100 * document['level']:.0f} %)."
     )
     if not found:
@@ -333,64 +200,6 @@ def _rechecks(document: Mapping[str, Any]) -> Section:
     return Section("rechecks", "Rechecks", lead, (table,))
 
 
-def _parameters(document: Mapping[str, Any]) -> Section:
-    spreads = document["parameters"]
-    lead = (
-        "Latest estimates of robots of one model. The spread is the standard deviation between robots, without the outlying ones and with "
-        "the uncertainty of the measurements removed (random effects, Paule and Mandel); 0 means that the measurements explain all "
-        "differences. Parameters of instrument and tool, those tied to them, and those that a prior holds are left out. If all robots of a "
-        f"model are of one normal distribution, any is named in {100 * document['level']:.0f} % of models at most."
-    )
-    if not spreads:
-        return Section(
-            "parameters",
-            "Robots of one model",
-            lead,
-            (Text(("Three robots of one model with a common parameter are needed.",)),),
-        )
-    outlying = [(spread, item) for spread in spreads for item in spread["outliers"]]
-    blocks: list[PageBlock] = []
-    if outlying:
-        blocks.append(
-            Table(
-                "table-outlying",
-                "Robots that differ from the others",
-                (
-                    "robot",
-                    "model",
-                    "parameter",
-                    "value ± std",
-                    "the others, mean ± spread",
-                    "unit",
-                    "p, corrected",
-                ),
-                tuple(_outlier_row(spread, item) for spread, item in outlying),
-                text_columns=(1, 2, 5),
-            )
-        )
-    else:
-        blocks.append(Text(("No robot differs significantly from the others of its model.",)))
-    blocks.append(
-        Table(
-            "table-spread",
-            "Spread over the robots of a model",
-            (
-                "parameter",
-                "model",
-                "robots",
-                "mean ± std",
-                "spread",
-                "95 % interval",
-                "measurement's std",
-                "unit",
-            ),
-            tuple(_spread_row(spread) for spread in spreads),
-            text_columns=(1, 7),
-        )
-    )
-    return Section("parameters", "Robots of one model", lead, tuple(blocks))
-
-
 def _problems(document: Mapping[str, Any]) -> Section:
     rows = tuple((problem["place"], problem["sentence"]) for problem in document["problems"])
     return Section(
@@ -409,67 +218,9 @@ def _problems(document: Mapping[str, Any]) -> Section:
     )
 
 
-def _drift_row(item: Mapping[str, Any]) -> tuple[str, ...]:
-    factor, unit = scaled(item["unit"])
-    rate, low, high = (significant(factor * item[key], 3) for key in ("per_year", "low", "high"))
-    return (
-        item["robot"],
-        item["name"],
-        str(item["visits"]),
-        item["first"],
-        item["last"],
-        f"{rate} ({low} to {high})",
-        unit,
-        p_value(item["adjusted_probability"]),
-    )
-
-
-def _outlier_row(spread: Mapping[str, Any], item: Mapping[str, Any]) -> tuple[str, ...]:
-    factor, unit = scaled(spread["unit"])
-    value, std, mean, width = (
-        significant(factor * number, 3)
-        for number in (item["value"], item["std"], spread["mean"], spread["spread"])
-    )
-    return (
-        item["robot"],
-        spread["model"],
-        spread["name"],
-        f"{value} ± {std}",
-        f"{mean} ± {width}",
-        unit,
-        p_value(item["adjusted_probability"]),
-    )
-
-
-def _spread_row(spread: Mapping[str, Any]) -> tuple[str, ...]:
-    factor, unit = scaled(spread["unit"])
-    mean, mean_std, width, low, high, std = (
-        significant(factor * spread[key], 3)
-        for key in ("mean", "mean_std", "spread", "spread_low", "spread_high", "measurement_std")
-    )
-    return (
-        spread["name"],
-        spread["model"],
-        str(spread["robots"]),
-        f"{mean} ± {mean_std}",
-        width,
-        "below the measurements'" if spread["spread_high"] == 0 else f"{low} to {high}",
-        std,
-        unit,
-    )
-
-
 def _rate(trend: Mapping[str, Any]) -> str:
     rate, low, high = (significant(trend[key], 2) for key in ("per_year", "low", "high"))
     return f"{rate} mm a year ({low} to {high})"
-
-
-def _with_trends(document: Mapping[str, Any]) -> Sequence[str]:
-    return [
-        robot["robot"]
-        for robot in document["robots"]
-        if robot["trend"] is not None or robot["parameter_trends"]
-    ]
 
 
 def _named(names: Sequence[str]) -> str:
@@ -478,7 +229,3 @@ def _named(names: Sequence[str]) -> str:
         if not names
         else ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "") + "."
     )
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"

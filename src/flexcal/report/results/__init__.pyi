@@ -1,5 +1,6 @@
 from .change_wording import amount, chance_in_words, change_sentence, explanation_in_words
 from .fitted_response import FittedResponse, fitted_responses
+from .fleet_robots import TOLERANCE_STATES, tolerance_kept, with_trends
 from .identifiability import IdentifiableParameters
 from .measured_response import MeasuredResponse, relative_to_diagonal, uncertainty_sentence
 from .particulars import NOT_GIVEN, MeasurementDetails
@@ -14,6 +15,7 @@ __all__ = [
     "LEVEL",
     "NOMINAL_COVERAGE",
     "NOT_GIVEN",
+    "TOLERANCE_STATES",
     "TX90L_PAPER",
     "Comparison",
     "FittedResponse",
@@ -35,5 +37,7 @@ __all__ = [
     "relative_to_diagonal",
     "study_level_rows",
     "study_statistics",
+    "tolerance_kept",
     "uncertainty_sentence",
+    "with_trends",
 ]

@@ -1,6 +1,8 @@
 from .base_parameters import base_parameters_section
 from .changed_robot import change_section
 from .first_screen import error_range, headline_facts
+from .fleet_parameters import parameter_spreads_section
+from .fleet_trends import trends_section
 from .friction import friction_section
 from .geometry import ARROW_FACTORS, arm_figure, error_figures, exaggeration, geometry_section
 from .headline_numbers import comparison_section
@@ -59,6 +61,7 @@ __all__ = [
     "noise_tables",
     "orientation_tables",
     "parameter_figures",
+    "parameter_spreads_section",
     "parameter_table",
     "provenance_section",
     "recording_labels",
@@ -73,6 +76,7 @@ __all__ = [
     "terms_section",
     "tilts_section",
     "torque_blocks",
+    "trends_section",
     "uncalibrated_ranges",
     "uncalibrated_rows",
     "uncalibrated_table",

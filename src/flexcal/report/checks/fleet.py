@@ -1,0 +1,72 @@
+"""Checks of a fleet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from flexcal.report.layout import Check, counted
+from flexcal.report.results import with_trends
+
+
+def fleet_checks(document: Mapping[str, Any]) -> tuple[Check, ...]:
+    """The checks behind the verdict, from the document of the verb."""
+    counts = document["counts"]
+    many = counts["robots"]
+    unknown = many - sum(robot["tolerance_mm"] is not None for robot in document["robots"])
+    unverified = sum(robot["p90_mm"] is None for robot in document["robots"])
+    checks = [
+        Check(
+            "Has every robot a tolerance?",
+            "Yes."
+            if not unknown
+            else f"{unknown} of {many} have none: give tolerance: in robot.yaml, or --tolerance.",
+            "good" if not unknown else "unknown" if unknown == many else "care",
+        ),
+        Check(
+            "Was every robot verified at poses outside its calibration?",
+            "Yes." if not unverified else f"{unverified} of {many} were not.",
+            "good" if not unverified else "care",
+        ),
+    ]
+    if counts["out"] or counts["within"] or counts["undecided"]:
+        checks.append(
+            Check(
+                "Do all that could be judged keep their tolerance?",
+                f"{counts['out']} do not; {counts['undecided']} are too near to tell."
+                if counts["out"] or counts["undecided"]
+                else "Yes.",
+                "bad" if counts["out"] else "care" if counts["undecided"] else "good",
+            )
+        )
+    tested = len(with_trends(document))
+    checks.append(
+        Check(
+            "Does any robot drift?",
+            f"{counts['drifting']} of {tested} with trends do."
+            if counts["drifting"]
+            else f"No significant trend of the errors of {counted(counts['error_trends_tested'], 'robot')}."
+            if counts["error_trends_tested"]
+            else "No single parameter has a significant trend, but no robot has three dated verifications of one calibration."
+            if tested
+            else "No robot has three dated visits.",
+            "care" if counts["drifting"] else "good" if counts["error_trends_tested"] else "unknown",
+        )
+    )
+    if counts["rechecked"]:
+        checks.append(
+            Check(
+                "Are the robots as calibrated, by their latest recheck?",
+                f"{counts['changed']} of {counts['rechecked']} are not." if counts["changed"] else "Yes.",
+                "bad" if counts["changed"] else "good",
+            )
+        )
+    if document["problems"]:
+        checks.append(
+            Check(
+                "Could everything be read?",
+                f"No: {len(document['problems'])} files or folders could not be used; they are listed below.",
+                "care",
+            )
+        )
+    return tuple(checks)

@@ -1,0 +1,29 @@
+"""Robots of a fleet in the document of its verb: whether they keep their tolerance, in words, and which have trends."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+TOLERANCE_STATES = {
+    "out": "out of tolerance",
+    "within": "within",
+    "undecided": "too near to tell",
+    "not_judged": "not judged",
+}
+"""Words for the `state` of a robot."""
+
+
+def tolerance_kept(robot: Mapping[str, Any]) -> str:
+    """Whether a robot of the document keeps its tolerance, and why that is not judged."""
+    told = TOLERANCE_STATES[robot["state"]]
+    return f"{told}: {robot['reason']}" if robot["state"] == "not_judged" else told
+
+
+def with_trends(document: Mapping[str, Any]) -> Sequence[str]:
+    """Robots of the document that have a trend of their errors or of a parameter."""
+    return [
+        robot["robot"]
+        for robot in document["robots"]
+        if robot["trend"] is not None or robot["parameter_trends"]
+    ]

@@ -1,0 +1,102 @@
+"""Spread of parameters over robots of one model, and robots that differ from the others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from flexcal.report.layout import Block, Section, Table, Text, p_value, scaled, significant
+
+
+def parameter_spreads_section(document: Mapping[str, Any]) -> Section:
+    """Spreads and outlying robots, from the document of the verb."""
+    spreads = document["parameters"]
+    lead = (
+        "Latest estimates of robots of one model. The spread is the standard deviation between robots, without the outlying ones and with "
+        "the uncertainty of the measurements removed (random effects, Paule and Mandel); 0 means that the measurements explain all "
+        "differences. Parameters of instrument and tool, those tied to them, and those that a prior holds are left out. If all robots of a "
+        f"model are of one normal distribution, any is named in {100 * document['level']:.0f} % of models at most."
+    )
+    if not spreads:
+        return Section(
+            "parameters",
+            "Robots of one model",
+            lead,
+            (Text(("Three robots of one model with a common parameter are needed.",)),),
+        )
+    outlying = [(spread, item) for spread in spreads for item in spread["outliers"]]
+    blocks: list[Block] = []
+    if outlying:
+        blocks.append(
+            Table(
+                "table-outlying",
+                "Robots that differ from the others",
+                (
+                    "robot",
+                    "model",
+                    "parameter",
+                    "value ± std",
+                    "the others, mean ± spread",
+                    "unit",
+                    "p, corrected",
+                ),
+                tuple(_outlier_row(spread, item) for spread, item in outlying),
+                text_columns=(1, 2, 5),
+            )
+        )
+    else:
+        blocks.append(Text(("No robot differs significantly from the others of its model.",)))
+    blocks.append(
+        Table(
+            "table-spread",
+            "Spread over the robots of a model",
+            (
+                "parameter",
+                "model",
+                "robots",
+                "mean ± std",
+                "spread",
+                "95 % interval",
+                "measurement's std",
+                "unit",
+            ),
+            tuple(_spread_row(spread) for spread in spreads),
+            text_columns=(1, 7),
+        )
+    )
+    return Section("parameters", "Robots of one model", lead, tuple(blocks))
+
+
+def _outlier_row(spread: Mapping[str, Any], item: Mapping[str, Any]) -> tuple[str, ...]:
+    factor, unit = scaled(spread["unit"])
+    value, std, mean, width = (
+        significant(factor * number, 3)
+        for number in (item["value"], item["std"], spread["mean"], spread["spread"])
+    )
+    return (
+        item["robot"],
+        spread["model"],
+        spread["name"],
+        f"{value} ± {std}",
+        f"{mean} ± {width}",
+        unit,
+        p_value(item["adjusted_probability"]),
+    )
+
+
+def _spread_row(spread: Mapping[str, Any]) -> tuple[str, ...]:
+    factor, unit = scaled(spread["unit"])
+    mean, mean_std, width, low, high, std = (
+        significant(factor * spread[key], 3)
+        for key in ("mean", "mean_std", "spread", "spread_low", "spread_high", "measurement_std")
+    )
+    return (
+        spread["name"],
+        spread["model"],
+        str(spread["robots"]),
+        f"{mean} ± {mean_std}",
+        width,
+        "below the measurements'" if spread["spread_high"] == 0 else f"{low} to {high}",
+        std,
+        unit,
+    )
