@@ -60,6 +60,36 @@ def test_the_interval_of_the_share_of_all_knows_that_those_of_a_task_are_not_ind
     assert ten["high"] - ten["low"] == pytest.approx(one["high"] - one["low"])
 
 
+def test_tasks_of_one_seed_tell_as_much_of_coverage_as_one() -> None:
+    errors = np.random.default_rng(7).standard_normal((40, 5))
+    columns = intervals(errors, 1.0) | {"seed": np.arange(40)}
+    once = study_statistics(table(columns))["coverage"]
+    often = study_statistics(table({name: np.tile(values, 4) for name, values in columns.items()}))[
+        "coverage"
+    ]
+    assert [often[key] for key in ("low", "high")] == pytest.approx(
+        [once[key] for key in ("low", "high")], abs=3e-3
+    )
+    single = often["parameters"]["p0"]
+    assert single["tasks"] == 160 and single["high"] - single["low"] >= 0.8 * (
+        once["parameters"]["p0"]["high"] - once["parameters"]["p0"]["low"]
+    )
+
+
+def test_intervals_that_are_right_are_seldom_called_wrong() -> None:
+    """Twelve seeds with three options each, whose errors are alike: 95 % lies outside the interval of the share in about 5 % of studies."""
+    rng = np.random.default_rng(8)
+    outside = []
+    for _ in range(100):
+        common = np.repeat(rng.standard_normal((12, 15)), 3, axis=0)
+        errors = np.sqrt(0.9) * common + np.sqrt(0.1) * rng.standard_normal(common.shape)
+        covered = study_statistics(table(intervals(errors, 1.0) | {"seed": np.repeat(np.arange(12), 3)}))[
+            "coverage"
+        ]
+        outside.append(not covered["low"] <= 0.95 <= covered["high"])
+    assert np.mean(outside) < 0.1
+
+
 def test_few_tasks_say_little_even_where_all_intervals_hold_the_truth() -> None:
     covered = study_statistics(table(intervals(np.zeros((3, 25)), 1.0)))["coverage"]
     assert covered["share"] == 1.0 and covered["low"] < 0.1 and covered["high"] == 1.0

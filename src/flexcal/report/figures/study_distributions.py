@@ -64,7 +64,7 @@ def level_distributions(levels: Sequence[tuple[str, np.ndarray]]) -> go.Figure:
 def interval_coverage(
     names: Sequence[str], share: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> go.Figure:
-    """Coverage (percent) of the 95 % intervals of every parameter, with binomial intervals, and the promised 95 %."""
+    """Coverage (percent) of the 95 % intervals of every parameter, with the intervals of these shares, and the promised 95 %."""
     figure = canvas(60 + 16 * len(names), legend=False)
     places = np.arange(len(names))
     figure.add_trace(

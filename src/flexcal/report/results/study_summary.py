@@ -63,11 +63,13 @@ def binomial_interval(inside: float, count: float) -> tuple[float, float]:
 
 
 def coverage(table: StudyTable, rows: np.ndarray | None = None) -> dict[str, Any]:
-    """How often 95 % intervals hold the true value: of every parameter, with the binomial interval of that share, and of all.
+    """How often 95 % intervals hold the true value: of every parameter, and of all, with the 95 % intervals of these shares.
 
-    The intervals of one task share its noise: the share of all has an interval from the scatter between tasks. `rows` (N,) is a mask.
+    Tasks of one seed share the drawn robot and its noise, as the intervals of one task do: only seeds are independent. `rows` (N,) is a
+    mask.
     """
     chosen = np.ones(len(table), bool) if rows is None else rows
+    drawn = _drawn_robots(table)
     parameters, held, known = {}, np.zeros(len(table)), np.zeros(len(table))
     for name in table.parameters:
         low, high, truth = (table.numbers(f"{name}.{what}") for what in ("low", "high", "truth"))
@@ -78,7 +80,7 @@ def coverage(table: StudyTable, rows: np.ndarray | None = None) -> dict[str, Any
         inside = told & (low <= truth) & (truth <= high)
         held += inside
         known += told
-        bounds = binomial_interval(int(inside.sum()), count)
+        bounds = _clustered_interval(inside, told, drawn)
         parameters[name] = {
             "tasks": count,
             "inside": int(inside.sum()),
@@ -88,7 +90,7 @@ def coverage(table: StudyTable, rows: np.ndarray | None = None) -> dict[str, Any
             "high": bounds[1],
         }
     some = known > 0
-    bounds = _clustered_interval(held[some], known[some])
+    bounds = _clustered_interval(held, known, drawn) if some.any() else None
     return {
         "tasks": int(some.sum()),
         "share": float(held.sum() / known.sum()) if some.any() else None,
@@ -98,17 +100,25 @@ def coverage(table: StudyTable, rows: np.ndarray | None = None) -> dict[str, Any
     }
 
 
-def _clustered_interval(held: np.ndarray, known: np.ndarray) -> tuple[float, float] | None:
-    """95 % interval of a share from `held` of `known` trials (T,) of every task, which are not independent within a task; None for one.
+def _drawn_robots(table: StudyTable) -> np.ndarray:
+    """Number (N,) of the seed of every task; a task without one is by itself."""
+    seeds = [-1 - k if seed is None else seed for k, seed in enumerate(table.values("seed"))]
+    return np.unique(seeds, return_inverse=True)[1]
 
-    Clopper and Pearson's for the number of independent trials that the scatter between tasks amounts to (Korn and Graubard 1998); that is
-    the number of tasks where all or none are held.
+
+def _clustered_interval(held: np.ndarray, known: np.ndarray, drawn: np.ndarray) -> tuple[float, float]:
+    """95 % interval of a share from `held` of `known` trials (N,) of every task, with `drawn` (N,) the number of its seed.
+
+    Clopper and Pearson's for the number of independent trials that the scatter between seeds amounts to (Korn and Graubard 1998); that is
+    the number of seeds where all or none are held, and one for one seed.
     """
-    count = len(known)
-    if count < 2:
-        return None
-    total = known.sum()
+    known_by_seed = np.bincount(drawn, known)
+    some = known_by_seed > 0
+    held, known = np.bincount(drawn, held)[some], known_by_seed[some]
+    count, total = len(known), known.sum()
     share = held.sum() / total
+    if count == 1:
+        return binomial_interval(share, 1)
     variance = ((held - share * known) ** 2).sum() * count / (count - 1) / total**2
     trials = share * (1 - share) / variance if variance > 0 else float(count)
     trials = min(

@@ -31,8 +31,9 @@ def coverage_section(covered: Mapping[str, Any]) -> Section:
     expected = (1 - NOMINAL_COVERAGE) * len(items)
     words = (
         f"{len(off)} of {len(items)} parameters have a share whose interval excludes 95 %; about {significant(expected, 2)} or fewer do so "
-        "by chance. The intervals of one task share its noise: they are not independent, and the interval of all comes from the scatter "
-        "between tasks. True values of parameters that the data cannot tell apart are mapped into those that were kept."
+        "by chance. Tasks of one seed share the drawn robot and its noise, as the intervals of one task do: the intervals of these shares "
+        "come from the scatter between seeds. True values of parameters that the data cannot tell apart are mapped into those that were "
+        "kept."
     )
     drawn = items[:_DRAWN]
     figure = interval_coverage(
@@ -50,7 +51,7 @@ def coverage_section(covered: Mapping[str, Any]) -> Section:
                 "figure-coverage",
                 "Coverage of the 95 % intervals",
                 figure,
-                f"Bars are 95 % binomial intervals.{few}",
+                f"Bars are 95 % intervals of the share.{few}",
                 "Coverage by parameter.",
             ),
             Text((words,)),
