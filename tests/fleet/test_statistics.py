@@ -64,9 +64,8 @@ def test_crossing_is_where_the_band_holds_the_limit() -> None:
     assert found.time == pytest.approx((9.0 - known.intercept) / known.slope)
     quantile = stats.t.ppf(0.975, 3)
     for end, sign in ((found.low, 1), (found.high, -1)):
-        half = quantile * np.hypot(
-            known.intercept_stderr * 0 + known.stderr * (end - 2.0), known.stderr * np.sqrt(10) / np.sqrt(5)
-        )
+        # the standard error of the mean of five values about the line is that of the slope times √(Σ(t − 2)² / 5)
+        half = quantile * known.stderr * np.hypot(end - 2.0, np.sqrt(10 / 5))
         assert known.intercept + known.slope * end + sign * half == pytest.approx(9.0)
     assert crossing(trend, 0.0) is not None
     (flat,) = moderated_trends([Course(time, np.array([1.0, 1.2, 0.9, 1.1, 1.0]), np.full(5, 1.0))])

@@ -9,7 +9,7 @@ import numpy as np
 
 from flexcal.fleet.between_units import variance_at, weighted_mean
 
-FEWEST = 5
+_FEWEST = 5
 """Least number of units among which an outlying one is looked for."""
 _LARGEST_SHARE = 0.2
 """Largest share of units that may be outlying; with more there is no majority of one kind."""
@@ -34,13 +34,13 @@ def outlying(values: np.ndarray, std: np.ndarray, quantities: int, level: float)
 
     The most extreme unit is taken out one by one, up to a fifth of them, and compared with those that remain by Student's t with their
     variance; all up to the last significant one are outlying, so that several do not hide each other (generalised extreme studentised
-    deviate, Rosner 1983, Technometrics 25, with variances of measurement beside the variance between units); with fewer than 25 units the
-    first that is not significant ends it. `level` is the probability
-    that any is named where there is none, over all `quantities` that are tested like this one.
+    deviate, Rosner 1983, Technometrics 25, with variances of measurement beside the variance between units). With fewer than 25 units
+    this ends at the first that is not significant. Among fewer than five none is looked for. `level` is the probability that any is named
+    where there is none, over all `quantities` that are tested like this one.
     """
     from scipy.special import stdtr
 
-    if len(values) < FEWEST:
+    if len(values) < _FEWEST:
         return ()
     left = np.arange(len(values))
     candidates: list[Outlying] = []

@@ -16,9 +16,9 @@ from flexcal.data.tables import TableFile, open_table
 from flexcal.errors import FlexcalError, InputError, naming
 from flexcal.jobs.inputs import (
     CalibratedRobot,
-    at_temperatures,
     is_station_identified,
     unmeasured_lengths_remark,
+    with_temperature,
 )
 from flexcal.jobs.pages import Result
 from flexcal.model.kinematics import found_xyz, joint_limits
@@ -192,7 +192,7 @@ def compensate(
     array([ True])
     """
     model, nominal = robot.probable, robot.with_points
-    targets, warm = at_temperatures(robot, targets, temperature)
+    targets, warm = with_temperature(robot, targets, temperature)
     if frame is not None:
         model, nominal = with_point_at_frame(model, frame), with_point_at_frame(nominal, frame)
         targets = replace(targets, target=np.full(len(targets), frame))

@@ -11,7 +11,7 @@ import numpy as np
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.data.poses import ToolTargets, read_commands, write_targets
 from flexcal.errors import FlexcalError
-from flexcal.jobs.inputs import CalibratedRobot, at_temperatures, unmeasured_lengths_remark
+from flexcal.jobs.inputs import CalibratedRobot, unmeasured_lengths_remark, with_temperature
 from flexcal.jobs.pages import Result
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import carried_mass, certain_flank, points_kinematics, tool_at_rest
@@ -110,7 +110,7 @@ def predict(
     """
     if commands.q is None:
         raise FlexcalError("E-RUN-097", "the commands hold no joint positions q; give those of the motors.")
-    commands, warm = at_temperatures(robot, commands, temperature)
+    commands, warm = with_temperature(robot, commands, temperature)
     parts = []
     for first in range(0, len(commands), _BLOCK):
         progress("predicting", first / len(commands))

@@ -22,9 +22,11 @@ State = Literal["out", "within", "undecided", "not_judged"]
 
 @dataclass(frozen=True, eq=False)
 class RobotAccuracy:
-    """The latest verification of a robot, or None; its `tolerance`, m, and whether it is kept; trend and when that reaches the tolerance.
+    """Accuracy of a robot against its tolerance.
 
-    `outlook` says the last two in a sentence.
+    `verification` is the record of the P90 of its latest usable verification, None without one; `state` says whether that keeps the
+    `tolerance`, m, and `reason` why. `drift` is the trend of the P90, `reaches` when that reaches the tolerance, years since 2000;
+    `outlook` says both in a clause.
     """
 
     robot: str

@@ -11,8 +11,9 @@ from flexcal.jobs.fleet.accuracy import RobotAccuracy
 from flexcal.jobs.fleet.courses import years
 from flexcal.jobs.fleet.drifts import Drift
 from flexcal.jobs.fleet.gathering import GatheredFleet
-from flexcal.jobs.fleet.parameters import ParameterSpread, own_terms
+from flexcal.jobs.fleet.parameters import ParameterSpread
 from flexcal.jobs.fleet.rechecks import LatestRecheck
+from flexcal.jobs.fleet_prior import comparable_terms
 from flexcal.report.layout import counted
 from flexcal.report.results import TOLERANCE_STATES
 from flexcal.units import MILLIMETRE
@@ -167,7 +168,7 @@ def _spread(spread: ParameterSpread) -> dict[str, Any]:
         "name": spread.name,
         "unit": spread.unit,
         "absorbs": spread.absorbs.split(),
-        "terms": spread.terms.split(),
+        "terms": list(spread.terms),
         "robots": len(spread.robots),
         "mean": distribution.mean,
         "mean_std": distribution.mean_std,
@@ -222,7 +223,7 @@ def _remarks(
             )
     terms: dict[str, set[str]] = defaultdict(set)
     for model, own in frame.filter(frame["terms"] != "").select("model", "terms").unique().iter_rows():
-        terms[model].add(own_terms(own))
+        terms[model].add(" ".join(comparable_terms(own)))
     for model, several in sorted(terms.items()):
         if len(several) > 1:
             remarks.append(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from flexcal.fleet import Trend, holm, moderated_trends
 from flexcal.jobs.fleet.courses import Record, Visits, visits_of
-from flexcal.jobs.fleet.parameters import own_terms
+from flexcal.jobs.fleet_prior import comparable_terms
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,15 @@ def parameter_drifts(records: Sequence[Record]) -> list[Drift]:
     """Trend of every parameter of every robot with three visits or more, estimated with the same terms."""
     groups: dict[tuple, list[Record]] = defaultdict(list)
     for r in records:
-        key = (r["robot"], r["model"], r["urdf"], r["kind"], r["name"], r["absorbs"], own_terms(r["terms"]))
+        key = (
+            r["robot"],
+            r["model"],
+            r["urdf"],
+            r["kind"],
+            r["name"],
+            r["absorbs"],
+            comparable_terms(r["terms"]),
+        )
         groups[key].append(r)
     found = []
     for key, group in groups.items():

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Set
 
-_OF_THE_SETUP = (
-    "tool.", "station.", "point.", "camera.", "board.", "sockets.", "sensor.", "scatter.", "payload.", "force_sensor.",
-)  # fmt: skip
+from flexcal.jobs.fleet_prior import OF_THE_CELL
+
+_OF_THE_SETUP = (*OF_THE_CELL, "sensor.", "scatter.", "payload.", "force_sensor.")
 """Beginnings of parameters that say how was measured, or what was mounted, and nothing of the robot."""
 _OF_THE_BASE = ("offset", "misalignment_1", "misalignment_2", "length_z")
 """Errors of a joint on the base that another place of the base, or of the instrument, looks like: offset, tilts, and length along it."""

@@ -12,10 +12,12 @@ import numpy as np
 from flexcal.files.formats import BLOCKS
 from flexcal.fleet import Outlying, RandomEffects, outlying, random_effects
 from flexcal.jobs.fleet.courses import Record, latest
+from flexcal.jobs.fleet_prior import comparable_terms
 
 _LARGEST_PRIOR_SHARE = 0.1
 """Largest share of a prior in a value: a larger one makes robots alike that are not."""
-FEWEST_ROBOTS = 3
+_FEWEST_ROBOTS = 3
+"""Least number of robots of a model over which a parameter has a spread."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +32,7 @@ class ParameterSpread:
     name: str
     unit: str
     absorbs: str
-    terms: str
+    terms: tuple[str, ...]
     robots: tuple[str, ...]
     values: np.ndarray
     std: np.ndarray
@@ -53,20 +55,23 @@ def comparable(records: Sequence[Record]) -> list[Record]:
     ]
 
 
-def own_terms(terms: str) -> str:
-    """Terms of a calibration that decide what its parameters mean: all but transmission errors, which are waves about the mean."""
-    return " ".join(sorted(term for term in terms.split() if "transmission" not in term))
-
-
 def parameter_spreads(records: Sequence[Record], level: float) -> list[ParameterSpread]:
     """Spread of every parameter that three robots of a model or more have; `level`: probability that any robot of a model is named without
     being different.
     """
     robots: dict[tuple, dict[str, list[Record]]] = defaultdict(lambda: defaultdict(list))
     for r in records:
-        key = (r["model"], r["urdf"], r["kind"], r["name"], r["unit"], r["absorbs"], own_terms(r["terms"]))
+        key = (
+            r["model"],
+            r["urdf"],
+            r["kind"],
+            r["name"],
+            r["unit"],
+            r["absorbs"],
+            comparable_terms(r["terms"]),
+        )
         robots[key][r["robot"]].append(r)
-    many = {key: group for key, group in robots.items() if len(group) >= FEWEST_ROBOTS}
+    many = {key: group for key, group in robots.items() if len(group) >= _FEWEST_ROBOTS}
     tests: dict[tuple[str, str], int] = defaultdict(int)
     for model, urdf, *_ in many:
         tests[model, urdf] += 1

@@ -22,7 +22,7 @@ _DATE = re.compile(r"(?<!\d)(\d{4}-\d\d-\d\d)(?:[T_ ](\d\d)[-:.]?(\d\d)(?!\d))?(
 
 @dataclass(frozen=True)
 class Problem:
-    """What of a fleet cannot be used: the file or folder from the fleet's, and one sentence."""
+    """A file or folder that cannot be used: its path relative to the fleet's folder, and one sentence that says why."""
 
     place: str
     sentence: str

@@ -14,19 +14,16 @@ _RANK = 1e-11
 """Relative eigenvalue of information, in plausible sizes, below which it is a rounding error."""
 _TOLD = 1e-6
 """Least information on a combination, in plausible sizes, that counts."""
+OF_THE_CELL = ("tool.", "point.", "station.", "sockets.", "board.", "camera.")
+"""Beginnings of the names of parameters of tool, targets and instruments, of which another cell tells nothing."""
 _OF_ROBOT = (*GEOMETRY, *ORIGIN, *LOOP, *LATERAL, "gravity_compliance", "backlash")
 
 
-def is_of_robot(model: RobotModel, name: str) -> bool:
+def is_geometric_error(model: RobotModel, name: str) -> bool:
     """Whether a parameter is a geometric error of the arm: not of tool, target or instrument, and no wave, spring or inertia."""
     owner, _, key = name.rpartition(".")
     owned = owner in model.joint_names or owner.startswith("loop.")
     return owned and (key in _OF_ROBOT or key.startswith(RATIO))
-
-
-def is_of_cell(name: str) -> bool:
-    """Whether a parameter is one of tool, target or instrument, of which another cell tells nothing."""
-    return name.startswith(("tool.", "point.", "station.", "sockets.", "board.", "lens.", "camera."))
 
 
 def geometry_information(

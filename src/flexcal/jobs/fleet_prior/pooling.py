@@ -14,7 +14,11 @@ from flexcal.calibration.fit import FleetPrior, base_errors, plausible_size
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate, Measured, population
 from flexcal.files.formats import block_sha256, read_estimates
-from flexcal.jobs.fleet_prior.geometry_information import geometry_information, is_of_cell, is_of_robot
+from flexcal.jobs.fleet_prior.geometry_information import (
+    OF_THE_CELL,
+    geometry_information,
+    is_geometric_error,
+)
 from flexcal.jobs.fleet_prior.kinematics import difference
 from flexcal.jobs.fleet_prior.prior_file import write_fleet_prior
 from flexcal.model.robot import RobotModel, unit_in
@@ -61,8 +65,12 @@ class CalibratedMember:
     @property
     def terms(self) -> tuple[str, ...]:
         """Terms of its calibration, without transmission errors, which are each robot's own."""
-        stored = self.estimate.provenance.get("option.terms", "").split()
-        return tuple(sorted(term for term in stored if not term.startswith(TRANSMISSION)))
+        return comparable_terms(self.estimate.provenance.get("option.terms", ""))
+
+
+def comparable_terms(stored: str) -> tuple[str, ...]:
+    """Terms of a calibration that decide what its parameters mean: all but transmission errors, which are waves about the mean."""
+    return tuple(sorted(term for term in stored.split() if TRANSMISSION not in term))
 
 
 def pool_fleet(members: Sequence[CalibratedMember], out: Path) -> FleetPrior:
@@ -132,9 +140,9 @@ def _measured(members: Sequence[CalibratedMember]) -> tuple[list[str], np.ndarra
     model = members[0].model
     base = base_errors(model)
     named = [item.name for member in members for item in member.estimate.parameters]
-    names = [name for name in dict.fromkeys(named) if is_of_robot(model, name) and name not in base]
+    names = [name for name in dict.fromkeys(named) if is_geometric_error(model, name) and name not in base]
     sizes = np.array([plausible_size(model, name) for name in names])
-    cell = [*base, *(name for name in dict.fromkeys(named) if is_of_cell(name))]
+    cell = [*base, *(name for name in dict.fromkeys(named) if name.startswith(OF_THE_CELL))]
     return names, sizes, [geometry_information(member.estimate, names, cell, sizes) for member in members]
 
 

@@ -10,7 +10,6 @@ from .experiment_files import (
 )
 from .given_temperature import (
     TEMPERATURE,
-    at_temperatures,
     calibrated_temperatures,
     held_at,
     reference_temperature,
@@ -35,7 +34,6 @@ __all__ = [
     "TARGETS_BETWEEN",
     "TEMPERATURE",
     "CalibratedRobot",
-    "at_temperatures",
     "calibrated_temperatures",
     "common_plan",
     "example_robot",

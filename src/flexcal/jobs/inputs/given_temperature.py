@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,42 +15,26 @@ from flexcal.model.robot import RobotModel
 
 TEMPERATURE = "temperature"
 """Name of the range of temperatures in the block `calibration` of estimates.yaml."""
+_Rows = TypeVar("_Rows", PoseSet, ToolTargets)
 _BEYOND = 0.1
 """Share of the calibrated range by which a temperature may lie outside it."""
 
 
-def at_temperatures(
-    robot: CalibratedRobot, targets: ToolTargets, given: float | None
-) -> tuple[ToolTargets, tuple[str, ...]]:
-    """Targets with their temperatures, their own or the `given` one, and remarks on these.
-
-    Raises `InputError` where both are there.
-    """
-    temperature, remarks = _chosen(robot, targets.temperature, given, len(targets), "positions")
-    return replace(targets, temperature=temperature), remarks
-
-
 def with_temperature(
-    robot: CalibratedRobot, poses: PoseSet, given: float | None
-) -> tuple[PoseSet, tuple[str, ...]]:
-    """Measured points with their temperatures, their own or the `given` one, and remarks on these.
+    robot: CalibratedRobot, rows: _Rows, given: float | None
+) -> tuple[_Rows, tuple[str, ...]]:
+    """Targets or measured points with their temperatures, their own or the `given` one, °C, and remarks on these.
 
     Raises `InputError` where both are there.
     """
-    temperature, remarks = _chosen(robot, poses.temperature, given, len(poses), "errors")
-    return replace(poses, temperature=temperature), remarks
-
-
-def _chosen(
-    robot: CalibratedRobot, own: np.ndarray | None, given: float | None, count: int, what: str
-) -> tuple[np.ndarray | None, tuple[str, ...]]:
-    if own is not None and given is not None:
+    if rows.temperature is not None and given is not None:
         raise InputError(
             "E-RUN-109",
             "there is a column 'temperature', and --temperature; leave the option or the column out.",
         )
-    temperature = np.full(count, float(given)) if given is not None else own
-    return temperature, temperature_remarks(robot, temperature, what)
+    temperature = rows.temperature if given is None else np.full(len(rows), float(given))
+    what = "errors" if isinstance(rows, PoseSet) else "positions"
+    return replace(rows, temperature=temperature), temperature_remarks(robot, temperature, what)
 
 
 def held_at(robot: CalibratedRobot, temperature: float | None) -> tuple[RobotModel, tuple[str, ...]]:

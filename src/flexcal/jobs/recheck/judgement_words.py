@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from flexcal.calibration.recheck import FALSE_ALARM, JudgedVisit, MovedTool, Suspect, TellingPose
+from flexcal.report.results import amount
 from flexcal.units import MILLIMETRE
 
 _KELVIN = 12e-6
@@ -100,14 +101,14 @@ def suspect_in_words(suspect: Suspect) -> str:
     change, values, stds = suspect.change, suspect.estimate, suspect.quantile * suspect.std
     value, half = float(values[0]), float(stds[0])
     if change.kind == "joint_shifted":
-        return f"{change.subject} shifted by {_amount(value, half, change.units[0])}"
+        return f"{change.subject} shifted by {amount(value, half, change.units[0])}"
     if change.kind == "thermal_growth":
         return (
-            f"thermal growth: all lengths by {_signed(1e6 * value, 1e6 * half)} µm/m (as {value / _KELVIN:+.1f} K of steel), unless it is "
-            "the scale of the instrument".replace("-", "−")
+            f"thermal growth: all lengths by {amount(1e6 * value, 1e6 * half, 'µm/m')} (as {value / _KELVIN:+.1f} K of steel), unless it "
+            "is the scale of the instrument".replace("-", "−")
         )
     if change.kind == "payload_changed":
-        return f"the payload changed by {_signed(value, half)} kg"
+        return f"the payload changed by {amount(value, half, 'kg')}"
     size = float(np.linalg.norm(values[:3]))
     # half-width along the displacement itself
     along = values[:3] / max(size, 1e-30)
@@ -133,16 +134,6 @@ def _effect(suspect: Suspect, tool: MovedTool, expected: float) -> str:
     if tool.p95_interval[1] < _SMALL * expected:
         told += f": significant, but small beside the {expected / MILLIMETRE:.3f} mm that are expected of the calibrated robot"
     return told
-
-
-def _amount(value: float, half: float, unit: str) -> str:
-    factor, name = {"rad": (1e3, "mrad"), "m": (1e3, "mm")}[unit]
-    return f"{_signed(factor * value, factor * half)} {name}"
-
-
-def _signed(value: float, half: float) -> str:
-    digits = int(min(max(1 - np.floor(np.log10(max(half, 1e-12))), 0), 6))
-    return f"{value:+.{digits}f} ± {half:.{digits}f}".replace("-", "−")
 
 
 def _chance(probability: float) -> str:
