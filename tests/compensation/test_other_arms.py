@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from scipy.optimize import minimize
 
 from flexcal.compensation import motor_commands
 from flexcal.data.poses import ToolTargets
-from flexcal.model.kinematics import point_kinematics
+from flexcal.model.kinematics import joint_ranges, point_kinematics
 from flexcal.model.parts import rotation_vector, vector_rotation
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import tool_at_rest
@@ -148,3 +149,36 @@ def test_two_hands(tree: RobotModel, tmp_path: Path) -> None:
         np.testing.assert_allclose(at, wanted, atol=1e-6)
         columns = [nominal.joint_index(joint) for joint in still]
         np.testing.assert_array_equal(found.q[rows][:, columns], q[rows][:, columns])
+
+
+def test_blocks_whose_points_need_other_joints(
+    tx90l: RobotModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A block with the points of the fourth link alone has no rotations, the next one with those of the tool has; both have rows that
+    Newton's steps lose, which are sought together.
+    """
+    for file in tx90l.path.parent.iterdir():
+        if file.suffix in (".yaml", ".urdf"):
+            shutil.copy(file, tmp_path)
+    description = tmp_path / "robot.yaml"
+    first = "smr: {frame: flange, xyz: [0.10, 0.00, 0.15]}"
+    text = description.read_text()
+    assert first in text
+    description.write_text(text.replace(first, first + "\n  elbow: {frame: link_4, xyz: [0.05, 0, 0.1]}"))
+    nominal = RobotModel.from_yaml(description, estimates=False)
+    robot = nominal.with_values({"joint_2.offset": 5e-3, "joint_3.length_x": 2e-3, "joint_5.offset": -4e-3})
+    lower, upper = joint_ranges(nominal)
+    q = np.random.default_rng(3).uniform(lower, upper, (48, nominal.n))
+    q[::6, 4] = 1e-4
+    q[1::6, 2] = upper[2]
+    target = np.array(["elbow"] * 20 + ["smr"] * 28)
+    targets = ToolTargets(np.arange(48), target, q)
+    parts = [targets.subset(slice(0, 20)), targets.subset(slice(20, 48))]
+    alone = [motor_commands(robot, nominal, part) for part in parts]
+    monkeypatch.setattr("flexcal.compensation.target_commands._BLOCK", 4)
+    together = motor_commands(robot, nominal, targets)
+    assert not together.reached.all() and together.reached.any()
+    for name in ("q", "nominal", "before", "unambiguous", "reason"):
+        np.testing.assert_array_equal(
+            getattr(together, name), np.concatenate([getattr(one, name) for one in alone])
+        )

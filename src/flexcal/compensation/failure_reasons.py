@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexcal.compensation.newton_search import Commands
+from flexcal.compensation.newton_search import CommandSearch
 from flexcal.compensation.tool_target import ToolPoseTarget
 from flexcal.model.kinematics import joint_limits
 from flexcal.model.robot import RobotModel
@@ -32,27 +32,26 @@ def nominal_reasons(model: RobotModel, aim: ToolPoseTarget, nearest: np.ndarray)
     ]
 
 
-def real_reasons(
-    model: RobotModel, aim: ToolPoseTarget, nominal: np.ndarray, commands: Commands
-) -> list[str]:
-    """Reasons why the real robot cannot reach K targets that the nominal one reaches at `nominal` (K, n); `commands` did not converge.
+def real_reasons(search: CommandSearch) -> list[str]:
+    """Reasons why the real robot cannot reach the targets of a search that the nominal one reaches.
 
     The two robots differ by millimetres, so it is a limit, or a singularity that asks for much motion to make up for little.
     """
+    model, nominal = search.model, search.nominal
     reasons = []
-    there, stuck = aim.reached(commands.after), _at_limits(model, commands.q)
-    weakest = _weakest_motion(model, aim, nominal)
-    for k, q in enumerate(commands.q):
+    there, stuck = search.aim.reached(search.after), _at_limits(model, search.q)
+    weakest = _weakest_motion(model, search.aim, nominal)
+    for k, q in enumerate(search.q):
         if there[k]:
             reasons.append(
                 _past_limit(model, q, "would be") or _large(model, q - nominal[k], _tied(model, weakest[k]))
             )
         elif stuck[k]:
             reasons.append(
-                f"joint limit: {_nearest(commands.after[k])}, with {_named(model, stuck[k])} at the limit"
+                f"joint limit: {_nearest(search.after[k])}, with {_named(model, stuck[k])} at the limit"
             )
         else:
-            reasons.append(f"singular: {_tied(model, weakest[k])}, and {_nearest(commands.after[k])}")
+            reasons.append(f"singular: {_tied(model, weakest[k])}, and {_nearest(search.after[k])}")
     return reasons
 
 

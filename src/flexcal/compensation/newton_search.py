@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 
@@ -21,53 +22,45 @@ _DAMPING = 1e-7
 """Damping relative to the reach: keeps exactly singular rows solvable, and is far below what can be corrected."""
 
 
-@dataclass(frozen=True, eq=False)
-class Commands:
-    """Motor positions `q` (N, n) after the last step; `reached` (N,): the tool is at its target, within all limits.
-
-    `before` and `after` (N, m): aim minus tool, as `ToolPoseTarget.residual` has it, at the nominal command and at `q`; `torque` (N, n) N
-    m at rest.
-    """
-
-    q: np.ndarray
-    reached: np.ndarray
-    before: np.ndarray
-    after: np.ndarray
-    torque: np.ndarray
-
-    def subset(self, rows: np.ndarray) -> Commands:
-        """Rows with these indices or of this mask."""
-        return Commands(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
+_PER_ROW = (
+    "nominal",
+    "payload",
+    "temperature",
+    "q",
+    "origin",
+    "at_limit",
+    "reached",
+    "turned",
+    "flank",
+    "torque",
+    "jacobian",
+    "before",
+    "after",
+)
 
 
-def solve_commands(
-    model: RobotModel,
-    aim: ToolPoseTarget,
-    nominal: np.ndarray,
-    payload: np.ndarray | None,
-    temperature: np.ndarray | None = None,
-) -> Commands:
-    """Commands of least change from `nominal` (N, n) that bring the deflected robot to `aim`, carrying `payload` (N,) kg
-    at `temperature` (N,), °C.
+class CommandSearch:
+    """Commands of least change from `nominal` (N, n) that bring the deflected robot to `aim`, carrying `payload` (N,) kg at
+    `temperature` (N,), °C.
 
     q ← q₀ + J⁺ (r + J (q − q₀)), the Gauss-Newton step to the solution nearest to q₀; for six joints and a full pose it is Newton's.
     A correction of millimetres hardly turns J, so that the first one serves for four steps.
     How the arm stands with the tool at its aim does not depend on the flank, and so the torque there settles it: once the steps have come
     to an end, and not on the way, where it could turn to and fro. Where a redundant arm leaves a limit, that joint is held there and the
-    others make up for it. Rows in which these steps lead away are sought once more by `nearest_positions`. Raises `FlexcalError` where the
-    springs cannot carry the arm.
+    others make up for it. Rows in which these steps lead away are `lost`, and sought once more by `try_damped`. Raises `FlexcalError`
+    where the springs cannot carry the arm.
+
+    Attributes
+    ----------
+    q : ndarray
+        Motor positions (N, n) after the last step.
+    reached : ndarray
+        Mask (N,): the tool is at its target, within all limits.
+    before, after : ndarray
+        Aim minus tool (N, m), as `ToolPoseTarget.residual` has it, at the nominal command and at `q`.
+    torque : ndarray
+        N m at rest (N, n).
     """
-    search = _Search(model, aim, nominal, payload, temperature)
-    for iteration in range(_ITERATIONS):
-        if not len(search.rows):
-            break
-        search.advance(jacobians=iteration >= _SHARED - 1)
-    search.try_damped()
-    return Commands(search.q, search.reached, search.before, search.after, search.torque)
-
-
-class _Search:
-    """State of the search for all rows; `rows` are the numbers of the active ones."""
 
     def __init__(
         self,
@@ -91,7 +84,40 @@ class _Search:
         self.before = aim.residual(start.kinematics)
         self.after = self.before.copy()
 
-    def advance(self, *, jacobians: bool) -> None:
+    def subset(self, rows: np.ndarray) -> CommandSearch:
+        """Rows with these indices or of this mask."""
+        own = copy(self)
+        own.aim = self.aim.subset(rows)
+        for name in _PER_ROW:
+            values = getattr(self, name)
+            setattr(own, name, None if values is None else values[rows])
+        own.rows = np.arange(len(own.q))
+        return own
+
+    def joined(self, others: Sequence[CommandSearch]) -> CommandSearch:
+        """Rows of this search and then those of others for the same robot."""
+        every = [self, *others]
+        own = copy(self)
+        own.aim = self.aim.joined([other.aim for other in others])
+        for name in _PER_ROW:
+            values = [getattr(one, name) for one in every]
+            setattr(own, name, None if values[0] is None else np.concatenate(values))
+        own.rows = np.arange(len(own.q))
+        return own
+
+    @property
+    def lost(self) -> np.ndarray:
+        """Mask (N,) of rows that the steps did not bring to their aim."""
+        return ~self.reached & ~self.aim.reached(self.after)
+
+    def step(self) -> None:
+        """Take the Newton steps."""
+        for iteration in range(_ITERATIONS):
+            if not len(self.rows):
+                break
+            self._advance(jacobians=iteration >= _SHARED - 1)
+
+    def _advance(self, *, jacobians: bool) -> None:
         """One step of all active rows; converged and diverging ones are removed."""
         self._step(self.rows)
         rows = self.rows = self.rows[~self._far(self.rows)]
@@ -103,7 +129,7 @@ class _Search:
 
     def try_damped(self) -> None:
         """Repeat rows without result by damped least squares within the limits; twice if the flank changes at the end."""
-        rows = np.flatnonzero(~self.reached & ~self.aim.reached(self.after))
+        rows = np.flatnonzero(self.lost)
 
         def forward(own: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             self._evaluate(rows[own], q, jacobians=True)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from flexcal.compensation.desired_poses import desired_pose, spare_joints
 from flexcal.compensation.failure_reasons import given_past_limit, nominal_reasons, real_reasons
 from flexcal.compensation.inverse_kinematics import inverse_kinematics
-from flexcal.compensation.newton_search import solve_commands
+from flexcal.compensation.newton_search import CommandSearch
 from flexcal.compensation.partial_orientation import partly_oriented
 from flexcal.compensation.start_postures import (
     best_posture,
@@ -21,7 +21,7 @@ from flexcal.model.robot import RobotModel
 from flexcal.model.statics import carried_mass, certain_flank
 from flexcal.progress import Progress, silent
 
-_BLOCK = 8192
+_BLOCK = 4096
 """Number of rows solved together: their memory is a few tens of megabytes."""
 
 
@@ -64,21 +64,60 @@ def motor_commands(
     """
     if targets.q is None and start is None:
         start = best_posture(nominal, str(targets.target[0]))
-    parts = []
+    found = _nothing(len(targets), model.n)
+    lost: list[_Rows] = []
     for first in range(0, len(targets), _BLOCK):
         progress("compensating", first / len(targets))
-        parts.append(_solve(model, nominal, targets.subset(slice(first, first + _BLOCK)), start))
+        block = np.arange(first, min(first + _BLOCK, len(targets)))
+        done, left = _stepped(found, block, model, nominal, targets, start).parted()
+        _take(found, done, targets)
+        if lost and (left.search.aim.rows != lost[0].search.aim.rows or _count(lost) >= _BLOCK):
+            _take_damped(found, lost, targets)
+            lost = []
+        lost.append(left)
+    if lost:
+        _take_damped(found, lost, targets)
     progress("compensating", 1.0)
-    joined = {
-        f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(MotorCommands)
-    }
-    return MotorCommands(**joined)
+    return found
 
 
-def _solve(
-    model: RobotModel, nominal: RobotModel, targets: ToolTargets, start: np.ndarray | None
-) -> MotorCommands:
-    """`motor_commands` for a block of rows."""
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """The search for the targets with some numbers (N,)."""
+
+    number: np.ndarray
+    search: CommandSearch
+
+    def parted(self) -> tuple[_Rows, _Rows]:
+        """Those that Newton's steps settled, and those that they lost."""
+        lost = self.search.lost
+        settled, left = (_Rows(self.number[rows], self.search.subset(rows)) for rows in (~lost, lost))
+        return settled, left
+
+
+def _count(parts: list[_Rows]) -> int:
+    return sum(len(part.number) for part in parts)
+
+
+def _nothing(size: int, joints: int) -> MotorCommands:
+    """No commands yet."""
+    q, nominal = np.full((2, size, joints), np.nan)
+    unambiguous, elsewhere = np.zeros((2, size), dtype=bool)
+    return MotorCommands(
+        q, nominal, np.full(size, np.nan), unambiguous, elsewhere, np.full(size, "", dtype=object)
+    )
+
+
+def _stepped(
+    found: MotorCommands,
+    block: np.ndarray,
+    model: RobotModel,
+    nominal: RobotModel,
+    every: ToolTargets,
+    start: np.ndarray | None,
+) -> _Rows:
+    """The nominal commands of a block, left in `found`, and Newton's steps from them for the targets that have one."""
+    targets = every.subset(slice(int(block[0]), int(block[-1]) + 1))
     size = len(targets)
     aim = desired_pose(model, nominal, targets)
     elsewhere = np.zeros(size, dtype=bool)
@@ -93,30 +132,35 @@ def _solve(
     else:
         assert start is not None
         known, reached, elsewhere = inverse_kinematics_from_postures(nominal, aim, start)
-    q, before = np.full((size, model.n), np.nan), np.full(size, np.nan)
-    unambiguous = np.zeros(size, dtype=bool)
     if targets.q is not None:
         past = given_past_limit(nominal, targets.q)
         reason = np.where(past == "", reason, past)
     lost = np.flatnonzero(~reached & (reason == ""))
     reason[lost] = nominal_reasons(nominal, aim.subset(lost), known[lost])
+    found.nominal[block], found.elsewhere[block], found.reason[block] = known, elsewhere, reason
     rows = np.flatnonzero(reason == "")
-    commands = solve_commands(
-        model,
-        aim.subset(rows),
-        known[rows],
-        targets.payload if targets.payload is None else targets.payload[rows],
-        targets.temperature if targets.temperature is None else targets.temperature[rows],
+    payload, temperature = (
+        None if values is None else values[rows] for values in (targets.payload, targets.temperature)
     )
-    before[rows] = np.linalg.norm(commands.before[:, :3], axis=1)
-    failed = ~commands.reached
-    reason[rows[failed]] = real_reasons(
-        model, aim.subset(rows[failed]), known[rows[failed]], commands.subset(failed)
-    )
-    done = rows[commands.reached]
-    q[done] = commands.q[commands.reached]
-    certain = certain_flank(
-        model, q[done], commands.torque[commands.reached], carried_mass(model, targets.payload, size)[done]
-    )
-    unambiguous[done] = certain[:, list(model.backlash_joints)].all(axis=1)
-    return MotorCommands(q, known, before, unambiguous, elsewhere, reason)
+    search = CommandSearch(model, aim.subset(rows), known[rows], payload, temperature)
+    search.step()
+    return _Rows(block[rows], search)
+
+
+def _take(found: MotorCommands, rows: _Rows, targets: ToolTargets) -> None:
+    """Leave the result of a search in `found`."""
+    number, search = rows.number, rows.search
+    found.before[number] = np.linalg.norm(search.before[:, :3], axis=1)
+    found.reason[number[~search.reached]] = real_reasons(search.subset(~search.reached))
+    done, there = number[search.reached], search.subset(search.reached)
+    found.q[done] = there.q
+    mass = carried_mass(search.model, targets.payload, len(targets))[done]
+    certain = certain_flank(search.model, there.q, there.torque, mass)
+    found.unambiguous[done] = certain[:, list(search.model.backlash_joints)].all(axis=1)
+
+
+def _take_damped(found: MotorCommands, lost: list[_Rows], targets: ToolTargets) -> None:
+    """Seek what Newton's steps lost in several blocks, all at once: it takes many steps of few rows."""
+    search = lost[0].search.joined([rows.search for rows in lost[1:]])
+    search.try_damped()
+    _take(found, _Rows(np.concatenate([rows.number for rows in lost]), search), targets)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -46,6 +47,19 @@ class ToolPoseTarget:
         turn = None if self.rotation is None else self.rotation[rows]
         about = None if self.turns is None else self.turns[rows]
         return ToolPoseTarget(self.target[rows], self.position[rows], turn, about)
+
+    def joined(self, others: Sequence[ToolPoseTarget]) -> ToolPoseTarget:
+        """Rows of these targets and then those of others of the same kind."""
+        every = [self, *others]
+
+        def together(name: str) -> np.ndarray | None:
+            values = [getattr(one, name) for one in every]
+            return None if values[0] is None else np.concatenate(values)
+
+        target, position = (
+            np.concatenate([getattr(one, name) for one in every]) for name in ("target", "position")
+        )
+        return ToolPoseTarget(target, position, together("rotation"), together("turns"))
 
     def about(self, turns: np.ndarray) -> ToolPoseTarget:
         """Targets whose rotation counts about the directions `turns` (N, k, 3) only."""

@@ -67,18 +67,19 @@ def rotation_vector(rotation: np.ndarray) -> np.ndarray:
 def rotation_wxyz(rotation: np.ndarray) -> np.ndarray:
     """Unit quaternions (..., 4), w first and not negative, of rotations (..., 3, 3): Shepperd's choice of the largest component."""
     (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(rotation, (-2, -1), (0, 1))
-    squares = np.stack([1 + a + e + i, 1 + a - e - i, 1 - a + e - i, 1 - a - e + i], axis=-1)
-    rows = np.stack(
-        [
-            np.stack([squares[..., 0], h - f, c - g, d - b], axis=-1),
-            np.stack([h - f, squares[..., 1], b + d, c + g], axis=-1),
-            np.stack([c - g, b + d, squares[..., 2], f + h], axis=-1),
-            np.stack([d - b, c + g, f + h, squares[..., 3]], axis=-1),
-        ],
-        axis=-2,
-    )
-    largest = np.argmax(squares, axis=-1)[..., None, None]
-    q = np.take_along_axis(rows, largest, axis=-2)[..., 0, :]
+    squares = np.stack([1 + a + e + i, 1 + a - e - i, 1 - a + e - i, 1 - a - e + i])
+    largest = np.argmax(squares, axis=0)
+    q = np.stack([squares[0], h - f, c - g, d - b], axis=-1)
+    if largest.any():
+        for k, components in enumerate(
+            (
+                (h - f, squares[1], b + d, c + g),
+                (c - g, b + d, squares[2], f + h),
+                (d - b, c + g, f + h, squares[3]),
+            ),
+            1,
+        ):
+            q = np.where((largest == k)[..., None], np.stack(components, axis=-1), q)
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return np.where(q[..., :1] < 0, -q, q)
 

@@ -272,18 +272,27 @@ def static_equilibrium(
     twist = twist_from_torque(load[:, sprung], stiffness[drives], hardening)
     free[:, sprung] += load[:, sprung] / stiffness[drives] - twist
     rest = np.sign(load) if flank is None else flank
-    passes = 0
-    while True:
-        passes += 1
-        slack = free - rest * model.drives.backlash
+
+    def solve(rows: np.ndarray | slice) -> list[np.ndarray]:
+        """Slack, deflection beside it, torque and derivatives."""
+        slack = free[rows] - rest[rows] * model.drives.backlash
         deflection, *derivatives = _solve(
-            model, axes, stiffness, q, slack, masses, sensitivities=sensitivities
+            model, axes, stiffness, q[rows], slack, masses[rows], sensitivities=sensitivities
         )
-        torque = load.copy()
+        torque = load[rows].copy()
         torque[:, sprung] = -model.springs.stiffness[sprung, 2] * deflection[:, sprung, 2]
-        if flank is not None or passes == _FLANK_PASSES or (np.sign(torque) == rest)[:, loose].all():
+        return [slack, deflection, torque, *derivatives]
+
+    found = solve(slice(None))
+    for _ in range(_FLANK_PASSES - 1 if flank is None else 0):
+        turned = np.flatnonzero((np.sign(found[2]) != rest)[:, loose].any(axis=1))
+        if not len(turned):
             break
-        rest = np.sign(torque)
+        rest[turned] = np.sign(found[2][turned])
+        for whole, part in zip(found, solve(turned), strict=True):
+            if len(whole):
+                whole[turned] = part
+    slack, deflection, torque, *derivatives = found
     sign = np.where(loose, rest, np.sign(torque)) if flank is None else flank
     deflection[:, :, 2] += slack
     if model.geometry.lateral_compliance.any():
