@@ -29,9 +29,6 @@ from flexcal.calibration.fit.structural_identifiability import (
 )
 from flexcal.calibration.fit.temperature_evidence import (
     TemperatureEvidence,
-    attenuation,
-    correlation_with_time,
-    sensor_scatter,
     time_columns,
     widened,
 )
@@ -520,20 +517,10 @@ class FittedPoints:
             products,
             int(self.linear.readings.present.sum()) - self.linear.free.shape[2],
         )
-        before = np.sqrt(np.diag(narrow)).tolist()
-        return wide, TemperatureEvidence(
-            lowest=float(poses.temperature.min()),
-            highest=float(poses.temperature.max()),
-            reference=float(self.model.thermal.reference[0]),
-            spread=float(poses.temperature.std()),
-            timed=poses.time is not None,
-            correlation=correlation_with_time(poses),
-            narrow={name: before[k] for k, name in enumerate(names) if is_thermal(name)},
-            wide=stds,
-            probability=probability,
-            scatter=sensor_scatter(poses),
-            attenuation=attenuation(poses),
-        )
+        before = dict(zip(names, np.sqrt(np.diag(narrow)).tolist(), strict=True))
+        reference = float(self.model.thermal.reference[0])
+        alone = {name: before[name] for name in thermal}
+        return wide, TemperatureEvidence.of(poses, reference, alone, stds, probability)
 
     def _covariance(self) -> np.ndarray:
         """Covariance (p, p) of the estimate, what else changes with time included where parameters change with temperature."""

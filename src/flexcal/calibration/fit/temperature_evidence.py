@@ -67,6 +67,31 @@ class TemperatureEvidence:
     scatter: float | None
     attenuation: float
 
+    @classmethod
+    def of(
+        cls,
+        poses: PoseSet,
+        reference: float,
+        narrow: dict[str, float],
+        wide: dict[str, float],
+        probability: float,
+    ) -> TemperatureEvidence:
+        """Evidence in the temperatures of fitted `poses`; the other arguments are the attributes of these names."""
+        assert poses.temperature is not None
+        return cls(
+            lowest=float(poses.temperature.min()),
+            highest=float(poses.temperature.max()),
+            reference=reference,
+            spread=float(poses.temperature.std()),
+            timed=poses.time is not None,
+            correlation=float(np.corrcoef(poses.temperature, _time(poses))[0, 1]),
+            narrow=narrow,
+            wide=wide,
+            probability=probability,
+            scatter=sensor_scatter(poses),
+            attenuation=_attenuation(poses),
+        )
+
     @property
     def confounded(self) -> bool:
         """Whether temperature and time cannot be told apart: a change in time would widen an interval clearly."""
@@ -113,23 +138,17 @@ def widened(
     told = products[:-1, :-1]
     wide = covariance + gain @ np.linalg.solve(told + np.diag(1 / sizes**2), gain.T)
     bias = np.zeros(len(values))
-    bias[own] = attenuation(poses) * np.array([values[name] for name in thermal])
+    bias[own] = _attenuation(poses) * np.array([values[name] for name in thermal])
     wide = wide + np.outer(bias, bias)
     stds = dict(zip(thermal, np.sqrt(np.diag(wide)[own]).tolist(), strict=True))
     return wide, stds, _probability(products, sizes, freedom)
 
 
-def attenuation(poses: PoseSet) -> float:
+def _attenuation(poses: PoseSet) -> float:
     """Share by which the scatter of the temperature's sensor makes coefficients too small; 0 where it is not told."""
     assert poses.temperature is not None
     scatter = sensor_scatter(poses)
     return 0.0 if scatter is None else (scatter / float(poses.temperature.std())) ** 2
-
-
-def correlation_with_time(poses: PoseSet) -> float:
-    """Correlation of temperature with time, or with the measuring order where no column says the time."""
-    assert poses.temperature is not None
-    return float(np.corrcoef(poses.temperature, _time(poses))[0, 1])
 
 
 def _time(poses: PoseSet) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import date, datetime, timedelta
 from typing import Any
 
 import numpy as np
@@ -20,12 +20,11 @@ Record = dict[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class Visits:
-    """Values (K,) and standard deviations (K,) on different days, `dates` in their order; `left_out` undated or repeated ones."""
+    """Values (K,) of a quantity and their standard deviations (K,) on K different days, `dates` in their order."""
 
     dates: tuple[datetime, ...]
     values: np.ndarray
     std: np.ndarray
-    left_out: int
 
     @property
     def many(self) -> bool:
@@ -46,24 +45,21 @@ def visits_of(records: Iterable[Record]) -> Visits:
     """Visits of one quantity. Of results from the same measurements the latest counts, and results of one day are one visit: their mean,
     with the uncertainty of one of them.
     """
-    everything = list(records)
-    dated = sorted((r for r in everything if r["date"] is not None), key=lambda r: r["date"])
-    distinct = list({r["data"] or r["file"]: r for r in dated}.values())
-    days: dict[object, list[Record]] = {}
-    for record in distinct:
+    dated = sorted((r for r in records if r["date"] is not None), key=lambda r: r["date"])
+    days: dict[date, list[Record]] = {}
+    for record in {r["data"] or r["file"]: r for r in dated}.values():
         days.setdefault(record["date"].date(), []).append(record)
-    groups = [days[day] for day in sorted(days)]  # type: ignore[type-var]
+    groups = [days[day] for day in sorted(days)]
     return Visits(
         tuple(group[0]["date"] for group in groups),
         np.array([np.mean([r["value"] for r in group]) for group in groups]),
         np.array([np.sqrt(np.mean([r["std"] ** 2 for r in group])) for group in groups]),
-        len(everything) - len(distinct),
     )
 
 
-def years(date: datetime) -> float:
+def years(when: datetime) -> float:
     """Years since 2000."""
-    return (date - _EPOCH) / _YEAR
+    return (when - _EPOCH) / _YEAR
 
 
 def date_at(time: float) -> datetime | None:

@@ -211,15 +211,8 @@ class GeometryConfig:
 
     def __post_init__(self) -> None:
         levels = ("kinematic", "offsets", "lengths", "backlash")
-        known = (
-            *levels,
-            "gravity_compliance",
-            "lateral_compliance",
-            "thermal_drift",
-            "transmission",
-            "ratio",
-        )
-        known = (*known, "thermal", "thermal_links", "thermal_stations")
+        of_joints = ("gravity_compliance", "lateral_compliance", "thermal_drift")
+        known = (*levels, *of_joints, "transmission", "ratio", "thermal", "thermal_links", "thermal_stations")
         if isinstance(self.terms, str) and self.terms != "auto":
             raise FlexcalError(
                 "E-ROBOT-015",
@@ -227,7 +220,7 @@ class GeometryConfig:
             )
         for term in () if isinstance(self.terms, str) else self.terms:
             owner, _, kind = term.rpartition(".")
-            if kind not in (known[4:7] if owner else known):
+            if kind not in (of_joints if owner else known):
                 raise FlexcalError(
                     "E-ROBOT-016", f"unknown geometry term '{term}'; known are {', '.join(known)}."
                 )
