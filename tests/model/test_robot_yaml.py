@@ -33,7 +33,7 @@ PAYLOAD = "payload: {frame: flange, mass: 6.0, com: [0.10, 0.00, -0.10], mass_st
 MISTAKES = [
     # unknown, missing and doubled keys
     (GRAVITY, "gravty: [0, 0, -9.81]", ["E-YAML-001", "gravty", "gravity"]),
-    (GRAVITY, f"{GRAVITY}\nspeed: 3", ["E-YAML-001", "speed", "known are robot, points"]),
+    (GRAVITY, f"{GRAVITY}\nspeed: 3", ["E-YAML-001", "speed", "known are robot, serial, tolerance, points"]),
     (SPRING, "drive: {stiffness: 143.7e3, dampening: 1}", ["E-YAML-001", "dampening", "damping"]),
     (SPRING, "drive: {damping: 115.1}", ["E-YAML-002", "stiffness"]),
     (SPRING, SPRING + "\n    drive: {stiffness: 1}", ["E-YAML-014", "drive"]),
