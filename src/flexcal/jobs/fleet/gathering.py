@@ -21,10 +21,9 @@ from flexcal.jobs.fleet.projects import Problem, Project, ResultFolder, find_res
 from flexcal.jobs.fleet.result_values import ResultValue, result_values, visit_values
 from flexcal.jobs.fleet.table import FleetTable, Row
 from flexcal.jobs.recheck import VISITS, read_visits
-from flexcal.jobs.result_files import RESULTS, read_results
+from flexcal.jobs.result_files import DESCRIPTIONS, RESULTS, read_results
 from flexcal.progress import Progress, silent
 
-_MODEL_FILES = (".yaml", ".yml", ".urdf", ".xml")
 _DIGITS = 12
 """Number of hexadecimal digits of a SHA-256 that tell files apart in the table."""
 
@@ -236,7 +235,7 @@ def _data(origin: Mapping[str, Any]) -> str:
         sorted(
             str(digest)[:_DIGITS]
             for name, digest in origin.items()
-            if name.startswith("input.") and not name.endswith(_MODEL_FILES)
+            if name.startswith("input.") and not name.endswith(DESCRIPTIONS)
         )
     )
 

@@ -12,11 +12,10 @@ from typing import Any
 
 from flexcal.errors import InputError
 from flexcal.jobs.recheck import VISITS
-from flexcal.jobs.result_files import RESULTS
+from flexcal.jobs.result_files import DESCRIPTIONS, RESULTS
 
 ROBOT = "robot.yaml"
 _WANTED = (ROBOT, RESULTS, VISITS, "estimates.npz")
-_ENDINGS = (".urdf", ".xml", ".yaml", ".yml")
 
 
 @contextmanager
@@ -76,7 +75,7 @@ def _is_wanted(part: Path) -> bool:
         not part.is_absolute()
         and ".." not in part.parts
         and not any(name.startswith(".") for name in part.parts)
-        and (part.name in _WANTED or part.suffix in _ENDINGS)
+        and (part.name in _WANTED or part.suffix in DESCRIPTIONS)
     )
 
 

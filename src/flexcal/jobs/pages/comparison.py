@@ -12,6 +12,7 @@ from flexcal.files.formats import read_estimates
 from flexcal.jobs.pages.changed_robot import geometry_change
 from flexcal.jobs.pages.report import missing_key_error
 from flexcal.jobs.result_files import (
+    DESCRIPTIONS,
     ESTIMATES,
     RESULTS,
     VERIFICATION,
@@ -25,8 +26,6 @@ from flexcal.report.results import Comparison, Run
 from flexcal.report.sections import common_origin
 
 COMPARISON = "comparison.html"
-_DECLARED = (".yaml", ".yml", ".urdf", ".xml")
-"""Inputs that describe the robot and are not measurements."""
 
 
 def compare_folders(first: Path, second: Path, robot: Path | None = None) -> dict[str, Any]:
@@ -131,5 +130,5 @@ def _data(origin: Mapping[str, str]) -> dict[str, str]:
         key.partition(".")[2]: value
         for key, value in origin.items()
         if key.startswith("block.")
-        or (key.startswith("input.") and not key.split(" (")[0].endswith(_DECLARED))
+        or (key.startswith("input.") and not key.split(" (")[0].endswith(DESCRIPTIONS))
     }

@@ -1,4 +1,5 @@
 from .document import (
+    DESCRIPTIONS,
     NOT_RECORDED,
     RESULTS,
     Kind,
@@ -34,6 +35,7 @@ from .torque_predictions import read_predictions, write_predictions
 from .verification_points import VERIFICATION, read_verification, write_verification
 
 __all__ = [
+    "DESCRIPTIONS",
     "ESTIMATES",
     "KEY",
     "NOT_RECORDED",

@@ -15,6 +15,9 @@ from flexcal.files.transaction import current_path, recover, write_text
 
 RESULTS = "results.json"
 
+DESCRIPTIONS = (".yaml", ".yml", ".urdf", ".xml")
+"""Endings of the inputs in a provenance that describe the robot; all others are measurements."""
+
 AGAIN = "run the verb that writes it again"
 """Advice if a file of a run cannot be used."""
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from flexcal.report.figures import cumulative_sums, visit_errors
 from flexcal.report.layout import (
+    NOTHING,
     Check,
     Fact,
     FigureBlock,
@@ -75,7 +76,7 @@ def recheck_page(study: RecheckStudy) -> Page:
         ),
         Fact(
             "What would have been found?",
-            "–" if least is None else f"{least * 1e3:.3f}",
+            NOTHING if least is None else f"{least * 1e3:.3f}",
             "mrad or mm",
             "Shift of any joint that is found with 95 %; joint by joint below.",
         ),
