@@ -18,17 +18,23 @@ from flexcal.calibration.comparison.common_poses import (
     rigid_motions,
 )
 from flexcal.calibration.comparison.explanations import LEVEL, Explanation, candidates_of, chance_of, explain
-from flexcal.calibration.comparison.joint_covariance import (
-    SplitCovariance,
-    difference_of_known,
-    split_covariance,
+from flexcal.calibration.comparison.joint_covariance import difference_of_known
+from flexcal.calibration.comparison.model_covariance import (
+    estimated,
+    is_geometric,
+    place_of,
+    root_of,
+    size_of,
+    split_of,
+    targets_of,
+    waves_of,
 )
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.fit import plausible_size
 from flexcal.calibration.measurement import random_poses, seen_from_base
 from flexcal.errors import FlexcalError
-from flexcal.estimation import Estimate, Parameters, analyse
-from flexcal.model.robot import GEOMETRY, RobotModel, declared_parameter, unit_in
+from flexcal.estimation import Estimate, analyse
+from flexcal.model.robot import RobotModel, unit_in
 
 _POSES = 200
 _RANK = 1e-7
@@ -160,7 +166,7 @@ def compare_geometry(
     nominal = model.with_estimated_springs(first.values)
     names = moving_names(nominal, pair)
     drawn = random_poses(nominal, limits, targets, poses)
-    robots = [_with(nominal, first), _with(declared or nominal, second)]
+    robots = [estimated(nominal, first), estimated(declared or nominal, second)]
     places = [seen_from_base(robot, drawn).position for robot in robots]
     gauge = rigid_motions(places[0])
     jacobian = columns(seen_from_base(nominal, drawn, jacobians=True), names)
@@ -168,14 +174,14 @@ def compare_geometry(
     moved = (places[1] - places[0]).ravel()
     moved = moved - gauge @ (gauge.T @ moved)
 
-    splits = [_split(nominal, estimate, names, pair, same_springs) for estimate in pair]
+    splits = [split_of(nominal, estimate, names, pair, same_springs) for estimate in pair]
     # the size of the waves is itself estimated from the points, so what is known of them does not cancel
-    known = difference_of_known(*splits, apart=[*_waves(first), *_waves(second)])
+    known = difference_of_known(*splits, apart=[*waves_of(first), *waves_of(second)])
     noise = splits[0].noise + splits[1].noise
-    spread = jacobian @ np.hstack([_root(noise), known])
+    spread = jacobian @ np.hstack([root_of(noise), known])
     variance = (spread**2).sum(axis=1).reshape(-1, 3).sum(axis=1)
 
-    scale = np.array([_size(nominal, name) for name in names])
+    scale = np.array([size_of(nominal, name) for name in names])
     test = _Test.of(
         jacobian / np.sqrt(len(drawn)),
         moved / np.sqrt(len(drawn)),
@@ -184,7 +190,7 @@ def compare_geometry(
         known,
         pair,
     )
-    own = [name for name in names if _is_geometric(nominal, name) and "transmission_" not in name]
+    own = [name for name in names if is_geometric(nominal, name) and "transmission_" not in name]
     matrix = test.map[:, [names.index(name) for name in own]]
     seen = (
         np.linalg.norm(matrix, axis=0)
@@ -193,7 +199,7 @@ def compare_geometry(
     )
     named = [name for name, there in zip(own, seen, strict=True) if there]
     matrix = matrix[:, seen]
-    candidates = candidates_of(named, matrix, {t: _place(nominal, t) for t in targets})
+    candidates = candidates_of(named, matrix, {t: place_of(nominal, t) for t in targets})
     statistic = float(test.difference @ test.difference)
     probability = chance_of(statistic, len(test.difference), test.freedom)
     explanations = explain(test.difference, candidates, test.freedom) if probability < LEVEL else ()
@@ -292,96 +298,8 @@ def _both(names: Sequence[str], pair: Sequence[Estimate]) -> list[str]:
     return [n for n in names if all(n in e.parameters and e.std(n) for e in pair)]
 
 
-def _split(
-    model: RobotModel, estimate: Estimate, names: list[str], pair: Sequence[Estimate], same_springs: bool
-) -> SplitCovariance:
-    """Covariance of an estimate, with terms that only the other fit has as held at nothing."""
-    waves = {**_waves(pair[0]), **_waves(pair[1]), **_waves(estimate)}
-    prior = {p.name: p.prior_std for p in estimate.parameters if np.isfinite(p.prior_std)} | _waves(estimate)
-    elastic = [n for n in names if n in estimate.parameters and not _is_geometric(model, n)]
-    joint = _prior_of_springs(model, elastic) if same_springs else ((), np.zeros((0, 0)))
-    split = split_covariance(estimate, names, {n: s for n, s in prior.items() if n not in joint[0]}, joint)
-    absent = [n for n in names if n not in estimate.parameters and _is_geometric(model, n)]
-    if not absent:
-        return split
-    kept = [n for n in names if n in estimate.parameters and _is_geometric(model, n) and estimate.std(n)]
-    ranges = np.array([estimate.ranges.get(n, (-np.pi, np.pi)) for n in model.motor_names]).T
-    there = random_poses(model, ranges, _targets(model, estimate), max(60, len(names)))
-    at = seen_from_base(model, there, jacobians=True)
-    free = np.hstack([columns(at, kept), rigid_motions(at.position)])
-    taken = -np.linalg.lstsq(free, columns(at, absent), rcond=1e-9)[0][: len(kept)]
-    sizes = np.array([waves.get(n) or plausible_size(model, n) for n in absent])
-    added = np.zeros((len(names), len(absent)))
-    added[[names.index(n) for n in kept]] = taken * sizes
-    added[[names.index(n) for n in absent], range(len(absent))] = sizes
-    return SplitCovariance(
-        split.names, split.noise, np.hstack([split.known, added]), (*split.sources, *absent)
-    )
-
-
-def _waves(estimate: Estimate) -> dict[str, float]:
-    """Standard deviations of the waves that are random effects, by name."""
-    terms = estimate.provenance.get("option.terms", "").split()
-    size = estimate.values.get("scatter.transmission", 0.0)
-    if "transmission" not in terms or not size > 0:
-        return {}
-    found = {}
-    for name in estimate.parameters.names:
-        key = name.rpartition(".")[2]
-        if key.startswith("transmission_") and key.rpartition("_")[0] not in terms:
-            found[name] = size / float(key.split("_")[1])
-    return found
-
-
-def _prior_of_springs(model: RobotModel, names: list[str]) -> tuple[list[str], np.ndarray]:
-    """Joint covariance of stiffness and inertia before the calibrations, natural units, of those that have one."""
-    declared = Parameters(declared_parameter(model, name) for name in names)
-    covariance = model.posterior.prior(declared)[1]
-    slopes = declared.natural_slope(declared.coordinates())
-    covariance = slopes[:, None] * covariance * slopes
-    known = [k for k in range(len(names)) if 0 < covariance[k, k] < np.inf]
-    return [names[k] for k in known], covariance[np.ix_(known, known)]
-
-
-def _with(model: RobotModel, estimate: Estimate) -> RobotModel:
-    known = model.values
-    return model.with_values(
-        {
-            name: value
-            for name, value in estimate.values.items()
-            if name in known and not name.startswith("station.")
-        }
-    )
-
-
-def _root(covariance: np.ndarray) -> np.ndarray:
-    size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    values, vectors = np.linalg.eigh(covariance / np.outer(size, size))
-    return size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
-
-
-def _size(model: RobotModel, name: str) -> float:
-    """Size of a change that matters, natural units."""
-    return (
-        plausible_size(model, name) if _is_geometric(model, name) else 1e-3 * abs(model.value(name)) or 1e-6
-    )
-
-
-def _is_geometric(model: RobotModel, name: str) -> bool:
-    try:
-        plausible_size(model, name)
-    except (KeyError, FlexcalError):
-        return False
-    return True
-
-
-def _targets(model: RobotModel, estimate: Estimate) -> list[str]:
-    told = estimate.provenance.get("option.targets", "").split(", ")
-    return [name for name in told if name in model.points] or [next(iter(model.points))]
-
-
 def _common_targets(model: RobotModel, pair: Sequence[Estimate]) -> list[str]:
-    first, second = (_targets(model, estimate) for estimate in pair)
+    first, second = (targets_of(model, estimate) for estimate in pair)
     common = [name for name in first if name in second]
     if not common:
         raise FlexcalError(
@@ -389,10 +307,3 @@ def _common_targets(model: RobotModel, pair: Sequence[Estimate]) -> list[str]:
             f"the two calibrations measured no point in common ({', '.join(first)}; {', '.join(second)}), so they cannot be compared.",
         )
     return common
-
-
-def _place(model: RobotModel, target: str) -> list[str]:
-    """Parameters of the place of a point on the tool."""
-    if target == next(iter(model.points)):
-        return [f"tool.{key}" for key in GEOMETRY if key.startswith("length")]
-    return [f"point.{target}.{axis}" for axis in "xyz"]
