@@ -1,4 +1,5 @@
 from .between_units import RandomEffects, random_effects
+from .joint_trends import JointLine, JointTest, joint_tests
 from .limit_crossing import Crossing, crossing
 from .multiplicity import holm
 from .outlying_units import Outlying, outlying
@@ -8,11 +9,14 @@ __all__ = [
     "FEWEST_VISITS",
     "Course",
     "Crossing",
+    "JointLine",
+    "JointTest",
     "Outlying",
     "RandomEffects",
     "Trend",
     "crossing",
     "holm",
+    "joint_tests",
     "moderated_trends",
     "outlying",
     "random_effects",

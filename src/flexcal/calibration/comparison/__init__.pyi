@@ -1,9 +1,12 @@
 from .explanations import Explanation
 from .geometry_change import GeometryChange, ParameterShift, compare_geometry
+from .geometry_over_time import GeometryTrend, geometry_trend
 
 __all__ = [
     "Explanation",
     "GeometryChange",
+    "GeometryTrend",
     "ParameterShift",
     "compare_geometry",
+    "geometry_trend",
 ]

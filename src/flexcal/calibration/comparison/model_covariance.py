@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexcal.calibration.comparison.common_poses import columns, random_poses, rigid_motions, seen_from_base
+from flexcal.calibration.comparison.common_poses import columns, rigid_motions
 from flexcal.calibration.comparison.joint_covariance import SplitCovariance, split_covariance
 from flexcal.calibration.fit import plausible_size
+from flexcal.calibration.measurement import random_poses, seen_from_base
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate, Parameters
 from flexcal.model.robot import GEOMETRY, RobotModel, declared_parameter

@@ -11,6 +11,8 @@ from flexcal.jobs.fleet.accuracy import RobotAccuracy
 from flexcal.jobs.fleet.courses import years
 from flexcal.jobs.fleet.drifts import Drift
 from flexcal.jobs.fleet.gathering import GatheredFleet
+from flexcal.jobs.fleet.geometry_document import geometry_entry
+from flexcal.jobs.fleet.geometry_drifts import GeometryDrift
 from flexcal.jobs.fleet.parameters import ParameterSpread
 from flexcal.jobs.fleet.rechecks import LatestRecheck
 from flexcal.jobs.fleet_prior import comparable_terms
@@ -24,6 +26,7 @@ def fleet_document(
     gathered: GatheredFleet,
     accuracies: Sequence[RobotAccuracy],
     drifts: Sequence[Drift],
+    geometry: Sequence[GeometryDrift],
     spreads: Sequence[ParameterSpread],
     rechecks: Mapping[str, LatestRecheck],
     declared: Mapping[str, float | None],
@@ -38,6 +41,13 @@ def fleet_document(
     by_robot: dict[str, list[Drift]] = defaultdict(list)
     for drift in found:
         by_robot[drift.robot].append(drift)
+    tolerances = {item.robot: item.tolerance for item in accuracies}
+    moving = sorted(
+        (item for item in geometry if item.probability <= level), key=lambda item: item.probability
+    )
+    entries = [geometry_entry(item, tolerances.get(item.course.robot)) for item in moving]
+    of_geometry = {item.course.robot for item in geometry}
+    sentences = {entry["robot"]: entry["sentence"] for entry in entries}
     tested_parameters = Counter(drift.robot for drift in drifts)
     robots = [
         {
@@ -49,6 +59,8 @@ def fleet_document(
             "recheck": _recheck(rechecks.get(item.robot), level),
             "parameter_trends": tested_parameters[item.robot],
             "drifting_parameters": [drift.name for drift in by_robot[item.robot]],
+            "geometry_tested": item.robot in of_geometry,
+            "geometry_drift": sentences.get(item.robot),
             "outlying_parameters": [
                 spread.name
                 for spread in spreads
@@ -69,10 +81,14 @@ def fleet_document(
             "results": sum(counts.values()),
             "rows": gathered.table.frame.height,
             **{state: states[state] for state in ("out", "within", "undecided", "not_judged")},
-            "drifting": sum(bool(r["drifts"] or r["drifting_parameters"]) for r in robots),
+            "drifting": sum(
+                bool(r["drifts"] or r["drifting_parameters"] or r["geometry_drift"]) for r in robots
+            ),
             "error_trends_tested": len(tested),
             "parameter_trends_tested": len(drifts),
             "robots_with_parameter_trends": len({drift.robot for drift in drifts}),
+            "geometry_trends_tested": len(of_geometry),
+            "geometry_drifting": len(sentences),
             "rechecked": len(rechecks),
             "changed": sum(r["recheck"] is not None and r["recheck"]["changed"] for r in robots),
             "reaching_tolerance": sum(robot["reaches"] is not None for robot in robots),
@@ -81,6 +97,7 @@ def fleet_document(
         "level": level,
         "robots": robots,
         "parameter_drifts": [_drift(drift) for drift in sorted(found, key=lambda drift: drift.probability)],
+        "geometry_drifts": entries,
         "parameters": [_spread(spread) for spread in spreads],
         "problems": [{"place": p.place, "sentence": p.sentence} for p in gathered.problems],
         "remarks": _remarks(gathered, accuracies, spreads),

@@ -40,8 +40,10 @@ def error_drifts(verifications: dict[str, list[Record]]) -> dict[str, Drift]:
     }
 
 
-def parameter_drifts(records: Sequence[Record]) -> list[Drift]:
-    """Trend of every parameter of every robot with three visits or more, estimated with the same terms."""
+def parameter_drifts(records: Sequence[Record], families: int) -> list[Drift]:
+    """Trend of every parameter of every robot with three visits or more, estimated with the same terms; its tests share the error rate with
+    those of all `families` of tests.
+    """
     groups: dict[tuple, list[Record]] = defaultdict(list)
     for r in records:
         key = (
@@ -59,13 +61,22 @@ def parameter_drifts(records: Sequence[Record]) -> list[Drift]:
         visits = visits_of(group)
         if visits.many:
             found.append((group[-1], visits, key[1:]))
-    return _tested(found)
+    return _tested(found, families)
 
 
-def _tested(courses: Sequence[tuple[Record, Visits, object]]) -> list[Drift]:
+def _tested(courses: Sequence[tuple[Record, Visits, object]], families: int = 1) -> list[Drift]:
     trends = moderated_trends([visits.course(family) for _, visits, family in courses])
     adjusted = holm([trend.probability for trend in trends])
     return [
-        Drift(r["robot"], r["model"], r["kind"], r["name"], r["unit"], visits, trend, float(p))
+        Drift(
+            r["robot"],
+            r["model"],
+            r["kind"],
+            r["name"],
+            r["unit"],
+            visits,
+            trend,
+            min(1.0, families * float(p)),
+        )
         for (r, visits, _), trend, p in zip(courses, trends, adjusted, strict=True)
     ]

@@ -15,6 +15,7 @@ import numpy as np
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, read_estimates, sha256_of
+from flexcal.jobs.fleet.geometry_drifts import GeometryCourse, geometry_courses
 from flexcal.jobs.fleet.parameter_owners import is_of_robot
 from flexcal.jobs.fleet.places import local_fleet
 from flexcal.jobs.fleet.projects import Problem, Project, ResultFolder, find_results, problem_of
@@ -30,12 +31,15 @@ _DIGITS = 12
 
 @dataclass(frozen=True, eq=False)
 class GatheredFleet:
-    """The table of a fleet, its `projects`, its `problems`, and `repeated`: how many results stand in several folders."""
+    """The table of a fleet, its `projects`, its `problems`, and `repeated`: how many results stand in several folders; `courses` of the
+    geometry of robots that were calibrated several times.
+    """
 
     table: FleetTable
     projects: Sequence[Project]
     problems: Sequence[Problem]
     repeated: int
+    courses: Sequence[GeometryCourse]
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,10 +101,10 @@ def gather_fleet(place: str | Path, progress: Progress = silent) -> GatheredFlee
             progress("reading", number / len(folders))
             results += _results(root, folder, problems)
         progress("reading", 1.0)
-    kept, repeated = _distinct(results, problems)
-    return GatheredFleet(
-        FleetTable.of(row for result in kept for row in result.rows), projects, problems, repeated
-    )
+        kept, repeated = _distinct(results, problems)
+        courses, refused = geometry_courses(root, [result.first for result in kept], projects, progress)
+    table = FleetTable.of(row for result in kept for row in result.rows)
+    return GatheredFleet(table, projects, [*problems, *refused], repeated, courses)
 
 
 def _results(root: Path, folder: ResultFolder, problems: list[Problem]) -> Iterator[_Result]:

@@ -14,6 +14,7 @@ from flexcal.jobs.fleet.courses import Record
 from flexcal.jobs.fleet.document import fleet_document
 from flexcal.jobs.fleet.drifts import Drift, parameter_drifts
 from flexcal.jobs.fleet.gathering import GatheredFleet, gather_fleet
+from flexcal.jobs.fleet.geometry_drifts import GeometryDrift, geometry_drifts
 from flexcal.jobs.fleet.parameters import ParameterSpread, comparable, parameter_spreads
 from flexcal.jobs.fleet.rechecks import LatestRecheck, latest_rechecks
 from flexcal.jobs.pages import SummarisedResult
@@ -38,7 +39,9 @@ class Fleet(SummarisedResult):
     accuracies : list of RobotAccuracy
         Every robot against its tolerance, with its trend.
     drifts : list of Drift
-        Trends of parameters.
+        Trends of parameters, each alone.
+    geometry : list of GeometryDrift
+        Trends of the geometry, all parameters of a robot together.
     spreads : list of ParameterSpread
         Parameters over the robots of each model.
     rechecks : mapping of LatestRecheck
@@ -53,6 +56,7 @@ class Fleet(SummarisedResult):
     gathered: GatheredFleet
     accuracies: Sequence[RobotAccuracy]
     drifts: Sequence[Drift]
+    geometry: Sequence[GeometryDrift]
     spreads: Sequence[ParameterSpread]
     rechecks: Mapping[str, LatestRecheck]
     declared: Mapping[str, float | None]
@@ -80,6 +84,7 @@ class Fleet(SummarisedResult):
             self.gathered,
             self.accuracies,
             self.drifts,
+            self.geometry,
             self.spreads,
             self.rechecks,
             self.declared,
@@ -149,11 +154,13 @@ def review_fleet(
     records: list[Record] = gathered.table.frame.to_dicts()
     known = {name: (model, own or tolerance) for name, (model, own) in robots.items()}
     parameters = comparable(records)
+    drifts = parameter_drifts(parameters, 2 if gathered.courses else 1)
     fleet = Fleet(
         str(place),
         gathered,
         robot_accuracies(known, records, LEVEL),
-        parameter_drifts(parameters),
+        drifts,
+        geometry_drifts(gathered.courses, 2 if drifts else 1, LEVEL),
         parameter_spreads(parameters, LEVEL),
         latest_rechecks(records),
         {name: own for name, (_, own) in robots.items()},

@@ -1,3 +1,4 @@
+from .changed_robot import model_before
 from .comparison import compare_folders, folder_comparison
 from .customer import customer_report
 from .report import REPORT, folder_page, report_folder, two_stage_study
@@ -25,6 +26,7 @@ __all__ = [
     "customer_report",
     "folder_comparison",
     "folder_page",
+    "model_before",
     "report_folder",
     "summary_row",
     "two_stage_study",

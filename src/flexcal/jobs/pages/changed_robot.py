@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -42,7 +42,7 @@ def geometry_change(
             "robot.yaml was not found in or above the folders; give it with --robot to compare the robots",
         )
     try:
-        model, same = _common_model(file, estimates)
+        model, same = model_before(file, estimates)
         if urdf[0] is not None and sha256_of(model.urdf) != urdf[0]:
             return (
                 None,
@@ -78,11 +78,11 @@ def _robot_file(folders: tuple[Path, Path], estimates: tuple[Estimate, Estimate]
     return next((f for f in files if sha256_of(f) in known), files[0] if files else None)
 
 
-def _common_model(file: Path, estimates: tuple[Estimate, Estimate]) -> tuple[RobotModel, bool]:
-    """Robot without calibration, and whether both calibrations had its stiffness and inertia as their prior."""
+def model_before(file: Path, estimates: Sequence[Estimate]) -> tuple[RobotModel, bool]:
+    """Robot without calibration, and whether all calibrations had its stiffness and inertia as their prior."""
     used = [{k: v for k, v in e.provenance.items() if k.startswith("block.")} for e in estimates]
     declared = RobotModel.from_yaml(file, estimates=False)
-    if used[0] != used[1]:
+    if any(other != used[0] for other in used[1:]):
         return declared, False
     stored = declared.path.parent / declared.config.estimates
     if not used[0]:

@@ -47,7 +47,9 @@ def fleet_checks(document: Mapping[str, Any]) -> tuple[Check, ...]:
             if counts["drifting"]
             else f"No significant trend of the errors of {counted(counts['error_trends_tested'], 'robot')}."
             if counts["error_trends_tested"]
-            else "No single parameter has a significant trend, but no robot has three dated verifications of one calibration."
+            else "Neither single parameters nor the geometry as a whole, of "
+            f"{counted(counts['geometry_trends_tested'], 'robot')}, have a significant trend, "
+            "but no robot has three dated verifications of one calibration."
             if tested
             else "No robot has three dated visits.",
             "care" if counts["drifting"] else "good" if counts["error_trends_tested"] else "unknown",

@@ -24,7 +24,7 @@ from flexcal.report.layout import (
     worst,
 )
 from flexcal.report.layout import Block as PageBlock
-from flexcal.report.results import tolerance_kept, with_trends
+from flexcal.report.results import drifts, tolerance_kept, with_trends
 from flexcal.report.sections import parameter_spreads_section, provenance_section, trends_section
 
 _LISTED = 300
@@ -70,7 +70,7 @@ def _verdict(document: Mapping[str, Any]) -> Verdict:
             "How many drift?",
             str(counts["drifting"]),
             f"of {len(with_trends(document))} with trends",
-            _named(sorted(r["robot"] for r in document["robots"] if r["drifts"] or r["drifting_parameters"]))
+            _named(sorted(robot["robot"] for robot in document["robots"] if drifts(robot)))
             or "None significantly, after correction for the number of tests.",
         ),
         Fact(
@@ -126,8 +126,7 @@ def _robots(document: Mapping[str, Any]) -> Section:
 def _needs_attention(robot: Mapping[str, Any]) -> bool:
     return bool(
         robot["state"] in ("out", "undecided")
-        or robot["drifts"]
-        or robot["drifting_parameters"]
+        or drifts(robot)
         or robot["outlying_parameters"]
         or (robot["recheck"] is not None and (robot["recheck"]["changed"] or robot["recheck"]["alarms"]))
     )
@@ -150,6 +149,8 @@ def _robot_row(robot: Mapping[str, Any]) -> tuple[str, ...]:
         outlook += f": {_rate(robot['trend'])}"
     if reaches is not None:
         outlook += f"; {reaches['date']} ({reaches['low']} to {reaches['high'] or 'open'})"
+    if robot["geometry_drift"] is not None:
+        outlook += f"; {robot['geometry_drift']}"
     for key, words in (("drifting_parameters", "drifts"), ("outlying_parameters", "differs from the others")):
         if robot[key]:
             outlook += f"; {', '.join(robot[key][:3])}{' and others' if len(robot[key]) > 3 else ''}: {words}"

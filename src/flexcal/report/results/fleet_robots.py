@@ -21,9 +21,14 @@ def tolerance_kept(robot: Mapping[str, Any]) -> str:
 
 
 def with_trends(document: Mapping[str, Any]) -> Sequence[str]:
-    """Robots of the document that have a trend of their errors or of a parameter."""
+    """Robots of the document whose errors, a parameter or the geometry as a whole were tested for a trend."""
     return [
         robot["robot"]
         for robot in document["robots"]
-        if robot["trend"] is not None or robot["parameter_trends"]
+        if robot["trend"] is not None or robot["parameter_trends"] or robot["geometry_tested"]
     ]
+
+
+def drifts(robot: Mapping[str, Any]) -> bool:
+    """Whether a robot of the document has a significant trend of its errors, of a parameter or of the geometry as a whole."""
+    return bool(robot["drifts"] or robot["drifting_parameters"] or robot["geometry_drift"])

@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from flexcal.report.figures import trend_courses
-from flexcal.report.layout import Block, FigureBlock, Section, Table, Text, p_value, scaled, significant
+from flexcal.report.layout import (
+    NOTHING,
+    Block,
+    FigureBlock,
+    Section,
+    Table,
+    Text,
+    counted,
+    p_value,
+    scaled,
+    significant,
+)
 
 _LISTED = 300
 _PANELS = 12
@@ -20,9 +31,10 @@ def trends_section(document: Mapping[str, Any]) -> Section:
     words = (
         f"Trends need three dated visits or more. Tested: the errors of {counts['error_trends_tested']} robots since their latest "
         f"calibration, and {counts['parameter_trends_tested']} parameters of {counts['robots_with_parameter_trends']} robots over their "
-        "calibrations. "
+        "calibrations; and the geometry as a whole, by the movement of the tool at common poses that all parameters together make, of "
+        f"{counted(counts['geometry_trends_tested'], 'robot')}. "
         f"P-values are corrected for the number of tests (Holm): if nothing drifts, any robot is named for its errors in "
-        f"{100 * level:.0f} % of fleets at most, and in as many for its parameters."
+        f"{100 * level:.0f} % of fleets at most, and in as many for its parameters, single or together."
     )
     blocks: list[Block] = []
     if drifting:
@@ -36,6 +48,8 @@ def trends_section(document: Mapping[str, Any]) -> Section:
                 f"Courses of the P90 of {len(shown)} robots over time.",
             )
         )
+    if document["geometry_drifts"]:
+        blocks.append(_geometry_table(document["geometry_drifts"]))
     if parameters:
         shown = parameters[:_PANELS]
         blocks.append(
@@ -70,12 +84,43 @@ def trends_section(document: Mapping[str, Any]) -> Section:
             Text(
                 (
                     "No significant trend."
-                    if counts["error_trends_tested"] or counts["parameter_trends_tested"]
+                    if counts["error_trends_tested"]
+                    or counts["parameter_trends_tested"]
+                    or counts["geometry_trends_tested"]
                     else "No robot has three dated visits, so nothing can be said of drift.",
                 )
             )
         )
     return Section("trends", "Drift", words, tuple(blocks))
+
+
+def _geometry_table(drifts: Sequence[Mapping[str, Any]]) -> Table:
+    return Table(
+        "table-geometry",
+        "Robots whose geometry as a whole changed over time",
+        ("robot", "visits", "from", "to", "what changed", "per year", "p, corrected"),
+        tuple(
+            (
+                item["robot"],
+                str(item["visits"]),
+                item["first"],
+                item["last"],
+                item["sentence"],
+                "; ".join(_yearly(cause) for cause in item["explanations"]) or NOTHING,
+                p_value(item["adjusted_probability"]),
+            )
+            for item in drifts[:_LISTED]
+        ),
+        note="Changes of parameters are the simplest that explain the movement of the tool. What another place of the base, of the "
+        "instrument or of the reflector on the tool looks like is left out.",
+        text_columns=(2, 3, 4, 5),
+    )
+
+
+def _yearly(cause: Mapping[str, Any]) -> str:
+    factor, unit = scaled(cause["unit"])
+    rate, std = (significant(factor * cause[key], 3) for key in ("per_year", "per_year_std"))
+    return f"{cause['name']} {rate} ± {std} {unit}"
 
 
 def _drift_row(item: Mapping[str, Any]) -> tuple[str, ...]:

@@ -1,0 +1,234 @@
+"""Linear change of a robot's geometry over three calibrations or more.
+
+Single parameters are known far worse than the combinations that the measurements determine, and a shift of one is taken up by several. So
+the calibrations are compared as `geometry_change` does, in positions of the tool at common poses, without what another place of the robot,
+of the instrument or of a point on the tool looks like.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.calibration.comparison.common_poses import (
+    columns,
+    common_ranges,
+    moving_names,
+    rigid_motions,
+)
+from flexcal.calibration.comparison.explanations import Explanation, candidates_of, explain
+from flexcal.calibration.comparison.model_covariance import (
+    estimated,
+    is_geometric,
+    place_of,
+    size_of,
+    split_of,
+    targets_of,
+    waves_of,
+)
+from flexcal.calibration.measurement import random_poses, seen_from_base
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Estimate
+from flexcal.model.robot import RobotModel, unit_in
+
+_POSES = 100
+_RANK = 1e-7
+"""Relative singular value below which parameters move no point."""
+_FLOOR = 1e-6
+"""Root mean square displacement, m, that counts as none: second-order terms, and rounding of controllers."""
+_KNOWN_SHARE = 0.5
+"""Largest share of the variance by what was known beforehand of a combination whose trend is tested."""
+_OF_THE_TOOL = ("tool.", "point.", "payload.")
+
+
+@dataclass(frozen=True, eq=False)
+class GeometryTrend:
+    """Straight line through a robot's geometry over K calibrations.
+
+    Attributes
+    ----------
+    change : ndarray
+        Change (m,) from the first to the last by the line, in the combinations of parameters that all determine, over their standard
+        deviations by the estimates' covariances (whitened).
+    residual : float
+        Sum of squares of the calibrations about the line, whitened, of (K − 2) m degrees of freedom where the covariances are right.
+    visits : int
+        K.
+    freedom : float
+        Degrees of freedom of the fits.
+    names : tuple of str
+        Parameters of joints that may have caused a change.
+    units : tuple of str
+        Their units.
+    map : ndarray
+        Derivatives (m, p) of `change` by these, natural units.
+    jacobian : ndarray
+        Derivatives (3 N, p) of the tool's positions in the base frame by these at N common poses, but for a motion of the whole robot.
+    """
+
+    change: np.ndarray
+    residual: float
+    visits: int
+    freedom: float
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    map: np.ndarray
+    jacobian: np.ndarray
+
+    @property
+    def statistic(self) -> float:
+        """Sum of squares of `change`: χ² of m degrees of freedom where nothing changed and the covariances are right."""
+        return float(self.change @ self.change)
+
+    def explained(self, scale: float, freedom: float) -> tuple[Explanation, ...]:
+        """Fewest changes of parameters from the first to the last calibration that explain the change, with variances `scale` times those
+        of the covariances, known with so many degrees of freedom.
+        """
+        size = np.sqrt(scale)
+        return explain(self.change / size, candidates_of(self.names, self.map / size, {}), freedom)
+
+    def displacement(
+        self, explanations: Sequence[Explanation], scale: float
+    ) -> tuple[float, float, float] | None:
+        """Mean distance, m, by which explained changes move the tool, its standard deviation, and the largest at any of the poses; None
+        without explanations.
+        """
+        if not explanations:
+            return None
+        rows = [self.names.index(name) for item in explanations for name in item.names]
+        change = np.array([value for item in explanations for value in item.change])
+        size = np.linalg.norm(self.map[:, rows], axis=0)
+        inverse = np.linalg.pinv(self.map[:, rows] / size, rcond=1e-6) / size[:, None]
+        moved = (self.jacobian[:, rows] @ change).reshape(-1, 3)
+        distance = np.linalg.norm(moved, axis=1)
+        direction = moved / np.maximum(distance, 1e-12)[:, None]
+        slope = np.einsum("ni,nip->p", direction, self.jacobian[:, rows].reshape(-1, 3, len(rows)))
+        std = np.sqrt(scale) * float(np.linalg.norm(slope @ inverse)) / len(distance)
+        return float(distance.mean()), std, float(distance.max())
+
+
+def geometry_trend(
+    model: RobotModel, estimates: Sequence[Estimate], times: np.ndarray, *, same_springs: bool
+) -> GeometryTrend:
+    """Linear trend of a robot's geometry over three blocks `calibration` or more, of different measurements at times (K,).
+
+    `model` is the robot without a calibration, with stiffness and inertia as identified; `same_springs` says whether all had these as
+    their prior. Raises `FlexcalError` where they measured no point in common, or no common joint range.
+    """
+    limits = common_ranges(model, estimates)
+    targets = _common_targets(model, estimates)
+    nominal = model.with_estimated_springs(estimates[0].values)
+    first = estimated(nominal, estimates[0])
+    known = first.values
+    names = [n for n in moving_names(nominal, estimates) if not n.startswith(_OF_THE_TOOL)]
+    drawn = random_poses(nominal, limits, targets, max(_POSES, len(names)))
+    at = seen_from_base(first, drawn, jacobians=True)
+    rigid = rigid_motions(at.position)
+    tools = [_alone(columns(at, place_of(nominal, target)), drawn.target == target) for target in targets]
+    gauge = np.linalg.qr(np.hstack([rigid, *tools]))[0]
+    whole = columns(at, names)
+    jacobian = whole - gauge @ (gauge.T @ whole)
+    scale = np.array([size_of(nominal, name) for name in names])
+    count = np.sqrt(len(drawn))
+    left, sizes, right = np.linalg.svd(jacobian * scale / count, full_matrices=False)
+    rank = int(np.sum(sizes > _RANK * sizes[0]))
+    by_parameter = sizes[:rank, None] * right[:rank] / scale
+
+    of_tool = {name: value for name, value in known.items() if name.startswith(_OF_THE_TOOL)}
+    places = [seen_from_base(estimated(nominal, e).with_values(of_tool), drawn).position for e in estimates]
+    moved = [left[:, :rank].T @ ((p - places[0]).ravel() / count) for p in places]
+    splits = [split_of(nominal, e, names, estimates, same_springs) for e in estimates]
+    noises = [by_parameter @ s.noise @ by_parameter.T + _FLOOR**2 * np.eye(rank) for s in splits]
+    apart = {name for e in estimates for name in waves_of(e)}
+    sources = _stacked([by_parameter @ s.known for s in splits], [s.sources for s in splits], apart)
+
+    span = (times - times.mean()) / np.ptp(times)
+    weights = span / (span @ span)
+    by_noise = np.einsum("k,kij->ij", weights**2, np.array(noises))
+    by_known = np.tensordot(weights, sources.reshape(len(times), rank, sources.shape[1]), axes=1)
+    whiten = _well_known(by_noise, by_known @ by_known.T)
+    if not len(whiten):
+        raise FlexcalError(
+            "E-CAL-035",
+            "no combination of the robot's parameters was determined by all its calibrations; measure more poses.",
+        )
+    change, factor, residual = _line(
+        np.array(moved) @ whiten.T, [whiten @ n @ whiten.T for n in noises], _each(whiten, sources), span
+    )
+    causes = [
+        k for k, name in enumerate(names) if is_geometric(nominal, name) and "transmission_" not in name
+    ]
+    matrix = factor @ whiten @ by_parameter[:, causes]
+    told = np.linalg.norm(matrix, axis=0) * 1e-3 > 1.0
+    causes = [k for k, there in zip(causes, told, strict=True) if there]
+    return GeometryTrend(
+        factor @ change,
+        residual,
+        len(times),
+        float(sum(e.degrees_of_freedom for e in estimates)),
+        tuple(names[k] for k in causes),
+        tuple(unit_in(nominal, names[k]) for k in causes),
+        matrix[:, told],
+        (whole - rigid @ (rigid.T @ whole))[:, causes],
+    )
+
+
+def _line(
+    values: np.ndarray, noises: Sequence[np.ndarray], sources: np.ndarray, span: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Generalised least-squares slope (m,) over `span` (K,) of values (K, m), a matrix (m, m) that whitens it, and the residual."""
+    from scipy.linalg import block_diag, cholesky, solve_triangular
+
+    size = values.shape[1]
+    root = cholesky(block_diag(*noises) + sources @ sources.T, lower=True)
+    design = np.kron(np.column_stack([np.ones(len(span)), span]), np.eye(size))
+    white = solve_triangular(root, np.column_stack([design, values.ravel()]), lower=True)
+    basis, triangle = np.linalg.qr(white[:, :-1])
+    coefficients = np.linalg.solve(triangle, basis.T @ white[:, -1])
+    rest = white[:, -1] - white[:, :-1] @ coefficients
+    # the slope's columns are last, so the triangle's last block is the root of its information
+    return coefficients[size:], triangle[size:, size:], float(rest @ rest)
+
+
+def _well_known(by_noise: np.ndarray, by_known: np.ndarray) -> np.ndarray:
+    """Combinations (m, r) whose variance is not mainly of what was known beforehand."""
+    values, vectors = np.linalg.eigh(by_noise + by_known)
+    white = (vectors / np.sqrt(values)).T
+    shares, turns = np.linalg.eigh(white @ by_known @ white.T)
+    return turns[:, shares < _KNOWN_SHARE].T @ white
+
+
+def _stacked(known: Sequence[np.ndarray], sources: Sequence[Sequence[str]], apart: set[str]) -> np.ndarray:
+    """Columns (K r, s) of what was known beforehand: one of a source that several calibrations have, one each of those kept `apart`."""
+    rank = len(known[0])
+    result: dict[tuple[str, int], np.ndarray] = {}
+    for number, (block, names) in enumerate(zip(known, sources, strict=True)):
+        for column, source in zip(block.T, names, strict=True):
+            place = (source, number if source in apart else 0)
+            result.setdefault(place, np.zeros((len(known), rank)))[number] += column
+    return np.column_stack([np.zeros((len(known) * rank, 0)), *(c.ravel() for c in result.values())])
+
+
+def _each(whiten: np.ndarray, sources: np.ndarray) -> np.ndarray:
+    """Stacked columns in other combinations (m, r)."""
+    size, rank = whiten.shape
+    blocks = sources.reshape(len(sources) // rank, rank, sources.shape[1])
+    return np.einsum("mr,krs->kms", whiten, blocks).reshape(size * len(blocks), sources.shape[1])
+
+
+def _alone(place: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Columns (3 N, 3) that are of the poses `own` (N,) alone."""
+    return place * np.repeat(own, 3)[:, None]
+
+
+def _common_targets(model: RobotModel, estimates: Sequence[Estimate]) -> list[str]:
+    every = [targets_of(model, estimate) for estimate in estimates]
+    common = [name for name in every[0] if all(name in other for other in every)]
+    if not common:
+        raise FlexcalError(
+            "E-CAL-036",
+            f"the robot's {len(estimates)} calibrations measured no point in common, so its geometry was not compared over time.",
+        )
+    return common

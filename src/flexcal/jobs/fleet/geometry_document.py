@@ -1,0 +1,69 @@
+"""Entries of a fleet's JSON document on the drift of robots' geometry, and the sentence of each."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flexcal.jobs.fleet.courses import years
+from flexcal.jobs.fleet.geometry_drifts import GeometryDrift
+from flexcal.report.results import explanation_in_words
+from flexcal.units import MILLIMETRE
+
+_SMALL = 0.2
+"""Largest movement of the tool, over the tolerance, that is called small."""
+
+
+def geometry_entry(drift: GeometryDrift, tolerance: float | None) -> dict[str, Any]:
+    """A robot's drift: changes from the first to the last calibration in SI units, movements of the tool in mm."""
+    course, test = drift.course, drift.test
+    units = dict(zip(course.trend.names, course.trend.units, strict=True))
+    span = years(course.dates[-1]) - years(course.dates[0])
+    return {
+        "robot": course.robot,
+        "model": course.model,
+        "visits": len(course.dates),
+        "first": course.dates[0].date().isoformat(),
+        "last": course.dates[-1].date().isoformat(),
+        "combinations": len(course.trend.change),
+        "scatter": test.scale**0.5,
+        "freedom": test.freedom,
+        "probability": test.probability,
+        "adjusted_probability": drift.probability,
+        "explanations": [
+            {
+                "name": item.subject,
+                "unit": units[item.subject],
+                "change": sum(item.change),
+                "std": sum(item.std),
+                "per_year": sum(item.change) / span,
+                "per_year_std": sum(item.std) / span,
+                "alternatives": list(item.alternatives),
+            }
+            for item in drift.explanations
+        ],
+        "tool_mm": None
+        if drift.moved is None
+        else dict(zip(("mean", "mean_std", "largest"), (m / MILLIMETRE for m in drift.moved), strict=True)),
+        "sentence": _sentence(drift, tolerance),
+    }
+
+
+def _sentence(drift: GeometryDrift, tolerance: float | None) -> str:
+    """What drifted by how much, and how far that moves the tool, with the tolerance (m) where there is one."""
+    if drift.moved is None:
+        return (
+            f"changed steadily over {len(drift.course.dates)} calibrations, by no single parameter of a joint; "
+            "flexcal report --compare shows where the tool moved between two of them"
+        )
+    changes = "; ".join(explanation_in_words(item) for item in drift.explanations)
+    mean, std, largest = (m / MILLIMETRE for m in drift.moved)
+    said = (
+        f"changed steadily over {len(drift.course.dates)} calibrations, from the first to the last {changes}: "
+        f"this moves the tool by {mean:.3f} ± {std:.3f} mm on average, {largest:.3f} mm at most"
+    )
+    if tolerance is None:
+        return said
+    limit = tolerance / MILLIMETRE
+    if largest <= _SMALL * limit:
+        return f"{said}; significant, but small beside the tolerance of {limit:.3g} mm"
+    return f"{said}; the tolerance is {limit:.3g} mm"

@@ -1,0 +1,120 @@
+"""Drift of robots' geometry over their calibrations, all parameters tested together."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+
+from flexcal.calibration.comparison import Explanation, GeometryTrend, geometry_trend
+from flexcal.errors import FlexcalError
+from flexcal.files.formats import read_estimates, sha256_of
+from flexcal.fleet import FEWEST_VISITS, JointLine, JointTest, holm, joint_tests
+from flexcal.jobs.fleet.courses import years
+from flexcal.jobs.fleet.places import ROBOT
+from flexcal.jobs.fleet.projects import Problem, Project, problem_of
+from flexcal.jobs.fleet.table import Row
+from flexcal.jobs.pages import model_before
+from flexcal.jobs.result_files import RESULTS
+from flexcal.progress import Progress
+
+
+@dataclass(frozen=True, eq=False)
+class GeometryCourse:
+    """A robot's geometry over calibrations on `dates`."""
+
+    robot: str
+    model: str
+    urdf: str
+    dates: tuple[datetime, ...]
+    trend: GeometryTrend
+
+
+@dataclass(frozen=True, eq=False)
+class GeometryDrift:
+    """Test of a course, its p-value corrected for the number of robots, and what explains the change where that is significant:
+    `explanations` from the first to the last visit, and by how far they move the tool, m: mean, its standard deviation, largest.
+    """
+
+    course: GeometryCourse
+    test: JointTest
+    probability: float
+    explanations: tuple[Explanation, ...]
+    moved: tuple[float, float, float] | None
+
+
+def geometry_courses(
+    root: Path, results: Sequence[Row], projects: Sequence[Project], progress: Progress
+) -> tuple[list[GeometryCourse], list[Problem]]:
+    """Courses of robots with three calibrations or more on different days, and problems of those that cannot be compared.
+
+    `results` are the first rows of all results, each once. Of calibrations of one day, or from the same measurements, the last counts.
+    """
+    robots: dict[tuple[str, str, str], list[Row]] = defaultdict(list)
+    for row in results:
+        if row.kind == "calibration" and row.date is not None and Path(row.file).name != RESULTS:
+            robots[row.robot, row.model, row.urdf].append(row)
+    many = {key: visits for key, rows in robots.items() if len(visits := _visits(rows)) >= FEWEST_VISITS}
+    courses: list[GeometryCourse] = []
+    problems: list[Problem] = []
+    for number, ((robot, model, urdf), visits) in enumerate(many.items()):
+        progress("comparing", number / len(many))
+        dates = tuple(row.date for row in visits if row.date is not None)
+        folder = next(p.folder for p in reversed(projects) if p.robot == robot)
+        try:
+            trend = _trend(root, folder, urdf, visits, dates)
+        except FlexcalError as problem:
+            problems.append(problem_of(root, folder, problem))
+            continue
+        if trend is not None:
+            courses.append(GeometryCourse(robot, model, urdf, dates, trend))
+    return courses, problems
+
+
+def geometry_drifts(courses: Sequence[GeometryCourse], families: int, level: float) -> list[GeometryDrift]:
+    """Tests of courses, which share the error rate with those of all `families` of tests; the change is explained of those that are
+    significant at the `level`.
+    """
+    lines = [
+        JointLine(
+            len(c.trend.change),
+            c.trend.visits,
+            c.trend.statistic,
+            c.trend.residual,
+            c.trend.freedom,
+            (c.model, c.urdf),
+        )
+        for c in courses
+    ]
+    tests = joint_tests(lines)
+    adjusted = holm([test.probability for test in tests])
+    found = []
+    for course, test, corrected in zip(courses, tests, adjusted, strict=True):
+        p = min(1.0, families * float(corrected))
+        explanations = course.trend.explained(test.scale, test.freedom) if p <= level else ()
+        moved = course.trend.displacement(explanations, test.scale)
+        found.append(GeometryDrift(course, test, p, explanations, moved))
+    return found
+
+
+def _visits(rows: Sequence[Row]) -> list[Row]:
+    distinct = {row.data or row.file: row for row in sorted(rows, key=_when)}
+    return list({row.date and row.date.date(): row for row in sorted(distinct.values(), key=_when)}.values())
+
+
+def _when(row: Row) -> datetime:
+    return row.date or row.modified
+
+
+def _trend(
+    root: Path, folder: Path, urdf: str, visits: Sequence[Row], dates: Sequence[datetime]
+) -> GeometryTrend | None:
+    estimates = [read_estimates(root / row.file)["calibration"] for row in visits]
+    model, same = model_before(folder / ROBOT, estimates)
+    if sha256_of(model.urdf) != urdf:
+        return None
+    return geometry_trend(model, estimates, np.array([years(date) for date in dates]), same_springs=same)
