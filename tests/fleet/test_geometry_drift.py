@@ -1,0 +1,124 @@
+"""Drift of a robot's geometry as a whole, on robots of a simulator that shares nothing with flexcal."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dh_arm import DHArm, postures, tracked, write_poses, write_robot
+from scipy.stats import binom
+
+from flexcal import RobotModel, fit_geometry, read_poses
+from flexcal.files.formats import write_estimates
+from flexcal.fleet import JointLine, joint_tests
+from flexcal.jobs.fleet import Fleet, review_fleet
+
+DAYS = ("2024-01-10", "2024-07-10", "2025-01-10", "2025-07-10")
+SIGMA = 2e-5
+
+
+def write_fleet(
+    root: Path, robots: int, seed: int, after: Callable[[DHArm, int, int], DHArm], visits: int = 4
+) -> Fleet:
+    """Robots that are calibrated on every day at other poses, with the tracker elsewhere and the reflector put on anew; `after` makes of
+    an arm what it is at a visit of a robot.
+    """
+    for number in range(robots):
+        folder = root / f"r{number}"
+        folder.mkdir(parents=True)
+        model = RobotModel.from_yaml(write_robot(folder), estimates=False)
+        urdf = hashlib.sha256((folder / "robot.urdf").read_bytes()).hexdigest()
+        rng = np.random.default_rng(100 * seed + number)
+        arm = DHArm.made(100 * seed + number)
+        for visit, day in enumerate(DAYS[:visits]):
+            own = after(arm, number, visit).bumped(tuple(3e-4 * rng.normal(size=3)))
+            q = postures(rng, 45)
+            measured = tracked(own.points(q), rng, SIGMA)
+            poses = write_poses(folder / "poses.csv", q, measured, SIGMA)
+            fit = fit_geometry(model, read_poses(poses, model), terms=("kinematic",))
+            origin = {
+                "option.targets": "smr",
+                "option.terms": "kinematic",
+                "input.robot.urdf": urdf,
+                "input.poses.csv": hashlib.sha256(poses.read_bytes()).hexdigest(),
+            }
+            ranges = {f"joint_{k + 1}": (float(q[:, k].min()), float(q[:, k].max())) for k in range(6)}
+            (folder / day).mkdir()
+            estimate = replace(fit.estimate, provenance=origin, ranges=ranges)
+            write_estimates(folder / day / "estimates.yaml", "calibration", estimate)
+    return review_fleet(root, tolerance=1e-3)
+
+
+def test_a_slow_drift_is_found_and_named(tmp_path: Path) -> None:
+    """joint_4 turns by 0.1 mrad from visit to visit, which moves the tool by less than 0.1 mm: no single parameter says so."""
+    fleet = write_fleet(tmp_path, 2, 1, lambda arm, n, visit: arm.turned(4, 1e-4 * visit) if n else arm)
+    document = fleet.document()
+    assert document["counts"]["geometry_trends_tested"] == 2 and not document["problems"]
+    (drift,) = document["geometry_drifts"]
+    assert drift["robot"] == "r1" and drift["adjusted_probability"] < 0.01
+    (cause,) = drift["explanations"]
+    assert cause["name"] == "joint_4.offset"
+    assert abs(cause["change"] - 3e-4) < 3 * cause["std"] < 1.5e-4
+    moved = drift["tool_mm"]
+    # a turn by 0.3 mrad moves a point 0.1 m from the axis of joint 4 by 0.03 mm
+    assert 0.01 < moved["mean"] < moved["largest"] < 0.15
+    assert "significant, but small beside the tolerance of 1 mm" in drift["sentence"]
+    fleet.write(tmp_path / "fleet.parquet")
+    page = (tmp_path / "fleet.html").read_text("utf-8")
+    assert "joint_4.offset" in page and "small beside the tolerance" in page
+
+
+def test_another_reflector_and_station_are_no_drift(tmp_path: Path) -> None:
+    """The reflector creeps by 0.5 mm a visit, which is nothing of the robot."""
+    fleet = write_fleet(tmp_path, 1, 2, lambda arm, _, visit: arm.bumped((5e-4 * visit, 0, 0)), visits=3)
+    document = fleet.document()
+    assert document["counts"]["geometry_trends_tested"] == 1
+    assert document["geometry_drifts"] == [] and document["robots"][0]["geometry_drift"] is None
+
+
+def test_calibrations_in_other_ranges_are_a_problem(tmp_path: Path) -> None:
+    write_fleet(tmp_path, 1, 3, lambda arm, *_: arm, visits=3)
+    file = tmp_path / "r0" / DAYS[1] / "estimates.yaml"
+    text = file.read_text("utf-8")
+    (line,) = [row for row in text.splitlines() if row.strip().startswith("joint_2: [")]
+    file.write_text(text.replace(line, line.partition(":")[0] + ": [2.5, 3.0]"), "utf-8")
+    (problem,) = review_fleet(tmp_path).document()["problems"]
+    assert problem["place"].startswith("r0") and "joint_2" in problem["sentence"]
+
+
+@pytest.mark.parametrize(("largest", "robots"), [(1.0, 1), (100.0, 12)])
+def test_rate_of_false_alarms(largest: float, robots: int) -> None:
+    """Normal values of 20 quantities of 4 visits, of which one scatters `largest` times as much (variance) as its covariance tells."""
+    rng, alarms, fleets = np.random.default_rng(7), 0, 300
+    spread = np.sqrt(np.r_[largest, np.ones(19)])
+    for _ in range(fleets):
+        slopes = (spread * rng.normal(size=(robots, 20))) ** 2
+        rest = (spread * rng.normal(size=(robots, 2, 20))) ** 2
+        lines = [
+            JointLine(20, 4, float(s.sum()), float(r.sum()), 500.0) for s, r in zip(slopes, rest, strict=True)
+        ]
+        alarms += joint_tests(lines)[0].probability < 0.05
+    assert alarms <= binom.ppf(0.999, fleets, 0.05)
+    assert alarms >= binom.ppf(0.001, fleets, 0.01)
+
+
+@pytest.mark.slow
+def test_rate_of_false_alarms_over_fleets(tmp_path: Path) -> None:
+    """Fleets of robots whose zeros of joints 2 and 3 and whose size go up and down with the temperature: any is named in 5 % at most."""
+
+    def warm(arm: DHArm, number: int, visit: int) -> DHArm:
+        rng = np.random.default_rng((number, visit, len(list(tmp_path.iterdir()))))
+        rows = arm.rows.copy()
+        rows[1:3, 0] += 1e-4 * rng.normal()
+        rows[:, 1:3] *= 1 + 1e-4 * rng.normal()
+        return replace(arm, rows=rows)
+
+    named = [
+        write_fleet(tmp_path / str(seed), 5, seed, warm, visits=3).document()["counts"]["drifting"] > 0
+        for seed in range(40)
+    ]
+    assert sum(named) <= binom.ppf(0.999, len(named), 0.05)
