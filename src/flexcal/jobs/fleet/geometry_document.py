@@ -52,13 +52,13 @@ def _sentence(drift: GeometryDrift, tolerance: float | None) -> str:
     """What drifted by how much, and how far that moves the tool, with the tolerance (m) where there is one."""
     if drift.moved is None:
         return (
-            f"changed steadily over {len(drift.course.dates)} calibrations, by no single parameter of a joint; "
+            f"trend over {len(drift.course.dates)} calibrations, of no single parameter of a joint; "
             "flexcal report --compare shows where the tool moved between two of them"
         )
     changes = "; ".join(explanation_in_words(item) for item in drift.explanations)
     mean, std, largest = (m / MILLIMETRE for m in drift.moved)
     said = (
-        f"changed steadily over {len(drift.course.dates)} calibrations, from the first to the last {changes}: "
+        f"trend over {len(drift.course.dates)} calibrations, from the first to the last {changes}: "
         f"this moves the tool by {mean:.3f} ± {std:.3f} mm on average, {largest:.3f} mm at most"
     )
     if tolerance is None:
