@@ -34,7 +34,8 @@ def trends_section(document: Mapping[str, Any]) -> Section:
         "calibrations; and the geometry as a whole, by the movement of the tool at common poses that all parameters together make, of "
         f"{counted(counts['geometry_trends_tested'], 'robot')}. "
         f"P-values are corrected for the number of tests (Holm): if nothing drifts, any robot is named for its errors in "
-        f"{100 * level:.0f} % of fleets at most, and in as many for its parameters, single or together."
+        f"{100 * level:.0f} % of fleets at most, and in as many for its parameters, single or together. "
+        "A jump between two visits is no trend and may not be found so: flexcal report --compare compares two calibrations."
     )
     blocks: list[Block] = []
     if drifting:
