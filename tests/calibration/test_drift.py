@@ -27,6 +27,16 @@ def test_a_drift_is_found(simulate, tx90l):
     assert 0 < np.sqrt(np.trace(drift.covariance)) < 0.4 * drift.distance
 
 
+def test_what_the_residuals_have_of_it_is_their_own_slope(simulate, tx90l):
+    """By a straight line through the residuals that the fit returns; the parameters took up the rest."""
+    poses = _drifted(simulate(3, 60, sigma=3e-5).poses, TRAVEL)
+    fit = fit_geometry(tx90l, poses)
+    drift = Drift.of(fit)
+    slope = np.polyfit(np.linspace(0, 1, len(poses)), fit.residuals, 1)[0]
+    np.testing.assert_allclose(drift.left, slope, rtol=1e-9, atol=1e-12)
+    assert 0 < drift.residual < drift.distance
+
+
 def test_taking_the_drift_out_leaves_none(simulate, tx90l):
     """The estimate is one step of Gauss-Newton: points less the drift that was found have none, the parameters fitted anew."""
     poses = _drifted(simulate(4, 60, sigma=3e-5).poses, TRAVEL)

@@ -133,7 +133,7 @@ class Estimate:
         return float(slope * math.sqrt(self.covariance[number, number]))
 
     def interval(self, name: str) -> tuple[float, float] | None:
-        """95 % confidence interval of a parameter in natural units, symmetric in the estimation coordinate.
+        """95 % confidence interval of a parameter in natural units, symmetric in the estimation coordinate, within the bounds.
 
         Quantile of Student's t below 100 degrees of freedom, where the noise level or the covariance is hardly better known, else normal.
 
@@ -153,7 +153,8 @@ class Estimate:
         item = self.parameters[number]
         centre = item.coordinate(item.value)
         half = self._quantile() * math.sqrt(self.covariance[number, number])
-        return item.natural(centre - half), item.natural(centre + half)
+        low, high = item.natural(centre - half), item.natural(centre + half)
+        return max(low, item.lower), min(high, item.upper)
 
     def quantity(self, name: str, truth: float | None = None) -> dict[str, float | bool | None]:
         """Value, standard deviation and interval of a parameter as in every results file.

@@ -19,17 +19,24 @@ _CHANCE = 0.0027
 class Drift:
     """Drift (3,) m of the points in the first station's frame during the measurement, at constant rate; `covariance` (3, 3).
 
-    `freedom` are the degrees of freedom of the scatter in that covariance.
+    `freedom` are the degrees of freedom of the scatter in that covariance. `left` (3,) m is the part of it in the residuals, whose straight
+    line has it from the first row to the last: what the fit did not take up by its parameters.
     """
 
     travel: np.ndarray
     covariance: np.ndarray
     freedom: int
+    left: np.ndarray
 
     @property
     def distance(self) -> float:
         """Length of the drift, m."""
         return float(np.linalg.norm(self.travel))
+
+    @property
+    def residual(self) -> float:
+        """Length of what the residuals drift by, m."""
+        return float(np.linalg.norm(self.left))
 
     @property
     def probability(self) -> float:
@@ -49,6 +56,7 @@ class Drift:
         """Block of a JSON document."""
         return {
             "distance_mm": self.distance / MILLIMETRE,
+            "residual_mm": self.residual / MILLIMETRE,
             "p": self.probability,
             "certain": self.certain,
         }
@@ -71,4 +79,7 @@ class Drift:
         travel = covariance @ products[:-1, -1]
         freedom = int(fit.linear.readings.present.sum()) - fit.linear.free.shape[2] - len(travel)
         left = float(products[-1, -1] - products[:-1, -1] @ travel)
-        return cls(travel, covariance * max(1.0, left / max(freedom, 1)), freedom)
+        seen = np.flatnonzero(poses.located & ~np.isin(np.arange(len(poses)), fit.estimate.outliers))
+        centred = share[seen] - share[seen].mean()
+        slope = centred @ fit.residuals[seen] / float(centred @ centred)
+        return cls(travel, covariance * max(1.0, left / max(freedom, 1)), freedom, slope)

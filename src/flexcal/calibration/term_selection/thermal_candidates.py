@@ -45,10 +45,13 @@ def thermal_weakness(poses: PoseSet, rigid: GeometricFit) -> str:
     assert temperature is not None
     extent, spread = float(np.ptp(temperature)), float(temperature.std())
     if not extent > 0:
-        return f"the temperature in the files is {temperature[0]:.1f} throughout"
+        return f"the temperature in the files is {temperature[0]:.1f} °C throughout"
     sensor = sensor_scatter(poses)
     if sensor is not None and spread < _ABOVE_SENSOR * sensor:
-        return f"the temperature varies by {extent:.2g} K only, and its sensor scatters by {sensor:.2g} K"
+        return (
+            f"the temperature varies by {spread:.2g} K (1σ), which is less than {_ABOVE_SENSOR:.0f} times the {sensor:.2g} K by which its "
+            "sensor scatters"
+        )
     std = float(np.sqrt(np.mean(rigid.residuals**2))) / (spread * _extent_of(rigid) * np.sqrt(len(poses)))
     if std > PRECISION:
         return (

@@ -45,8 +45,27 @@ PoseFiles = Annotated[
     Positional[Paths],
     file_argument("POSES...", "files of measured poses (CSV or Parquet), one or several"),
 ]
+
+
+def _celsius(texts: list[str]) -> float:
+    try:
+        return float(texts[0])
+    except ValueError:
+        raise InputError(
+            "E-CLI-047",
+            f"--temperature is '{texts[0]}', but must be a number of °C, without a unit, as in --temperature 32.",
+        ) from None
+
+
 Temperature = Annotated[
     MaybeNumber,
+    PrimitiveConstructorSpec(
+        nargs=1,
+        metavar="°C",
+        instance_from_str=_celsius,
+        is_instance=lambda value: value is None or isinstance(value, float),
+        str_from_instance=lambda value: [str(value)],
+    ),
     arg(
         metavar="°C",
         help="Temperature of the arm, °C, where no column 'temperature' says it.",

@@ -34,6 +34,11 @@ def estimates_option(place: Path | None) -> str:
     return "" if place is None else f" --estimates {place}"
 
 
+def temperature_option(celsius: float | None) -> str:
+    """The option by which another verb takes the same temperature of the arm; empty where none was given."""
+    return "" if celsius is None else f" --temperature {celsius:g}"
+
+
 def after_dynamics(robot: Path, model: RobotModel, loaded: str) -> str:
     """Next commands after the robot's own dynamics: the payload by `loaded`, if one is declared and not identified, and springs or
     poses.

@@ -22,7 +22,7 @@ from flexcal.cli.arguments.shared_options import (
     require_at_least,
     require_robot,
 )
-from flexcal.cli.arguments.suggested_commands import estimates_option
+from flexcal.cli.arguments.suggested_commands import estimates_option, temperature_option
 from flexcal.cli.terminal.console import Console
 
 
@@ -108,7 +108,7 @@ class Map:
         where = estimates_option(self.estimates)
         console.finish(
             document,
-            f"flexcal compensate {self.robot} TARGETS.csv{where}, for commands with this accuracy",
+            f"flexcal compensate {self.robot} TARGETS.csv{temperature_option(self.temperature)}{where}, for commands with this accuracy",
         )
 
 

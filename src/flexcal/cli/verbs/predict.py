@@ -9,6 +9,7 @@ from typing import Annotated
 from tyro.conf import Positional, arg
 
 from flexcal.cli.arguments.shared_options import Estimates, Json, Robot, Temperature, require_robot
+from flexcal.cli.arguments.suggested_commands import estimates_option, temperature_option
 from flexcal.cli.terminal.console import Console
 
 
@@ -54,7 +55,8 @@ class Predict:
         for remark in document["remarks"]:
             console.say(remark)
         console.say(f"wrote {self.out}: {document['poses']} poses of the tool in the base frame")
+        where = temperature_option(self.temperature) + estimates_option(self.estimates)
         console.finish(
             document,
-            f"flexcal compensate {self.robot} TARGETS.csv, for commands that bring the tool to its targets",
+            f"flexcal compensate {self.robot} TARGETS.csv{where}, for commands that bring the tool to its targets",
         )

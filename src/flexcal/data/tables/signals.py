@@ -16,7 +16,7 @@ from flexcal.errors import InputError, unreadable
 from flexcal.files.formats import read_yaml_file
 from flexcal.files.structuring import suggestion
 from flexcal.files.transaction import current_path
-from flexcal.units import DEGREE, MILLIMETRE
+from flexcal.units import COLDEST, DEGREE, HOTTEST, MILLIMETRE, temperature_fault
 
 if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel, SignalConfig
@@ -57,9 +57,12 @@ UNITS: dict[str, dict[str, float]] = {
     "base_quaternion": {},
     "sigma_angle": {"rad": 1.0, "deg": DEGREE},
     **dict.fromkeys(("tilt_x", "tilt_y", "tilt_z"), _TILT),
-    "temperature": {},
+    "temperature": {"degC": 1.0, "degF": 5 / 9, "K": 1.0},
 }
 """Quantities that `signals:` can map, and the factors of their units to SI; currents take a gain in N m/A."""
+
+ZEROS = {"degF": -32.0, "K": -273.15}
+"""What is added to a value in such a unit before the factor to SI, or to °C."""
 
 SENSOR_UNITS: tuple[dict[str, float], ...] = (
     _LENGTH,
@@ -85,12 +88,14 @@ class Signal:
     timestamps: bool = False
 
     def values(self, table: Table) -> np.ndarray:
-        """The quantity (N, m) in SI units."""
-        raw = np.stack([table.columns[name] for name in self.columns], axis=1)
-        if self.matrix is None and not self.offset.any() and (self.factor == 1.0).all():
-            return raw
-        scaled = raw * self.factor
-        return (scaled if self.matrix is None else scaled @ self.matrix.T) + self.offset
+        """The quantity (N, m) in SI units, temperatures in °C; raises `InputError` at the first that no arm has."""
+        values = np.stack([table.columns[name] for name in self.columns], axis=1)
+        if self.matrix is not None or self.offset.any() or (self.factor != 1.0).any():
+            scaled = values * self.factor
+            values = (scaled if self.matrix is None else scaled @ self.matrix.T) + self.offset
+        if self.quantity == "temperature":
+            _check_celsius(table, self.columns[0], values[:, 0])
+        return values
 
     def columns_of(self, values: np.ndarray) -> dict[str, np.ndarray]:
         """The columns (N,) that a file would have for a quantity (N, m), by name; raises `InputError` where the matrix has no inverse."""
@@ -165,6 +170,19 @@ def assign(
             )
             raise file.error("E-TABLE-004", f"the column '{column}' is not known{hint}")
     return assigned
+
+
+def _check_celsius(table: Table, column: str, values: np.ndarray) -> None:
+    wrong = (values < COLDEST) | (values > HOTTEST)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        hint = " Or say the column's unit, degF or K, by `unit:` under `signals:` of robot.yaml, or by 'flexcal import --map'."
+        raise table.error(
+            "E-TABLE-044",
+            row,
+            column,
+            f"the temperature {temperature_fault(float(values[row]))}{hint if wrong.all() and values[row] < 400 else ''}",
+        )
 
 
 def _choose(file: TableFile, quantity: str, n: int, mapped: Signal | None, required: bool) -> Signal | None:
@@ -259,7 +277,8 @@ def _mapped(model: RobotModel, name: str, config: SignalConfig) -> Signal:
             f"{k} columns are named, but {m} are needed ({', '.join(standard_columns(name, model.n))}).",
         )
     gain = np.ones(k) if config.gain is None else np.array(config.gain)
-    offset = np.zeros(m) if config.offset is None else np.array(config.offset) * unit
+    offset = np.zeros(m) if config.offset is None else np.array(config.offset)
+    offset = (offset + ZEROS.get(config.unit or "", 0.0)) * unit
     return Signal(name, tuple(config.columns), gain * unit, matrix, offset, config.unit == TIMESTAMP)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.data.tables import UNITS, Signal, Table, standard_columns
+from flexcal.data.tables import UNITS, ZEROS, Signal, Table, standard_columns
 
 NUMBERED = ("pose",)
 """Quantities that `signals:` does not map: files have them under their own names."""
@@ -36,7 +36,7 @@ def units_of(quantity: str) -> Mapping[str, float]:
 
 @dataclass(frozen=True)
 class ColumnAssignment:
-    """SI = (gain · column + offset) · unit, one entry a column; `why` says how the columns and their units were recognised."""
+    """SI = (gain · column + offset + zero of the unit) · unit, one entry a column; `why` says how columns and units were recognised."""
 
     quantity: str
     columns: tuple[str, ...]
@@ -66,7 +66,7 @@ class ColumnAssignment:
             self.columns,
             np.array(self.gains) * factors,
             None,
-            np.array(self.offsets) * factors,
+            (np.array(self.offsets) + [ZEROS.get(unit or "", 0.0) for unit in self.units]) * factors,
         )
 
     def values(self, table: Table) -> np.ndarray:

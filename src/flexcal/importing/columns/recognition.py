@@ -276,5 +276,5 @@ def place(
         unit = (pose_time_unit if points else time_unit)(values[:, 0])
         return ColumnAssignment.plain(quantity, columns, (unit,), f"{why}; the unit by the rate")
     default = next(iter(known), None)
-    taken = f"; taken to be in {default}" if default else ""
+    taken = f"; taken to be in {default.replace('degC', '°C')}" if default else ""
     return ColumnAssignment.plain(quantity, columns, (default,) * len(columns), f"{why}{taken}")

@@ -6,6 +6,8 @@ import re
 from dataclasses import dataclass
 from unicodedata import normalize
 
+from flexcal.importing.tables.vocabulary import SINGLE
+
 _UNITS = {
     "deg": ("deg", "degree", "degrees", "degs", "°", "º", "grad"),
     "rad": ("rad", "rads", "radian", "radians"),
@@ -32,9 +34,12 @@ _UNITS = {
     "mA": ("ma",),
     "kg": ("kg",),
     "g": ("g",),
+    "degC": ("c", "°c", "degc", "celsius"),
+    "degF": ("f", "°f", "degf", "fahrenheit"),
+    "K": ("k", "kelvin"),
 }
 _SPELLINGS = {spelling: unit for unit, spellings in _UNITS.items() for spelling in spellings}
-_OTHER_UNITS = ("-", "1", "c", "°c", "degc", "k", "v", "%", "none", "hz")
+_OTHER_UNITS = ("-", "1", "v", "%", "none", "hz")
 _AS_WORD = {
     "deg",
     "degree",
@@ -50,8 +55,15 @@ _AS_WORD = {
     "ma",
     "rpm",
     "kg",
+    "celsius",
+    "fahrenheit",
+    "kelvin",
+    "degc",
+    "degf",
 }
 """Units recognised as the last word of a name."""
+_OF_TEMPERATURE = {"c", "f", "k"}
+"""Units recognised only after a word of a temperature: elsewhere they are names of axes and others."""
 _LAST_WORD = {"m", "s", "a", "n"}
 """Units recognised only after other words, and no number."""
 _BRACKETS = re.compile(r"[\[({<]\s*([^\])}>]*?)\s*[\])}>]\s*$")
@@ -92,7 +104,8 @@ def parse_name(column: str, unit: str | None = None) -> ColumnName:
     if given_unit is None and len(parts) > 1:
         last = parts[-1]
         after_words = len(parts) > 2 or not parts[0].isdigit()
-        if last in _AS_WORD or (last in _LAST_WORD and after_words and not _is_short(parts[:-1])):
+        warm = last in _OF_TEMPERATURE and set(parts[:-1]) & SINGLE["temperature"]
+        if warm or last in _AS_WORD or (last in _LAST_WORD and after_words and not _is_short(parts[:-1])):
             given_unit, parts = _SPELLINGS[last], parts[:-1]
     numbers = [int(part) for part in parts if part.isdigit()]
     words = tuple(part for part in parts if not part.isdigit())

@@ -44,6 +44,7 @@ from flexcal.jobs.inputs import (
     CalibratedRobot,
     is_station_identified,
     require_distinct_files,
+    require_temperature,
     temperature_remarks,
     unmeasured_targets_remark,
 )
@@ -311,6 +312,7 @@ def _checked_map(
     progress: Progress,
 ) -> AccuracyMap:
     """`accuracy_map` after the check by verification poses."""
+    require_temperature(temperature)
     # what inclinometers alone leave open is uncertain by the tolerances
     model = robot.model if robot.measured else robot.probable
     # a fixture with sockets is no instrument: what it tells is in the base frame

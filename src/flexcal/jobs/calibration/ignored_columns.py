@@ -19,5 +19,5 @@ def ignored_columns_remarks(poses: PoseSet, used: Collection[str] = ()) -> tuple
             "the temperature in the files is not used: no selected term of the model depends on it"
         )
     if poses.time is not None and "time" not in used:
-        remarks.append("the times in the files are not used: no term of the model depends on them")
+        remarks.append("no term of the model depends on the times in the files")
     return tuple(remarks)

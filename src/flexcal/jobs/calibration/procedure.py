@@ -139,7 +139,7 @@ def calibrate(
     estimate = replace(
         selected.estimate,
         provenance=provenance((), options),
-        ranges=joint_extents(selected.model, selected.poses.q) | _temperatures(selected),
+        ranges=joint_extents(selected.model, selected.poses.q) | _temperatures(selected.poses),
         measurements=measurement_digests(poses),
     )
     uncalibrated = uncalibrated_model(fits.model, poses)
@@ -163,10 +163,10 @@ def calibrate(
     )
 
 
-def _temperatures(fit: GeometricFit) -> dict[str, tuple[float, float]]:
-    """Range of the temperatures, °C, where the robot changes with them."""
-    told = fit.temperature
-    return {} if told is None else {TEMPERATURE: (told.lowest, told.highest)}
+def _temperatures(poses: PoseSet) -> dict[str, tuple[float, float]]:
+    """Range of the temperatures, °C, where they were measured."""
+    measured = poses.temperature
+    return {} if measured is None else {TEMPERATURE: (float(measured.min()), float(measured.max()))}
 
 
 def _without_wrong_readings(poses: PoseSet, fit: GeometricFit) -> np.ndarray:

@@ -155,7 +155,8 @@ def calibration_remarks(fit: GeometricFit, cause: Sequence[str] = ()) -> tuple[s
     drift = Drift.of(fit) if fit.poses.located.any() else None
     if drift is not None and drift.certain:
         remarks.append(
-            f"residuals drift with time (p = {drift.probability:.1g}), by {drift.distance / MILLIMETRE:.3f} mm from first to last pose: "
+            f"residuals drift with time (p = {drift.probability:.1g}), by {drift.residual / MILLIMETRE:.3f} mm from first to last pose, "
+            f"and the fit may have taken up more: a drift of {drift.distance / MILLIMETRE:.3f} mm beside it explains the readings best; "
             "robot or instrument warmed up, or position and measuring order are correlated"
         )
     remarks += cause

@@ -86,7 +86,8 @@ def _confounded(told: TemperatureEvidence) -> str:
     name = max(told.narrow, key=lambda n: told.wide[n] / told.narrow[n])
     return (
         f"temperature and {_clock(told)} go together in these measurements (correlation {told.correlation:.2f}), so a change with "
-        f"temperature is hardly told from another drift: it widens the interval of {name} by {told.wide[name] / told.narrow[name]:.1f}; "
+        f"temperature is hardly told from another drift: it widens the interval of {name} by a factor of "
+        f"{told.wide[name] / told.narrow[name]:.1f}; "
         "measure while the arm warms up and cools down, or with warm and cold poses mixed, to tell them apart"
     )
 

@@ -13,6 +13,7 @@ from .given_temperature import (
     calibrated_temperatures,
     held_at,
     reference_temperature,
+    require_temperature,
     temperature_remarks,
     with_temperature,
 )
@@ -46,6 +47,7 @@ __all__ = [
     "read_responses",
     "reference_temperature",
     "require_distinct_files",
+    "require_temperature",
     "robot_file",
     "robot_provenance",
     "stored_estimates",

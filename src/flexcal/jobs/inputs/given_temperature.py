@@ -12,6 +12,7 @@ from flexcal.errors import InputError
 from flexcal.jobs.inputs.stored_model import CalibratedRobot
 from flexcal.model.kinematics import at_temperature, depends_on_temperature
 from flexcal.model.robot import RobotModel
+from flexcal.units import temperature_fault
 
 TEMPERATURE = "temperature"
 """Name of the range of temperatures in the block `calibration` of estimates.yaml."""
@@ -25,8 +26,9 @@ def with_temperature(
 ) -> tuple[_Rows, tuple[str, ...]]:
     """Targets or measured points with their temperatures, their own or the `given` one, °C, and remarks on these.
 
-    Raises `InputError` where both are there.
+    Raises `InputError` where both are there, and where the given one is that of no arm.
     """
+    require_temperature(given)
     if rows.temperature is not None and given is not None:
         raise InputError(
             "E-RUN-109",
@@ -38,7 +40,11 @@ def with_temperature(
 
 
 def held_at(robot: CalibratedRobot, temperature: float | None) -> tuple[RobotModel, tuple[str, ...]]:
-    """The most probable robot at one temperature, °C, by default that at which its parameters hold, and remarks on it."""
+    """The most probable robot at one temperature, °C, by default that at which its parameters hold, and remarks on it.
+
+    Raises `InputError` for a temperature that no arm has.
+    """
+    require_temperature(temperature)
     if not depends_on_temperature(robot.model):
         warm = None if temperature is None else np.array([temperature])
         return robot.probable, temperature_remarks(robot, warm)
@@ -52,17 +58,20 @@ def held_at(robot: CalibratedRobot, temperature: float | None) -> tuple[RobotMod
     return at_temperature(robot.probable, at), (*said, *outside)
 
 
+def require_temperature(given: float | None) -> None:
+    """Raise `InputError` for a temperature, °C, that no arm has; None passes."""
+    fault = "" if given is None else temperature_fault(given)
+    if fault:
+        raise InputError("E-RUN-111", f"the given temperature {fault}")
+
+
 def temperature_remarks(
     robot: CalibratedRobot, temperature: np.ndarray | None, what: str = "positions"
 ) -> tuple[str, ...]:
     """What is to be said of temperatures (N,), °C, at which a calibrated robot is used, or of their absence."""
     model = robot.model
     if not depends_on_temperature(model):
-        return (
-            ()
-            if temperature is None
-            else ("the temperature has no effect: the calibrated robot has no term that depends on it",)
-        )
+        return () if temperature is None else (_unused(robot, temperature, what),)
     low, high = calibrated_temperatures(robot)
     if temperature is None:
         return (
@@ -78,6 +87,23 @@ def temperature_remarks(
     if outside.all() and np.ptp(temperature) == 0:
         return (f"the temperature of {worst:.1f} °C lies {beyond}",)
     return (f"{outside.sum()} of {len(temperature)} temperatures, as {worst:.1f} °C, lie {beyond}",)
+
+
+def _unused(robot: CalibratedRobot, temperature: np.ndarray, what: str) -> str:
+    """That a calibration without a term of temperature takes none, and how far from its own temperatures (N,) °C are."""
+    said = "the temperature is not used, because the calibration has no term that depends on it: "
+    measured = robot.blocks["calibration"].ranges.get(TEMPERATURE) if "calibration" in robot.blocks else None
+    if measured is None:
+        return f"{said}{what} are for the temperature at which it was measured, which is not known"
+    low, high = measured
+    where = f"at {low:.1f} °C" if high - low < 0.1 else f"from {low:.1f} to {high:.1f} °C"
+    away = float(np.maximum(low - temperature, temperature - high).max())
+    far = (
+        f", and {away:.1f} K from the farthest of these temperatures"
+        if away > 0
+        else ", which includes these"
+    )
+    return f"{said}{what} are for the temperatures at which it was measured, {where}{far}"
 
 
 def calibrated_temperatures(robot: CalibratedRobot) -> tuple[float, float]:

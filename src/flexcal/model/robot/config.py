@@ -8,6 +8,7 @@ from typing import Literal
 
 from flexcal.errors import FlexcalError
 from flexcal.model.parts import Bearings
+from flexcal.units import temperature_fault
 
 Triple = tuple[float, float, float]
 _LEAST_PRIOR = 1e-12
@@ -210,6 +211,9 @@ class GeometryConfig:
     reference_temperature: float | None = None
 
     def __post_init__(self) -> None:
+        fault = "" if self.reference_temperature is None else temperature_fault(self.reference_temperature)
+        if fault:
+            raise FlexcalError("E-ROBOT-080", f"reference_temperature {fault}")
         levels = ("kinematic", "offsets", "lengths", "backlash")
         of_joints = ("gravity_compliance", "lateral_compliance", "thermal_drift")
         known = (*levels, *of_joints, "transmission", "ratio", "thermal", "thermal_links", "thermal_stations")

@@ -158,8 +158,9 @@ def check_drift(drift: Mapping[str, Any]) -> Check:
     if not drift["certain"]:
         return Check(question, f"No drift detected (p = {p_value(drift['p'])}).", "good")
     answer = (
-        f"Residuals drift with time (p = {p_value(drift['p'])}), by {document_millimetres(drift['distance_mm'])} mm from the first "
-        "pose to the last. Let robot and instrument warm up, or measure in random order if place and order are correlated."
+        f"Residuals drift with time (p = {p_value(drift['p'])}), by {document_millimetres(drift['residual_mm'])} mm from the first "
+        f"pose to the last; a drift of {document_millimetres(drift['distance_mm'])} mm beside the fit explains the readings best. Let "
+        "robot and instrument warm up, or measure in random order if place and order are correlated."
     )
     return Check(question, answer, "care")
 
