@@ -29,6 +29,7 @@ from flexcal.jobs.calibration.fitted_measurements import measurement_digests
 from flexcal.jobs.calibration.held_out import held_out_errors
 from flexcal.jobs.calibration.held_out_tilts import held_out_tilts
 from flexcal.jobs.calibration.joint_ranges import joint_extents
+from flexcal.jobs.calibration.odd_temperatures import plausible_temperatures, with_plausible_temperatures
 from flexcal.jobs.calibration.result import Calibration
 from flexcal.jobs.inputs import TARGETS, TARGETS_BETWEEN, TEMPERATURE, is_station_identified
 from flexcal.model.robot import ZERO_DRIFT, RobotModel
@@ -104,7 +105,10 @@ def calibrate(
     0.1 mm at 77 poses
     """
     _require_uncalibrated(model)
-    nominal, measured = model, poses
+    plausible = plausible_temperatures(poses)
+    if hold_out is not None:
+        hold_out = (hold_out[0], hold_out[1][plausible])
+    nominal, measured = model, with_plausible_temperatures(poses, plausible)
     sample = StratifiedSample.of(measured)
     poses = measured if sample is None else measured.subset(sample.rows)
     requested = requested_terms(model, terms)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from flexcal.calibration.fit import GeometricFit, TemperatureEvidence
-from flexcal.model.robot import EXPANSION
+from flexcal.model.robot import EXPANSION, STATION_DRIFT
+from flexcal.units import MILLIMETRE
 
 _MICRO = 1e-6
 _METALS = 30.0
@@ -55,6 +56,7 @@ def thermal_document(fit: GeometricFit) -> dict[str, Any] | None:
         "drift_p": told.probability,
         "sensor_std": told.scatter,
         "attenuation": told.attenuation,
+        "instrument_mm": None if (change := _instrument_change(fit, told)) is None else change / MILLIMETRE,
         "parameters": {
             name: {"std": told.wide[name], "std_without_time": narrow} for name, narrow in told.narrow.items()
         },
@@ -68,6 +70,12 @@ def _expansion(fit: GeometricFit, told: TemperatureEvidence) -> str:
         f"{told.highest:.1f} °C"
     )
     interval = fit.estimate.interval(EXPANSION) if EXPANSION in fit.estimate.parameters else None
+    change = _instrument_change(fit, told)
+    if change is not None and all(_is_of_station(name) for name in told.narrow):
+        return (
+            f"the instrument's readings change with temperature or time, by {change / MILLIMETRE:.3f} mm over the measured "
+            f"temperatures, and no term of the robot itself was taken: {where}"
+        )
     if interval is None:
         return f"the robot changes with temperature: {where}"
     low, high = (limit / _MICRO for limit in interval)
@@ -80,6 +88,19 @@ def _expansion(fit: GeometricFit, told: TemperatureEvidence) -> str:
         )
     size = f"{(low + high) / 2:.1f} ± {(high - low) / 2:.1f} µm/m"
     return f"the {of} expands by {size} per kelvin of the column 'temperature' (95 %){odd}; {where}"
+
+
+def _instrument_change(fit: GeometricFit, told: TemperatureEvidence) -> float | None:
+    """Largest change of an instrument's readings over the measured temperatures, m; None without such a term."""
+    of: dict[str, float] = {}
+    for name in filter(_is_of_station, told.narrow):
+        station = name.rpartition(".")[0]
+        of[station] = of.get(station, 0.0) + fit.estimate.values[name] ** 2
+    return max(of.values()) ** 0.5 * (told.highest - told.lowest) if of else None
+
+
+def _is_of_station(name: str) -> bool:
+    return name.rpartition(".")[2] in STATION_DRIFT
 
 
 def _confounded(told: TemperatureEvidence) -> str:

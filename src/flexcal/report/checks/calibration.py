@@ -22,6 +22,7 @@ from flexcal.report.checks.pose_errors import (
     check_outliers,
     check_rank,
 )
+from flexcal.report.checks.temperature import check_instrument_change, check_temperature_sensor
 from flexcal.report.layout import Check
 from flexcal.report.results import IdentifiableParameters
 from flexcal.units import MILLIMETRE
@@ -59,12 +60,25 @@ def calibration_checks(
             estimate, results["variances"], is_implausible=results["fit"]["is_implausible"], held=held
         ).named("residual"),
         check_rank(identifiable.parameters, identifiable.rank, identifiable.gap).named("rank"),
-        *([] if results["drift"] is None else [check_drift(results["drift"]).named("drift")]),
+        *_checks_of_drift(results),
         check_outliers(len(estimate.outliers), errors).named("outliers"),
         *([] if results.get("places") is None else [check_places(results["places"])]),
         *check_bearings(results.get("bearings")),
         *check_fleet(results.get("fleet")),
         *_stage_one_checks(results.get("stage1")),
+    )
+
+
+def _checks_of_drift(results: Mapping[str, Any]) -> tuple[Check, ...]:
+    """Whether anything drifted, in the residuals or in what terms of temperature took up, and whether these are measured well enough."""
+    drift, told = results["drift"], results.get("temperature")
+    changed = told is not None and told["instrument_mm"] is not None
+    # what the instrument's term took up is no drift of the residuals any more
+    shown = drift is not None and (drift["certain"] or not changed)
+    return (
+        *([check_drift(drift).named("drift")] if shown else []),
+        *([check_instrument_change(told)] if changed else []),
+        *([] if told is None else check_temperature_sensor(told, results["fit"])),
     )
 
 

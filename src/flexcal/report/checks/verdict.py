@@ -156,6 +156,8 @@ PHRASES: dict[str, dict[str, str]] = {
         "else": "it is not clear which parameters the poses determine",
     },
     "drift": {"good": "no drift was detected", "else": "residuals drift with time"},
+    "instrument_change": {"else": "the instrument's readings change with temperature or time"},
+    "temperature_sensor": {"else": "the temperature may be measured too imprecisely for its coefficients"},
     "bearings": {
         "good": "the bearings tilt about the right axes",
         "else": "the data fit other bearing axes than the declared ones",
