@@ -22,11 +22,14 @@ from flexcal.calibration.recheck import (
     drift_sums,
     errors_from_calibration,
     errors_from_reference,
+    explaining_alarms,
     judge_visit,
     possible_changes,
 )
 from flexcal.calibration.recheck.cumulative_sums import decision_limit, innovations, run_length
 from flexcal.data.poses import PoseSet, concatenate
+from flexcal.jobs.inputs import reference_temperature
+from flexcal.jobs.recheck.visit_history import Readings
 
 
 class Visited:
@@ -114,6 +117,42 @@ def test_one_wrong_reading_is_no_change_of_the_robot(visited: Visited) -> None:
     position[4] += (4e-4, -3e-4, 2e-4)
     found = recheck(visited.robot, replace(visit, position=position), reference=visited.reference)
     assert found.verdict == "wrong_reading" and "pose 4 disagrees on its own" in found.headline
+
+
+def test_a_visit_and_its_reference_are_each_taken_at_their_own_temperature(visited: Visited) -> None:
+    """An arm that grows by 15 µm/m/K, 8 K above the temperature of its parameters, then and now."""
+    shop, q = visited.shop, visited.q
+    model = visited.robot.model.with_values({"thermal.expansion": 15e-6, "thermal.reference": 20.0})
+    robot = CalibratedRobot(visited.robot.nominal, model, visited.robot.blocks)
+    holds = reference_temperature(model)
+
+    def at(warmer: float, rows: np.ndarray, told: bool = True) -> PoseSet:
+        poses = shop.measured(model, rows, growth=15e-6 * warmer)
+        return replace(poses, temperature=np.full(len(rows), holds + warmer) if told else None)
+
+    reference = at(8.0, np.repeat(q, 3, axis=0))
+    stored = Readings.of(reference).poses(1e-5)
+    for warmer in (8.0, 0.0):
+        found = recheck(robot, at(warmer, q), reference=stored)
+        assert found.verdict == "as_calibrated" and "not used" not in found.summary()
+    given = recheck(robot, at(8.0, q, told=False), reference=stored, temperature=holds + 8.0)
+    assert given.verdict == "as_calibrated"
+    # what is not told shows as growth, and is said
+    silent = recheck(robot, at(8.0, q), reference=replace(stored, temperature=None))
+    assert silent.verdict == "thermal_growth" and "the reference visit has no temperature" in silent.summary()
+    unsaid = recheck(robot, at(-8.0, q, told=False), reference=stored)
+    assert unsaid.verdict == "thermal_growth" and "no temperature is given" in unsaid.summary()
+
+
+def test_beside_an_instrument_that_moved_a_first_joint_is_said_to_be_unseen(visited: Visited) -> None:
+    place = visited.shop.place.copy()
+    place[:3, 3] += (2e-4, -1e-4, 1e-4)
+    found = visited.judged(place=place, arm=visited.shop.arm.turned(1, 4e-4))
+    assert found.verdict == "instrument_moved" and "a shift of joint_1 looks just like" in found.headline
+    assert "not seen: joint_1" in found.power_sentence and not found.judged.suspects
+    shifted = visited.judged(arm=visited.shop.arm.turned(1, 4e-4))
+    assert shifted.verdict == "ambiguous" and "the tool is where it was" in shifted.headline
+    assert "if it was a shift of joint_1, the tool is off by" in shifted.headline
 
 
 def test_the_place_of_the_instrument_is_fitted_where_declared(visited: Visited) -> None:
@@ -257,6 +296,29 @@ def test_a_slow_drift_is_found_by_the_sums_before_any_visit_shows_it() -> None:
     assert max(abs(v[0].estimate) for v in drifting[: found.alarm]) / np.hypot(1.0, 0.5) < norm.ppf(
         1 - 0.0005 / 7
     )
+
+
+def test_a_step_is_told_from_a_drift_and_from_other_joints() -> None:
+    """Another joint, of whose shift a visit shows half, raises its sum too and is not named."""
+    rng = np.random.default_rng(6)
+
+    def visits(course: np.ndarray) -> list[list[ShiftAtVisit]]:
+        noise = 0.5 * rng.normal(size=(len(course), 2))
+        return [
+            [
+                ShiftAtVisit("joint_5", 0.5 * c + n[0], 0.5, 0.3, "a"),
+                ShiftAtVisit("joint_2", c + n[1], 0.5, 0.3, "a"),
+            ]
+            for c, n in zip(course, noise, strict=True)
+        ]
+
+    for course, told in (((np.arange(40) >= 12) * 1.0, "step"), (0.1 * np.arange(40), "drift")):
+        sums = drift_sums(visits(course))
+        assert sum(item.gradual for item in sums) == 2
+        (found,) = explaining_alarms(sums)
+        assert found.subject == "joint_2" and found.course == told
+        assert told == "drift" or abs(found.stepped - 12) <= 2
+    assert explaining_alarms(drift_sums([*visits(np.zeros(20)), *[[]] * 5])) == ()
 
 
 def test_real_poses_left_out_are_as_calibrated_and_a_shifted_column_is_named(examples: Path) -> None:

@@ -1,5 +1,5 @@
 from .change_effects import PossibleChange, possible_changes
-from .cumulative_sums import AVERAGE_RUN, DriftSum, ShiftAtVisit, drift_sums
+from .cumulative_sums import AVERAGE_RUN, DriftSum, ShiftAtVisit, drift_sums, explaining_alarms
 from .detection import DetectionLimit, detection_limits
 from .displaced_tool import MovedTool, TellingPose, moved_tool, telling_pose
 from .global_test import FALSE_ALARM, GlobalTest
@@ -32,6 +32,7 @@ __all__ = [
     "drift_sums",
     "errors_from_calibration",
     "errors_from_reference",
+    "explaining_alarms",
     "judge_visit",
     "moved_tool",
     "planned_errors",

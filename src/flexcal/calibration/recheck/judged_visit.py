@@ -8,13 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.calibration.recheck.change_effects import PossibleChange, possible_changes, wrong_readings
-from flexcal.calibration.recheck.cumulative_sums import ShiftAtVisit
+from flexcal.calibration.recheck.cumulative_sums import ALIKE, ShiftAtVisit
 from flexcal.calibration.recheck.global_test import FALSE_ALARM, GlobalTest, SeenChange, seen_change
 from flexcal.calibration.recheck.visit_errors import VisitErrors
 from flexcal.estimation import student_quantile
 
-_ALIKE = 2 * np.log(20.0)
-"""Difference of twice the log-likelihood below which two changes explain the errors about as well: odds of 20."""
 _LARGE = 1e-4
 """Shift of a joint, rad or m, above which the points do not move in proportion to it."""
 _STEPS = 4
@@ -77,6 +75,8 @@ class JudgedVisit:
         Every change of one parameter, as if it were the only one, whatever the verdict.
     instrument : {"known", "declared", "evident"}
         Why the place of the instrument was fitted to the visit, if it was.
+    place : Suspect or None
+        Where the instrument stands then, where that alone explains the errors.
     """
 
     test: GlobalTest
@@ -85,6 +85,7 @@ class JudgedVisit:
     together: float
     shifts: tuple[Suspect, ...]
     instrument: str = "known"
+    place: Suspect | None = None
 
     @property
     def as_calibrated(self) -> bool:
@@ -128,7 +129,8 @@ def judge_visit(errors_of: Callable[[bool], VisitErrors | None], *, placed: bool
     judged = _judge(errors)
     if placed:
         return replace(judged, instrument="declared")
-    if judged.as_calibrated or judged.suspects:
+    alone = [suspect.change.kind for suspect in judged.suspects] == ["instrument_moved"]
+    if judged.as_calibrated or (judged.suspects and not alone):
         return judged
     again = errors_of(True)
     if again is None or again.errors.size < _LEAST:
@@ -138,7 +140,7 @@ def judge_visit(errors_of: Callable[[bool], VisitErrors | None], *, placed: bool
     before = float(np.sum((judged.test.whitening @ errors.errors) ** 2))
     after = float(np.sum((moved.test.whitening @ again.errors) ** 2))
     if moved.as_calibrated or (moved.suspects and after < _EVIDENT * before):
-        return replace(moved, instrument="evident")
+        return replace(moved, instrument="evident", place=judged.suspects[0] if alone else None)
     return judged
 
 
@@ -182,7 +184,7 @@ def _suspects(test: GlobalTest) -> tuple[Suspect, ...]:
         if suspect is best:
             continue
         same = _contains(item, best_item)
-        if same or suspect.score < best.score + _ALIKE:
+        if same or suspect.score < best.score + ALIKE:
             alike.append(replace(suspect, same=same or _contains(best_item, item)))
     return tuple(sorted(alike, key=lambda s: s.score))
 

@@ -23,6 +23,7 @@ from flexcal.calibration.verification import (
 )
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
+from flexcal.model.kinematics import depends_on_temperature
 from flexcal.model.robot import RobotModel
 
 LEAST_MATCHED = 4
@@ -118,9 +119,10 @@ def errors_from_reference(
 ) -> VisitErrors | None:
     """Change of the errors since a `reference` visit, at the poses and points that both have; None where these are fewer than four.
 
-    Errors of model and parameters cancel; what remains is the scatter of both visits: that of repeated readings within them where there
-    are enough, else as the calibration found it, which may be larger, as errors of the model at single poses are part of it. With
-    `placed` the instrument stands elsewhere than at the reference. Raises `FlexcalError` as `errors_from_calibration` does.
+    Errors of model and parameters cancel, but for those of the expansion between different temperatures of the visits; what remains is the
+    scatter of both visits: that of repeated readings within them where there are enough, else as the calibration found it, which may be
+    larger, as errors of the model at single poses are part of it. With `placed` the instrument stands elsewhere than at the reference.
+    Raises `FlexcalError` as `errors_from_calibration` does.
     """
     poses, reference = _points(poses), _points(reference)
     pairs = _matched(poses, reference)
@@ -147,6 +149,8 @@ def errors_from_reference(
     turned = _turns(here, base, first)
     weights = [np.repeat(1 / np.sqrt(group.count[pairs[:, k]]), 3) for k, group in enumerate((now, then))]
     own, common = (size * w[:, None] * independent * w for w in weights)
+    warmed = _warmed(here, first, reference.subset(then.first[pairs[:, 1]]), covariance)
+    common = common + warmed @ warmed.T
     return VisitErrors(
         here,
         first,
@@ -257,6 +261,22 @@ def _placed(model: RobotModel, poses: PoseSet) -> RobotModel:
     at_base = with_stations_at_base(model)
     placement = rigid_placement(poses, predict_measurements(at_base, poses).position)
     return model.with_values(placement.values(model))
+
+
+def _warmed(model: RobotModel, poses: PoseSet, reference: PoseSet, covariance: ErrorCovariance) -> np.ndarray:
+    """Roots (3 K, k), m, of the errors of the calibrated parameters that do not cancel as the visits had different temperatures."""
+    if not depends_on_temperature(model):
+        return np.zeros((3 * len(poses), 0))
+    warm = [
+        np.full(len(rows), float(model.thermal.reference[0]))
+        if rows.temperature is None
+        else rows.temperature
+        for rows in (poses, reference)
+    ]
+    if np.allclose(*warm, rtol=0, atol=1e-9):
+        return np.zeros((3 * len(poses), 0))
+    before = prediction_errors_with_covariance(model, replace(poses, temperature=warm[1]))[1]
+    return (covariance.roots - before.roots).reshape(3 * len(poses), -1)
 
 
 def _turns(here: RobotModel, base: RobotModel, poses: PoseSet) -> np.ndarray:

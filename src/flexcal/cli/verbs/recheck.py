@@ -16,6 +16,7 @@ from flexcal.cli.arguments.shared_options import (
     MaybeText,
     Paths,
     Robot,
+    Temperature,
     any_number,
     file_argument,
     require_robot,
@@ -51,6 +52,7 @@ class Recheck:
     """station: the instrument stands elsewhere than at the calibration or the reference visit; its place is fitted to the poses."""
     reference: bool = False
     """This visit is the reference for later ones, in place of an earlier one; measure every pose three times in it."""
+    temperature: Temperature = None
     date: Annotated[MaybeText, arg(metavar="DATE", help_behavior_hint="(default: today)")] = None
     """Date of the visit, like 2026-03-31."""
     visits: Annotated[
@@ -86,6 +88,7 @@ class Recheck:
                 estimates=self.estimates,
                 refit="station" in self.refit,
                 reference=self.reference,
+                temperature=self.temperature,
                 day=self.date,
                 command=command_line(),
                 progress=progress,
@@ -94,20 +97,25 @@ class Recheck:
         console.say(checked.power_sentence)
         for remark in checked.remarks:
             console.say(remark)
-        console.say(f"wrote {self.out / 'visits.json'}: {len(checked.dates)} visits since this calibration")
+        console.say(
+            f"wrote {self.out / 'visits.json'}: {_counted(len(checked.dates), 'visit')} since this calibration"
+        )
         console.say(f"wrote {self.out / 'report.html'}")
         document = checked.document()
         where = estimates_option(self.estimates)
+        kept = where if self.visits is None else f"{where} --out {self.visits}"
+        again = f"flexcal recheck {self.robot} NEXT_VISIT.csv{kept}"
         after = {
-            "as_calibrated": f"flexcal recheck {self.robot} NEXT_VISIT.csv{where}, at the same poses",
-            "wrong_reading": "measure that pose again, and recheck",
-            "instrument_moved": "nothing for the robot; tell later visits with --refit station",
+            "as_calibrated": f"{again}, at the same poses",
+            "wrong_reading": f"measure again what disagrees, and {again}",
+            "instrument_moved": f"while the instrument stands there, {again} --refit station, at the same poses",
+            "recalibrate": f"flexcal calibrate {self.robot} POSES… anew, unless the visit was measured or written wrongly",
         }
         console.finish(
             document,
             after.get(
                 checked.verdict,
-                f"mend what is named where it can be, and recheck; or flexcal calibrate {self.robot} POSES… anew",
+                f"mend what is named where it can be, and {again}; or flexcal calibrate {self.robot} POSES… anew",
             ),
         )
 
@@ -135,3 +143,7 @@ class Recheck:
             planned.document(),
             f"{measure_command(planned.file, self.robot, 'visit')}{import_command(self.robot, 'visit.csv')}",
         )
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

@@ -13,7 +13,7 @@ from flexcal.jobs.guidance.analysis import Analysis
 from flexcal.jobs.guidance.consistency import FEWEST, length_ratio
 from flexcal.jobs.guidance.disturbances import Disturbance
 from flexcal.jobs.guidance.judgement import Finding, Judgement, moved_far_text, p_text, radius
-from flexcal.jobs.guidance.misreadings import Misreading, misread_point, other_pose, planned_pose
+from flexcal.jobs.inputs import Misreading, misread_point, other_pose, planned_pose
 from flexcal.model.robot import RobotModel
 from flexcal.units import MILLIMETRE
 

@@ -17,6 +17,7 @@ from .given_temperature import (
     temperature_remarks,
     with_temperature,
 )
+from .misreadings import Misreading, misread_point, other_pose, planned_pose
 from .provenance import image_provenance, robot_provenance
 from .stored_model import (
     TARGETS,
@@ -35,6 +36,7 @@ __all__ = [
     "TARGETS_BETWEEN",
     "TEMPERATURE",
     "CalibratedRobot",
+    "Misreading",
     "calibrated_temperatures",
     "common_plan",
     "example_robot",
@@ -42,7 +44,10 @@ __all__ = [
     "image_provenance",
     "is_station_identified",
     "measured_points",
+    "misread_point",
+    "other_pose",
     "plan_files",
+    "planned_pose",
     "read_plan_for_robot",
     "read_responses",
     "reference_temperature",

@@ -18,6 +18,7 @@ from flexcal.calibration.recheck import (
     TellingPose,
 )
 from flexcal.jobs.recheck.judgement_words import suspect_in_words
+from flexcal.model.robot import RobotModel
 from flexcal.units import MILLIMETRE
 
 SHIFT = 0.05e-3
@@ -48,7 +49,9 @@ def recheck_block(
         "noise": errors.noise,
         "instrument": judged.instrument,
         "poses": len(errors.poses),
-        "suspects": [_suspect_block(s, tool) for s, tool in zip(judged.suspects, tools, strict=True)],
+        "suspects": [
+            _suspect_block(s, tool, errors.model) for s, tool in zip(judged.suspects, tools, strict=True)
+        ],
         "together": judged.together,
         "telling_pose": None if telling is None else {"q": telling.q, "apart_mm": telling.apart / MILLIMETRE},
         "against_calibration": None
@@ -63,8 +66,8 @@ def recheck_block(
     }
 
 
-def drift_block(drifts: Sequence[DriftSum], dates: Sequence[str]) -> dict[str, Any]:
-    """Block `drift`: cumulative sums over the visits of these dates."""
+def drift_block(drifts: Sequence[DriftSum], dates: Sequence[str], alarms: Sequence[str]) -> dict[str, Any]:
+    """Block `drift`: cumulative sums over the visits of these dates; `alarms` are subjects that explain them."""
     return {
         "average_run": AVERAGE_RUN,
         "limit": drifts[0].limit if drifts else None,
@@ -75,7 +78,7 @@ def drift_block(drifts: Sequence[DriftSum], dates: Sequence[str]) -> dict[str, A
                 "downward": item.downward,
                 "alarm": item.alarm,
                 "since": item.since,
-                "drifts": item.gradual,
+                "drifts": item.subject in alarms,
             }
             for item in drifts
         },
@@ -99,12 +102,12 @@ def power_block(limits: Sequence[DetectionLimit]) -> dict[str, Any]:
     }
 
 
-def _suspect_block(suspect: Suspect, tool: MovedTool) -> dict[str, Any]:
+def _suspect_block(suspect: Suspect, tool: MovedTool, model: RobotModel) -> dict[str, Any]:
     change = suspect.change
     return {
         "kind": change.kind,
         "subject": change.subject,
-        "words": suspect_in_words(suspect),
+        "words": suspect_in_words(suspect, model),
         "changes": {
             name: {
                 "estimate": float(value),

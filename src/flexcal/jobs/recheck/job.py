@@ -10,7 +10,7 @@ from datetime import date
 from pathlib import Path
 
 from flexcal.calibration.recheck import ShiftAtVisit, drift_sums
-from flexcal.data.poses import DEFAULT_SIGMA, PoseSet, read_poses, tables_of
+from flexcal.data.poses import DEFAULT_SIGMA, read_poses, tables_of
 from flexcal.errors import InputError
 from flexcal.files.formats import block_sha256, provenance, sha256_of
 from flexcal.jobs.inputs import CalibratedRobot, image_provenance, require_distinct_files
@@ -31,6 +31,7 @@ def recheck_robot(
     estimates: Path | None = None,
     refit: bool = False,
     reference: bool = False,
+    temperature: float | None = None,
     day: str | None = None,
     command: str = "",
     progress: Progress = silent,
@@ -58,7 +59,11 @@ def recheck_robot(
     base = before[references[-1]] if references else None
     before = before[references[-1] :] if references else before
     judged = recheck(
-        robot, poses, reference=None if base is None else base.readings.poses(DEFAULT_SIGMA), refit=refit
+        robot,
+        poses,
+        reference=None if base is None else base.readings.poses(DEFAULT_SIGMA),
+        refit=refit,
+        temperature=temperature,
     )
     absolute = judged.absolute or judged.judged
     origin = provenance([robot_file, robot.nominal.urdf, *files], None, robot.stored, tuple(robot.blocks))
@@ -71,9 +76,11 @@ def recheck_robot(
     )
     series = _series(judged, base, calibration)
     shifts = [item for item in judged.judged.at_visit(series) if item.std < _LARGEST]
-    history = [*before, _visit(judged, poses, when, digests, calibration, shifts)]
+    history = [*before, _visit(judged, when, digests, calibration, shifts)]
     judged = replace(
-        judged, dates=tuple(v.date for v in history), drifts=drift_sums([v.shifts for v in history])
+        judged,
+        dates=tuple(v.date for v in history),
+        drifts=drift_sums([v.shifts if v.steady else [] for v in history]),
     )
     visit = replace(
         history[-1],
@@ -89,7 +96,6 @@ def recheck_robot(
 
 def _visit(
     judged: Recheck,
-    poses: PoseSet,
     when: str,
     digests: dict[str, str],
     calibration: str,
@@ -105,7 +111,7 @@ def _visit(
         sentence=judged.headline,
         probability=judged.judged.probability,
         shifts=shifts,
-        readings=Readings.of(poses),
+        readings=Readings.of(judged.poses),
         alarms=[],
         suspects=judged.numbers["suspects"],
     )

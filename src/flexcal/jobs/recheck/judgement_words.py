@@ -6,7 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexcal.calibration.recheck import FALSE_ALARM, JudgedVisit, MovedTool, Suspect, TellingPose
+from flexcal.calibration.recheck import (
+    AVERAGE_RUN,
+    FALSE_ALARM,
+    DriftSum,
+    JudgedVisit,
+    MovedTool,
+    Suspect,
+    TellingPose,
+)
+from flexcal.model.robot import EXPANSION, RobotModel
 from flexcal.report.results import amount
 from flexcal.units import MILLIMETRE
 
@@ -22,10 +31,11 @@ def judgement_sentence(judged: JudgedVisit) -> str:
     """What the visit says of the robot."""
     chance = _chance(judged.probability)
     moved = judged.instrument == "evident"
-    elsewhere = "the instrument, or the base of the robot, stands elsewhere; beside that the robot is "
     if judged.as_calibrated:
         if moved:
-            return f"{elsewhere}as calibrated ({chance}; false alarms {FALSE_ALARM:.0%})"
+            place = "the instrument, or the base of the robot, stands elsewhere"
+            told = place if judged.place is None else suspect_in_words(judged.place, judged.test.errors.model)
+            return f"{told}; beside that the robot is as calibrated{_as_far_as_seen(judged)} ({chance}; false alarms {FALSE_ALARM:.0%})"
         return f"as calibrated ({chance}; false alarms {FALSE_ALARM:.0%})"
     lead = "the instrument, or the base of the robot, stands elsewhere; beside that: " if moved else ""
     if not judged.suspects:
@@ -38,7 +48,7 @@ def judgement_sentence(judged: JudgedVisit) -> str:
             f"{lead}recalibrate ({chance}): the errors are not those of shifted joints, a bumped tool, growth or a moved instrument, all "
             "together; if the instrument is noisier than at the calibration, or poses were not those commanded, measure again first"
         )
-    return f"{lead}{', or '.join(suspect_in_words(s) for s in judged.suspects)} ({chance})"
+    return f"{lead}{', or '.join(suspect_in_words(s, judged.test.errors.model) for s in judged.suspects)} ({chance})"
 
 
 def effect_sentence(judged: JudgedVisit, tools: Sequence[MovedTool], expected: float) -> str:
@@ -47,7 +57,26 @@ def effect_sentence(judged: JudgedVisit, tools: Sequence[MovedTool], expected: f
     """
     if judged.as_calibrated or not judged.suspects:
         return ""
-    return _effect(judged.suspects[0], tools[0], expected)
+    if len(judged.suspects) == 1:
+        return _effect(judged.suspects[0], tools[0], expected)
+    told = [
+        f"if it was {suspect_name(suspect)}, "
+        + (
+            "the tool is where it was"
+            if suspect.change.kind in ("instrument_moved", "wrong_reading")
+            else f"the tool is off by {tool.p95 / MILLIMETRE:.3f} mm at 95 % of the poses"
+        )
+        for suspect, tool in zip(judged.suspects, tools, strict=True)
+    ]
+    return f"; {', '.join(told)}"
+
+
+def _as_far_as_seen(judged: JudgedVisit) -> str:
+    """Joints whose shift is not seen beside the fitted place of the instrument."""
+    unseen = [change.subject for change in judged.test.unseen if change.kind == "joint_shifted"]
+    if not unseen:
+        return ""
+    return f", as far as it can be seen then: a shift of {' or '.join(unseen)} looks just like another place of the instrument"
 
 
 def telling_sentence(judged: JudgedVisit, telling: TellingPose | None, noise: float) -> str:
@@ -83,6 +112,23 @@ def telling_sentence(judged: JudgedVisit, telling: TellingPose | None, noise: fl
     )
 
 
+def alarm_sentence(alarms: Sequence[DriftSum], dates: Sequence[str]) -> str:
+    """What `alarms`, the most likely first, say of the visits of these dates."""
+    item = alarms[0]
+    names = " or ".join(
+        f"the {other.subject}" if other.subject == "payload" else other.subject for other in alarms
+    )
+    many = len(alarms) == 1 and item.subject.startswith("all ")
+    drifts = f"{names} drift{'' if many else 's'} slowly over the visits to {dates[-1]}"
+    before = f" between the visits of {dates[item.stepped - 1]} and {dates[item.stepped]}"
+    steps = f"{names} changed at once{before}"
+    told = {"drift": drifts, "step": steps, "either": f"{drifts}, or changed at once{before}"}[item.course]
+    return (
+        f"{told}: that adds up beyond chance, though no visit shows it (cumulative sum; one false alarm in {AVERAGE_RUN:.0f} visits; a "
+        "tool or an instrument that creeps looks much the same)"
+    )
+
+
 def suspect_name(suspect: Suspect) -> str:
     """Name of a change without its size."""
     subject = suspect.change.subject
@@ -96,16 +142,16 @@ def suspect_name(suspect: Suspect) -> str:
     }[suspect.change.kind]
 
 
-def suspect_in_words(suspect: Suspect) -> str:
-    """A change with its size and 95 % half-width."""
+def suspect_in_words(suspect: Suspect, model: RobotModel) -> str:
+    """A change of a calibrated robot with its size and 95 % half-width."""
     change, values, stds = suspect.change, suspect.estimate, suspect.quantile * suspect.std
     value, half = float(values[0]), float(stds[0])
     if change.kind == "joint_shifted":
         return f"{change.subject} shifted by {amount(value, half, change.units[0])}"
     if change.kind == "thermal_growth":
         return (
-            f"thermal growth: all lengths by {amount(1e6 * value, 1e6 * half, 'µm/m')} (as {value / _KELVIN:+.1f} K of steel), unless it "
-            "is the scale of the instrument".replace("-", "−")
+            f"thermal growth: all lengths by {amount(1e6 * value, 1e6 * half, 'µm/m')} ({_as_warmth(value, model)}), unless it is the "
+            "scale of the instrument"
         )
     if change.kind == "payload_changed":
         return f"the payload changed by {amount(value, half, 'kg')}"
@@ -123,8 +169,20 @@ def suspect_in_words(suspect: Suspect) -> str:
     return f"the instrument, or the base of the robot, stands elsewhere by {told} and {turned * 1e3:.3f} mrad"
 
 
+def _as_warmth(growth: float, model: RobotModel) -> str:
+    """Growth of all lengths, m/m, as a change of temperature: by the arm's own coefficient where it is known to a third."""
+    expansion, posterior = model.value(EXPANSION), model.posterior
+    if posterior.determines(EXPANSION) and expansion > 3 * np.sqrt(posterior.marginal([EXPANSION])[0, 0]):
+        told = f"as {growth / expansion:+.1f} K of this arm, whose calibrated expansion is {1e6 * expansion:.1f} µm/m/K"
+    else:
+        told = f"as {growth / _KELVIN:+.1f} K of steel"
+    return told.replace("-", "−")
+
+
 def _effect(suspect: Suspect, tool: MovedTool, expected: float) -> str:
-    if suspect.change.kind in ("instrument_moved", "wrong_reading"):
+    if suspect.change.kind == "instrument_moved":
+        return ""
+    if suspect.change.kind == "wrong_reading":
         return "; beside that the robot is as calibrated"
     low, high = (value / MILLIMETRE for value in tool.p95_interval)
     told = (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from flexcal.calibration.recheck import (
-    AVERAGE_RUN,
     LEAST_MATCHED,
     DetectionLimit,
     DriftSum,
@@ -22,6 +20,7 @@ from flexcal.calibration.recheck import (
     detection_limits,
     errors_from_calibration,
     errors_from_reference,
+    explaining_alarms,
     judge_visit,
     moved_tool,
     telling_pose,
@@ -29,15 +28,22 @@ from flexcal.calibration.recheck import (
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.jobs.calibration import ignored_columns_remarks, outside_ranges
-from flexcal.jobs.inputs import CalibratedRobot, is_station_identified
+from flexcal.jobs.inputs import (
+    CalibratedRobot,
+    is_station_identified,
+    reference_temperature,
+    with_temperature,
+)
 from flexcal.jobs.pages import REPORT, PlottedResult
 from flexcal.jobs.recheck.document import SHIFT, UNSEEN, drift_block, recheck_block
 from flexcal.jobs.recheck.judgement_words import (
+    alarm_sentence,
     effect_sentence,
     judgement_sentence,
     telling_sentence,
 )
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, header, write_results
+from flexcal.model.kinematics import depends_on_temperature
 from flexcal.report.layout import Page
 from flexcal.report.pages import RecheckStudy, recheck_page
 
@@ -66,6 +72,8 @@ class Recheck(PlottedResult):
         Expected error of the calibrated robot at these poses, root mean square, m.
     outside : str
         Which poses lie outside the joint ranges of the calibration.
+    warm : tuple of str
+        Remarks on the temperatures of the visit and of the reference.
     unmatched : bool
         Whether a reference visit was given that has fewer than four poses in common with this one.
     reference_date : str or None
@@ -86,6 +94,7 @@ class Recheck(PlottedResult):
     telling: TellingPose | None
     expected: float
     outside: str
+    warm: tuple[str, ...] = ()
     unmatched: bool = False
     reference_date: str | None = None
     dates: tuple[str, ...] = ()
@@ -122,15 +131,21 @@ class Recheck(PlottedResult):
 
     @property
     def alarms(self) -> tuple[DriftSum, ...]:
-        """Cumulative sums that passed their limit over several visits, the largest first; a jump at one visit is no drift."""
-        passed = [item for item in self.drifts if item.gradual]
-        return tuple(sorted(passed, key=lambda item: -max(item.upward[-1], item.downward[-1])))
+        """Of the cumulative sums, where one passed its limit over several visits, those of subjects whose change explains the visits, the
+        most likely first; where the visit itself shows a change, only of what that may be.
+        """
+        named = {suspect.change.subject for suspect in self.judged.suspects}
+        return tuple(
+            item
+            for item in explaining_alarms(self.drifts)
+            if self.judged.as_calibrated or item.subject in named
+        )
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:
         """Remarks, one sentence each."""
         judged, errors = self.judged, self.judged.test.errors
-        remarks = [*self.poses.notes, *ignored_columns_remarks(self.poses)]
+        remarks = [*self.poses.notes, *ignored_columns_remarks(self.poses, ("temperature",)), *self.warm]
         if self.outside:
             remarks.append(self.outside)
         if judged.instrument == "declared":
@@ -141,6 +156,11 @@ class Recheck(PlottedResult):
         noise = float(np.sqrt(np.trace(errors.own) / len(errors.own)))
         if telling := telling_sentence(judged, self.telling, noise):
             remarks.append(telling)
+        if judged.verdict == "instrument_moved" and any(limit.found >= UNSEEN for limit in self.limits):
+            remarks.append(
+                "a point that is fixed to the robot's base, measured with the others, tells a moved instrument from a shift of a joint "
+                "that only turns or moves the whole"
+            )
         if self.absolute is not None and not self.absolute.as_calibrated and judged.as_calibrated:
             remarks.append(
                 "since the reference visit nothing changed; against the calibration itself: "
@@ -162,18 +182,8 @@ class Recheck(PlottedResult):
                 "three times tells the robot's own, and makes the test sharper"
             )
         if self.alarms:
-            remarks.append(self._alarm(self.alarms))
+            remarks.append(alarm_sentence(self.alarms, self.dates))
         return tuple(remarks)
-
-    def _alarm(self, alarms: Sequence[DriftSum]) -> str:
-        item = alarms[0]
-        assert item.alarm is not None and item.since is not None
-        others = ", ".join(other.subject for other in alarms[1:])
-        return (
-            f"{item.subject} drifts: over the visits from {self.dates[item.since]} to {self.dates[item.alarm]} its shift adds up beyond "
-            f"chance (cumulative sum; one false alarm in {AVERAGE_RUN:.0f} visits)"
-            + (f"; so does that of {others}, which the same drift may make" if others else "")
-        )
 
     def write(self, folder: str | Path) -> None:
         """Write results.json and report.html to a folder.
@@ -195,7 +205,7 @@ class Recheck(PlottedResult):
             **header("recheck"),
             "robot": self.model.name,
             "recheck": self.numbers,
-            "drift": drift_block(self.drifts, self.dates),
+            "drift": drift_block(self.drifts, self.dates, [item.subject for item in self.alarms]),
             "sentence": self.headline,
             "power_sentence": self.power_sentence,
             "remarks": list(self.remarks),
@@ -217,7 +227,12 @@ class Recheck(PlottedResult):
 
 
 def recheck(
-    robot: CalibratedRobot, poses: PoseSet, *, reference: PoseSet | None = None, refit: bool = False
+    robot: CalibratedRobot,
+    poses: PoseSet,
+    *,
+    reference: PoseSet | None = None,
+    refit: bool = False,
+    temperature: float | None = None,
 ) -> Recheck:
     """Judge by few measured poses whether a robot is as calibrated, and what changed.
 
@@ -231,6 +246,9 @@ def recheck(
         The same poses, or some of them, as measured when the robot was as calibrated; errors of the model cancel then.
     refit : bool
         Whether the instrument stands elsewhere than at the calibration, or at the reference visit.
+    temperature : float, optional
+        Temperature of the arm, °C, for points that have none; by default that at which the calibrated parameters hold. The reference
+        visit has its own.
 
     Returns
     -------
@@ -254,8 +272,10 @@ def recheck(
     """
     model = robot.model
     _require(robot, poses)
+    poses, warm = with_temperature(robot, poses, temperature)
     if reference is not None:
         _require(robot, reference)
+        warm = (*warm, *_reference_temperature(robot, poses, reference))
     unknown = any(not is_station_identified(model, station) for station in poses.stations)
 
     def against_calibration(placed: bool) -> VisitErrors | None:
@@ -288,7 +308,22 @@ def recheck(
         else None,
         expected=float(np.sqrt(3 * np.trace(whole) / len(whole))),
         outside=outside_ranges(robot, poses.q),
+        warm=warm,
         unmatched=reference is not None and relative is None,
+    )
+
+
+def _reference_temperature(robot: CalibratedRobot, poses: PoseSet, reference: PoseSet) -> tuple[str, ...]:
+    """What is to be said of a reference visit without temperature; where both visits have none, the visit's own remark says it."""
+    if (
+        reference.temperature is not None
+        or poses.temperature is None
+        or not depends_on_temperature(robot.model)
+    ):
+        return ()
+    return (
+        f"the reference visit has no temperature and is taken as of {reference_temperature(robot.model):.1f} °C; if the arm was warmer or "
+        "colder then, that shows as thermal growth: make a reference visit with its temperature (--reference)",
     )
 
 
@@ -302,5 +337,6 @@ def _require(robot: CalibratedRobot, poses: PoseSet) -> None:
         )
     if len(poses) < 4:
         raise FlexcalError(
-            "E-RECHECK-007", f"{len(poses)} poses tell too little; measure four or more, better ten."
+            "E-RECHECK-007",
+            f"{len(poses)} {'pose tells' if len(poses) == 1 else 'poses tell'} too little; measure four or more, better ten.",
         )

@@ -25,7 +25,7 @@ _ADVICE = "restore it from a copy, or move it away to begin anew"
 
 @dataclass(frozen=True)
 class Readings:
-    """Measured points of a visit, N rows: SI units, `sigma` and `payload` None where they were not given."""
+    """Measured points of a visit, N rows: SI units, `sigma`, `payload` and `temperature` (°C) None where they were not given."""
 
     pose: list[int]
     target: list[str]
@@ -34,6 +34,7 @@ class Readings:
     position: list[list[float]]
     sigma: list[list[float]] | None = None
     payload: list[float] | None = None
+    temperature: list[float] | None = None
 
     @classmethod
     def of(cls, poses: PoseSet) -> Readings:
@@ -46,6 +47,7 @@ class Readings:
             poses.position.tolist(),
             poses.sigma.tolist() if poses.sigma_given else None,
             None if poses.payload is None else poses.payload.tolist(),
+            None if poses.temperature is None else poses.temperature.tolist(),
         )
 
     def poses(self, sigma: float) -> PoseSet:
@@ -60,7 +62,7 @@ class Readings:
             payload=None if self.payload is None else np.array(self.payload, dtype=float),
             target=np.array(self.target),
             station=np.array(self.station),
-            temperature=None,
+            temperature=None if self.temperature is None else np.array(self.temperature, dtype=float),
             pose=np.array(self.pose, dtype=int),
             sigma_given=given,
         )
@@ -105,6 +107,11 @@ class Visit:
     readings: Readings
     alarms: list[str]
     suspects: list[Any]
+
+    @property
+    def steady(self) -> bool:
+        """Whether the visit shows no change of the robot on its own, so that its shifts count for cumulative sums."""
+        return self.verdict in ("as_calibrated", "instrument_moved")
 
 
 @dataclass(frozen=True)

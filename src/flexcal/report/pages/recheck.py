@@ -58,11 +58,10 @@ def recheck_page(study: RecheckStudy) -> Page:
     block = results["recheck"]
     found = [j["found_95_percent"] for j in block["power"]["joints"].values()]
     least = None if not found or any(v is None for v in found) else max(found)
-    tool = block["suspects"][0]["tool_mm"] if block["suspects"] else None
     facts = (
         Fact(
             "Is it as calibrated?",
-            {"good": "Yes", "care": "Robot yes", "bad": "No"}.get(_status(block["verdict"]), ""),
+            {"good": "Yes", "care": "As far as seen", "bad": "No"}.get(_status(block["verdict"]), ""),
             "",
             f"Chance makes errors as conspicuous with p = {significant(block['probability'], 2)}; "
             f"below {block['false_alarm']:g} something changed.",
@@ -70,14 +69,15 @@ def recheck_page(study: RecheckStudy) -> Page:
         ),
         Fact(
             "How far is the tool off now?",
-            document_millimetres(None if tool is None else tool["p95"]),
+            _tool_off(block),
             "mm",
-            f"At 95 % of the poses; {document_millimetres(block['expected_mm'])} mm (rms) are expected of the calibrated robot.",
+            f"{'By what it was. ' if len(block['suspects']) > 1 else ''}At 95 % of the poses; "
+            f"{document_millimetres(block['expected_mm'])} mm (rms) are expected of the calibrated robot.",
         ),
         Fact(
             "What would have been found?",
             NOTHING if least is None else f"{least * 1e3:.3f}",
-            "mrad or mm",
+            _shift_unit(block),
             "Shift of any joint that is found with 95 %; joint by joint below.",
         ),
     )
@@ -105,6 +105,19 @@ def recheck_page(study: RecheckStudy) -> Page:
     )
 
 
+def _shift_unit(block: Mapping[str, Any]) -> str:
+    """Thousandth of the unit of the joints' shifts."""
+    units = {joint["unit"] for joint in block["power"]["joints"].values()}
+    return "mm" if units == {"m"} else "mrad or mm" if "m" in units else "mrad"
+
+
+def _tool_off(block: Mapping[str, Any]) -> str:
+    """Displacement of the tool by the change that is named, or by the changes that may be."""
+    off = [suspect["tool_mm"]["p95"] for suspect in block["suspects"]]
+    told = list(dict.fromkeys(document_millimetres(value) for value in sorted(off)))
+    return f"{told[0]} to {told[-1]}" if len(told) > 1 else told[0] if told else document_millimetres(None)
+
+
 def _status(verdict: str) -> Status:
     if verdict == "as_calibrated":
         return "good"
@@ -123,14 +136,21 @@ def _checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
         Check("Is the robot as calibrated?", _sentence(results["sentence"]), _status(block["verdict"])),
         Check(
             "Does the visit see every joint?",
-            f"Not {', '.join(lost)}: these points do not show their shift." if lost else "Yes.",
+            f"Not {', '.join(lost)}: these points do not show their shift"
+            + (
+                ", as it looks just like another place of the instrument."
+                if block["instrument"] != "known"
+                else "."
+            )
+            if lost
+            else "Yes.",
             "care" if lost else "good",
         ),
         Check(
             "Does anything drift over the visits?",
-            f"{', '.join(alarms)}: see the cumulative sums."
+            f"{' or '.join(alarms)}: see the cumulative sums."
             if alarms
-            else f"Not beyond chance in {len(drift['visits'])} visits.",
+            else f"Not beyond chance in {len(drift['visits'])} visit{'' if len(drift['visits']) == 1 else 's'}.",
             "care" if alarms else "good" if len(drift["visits"]) > 1 else "unknown",
         ),
     ]
@@ -190,7 +210,7 @@ def _power_section(block: Mapping[str, Any]) -> Section:
     )
     table = Table(
         "table-power",
-        "Shifts of single joints that this visit finds, mrad (of sliding joints mm)",
+        f"Shifts of single joints that this visit finds, {_shift_unit(block)}",
         (
             "joint",
             "std",
