@@ -72,13 +72,14 @@ def calibration_checks(
 def _checks_of_drift(results: Mapping[str, Any]) -> tuple[Check, ...]:
     """Whether anything drifted, in the residuals or in what terms of temperature took up, and whether these are measured well enough."""
     drift, told = results["drift"], results.get("temperature")
-    changed = told is not None and told["instrument_mm"] is not None
+    if told is None:
+        return () if drift is None else (check_drift(drift).named("drift"),)
+    changed = told["instrument_mm"] is not None
     # what the instrument's term took up is no drift of the residuals any more
-    shown = drift is not None and (drift["certain"] or not changed)
     return (
-        *([check_drift(drift).named("drift")] if shown else []),
+        *([] if drift is None or (changed and not drift["certain"]) else [check_drift(drift).named("drift")]),
         *([check_instrument_change(told)] if changed else []),
-        *([] if told is None else check_temperature_sensor(told, results["fit"])),
+        *check_temperature_sensor(told, results["fit"]),
     )
 
 
