@@ -1,5 +1,6 @@
 """The prior of a robot model from calibrated robots, of an arm that was simulated without the library's kinematics."""
 
+import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -247,6 +248,7 @@ def test_the_fleet_writes_the_prior_of_its_model(
         if k == 3:
             estimate = replace(estimate, provenance={**estimate.provenance, f"input.{FLEET}": "0"})
         write_estimates(file.parent / "estimates.yaml", "calibration", estimate)
+    shutil.copytree(tmp_path / "fleet" / "cell_0", tmp_path / "fleet" / "cell_0_backup")
     out = tmp_path / "prior.yaml"
     assert (
         main(["fleet", str(tmp_path / "fleet"), "--out", str(tmp_path / "t.parquet"), "--prior", str(out)])
@@ -254,6 +256,7 @@ def test_the_fleet_writes_the_prior_of_its_model(
     )
     said = " ".join(capsys.readouterr().out.split())
     assert "from 3 robots (cell_0, cell_1, cell_2)" in said
+    assert "without cell_0_backup, whose calibration is the same as that of cell_0" in said
     assert "without cell_3, calibrated with a prior of other robots" in said
     assert read_fleet_prior(out, six.model).robots == ("cell_0", "cell_1", "cell_2")
 

@@ -15,9 +15,17 @@ def record_command_line(arguments: Sequence[str]) -> None:
     _GIVEN.set(shlex.join(["flexcal", *(_from_here(text) for text in arguments)]))
 
 
-def command_line() -> str:
-    """The command line, paths in or under the current folder relative to it."""
-    return _GIVEN.get()
+def command_line(*, without: str = "") -> str:
+    """The command line, paths in or under the current folder relative to it; `without` an option and its one value."""
+    if not without:
+        return _GIVEN.get()
+    words, kept = iter(shlex.split(_GIVEN.get())), []
+    for word in words:
+        if word == without:
+            next(words, None)
+        elif not word.startswith(f"{without}="):
+            kept.append(word)
+    return shlex.join(kept)
 
 
 def _from_here(argument: str) -> str:

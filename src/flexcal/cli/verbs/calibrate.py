@@ -172,7 +172,7 @@ class Calibrate:
             else f"flexcal export offsets {self.robot}{where}, for the joint zeros that these readings tell"
         )
         if document["fleet"] is not None and document["fleet"]["conflict"]["contradicted"]:
-            following = f"flexcal calibrate {self.robot} {self.poses[0]}…{where}, without --prior"
+            following = f"{command_line(without='--prior')}, on 30 poses or more, for a calibration from these measurements alone"
         if calibration.bearings is not None and calibration.bearings.contradicted:
             following = (
                 f"write `bearings: {calibration.bearings.preferred}` in {self.robot}, and calibrate again"

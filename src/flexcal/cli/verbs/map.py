@@ -108,7 +108,9 @@ class Map:
         where = estimates_option(self.estimates)
         console.finish(
             document,
-            f"flexcal compensate {self.robot} TARGETS.csv{temperature_option(self.temperature)}{where}, for commands with this accuracy",
+            "mend what the verdict names; do not use this calibration before that"
+            if accuracy.trust.status == "bad"
+            else f"flexcal compensate {self.robot} TARGETS.csv{temperature_option(self.temperature)}{where}, for commands with this accuracy",
         )
 
 

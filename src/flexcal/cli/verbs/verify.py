@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
@@ -95,13 +96,15 @@ class Verify:
         console.say(verification.trust.sentence)
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")
-        console.finish(document, self._next(verification.trust.status))
+        console.finish(document, self._next(verification.trust.status, verification.trust.reasons))
 
-    def _next(self, status: Status) -> str:
+    def _next(self, status: Status, reasons: Sequence[str]) -> str:
         """The next step after a verdict."""
         where = estimates_option(self.estimates)
         if status == "bad":
             return "mend what the verdict names, and verify again; do not use this calibration before that"
+        if status == "care" and "improvement" in reasons:
+            return f"flexcal calibrate {self.robot} MORE_POSES…: these poses do not show that the calibration makes the robot more accurate"
         if status == "unknown":
             return (
                 f"flexcal verify {self.robot} MORE_POSES…{where} (flexcal design poses --random plans some)"

@@ -86,6 +86,8 @@ class Verification(ReportedResult):
         Which poses lie outside the joint ranges of the calibration.
     fitted : tuple of str
         Files or points among these that the calibration was made from.
+    refused : str
+        Why the verdict on the calibration itself was no; empty where it was not.
     record : RunRecord
         What the result comes from.
     orientation : OrientationErrors or None
@@ -110,6 +112,7 @@ class Verification(ReportedResult):
     uncalibrated: tuple[str, ...]
     outside: str
     fitted: tuple[str, ...]
+    refused: str = ""
     record: RunRecord = NOT_RECORDED
     orientation: OrientationErrors | None = None
     orientation_before: OrientationErrors | None = None
@@ -220,6 +223,7 @@ class Verification(ReportedResult):
             "ambiguous_poses": int(result.ambiguous.sum()),
             "sample": subsample_document(self.sample, self.everywhere),
             "fitted": list(self.fitted),
+            "refused": self.refused,
             "remarks": list(self.remarks),
             **self.record.document(),
         }
@@ -296,6 +300,7 @@ def verify(
         uncalibrated=() if "point" in refit else unmeasured,
         outside=outside_ranges(robot, measured.q),
         fitted=fitted_points(robot, poses),
+        refused=robot.refused,
         sample=sample,
         everywhere=None if sample is None else all_errors(standing, measured, progress),
         orientation=orientation_errors(standing, turned),

@@ -43,6 +43,7 @@ from flexcal.jobs.experiments import box_corners, working_file, working_volume
 from flexcal.jobs.inputs import (
     CalibratedRobot,
     is_station_identified,
+    refused_remark,
     require_distinct_files,
     require_temperature,
     temperature_remarks,
@@ -104,6 +105,8 @@ class AccuracyMap(PlottedResult):
         What the result comes from.
     whole : MapSummary or None
         Quantiles over all poses, where `predicted` has only the first of them.
+    refused : str
+        Why the verdict on the calibration itself was no; empty where it was not.
     """
 
     reach: Propagation
@@ -122,6 +125,7 @@ class AccuracyMap(PlottedResult):
     sample: StratifiedSample | None = None
     record: RunRecord = NOT_RECORDED
     whole: MapSummary | None = None
+    refused: str = ""
 
     @property
     def poses(self) -> int:
@@ -181,7 +185,7 @@ class AccuracyMap(PlottedResult):
     @property
     def trust(self) -> Trust:
         """The verdict, from the same checks as on the page."""
-        return Trust(prediction_checks(self.scale, self.fitted))
+        return Trust(prediction_checks(self.scale, self.fitted, self.refused))
 
     def document(self) -> dict[str, Any]:
         """The JSON document."""
@@ -213,6 +217,7 @@ class AccuracyMap(PlottedResult):
                 "applied": error_scale_factor(scale),
                 "fitted": list(self.fitted),
             },
+            "refused": self.refused,
             "verdict": self.trust.document(),
             "remarks": list(self.remarks),
             **self.record.document(),
@@ -344,12 +349,14 @@ def _checked_map(
         None if check is None else check.before,
         None if check is None else check.errors,
         (
+            *refused_remark(robot),
             *unmeasured_targets_remark(robot, [reach.target]),
             *temperature_remarks(robot, None if temperature is None else np.array([temperature]), "errors"),
         ),
         () if check is None else check.fitted,
         outside_ranges(robot, q),
         None if check is None else check.sample,
+        refused=robot.refused,
     )
 
 

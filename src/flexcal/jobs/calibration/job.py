@@ -84,6 +84,6 @@ def calibrate_robot(
         stiffness=blocks.get("stiffness"),
         estimates=target,
         command=command,
-    )
+    ).marked()
     result.store(source, out, blocks)
     return result

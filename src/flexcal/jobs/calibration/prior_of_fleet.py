@@ -39,6 +39,11 @@ def fleet_document(fit: GeometricFit) -> dict[str, Any] | None:
     }
 
 
+def contradicts(block: dict[str, Any] | None) -> bool:
+    """Whether the block `fleet` of results.json tells of a robot that the prior does not fit."""
+    return block is not None and bool(block["conflict"]["contradicted"])
+
+
 def fleet_remarks(block: dict[str, Any] | None) -> list[str]:
     """Sentences on the block `fleet` of results.json."""
     if block is None:
@@ -51,7 +56,7 @@ def fleet_remarks(block: dict[str, Any] | None) -> list[str]:
         if known
         else f": the measurements improve all its {block['parameters']} parameters"
     )
-    return [sentence, *([conflict_sentence(block)] if block["conflict"]["contradicted"] else [])]
+    return [sentence, *([conflict_sentence(block)] if contradicts(block) else [])]
 
 
 def conflict_sentence(block: dict[str, Any]) -> str:

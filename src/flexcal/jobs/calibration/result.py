@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
@@ -52,12 +52,12 @@ from flexcal.files.formats import Block, json_values
 from flexcal.jobs.calibration.held_out import HeldOut
 from flexcal.jobs.calibration.held_out_tilts import HeldOutTilts
 from flexcal.jobs.calibration.inclinations import inclination_document
-from flexcal.jobs.calibration.prior_of_fleet import fleet_document, fleet_remarks
+from flexcal.jobs.calibration.prior_of_fleet import contradicts, fleet_document, fleet_remarks
 from flexcal.jobs.calibration.remarks import calibration_remarks, floor_remark, outliers_of
 from flexcal.jobs.calibration.sockets import base_remark, place_remarks, scale_document, scale_remark
 from flexcal.jobs.calibration.subsample import calibration_subsample_remark, subsample_document
 from flexcal.jobs.calibration.thermal import thermal_document
-from flexcal.jobs.inputs import CalibratedRobot
+from flexcal.jobs.inputs import REFUSED, CalibratedRobot
 from flexcal.jobs.pages import Identification
 from flexcal.jobs.result_files import (
     header,
@@ -145,7 +145,15 @@ class Calibration(Identification):
     @property
     def robot(self) -> CalibratedRobot:
         """Calibrated robot with the nominal one, as `verify`, `predict`, `compensate` and `accuracy_map` take it."""
-        return CalibratedRobot(self.nominal, self.model, {self.block: self.estimate})
+        return CalibratedRobot(self.nominal, self.model, {self.block: self.marked().estimate})
+
+    def marked(self) -> Calibration:
+        """The same, with the reason in the provenance of its estimate where the verdict is no, for what later uses the estimate."""
+        trust = self.trust
+        if trust.status != "bad":
+            return self
+        origin = {**self.estimate.provenance, REFUSED: trust.because}
+        return replace(self, estimate=replace(self.estimate, provenance=origin))
 
     @property
     def residuals(self) -> np.ndarray:
@@ -254,11 +262,12 @@ class Calibration(Identification):
         drift = drift if drift is not None and np.isfinite(drift.probability) else None
         agreement, scale = PlaceAgreement.of(selected), scale_document(selected)
         coupling = self.coupling
-        floor = RepeatabilityFloor.of(selected) if coupling is None else None
+        fleet = fleet_document(selected)
+        misfits = coupling is not None or contradicts(fleet)
+        floor = None if misfits else RepeatabilityFloor.of(selected)
         learning = LearningCurve.of(selected)
         bearings = bearing_remarks(self.bearings, selected)
         blamed = self.bearings is not None and self.bearings.contradicted
-        fleet = fleet_document(selected)
         misfit = None if self.stiffness is None else self.stiffness.misfit
         return {
             "robot": selected.model.name,
@@ -326,7 +335,7 @@ class Calibration(Identification):
                 *calibration_remarks(selected, self._cause),
                 *(() if blamed else bearings),
                 *place_remarks(agreement),
-                *(() if self._cause else floor_remark(selected, self.before.robots_own)),
+                *(() if self._cause or misfits else floor_remark(selected, self.before.robots_own)),
                 *(
                     []
                     if misfit is None

@@ -17,6 +17,7 @@ from flexcal.errors import FlexcalError, InputError, naming
 from flexcal.jobs.inputs import (
     CalibratedRobot,
     is_station_identified,
+    refused_remark,
     unmeasured_lengths_remark,
     with_temperature,
 )
@@ -224,7 +225,7 @@ def compensate(
         origin,
         nominal,
         robot.measured,
-        remarks=(*unmeasured_lengths_remark(robot), *warm),
+        remarks=(*refused_remark(robot), *unmeasured_lengths_remark(robot), *warm),
     )
 
 

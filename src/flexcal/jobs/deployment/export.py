@@ -23,7 +23,13 @@ from flexcal.export import (
 )
 from flexcal.files.formats import read_estimates
 from flexcal.jobs.deployment.actuator_export import actuator_remarks, identified_actuators, rendered_actuators
-from flexcal.jobs.inputs import CalibratedRobot, held_at, stored_estimates, unmeasured_lengths_remark
+from flexcal.jobs.inputs import (
+    CalibratedRobot,
+    held_at,
+    refused_remark,
+    stored_estimates,
+    unmeasured_lengths_remark,
+)
 from flexcal.jobs.pages import Result
 from flexcal.model.robot import RobotModel, with_blocks
 
@@ -186,7 +192,12 @@ def export_robot(
     else:
         rendered = render(format, probable, nominal)
     written = write_rendered(probable, path, rendered)
-    remarks = (*unmeasured_lengths_remark(robot), *actuator_remarks(robot, format), *warm)
+    remarks = (
+        *refused_remark(robot),
+        *unmeasured_lengths_remark(robot),
+        *actuator_remarks(robot, format),
+        *warm,
+    )
     written = replace(written, remarks=(*written.remarks, *remarks))
     return ExportedRobot(probable, written, "calibration" in robot.blocks)
 

@@ -11,7 +11,7 @@ import numpy as np
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.data.poses import ToolTargets, read_commands, write_targets
 from flexcal.errors import FlexcalError
-from flexcal.jobs.inputs import CalibratedRobot, unmeasured_lengths_remark, with_temperature
+from flexcal.jobs.inputs import CalibratedRobot, refused_remark, unmeasured_lengths_remark, with_temperature
 from flexcal.jobs.pages import Result
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import carried_mass, certain_flank, points_kinematics, tool_at_rest
@@ -119,7 +119,13 @@ def predict(
     progress("predicting", 1.0)
     position, rotation, beside, certain = (np.concatenate(part) for part in zip(*parts, strict=True))
     tool = replace(commands, q=None, position=position, rotation=rotation)
-    return Prediction(robot.probable, tool, beside, certain, (*unmeasured_lengths_remark(robot), *warm))
+    return Prediction(
+        robot.probable,
+        tool,
+        beside,
+        certain,
+        (*refused_remark(robot), *unmeasured_lengths_remark(robot), *warm),
+    )
 
 
 def predict_robot(

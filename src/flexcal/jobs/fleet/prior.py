@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -13,6 +15,9 @@ from flexcal.errors import FlexcalError, InputError
 from flexcal.jobs.fleet.places import ROBOT, local_fleet
 from flexcal.jobs.fleet.projects import find_results
 from flexcal.jobs.fleet_prior import FEWEST, CalibratedMember, alike, pool_fleet
+
+_EQUAL = 1000.0
+"""Number of times as far apart as two measurements of one robot from which these are equal but for rounding."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +72,8 @@ def write_prior(place: str | Path, out: Path) -> WrittenPrior:
                 "E-PRIOR-001",
                 f"{place} has calibrated robots of several models: {listed}; a prior is of one, so give a folder with its robots alone.",
             )
+        members, copies = _without_copies(members)
+        remarks += copies
         with_prior = [member.name for member in members if member.has_prior]
         own = [member for member in members if not member.has_prior]
         if with_prior:
@@ -76,10 +83,34 @@ def write_prior(place: str | Path, out: Path) -> WrittenPrior:
         prior = pool_fleet(own, out)
     for one, other, times in alike(own) if len(own) >= FEWEST else ():
         remarks.append(
-            f"{one} and {other} differ by no more than the errors of their measurements, and other robots {times:.0f} times as much: if "
+            f"{one} and {other} differ by no more than the errors of their measurements, and other robots {_times(times)}: if "
             "they are one robot, the prior is too narrow; give both one `serial:` in robot.yaml"
         )
     return WrittenPrior(out, prior, tuple(remarks))
+
+
+def _times(times: float) -> str:
+    """How many times as far apart others are, in words; of measurements that are equal no number is meant."""
+    return f"{times:.0f} times as much" if times < _EQUAL else "far more"
+
+
+def _without_copies(
+    members: Sequence[CalibratedMember],
+) -> tuple[list[CalibratedMember], list[str]]:
+    """Robots whose calibrations differ, the first of equal ones, as the fleet counts them; and remarks on the others."""
+    first: dict[str, CalibratedMember] = {}
+    remarks = []
+    for member in members:
+        estimate = member.estimate
+        measured = {k: v for k, v in estimate.provenance.items() if k.startswith(("input.", "option."))}
+        content = json.dumps([measured, [(item.name, float(item.value)) for item in estimate.parameters]])
+        other = first.setdefault(content, member)
+        if other is not member:
+            remarks.append(
+                f"without {member.name}, whose calibration is the same as that of {other.name}; measure this robot, or give both one "
+                "`serial:`"
+            )
+    return list(first.values()), remarks
 
 
 def _members(root: Path) -> tuple[list[CalibratedMember], list[str]]:

@@ -20,11 +20,13 @@ from .given_temperature import (
 from .misreadings import Misreading, misread_point, other_pose, planned_pose
 from .provenance import image_provenance, robot_provenance
 from .stored_model import (
+    REFUSED,
     TARGETS,
     TARGETS_BETWEEN,
     CalibratedRobot,
     is_station_identified,
     measured_points,
+    refused_remark,
     stored_estimates,
     unmeasured_lengths_remark,
     unmeasured_targets_remark,
@@ -32,6 +34,7 @@ from .stored_model import (
 
 __all__ = [
     "FREQUENCY_PLAN",
+    "REFUSED",
     "TARGETS",
     "TARGETS_BETWEEN",
     "TEMPERATURE",
@@ -51,6 +54,7 @@ __all__ = [
     "read_plan_for_robot",
     "read_responses",
     "reference_temperature",
+    "refused_remark",
     "require_distinct_files",
     "require_temperature",
     "robot_file",

@@ -18,6 +18,8 @@ from flexcal.model.robot import RobotModel, with_blocks
 TARGETS = "targets"
 """Provenance key of a calibration: the measured points."""
 TARGETS_BETWEEN = ", "
+REFUSED = "refused"
+"""Provenance key of a calibration whose own verdict was no: why."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +101,12 @@ class CalibratedRobot:
         return tuple(name for name in self.targets if not is_inclinometer(self.nominal, name))
 
     @property
+    def refused(self) -> str:
+        """Why the verdict on the calibration itself was no; empty where it was not."""
+        calibration = self.blocks.get("calibration")
+        return "" if calibration is None else calibration.provenance.get(REFUSED, "")
+
+    @property
     def probable(self) -> RobotModel:
         """Robot with the most probable values along the directions that the measured points do not determine; for all other frames."""
         return self._most_probable[0]
@@ -116,6 +124,16 @@ class CalibratedRobot:
     def with_points(self) -> RobotModel:
         """Nominal robot with the measured points at their calibrated positions on the tool."""
         return with_calibrated_points(self.nominal, self.probable, self.measured)
+
+
+def refused_remark(calibrated: CalibratedRobot) -> tuple[str, ...]:
+    """Remark on a calibration whose own verdict was no; none for others."""
+    if not calibrated.refused:
+        return ()
+    return (
+        f"'flexcal calibrate' did not trust this calibration, because {calibrated.refused}: do not use it on the robot before that is "
+        "mended",
+    )
 
 
 def unmeasured_targets_remark(calibrated: CalibratedRobot, targets: Iterable[str]) -> tuple[str, ...]:

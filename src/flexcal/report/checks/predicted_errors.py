@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from flexcal.calibration.verification import ErrorScale
+from flexcal.report.checks.against_nominal import check_own_verdict
 from flexcal.report.checks.pose_errors import FEW_POSES, check_claimed_uncertainty, check_enough, check_unseen
 from flexcal.report.layout import Check
 from flexcal.units import MILLIMETRE
@@ -12,10 +14,18 @@ from flexcal.units import MILLIMETRE
 _BETTER = "Is the robot more accurate than before?"
 
 
-def prediction_checks(scale: ErrorScale | None, fitted: Sequence[str]) -> tuple[Check, ...]:
-    """The checks behind the verdict: `scale` is None where nothing was measured, `fitted` names the files that the fit has used."""
+def prediction_checks(
+    scale: ErrorScale | None, fitted: Sequence[str], refused: str = ""
+) -> tuple[Check, ...]:
+    """The checks behind the verdict: `scale` is None where nothing was measured, `fitted` names the files that the fit has used,
+    and `refused` is why the calibration's own verdict was no.
+    """
     document = None if scale is None else scale.document()
-    checks = [check_claimed_uncertainty(document).named("claimed_uncertainty", independent=True)]
+    claimed = check_claimed_uncertainty(document)
+    if scale is not None and scale.verdict == "optimistic" and claimed.status == "good":
+        answer = f"No: those of parameters and model are {scale.factor:.2f} times the predicted size. {claimed.answer}"
+        claimed = replace(claimed, answer=answer, status="care")
+    checks = [*check_own_verdict(refused), claimed.named("claimed_uncertainty", independent=True)]
     if scale is None:
         return tuple(checks)
     if fitted:

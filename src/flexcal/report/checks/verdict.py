@@ -55,6 +55,14 @@ class Trust:
         return (*unknown, *(check for check in self.checks if check.status == "care"))
 
     @property
+    def because(self) -> str:
+        """Findings of the deciding checks, as clauses."""
+        phrases = [_phrase(check) for check in self.deciding]
+        if NO_INDEPENDENT_CHECK in self.reasons:
+            phrases.insert(0, "no independent check was made")
+        return "; ".join(dict.fromkeys(phrases))
+
+    @property
     def reasons(self) -> tuple[str, ...]:
         """Codes of the deciding checks; of a result without an independent check the first is NO_INDEPENDENT_CHECK."""
         codes = tuple(check.code for check in self.deciding)
@@ -71,10 +79,7 @@ class Trust:
     @property
     def sentence(self) -> str:
         """The verdict in one line, for the console."""
-        phrases = [_phrase(check) for check in self.deciding]
-        if NO_INDEPENDENT_CHECK in self.reasons:
-            phrases.insert(0, "no independent check was made")
-        return f"Trusted: {ANSWERS[self.status].lower()} — because {'; '.join(dict.fromkeys(phrases))}"
+        return f"Trusted: {ANSWERS[self.status].lower()} — because {self.because}"
 
     def fact(self) -> Fact:
         """The verdict on the first screen."""
@@ -116,8 +121,10 @@ PHRASES: dict[str, dict[str, str]] = {
         "good": "whole groups left out of the fit are predicted as accurately as expected",
         "else": "whole groups left out of the fit are predicted worse than expected",
     },
+    "own_verdict": {"else": "the calibration itself was not trusted"},
     "improvement": {
         "good": "the errors are smaller than before",
+        "care": "it may be chance that the errors are smaller than before",
         "else": "the errors are not smaller than before",
     },
     "unseen_poses": {

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from flexcal.calibration.verification import MeasuredPoints
+import numpy as np
+
+from flexcal.calibration.verification import OWN, MeasuredPoints
+from flexcal.report.checks.against_nominal import check_own_verdict, check_smaller_errors
 from flexcal.report.checks.pose_errors import (
     check_claimed_uncertainty,
     check_enough,
@@ -16,6 +19,10 @@ from flexcal.report.checks.pose_errors import (
 )
 from flexcal.report.layout import Check
 
+_POINT = 3
+_STATION = 6
+"""Parameters of a point on the tool, and of the place of an instrument, which were fitted for the errors before."""
+
 
 def verification_checks(results: Mapping[str, Any], points: MeasuredPoints) -> tuple[Check, ...]:
     """The checks behind the verdict; `results` is the document of results.json."""
@@ -25,6 +32,8 @@ def verification_checks(results: Mapping[str, Any], points: MeasuredPoints) -> t
         check_unseen(results["fitted"]).named("unseen_poses", independent=True),
         check_enough(verification.all.poses).named("enough_poses"),
         check_claimed_uncertainty(results["prediction"]).named("claimed_uncertainty", independent=True),
+        *check_own_verdict(results.get("refused", "")),
+        *_improvement(results, points),
         *flanks,
         *(
             (check_known_points(results["uncalibrated_points"]).named("calibrated_points"),)
@@ -37,3 +46,14 @@ def verification_checks(results: Mapping[str, Any], points: MeasuredPoints) -> t
             else ()
         ),
     )
+
+
+def _improvement(results: Mapping[str, Any], points: MeasuredPoints) -> tuple[Check, ...]:
+    """Check against the uncalibrated robot; none where it is not known, or where a point or instrument elsewhere is part of the errors."""
+    before = points.delivered
+    if before is None or results.get("uncalibrated_points") or results.get("refit_proposed"):
+        return ()
+    poses = points.poses
+    fitted = _STATION * len(poses.stations) + (_POINT * len(poses.targets) if OWN in points.errors else 0)
+    sizes = np.linalg.norm(before, axis=1) / np.sqrt(1 - fitted / (3 * len(poses)))
+    return (check_smaller_errors(sizes, np.linalg.norm(points.calibrated, axis=1)),)

@@ -46,7 +46,7 @@ def map_page(study: MapStudy) -> Page:
     results, verified = study.results, study.results["verification"]
     fitted = [] if verified is None else verified["fitted"]
     p95, mean = results["predicted"]["p95"], results["predicted"]["mean"]
-    trust = Trust(prediction_checks(study.scale, fitted))
+    trust = Trust(prediction_checks(study.scale, fitted, results.get("refused", "")))
     leading = max(results["sources"], key=results["sources"].__getitem__)
     verdict = Verdict(
         trust.status,
