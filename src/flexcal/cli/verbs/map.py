@@ -110,7 +110,8 @@ class Map:
             document,
             "mend what the verdict names; do not use this calibration before that"
             if accuracy.trust.status == "bad"
-            else f"flexcal compensate {self.robot} TARGETS.csv{temperature_option(self.temperature)}{where}, for commands with this accuracy",
+            else f"flexcal compensate {self.robot} TARGETS.csv{temperature_option(self.temperature)}{where}, for commands with this "
+            "accuracy",
         )
 
 

@@ -96,6 +96,10 @@ class ResampledCalibrations(StudyTasks):
         count = 0 if self.resampling is None else self.resampling.bootstrap
         return [ALL, *(f"{BOOTSTRAP}{number}" for number in range(1, count + 1))]
 
+    def require(self, options: Mapping[str, Any]) -> None:
+        """As `StudyTasks.require`: there are such terms."""
+        requested_terms(self.model, structured(options, CalibrateOptions, {}).terms)
+
     def result(self, row: StudyRow) -> dict[str, Any]:
         """As `StudyTasks.result`."""
         options = structured(row.options, CalibrateOptions, {})

@@ -87,6 +87,7 @@ def _check_options(file: YamlFile, config: StudyConfig, tasks: StudyTasks) -> No
     for keys, name, value in _given(config):
         try:
             structured({name: value}, tasks.options, tasks.cell)
+            tasks.require({name: value})
         except StructureError as problem:
             raise file.error(problem.code, keys, problem.failures[0].sentence) from problem
         except FlexcalError as problem:

@@ -35,6 +35,10 @@ class StudyTasks(ABC):
         """Data sets of every combination of options."""
         return ("",)
 
+    def require(self, options: Mapping[str, Any]) -> None:
+        """Raise `FlexcalError` where no task could run with these `options` by name; by default all can that have the right types."""
+        del options
+
     @abstractmethod
     def result(self, row: StudyRow) -> dict[str, Any]:
         """Columns of a row's results: a pure function of the row. Raises `FlexcalError` where it cannot be computed."""
