@@ -41,6 +41,7 @@ def said(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict:
 def test_visits_are_kept_and_compared_with_the_first(folder: Path, capsys) -> None:
     robot, home = folder / "robot.yaml", folder / "recheck"
     first = said(capsys, robot, folder / "reference.csv", "--date", "2026-01-10")
+    assert "this visit is now the reference" in " ".join(first["remarks"])
     assert first["recheck"]["compared"] == "calibration" and first["recheck"]["verdict"] == "as_calibrated"
     for name, day in (("first", "2026-02-10"), ("second", "2026-03-10")):
         document = said(capsys, robot, folder / f"{name}.csv", "--date", day)
@@ -49,6 +50,7 @@ def test_visits_are_kept_and_compared_with_the_first(folder: Path, capsys) -> No
     assert document["drift"]["visits"] == ["2026-01-10", "2026-02-10", "2026-03-10"]
     # the same files again are the same visit
     again = said(capsys, robot, folder / "second.csv", "--date", "2026-03-11")
+    assert "are the visit of 2026-03-10 already" in " ".join(again["remarks"])
     stored = json.loads((home / "visits.json").read_text("utf-8"))
     assert [visit["date"] for visit in stored["visits"]] == ["2026-01-10", "2026-02-10", "2026-03-10"]
     assert [visit["reference"] for visit in stored["visits"]] == [True, False, False]
@@ -89,6 +91,11 @@ def test_a_plan_states_what_it_finds(folder: Path, tmp_path: Path, capsys) -> No
     assert found["reference"]["wrist_3_joint"] is None  # the point lies on its axis
     assert found["reference_repeated"]["elbow_joint"] < found["reference"]["elbow_joint"] < 1e-3
     assert found["reference_refit"]["shoulder_pan_joint"] is None
+
+
+def test_poses_of_the_calibration_do_not_judge_it(folder: Path, tmp_path: Path, capsys) -> None:
+    document = said(capsys, folder / "robot.yaml", folder / "poses.csv", "--out", tmp_path)
+    assert "was fitted to 200 of these 200 points, so they cannot judge it" in document["sentence"]
 
 
 @pytest.mark.parametrize(

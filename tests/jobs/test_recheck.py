@@ -349,6 +349,37 @@ def test_what_tells_nothing_is_refused(visited: Visited, examples: Path) -> None
         recheck(robot, visited.visit())
 
 
+def test_errors_in_the_data_are_named(visited: Visited) -> None:
+    shop = visited.shop
+
+    def found(position: np.ndarray, visit: PoseSet) -> Recheck:
+        return recheck(visited.robot, replace(visit, position=position), reference=visited.reference)
+
+    visit = visited.visit()
+    swapped = found(visit.position[:, [1, 0, 2]], visit)
+    assert swapped.verdict == "wrong_reading" and "x and y are swapped" in swapped.headline
+    order = np.arange(10)
+    order[[3, 4]] = 4, 3
+    rows = found(visit.position[order], visit)
+    assert "the point of pose 3 is that of pose 4" in rows.headline and "as calibrated" in rows.headline
+    shifted = visited.visit(arm=shop.arm.turned(2, 8e-4))
+    position = shifted.position.copy()
+    position[6] += (6e-4, 8e-4, 0.0)
+    both = found(position, shifted)
+    assert both.headline.startswith("pose 6 (") and "without that: joint_2 shifted by" in both.headline
+    position[1] -= (9e-4, 0.0, 7e-4)
+    assert {"pose 1 (", "pose 6 ("} <= {
+        p for p in ("pose 1 (", "pose 6 (") if p in found(position, shifted).headline
+    }
+
+
+def test_a_reference_that_was_not_as_calibrated_is_said_to_differ(visited: Visited) -> None:
+    q = np.repeat(visited.q, 3, axis=0)
+    wrong = visited.shop.measured(visited.robot.model, q, arm=visited.shop.arm.turned(2, 8e-4))
+    found = recheck(visited.robot, visited.visit(), reference=wrong)
+    assert not found.judged.as_calibrated and "that visit is what differs" in found.summary()
+
+
 def _renamed(estimate):
     return replace(estimate, provenance={"option.targets": "other"})
 

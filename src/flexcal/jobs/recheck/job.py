@@ -53,6 +53,9 @@ def recheck_robot(
     calibration = block_sha256(robot.stored, "calibration")
     digests = {f"{k}. {file.name}": sha256_of(file) for k, file in enumerate(files, start=1)}
     stored = read_visits(out, robot.nominal.name)
+    same = next((v for v in stored if (v.files, v.calibration) == (digests, calibration)), None)
+    again = None if same is None or day is None or same.date == when else same.date
+    when = when if same is None else same.date
     # visits compared with another calibration, as before the last one, are kept and do not count
     before = [v for v in stored if v.calibration == calibration and v.files != digests and v.date <= when]
     references = [k for k, v in enumerate(before) if v.reference]
@@ -66,12 +69,16 @@ def recheck_robot(
         temperature=temperature,
     )
     absolute = judged.absolute or judged.judged
+    first = base is None and absolute.verdict == "as_calibrated"
+    becomes = reference or first or (same is not None and same.reference)
     origin = provenance([robot_file, robot.nominal.urdf, *files], None, robot.stored, tuple(robot.blocks))
     if base is not None:
         origin |= {f"input.{name} (reference visit)": digest for name, digest in base.files.items()}
     judged = replace(
         judged,
         reference_date=base.date if base is not None and judged.absolute is not None else None,
+        becomes_reference=becomes,
+        again=again,
         record=RunRecord(origin | image_provenance(files), command),
     )
     series = _series(judged, base, calibration)
@@ -84,7 +91,7 @@ def recheck_robot(
     )
     visit = replace(
         history[-1],
-        reference=reference or (base is None and absolute.verdict == "as_calibrated"),
+        reference=becomes,
         alarms=[item.subject for item in judged.alarms],
     )
     progress("writing", 0.5)

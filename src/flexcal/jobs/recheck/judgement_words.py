@@ -30,6 +30,12 @@ _SMALL = 0.5
 def judgement_sentence(judged: JudgedVisit) -> str:
     """What the visit says of the robot."""
     chance = _chance(judged.probability)
+    errors = judged.test.errors
+    count = len(errors.errors) / 3
+    size = (
+        f"{chance}, errors of {np.sqrt(errors.errors @ errors.errors / count) / MILLIMETRE:.3f} mm rms where "
+        f"{np.sqrt(np.trace(errors.covariance) / count) / MILLIMETRE:.3f} are expected"
+    )
     moved = judged.instrument == "evident"
     if judged.as_calibrated:
         if moved:
@@ -41,11 +47,11 @@ def judgement_sentence(judged: JudgedVisit) -> str:
     if not judged.suspects:
         if judged.together > FALSE_ALARM:
             return (
-                f"{lead}recalibrate ({chance}): no single change of a joint, of the tool, of all lengths, of the payload or of the "
+                f"{lead}recalibrate ({size}): no single change of a joint, of the tool, of all lengths, of the payload or of the "
                 "instrument explains the errors, several together would"
             )
         return (
-            f"{lead}recalibrate ({chance}): the errors are not those of shifted joints, a bumped tool, growth or a moved instrument, all "
+            f"{lead}recalibrate ({size}): the errors are not those of shifted joints, a bumped tool, growth or a moved instrument, all "
             "together; if the instrument is noisier than at the calibration, or poses were not those commanded, measure again first"
         )
     return f"{lead}{', or '.join(suspect_in_words(s, judged.test.errors.model) for s in judged.suspects)} ({chance})"

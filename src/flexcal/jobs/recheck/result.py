@@ -16,7 +16,6 @@ from flexcal.calibration.recheck import (
     JudgedVisit,
     MovedTool,
     TellingPose,
-    VisitErrors,
     detection_limits,
     errors_from_calibration,
     errors_from_reference,
@@ -27,7 +26,7 @@ from flexcal.calibration.recheck import (
 )
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
-from flexcal.jobs.calibration import ignored_columns_remarks, outside_ranges
+from flexcal.jobs.calibration import fitted_points, ignored_columns_remarks, outside_ranges
 from flexcal.jobs.inputs import (
     CalibratedRobot,
     is_station_identified,
@@ -35,6 +34,7 @@ from flexcal.jobs.inputs import (
     with_temperature,
 )
 from flexcal.jobs.pages import REPORT, PlottedResult
+from flexcal.jobs.recheck.data_errors import DataErrors, disagreeing_poses, misread_visit
 from flexcal.jobs.recheck.document import SHIFT, UNSEEN, drift_block, recheck_block
 from flexcal.jobs.recheck.judgement_words import (
     alarm_sentence,
@@ -74,6 +74,16 @@ class Recheck(PlottedResult):
         Which poses lie outside the joint ranges of the calibration.
     warm : tuple of str
         Remarks on the temperatures of the visit and of the reference.
+    mistake : DataErrors or None
+        What is wrong with the data, where that explains the errors.
+    fitted : tuple of str
+        How many of the points the calibration was fitted to, in words.
+    reference_changed : bool
+        Whether the reference visit was itself not as calibrated, where this one is.
+    becomes_reference : bool
+        Whether later visits of a folder are compared with this one.
+    again : str or None
+        Date under which the same files are stored already, where another was given.
     unmatched : bool
         Whether a reference visit was given that has fewer than four poses in common with this one.
     reference_date : str or None
@@ -95,6 +105,11 @@ class Recheck(PlottedResult):
     expected: float
     outside: str
     warm: tuple[str, ...] = ()
+    mistake: DataErrors | None = None
+    fitted: tuple[str, ...] = ()
+    reference_changed: bool = False
+    becomes_reference: bool = False
+    again: str | None = None
     unmatched: bool = False
     reference_date: str | None = None
     dates: tuple[str, ...] = ()
@@ -104,12 +119,20 @@ class Recheck(PlottedResult):
     @property
     def verdict(self) -> str:
         """The judgement as a word, as in results.json."""
-        return self.judged.verdict
+        return "wrong_reading" if self.mistake is not None else self.judged.verdict
 
     @property
     def headline(self) -> str:
         """The judgement in a sentence."""
-        return judgement_sentence(self.judged) + effect_sentence(self.judged, self.tools, self.expected)
+        if self.mistake is not None:
+            rest = self.mistake.rest
+            return self.mistake.words + (
+                "" if rest is None else f"; without that: {judgement_sentence(rest)}"
+            )
+        own = ""
+        if self.fitted and self.judged.as_calibrated and self.judged.test.errors.compared == "calibration":
+            own = f"the calibration was fitted to {self.fitted[0]}, so they cannot judge it; measure others: "
+        return own + judgement_sentence(self.judged) + effect_sentence(self.judged, self.tools, self.expected)
 
     def summary(self) -> str:
         """The judgement, what would have been found, and remarks."""
@@ -146,6 +169,10 @@ class Recheck(PlottedResult):
         """Remarks, one sentence each."""
         judged, errors = self.judged, self.judged.test.errors
         remarks = [*self.poses.notes, *ignored_columns_remarks(self.poses, ("temperature",)), *self.warm]
+        if self.again is not None:
+            remarks.append(
+                f"the same files are the visit of {self.again} already, which keeps its date; take it out of visits.json to give another"
+            )
         if self.outside:
             remarks.append(self.outside)
         if judged.instrument == "declared":
@@ -181,9 +208,30 @@ class Recheck(PlottedResult):
                 "the scatter is that of the calibration, which may contain errors of its model; a reference visit that measures every pose "
                 "three times tells the robot's own, and makes the test sharper"
             )
+        if self.absolute is not None and self.absolute.as_calibrated and not judged.as_calibrated:
+            remarks.append(self._against_calibration(self.absolute))
+        if self.becomes_reference:
+            remarks.append(self._as_reference)
         if self.alarms:
             remarks.append(alarm_sentence(self.alarms, self.dates))
         return tuple(remarks)
+
+    def _against_calibration(self, absolute: JudgedVisit) -> str:
+        told = f"against the calibration itself the robot is {judgement_sentence(absolute)}"
+        if self.reference_changed:
+            return f"{told}, and at the reference visit it was not: that visit is what differs; make this one the reference (--reference)"
+        return f"{told}: what changed since the reference visit is less than that comparison shows"
+
+    @property
+    def _as_reference(self) -> str:
+        absolute = self.absolute or self.judged
+        told = "this visit is now the reference: later ones at the same poses are compared with it"
+        if absolute.as_calibrated and self.mistake is None:
+            return told
+        return (
+            f"{told}, although against the calibration it is not as calibrated ({judgement_sentence(absolute)}); a later visit that is "
+            "as this one is not as calibrated either"
+        )
 
     def write(self, folder: str | Path) -> None:
         """Write results.json and report.html to a folder.
@@ -223,7 +271,7 @@ class Recheck(PlottedResult):
             self.telling,
             self.expected,
             self.limits,
-        )
+        ) | {"verdict": self.verdict, "fitted": list(self.fitted)}
 
 
 def recheck(
@@ -278,24 +326,37 @@ def recheck(
         warm = (*warm, *_reference_temperature(robot, poses, reference))
     unknown = any(not is_station_identified(model, station) for station in poses.stations)
 
-    def against_calibration(placed: bool) -> VisitErrors | None:
-        return errors_from_calibration(model, poses, placed=placed)
-
-    def against_reference(placed: bool) -> VisitErrors | None:
-        assert reference is not None
-        return errors_from_reference(model, poses, reference, placed=placed)
-
-    absolute = judge_visit(against_calibration, placed=refit or unknown)
-    assert absolute is not None
-    relative = None
-    if reference is not None:
-        relative = judge_visit(
-            against_reference, placed=refit or set(poses.stations) != set(reference.stations)
+    def against_calibration(rows: PoseSet) -> JudgedVisit | None:
+        return judge_visit(
+            lambda placed: errors_from_calibration(model, rows, placed=placed), placed=refit or unknown
         )
+
+    def against_reference(rows: PoseSet) -> JudgedVisit | None:
+        then = reference
+        assert then is not None
+        return judge_visit(
+            lambda placed: errors_from_reference(model, rows, then, placed=placed),
+            placed=refit or set(poses.stations) != set(then.stations),
+        )
+
+    absolute = against_calibration(poses)
+    assert absolute is not None
+    relative = None if reference is None else against_reference(poses)
     judged = relative or absolute
+    compared = against_calibration if relative is None else against_reference
+    whole = absolute.test.errors.covariance
+    expected = float(np.sqrt(3 * np.trace(whole) / len(whole)))
+    mistake = None
+    if not judged.as_calibrated or judged.instrument == "evident":
+        mistake = None if refit or unknown else misread_visit(model, poses, expected, compared)
+    if mistake is None and judged.verdict == "recalibrate":
+        mistake = disagreeing_poses(judged, poses, compared)
+    reference_changed = False
+    if reference is not None and absolute.as_calibrated and not judged.as_calibrated:
+        then = against_calibration(reference)
+        reference_changed = then is not None and not then.as_calibrated
     ranges, targets = robot.blocks["calibration"].ranges, poses.targets
     suspects = judged.suspects
-    whole = absolute.test.errors.covariance
     return Recheck(
         model=model,
         poses=poses,
@@ -306,9 +367,12 @@ def recheck(
         telling=telling_pose(model, ranges, (suspects[0], suspects[1]), targets)
         if len(suspects) > 1
         else None,
-        expected=float(np.sqrt(3 * np.trace(whole) / len(whole))),
+        expected=expected,
         outside=outside_ranges(robot, poses.q),
         warm=warm,
+        mistake=mistake,
+        fitted=fitted_points(robot, poses),
+        reference_changed=reference_changed,
         unmatched=reference is not None and relative is None,
     )
 

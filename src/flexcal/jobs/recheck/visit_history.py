@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -152,11 +152,9 @@ def read_visits(folder: Path, robot: str) -> tuple[Visit, ...]:
 
 
 def with_visit(visits: Sequence[Visit], visit: Visit) -> tuple[Visit, ...]:
-    """Visits with one more, by date; one of the same files and calibration is replaced, its date kept."""
+    """Visits with one more, by date; one of the same files and calibration is replaced."""
     same = [v for v in visits if (v.files, v.calibration) == (visit.files, visit.calibration)]
     others = [v for v in visits if v not in same]
-    if same and same[0].date < visit.date:
-        visit = replace(visit, date=same[0].date)
     return tuple(sorted([*others, visit], key=lambda v: v.date))
 
 

@@ -30,7 +30,7 @@ _HEADLINES = {
     "thermal_growth": "Thermal growth",
     "payload_changed": "Another payload",
     "instrument_moved": "The instrument moved, the robot is as calibrated",
-    "wrong_reading": "One pose disagrees on its own",
+    "wrong_reading": "Readings disagree: mend or repeat them",
     "ambiguous": "Changed, in one of several ways",
     "recalibrate": "Recalibrate",
 }
@@ -61,11 +61,11 @@ def recheck_page(study: RecheckStudy) -> Page:
     facts = (
         Fact(
             "Is it as calibrated?",
-            {"good": "Yes", "care": "As far as seen", "bad": "No"}.get(_status(block["verdict"]), ""),
+            _as_calibrated(block),
             "",
             f"Chance makes errors as conspicuous with p = {significant(block['probability'], 2)}; "
             f"below {block['false_alarm']:g} something changed.",
-            _status(block["verdict"]),
+            _status(block),
         ),
         Fact(
             "How far is the tool off now?",
@@ -82,7 +82,7 @@ def recheck_page(study: RecheckStudy) -> Page:
         ),
     )
     verdict = Verdict(
-        _status(block["verdict"]),
+        _status(block),
         _HEADLINES[block["verdict"]],
         _sentence(results["sentence"]),
         facts,
@@ -105,6 +105,12 @@ def recheck_page(study: RecheckStudy) -> Page:
     )
 
 
+def _as_calibrated(block: Mapping[str, Any]) -> str:
+    if block["verdict"] == "wrong_reading":
+        return "Measure again"
+    return {"good": "Yes", "care": "As far as seen"}.get(_status(block), "No")
+
+
 def _shift_unit(block: Mapping[str, Any]) -> str:
     """Thousandth of the unit of the joints' shifts."""
     units = {joint["unit"] for joint in block["power"]["joints"].values()}
@@ -118,10 +124,10 @@ def _tool_off(block: Mapping[str, Any]) -> str:
     return f"{told[0]} to {told[-1]}" if len(told) > 1 else told[0] if told else document_millimetres(None)
 
 
-def _status(verdict: str) -> Status:
-    if verdict == "as_calibrated":
-        return "good"
-    return "care" if verdict in ("instrument_moved", "wrong_reading") else "bad"
+def _status(block: Mapping[str, Any]) -> Status:
+    if block["verdict"] == "as_calibrated":
+        return "care" if block.get("fitted") and block["compared"] == "calibration" else "good"
+    return "care" if block["verdict"] in ("instrument_moved", "wrong_reading") else "bad"
 
 
 def _sentence(text: str) -> str:
@@ -133,7 +139,7 @@ def _checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
     lost = [name for name, joint in block["power"]["joints"].items() if joint["found_95_percent"] is None]
     alarms = [name for name, item in drift["sums"].items() if item["drifts"]]
     checks = [
-        Check("Is the robot as calibrated?", _sentence(results["sentence"]), _status(block["verdict"])),
+        Check("Is the robot as calibrated?", _sentence(results["sentence"]), _status(block)),
         Check(
             "Does the visit see every joint?",
             f"Not {', '.join(lost)}: these points do not show their shift"
