@@ -21,6 +21,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -36,6 +37,7 @@ from flexcal.jobs.logs.hold_out import MOST_EXPERIMENTS
 from flexcal.model.robot import RobotModel
 from flexcal.parallel import DaskCluster, ThisProcess, Workers, consecutive_groups, open_workers
 
+T = TypeVar("T")
 FILES, SAMPLES, DECIMATION = 10, 1_000_000, 10
 LIMIT_MB, SCALING = 400.0, 1.8
 _PART = 20_000
@@ -226,7 +228,7 @@ class _cluster:
         import distributed
 
         self._started = distributed.LocalCluster(
-            n_workers=self._count, threads_per_worker=1, dashboard_address=None
+            n_workers=self._count, threads_per_worker=1, dashboard_address="127.0.0.1:0"
         )
         address = self._started.scheduler_address.replace("tcp://", "dask://")
         self._workers = open_workers(address, 1)
@@ -256,7 +258,7 @@ def _observation() -> Observation:
     return Observation(replace(model, config=replace(model.config, signals={})), CLASSIC)
 
 
-def _timed(work: Callable[[], object]) -> tuple[float, object]:
+def _timed(work: Callable[[], T]) -> tuple[float, T]:
     begun = time.process_time()
     value = work()
     return time.process_time() - begun, value
@@ -272,7 +274,8 @@ def figure(costs: Costs, path: Path, logs: Sequence[int] = (200, 10_000)) -> Non
     )
     for column, count in enumerate(logs, start=1):
         parts = costs.seconds(_WORKERS, count)
-        lines = {"all": sum(parts.values()), **parts, "ideal": sum(parts.values())[0] / _WORKERS}
+        total = np.sum(list(parts.values()), axis=0)
+        lines = {"all": total, **parts, "ideal": total[0] / _WORKERS}
         for name, seconds in lines.items():
             dash = {"all": "solid", "ideal": "dash"}.get(name, "dot")
             line = go.Scatter(x=_WORKERS, y=seconds, name=name, line={"dash": dash}, showlegend=column == 1)
@@ -284,7 +287,7 @@ def figure(costs: Costs, path: Path, logs: Sequence[int] = (200, 10_000)) -> Non
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--files", type=int, nargs="+", default=[FILES])
     parser.add_argument("--samples", type=int, default=SAMPLES)
     parser.add_argument("--rounds", type=int, default=1)
@@ -323,7 +326,7 @@ def main() -> None:
                 logs,
                 "logs:",
                 {name: seconds.round(2).tolist() for name, seconds in parts.items()},
-                sum(parts.values()).round(1),
+                np.sum(list(parts.values()), axis=0).round(1),
             )
         figure(costs, options.figure)
 
