@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from flexcal.report.layout import Check, counted
+from flexcal.report.layout import Check, counted, significant
 from flexcal.report.results import with_trends
+
+_TELLING_VISITS = 4
+"""Visits of a robot from which the absence of a trend tells something: three find few drifts."""
 
 
 def fleet_checks(document: Mapping[str, Any]) -> tuple[Check, ...]:
@@ -40,19 +43,25 @@ def fleet_checks(document: Mapping[str, Any]) -> tuple[Check, ...]:
             )
         )
     tested = len(with_trends(document))
+    trends = [robot["trend"] for robot in document["robots"] if robot["trend"] is not None]
     checks.append(
         Check(
             "Does any robot drift?",
             f"{counts['drifting']} of {tested} with trends do."
             if counts["drifting"]
-            else f"No significant trend of the errors of {counted(counts['error_trends_tested'], 'robot')}."
-            if counts["error_trends_tested"]
+            else f"No significant trend of the errors of {counted(len(trends), 'robot')}; their 95 % intervals allow up to "
+            f"{significant(max(trend['high'] for trend in trends), 2)} mm a year."
+            if trends
             else "Neither single parameters nor the geometry as a whole, of "
             f"{counted(counts['geometry_trends_tested'], 'robot')}, have a significant trend, "
             "but no robot has three dated verifications of one calibration."
             if tested
             else "No robot has three dated visits.",
-            "care" if counts["drifting"] else "good" if counts["error_trends_tested"] else "unknown",
+            "care"
+            if counts["drifting"]
+            else "good"
+            if trends and min(trend["visits"] for trend in trends) >= _TELLING_VISITS
+            else "unknown",
         )
     )
     if counts["rechecked"]:
