@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from flexcal.files.formats import BLOCKS, Block, YamlFile, read_yaml_file, write_yaml
 from flexcal.files.structuring import Keys, suggestion
-from flexcal.model.robot import GEOMETRY, NUISANCE, SPRINGS, STATION, RobotModel, unit_of
+from flexcal.model.robot import GEOMETRY, NUISANCE, REFERENCE, SPRINGS, STATION, RobotModel, unit_of
 from flexcal.virtual_cell.config import SpreadConfig
 
 _LARGEST = 1e12
@@ -83,10 +84,17 @@ def _draws(model: RobotModel, spread: SpreadConfig, rng: np.random.Generator) ->
 
 
 def write_truth(path: str | Path, values: Mapping[str, float]) -> None:
-    """Write true values, atomically, as values with units in the blocks of an estimates.yaml; floats come back bit by bit."""
+    """Write true values, atomically, as values with units in the blocks of an estimates.yaml; floats come back bit by bit.
+
+    A robot that temperature does not change has no reference temperature (NaN), and the file none.
+    """
     blocks: dict[Block, dict[str, dict[str, object]]] = {}
     for block in BLOCKS:
-        named = {name: value for name, value in values.items() if _block(name) == block}
+        named = {
+            name: value
+            for name, value in values.items()
+            if _block(name) == block and not (name == REFERENCE and math.isnan(value))
+        }
         entries: dict[str, object] = {
             name: {"estimate": float(value), "unit": unit_of(name)} for name, value in named.items()
         }
