@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -74,6 +77,17 @@ def test_what_is_left_is_cancelled_and_the_workers_serve_again(workers: Workers)
     started.close()  # type: ignore[attr-defined]
     assert len(taken) < 100  # tasks are made as they are needed
     assert len(list(workers.results(failing, [0, 1]))) == 2
+
+
+def test_workers_that_are_killed_between_two_calls_are_started_again() -> None:
+    with open_workers(None, 2) as workers:
+        assert list(workers.values(least_squares, range(3), 40))
+        pool = workers._pool  # type: ignore[attr-defined]
+        for process in pool._processes.values():
+            os.kill(process.pid, signal.SIGKILL)
+        while pool._flags.broken is None:  # from here on the pool refuses tasks
+            time.sleep(0.01)
+        assert list(workers.values(failing, [0, 1, 5])) == [0, 1, 5]
 
 
 def test_a_task_that_kills_every_worker_is_an_error_and_the_others_go_on(tmp_path: Path) -> None:
@@ -177,7 +191,7 @@ def test_encrypted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
             dask.config.set(settings),
             open_workers(cluster.scheduler_address, 1) as w,
         ):
-            assert [outcome.value for outcome in w.results(failing, [0, 1])] == [0, 1]
+            assert list(w.values(failing, [0, 1])) == [0, 1]
         monkeypatch.setattr("flexcal.parallel.dask_cluster._PATIENCE", 0.3)
         with refused("E-WORK-002", cluster.scheduler_address), open_workers(cluster.scheduler_address, 1):
             pass

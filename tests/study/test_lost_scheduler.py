@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import socket
 import subprocess
 import sys
-from contextlib import closing
+import time
+from contextlib import closing, suppress
 from pathlib import Path
 
 import pytest
@@ -21,14 +23,20 @@ class Cluster:
     """A scheduler on a port of this machine, and a worker, in processes of their own."""
 
     def __init__(self, port: int):
-        words = {"scheduler": ["--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]}
-        words["worker"] = [f"tcp://127.0.0.1:{port}", "--no-nanny", "--no-dashboard", "--nthreads", "1"]
-        self.processes = [
-            subprocess.Popen(
-                [sys.executable, "-m", f"distributed.cli.dask_{name}", *given], stderr=subprocess.DEVNULL
-            )
-            for name, given in words.items()
-        ]
+        self.processes: list[subprocess.Popen[bytes]] = []
+        self.start("scheduler", "--host", "127.0.0.1", "--port", str(port))
+        while True:  # until it listens
+            assert self.processes[0].poll() is None, "the scheduler ended"
+            with closing(socket.socket()) as tried:
+                if tried.connect_ex(("127.0.0.1", port)) == 0:
+                    break
+            time.sleep(0.1)
+        self.start("worker", f"tcp://127.0.0.1:{port}", "--no-nanny", "--nthreads", "1")
+
+    def start(self, name: str, *words: str) -> None:
+        """Start a program of Dask."""
+        program = [sys.executable, "-m", f"distributed.cli.dask_{name}", "--no-dashboard", *words]
+        self.processes.append(subprocess.Popen(program))
 
     def kill(self) -> None:
         """End both at once."""
@@ -37,12 +45,19 @@ class Cluster:
             process.wait()
 
 
+def free_port() -> int:
+    """A port below those that the system gives to connections, where none can take it between two schedulers."""
+    for port in range(20000 + os.getpid() % 10000, 32768):
+        with closing(socket.socket()) as tried, suppress(OSError):
+            tried.bind(("127.0.0.1", port))
+            return port
+    raise OSError("no port is free")
+
+
 def test_a_study_goes_on_when_the_scheduler_is_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("flexcal.jobs.study.store._EVERY", 0.0)
     monkeypatch.setattr("flexcal.jobs.study.store._SHARE", 0.0)
-    with closing(socket.socket()) as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     plan, out = read_study(write_study(tmp_path)), tmp_path / "out"
     cluster = Cluster(port)
 

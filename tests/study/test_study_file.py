@@ -10,6 +10,15 @@ from small_study import EXAMPLES, UR5, write_study
 
 from flexcal.jobs.study import read_study
 
+DATA_SET = {
+    "kind": "calibrate",
+    "seeds": None,
+    "grid": None,
+    "options": None,
+    "poses": [str(UR5 / "random.csv")],
+}
+"""Keys of a study of measured poses, for `write_study`."""
+
 
 def test_every_combination_has_a_row_for_every_seed(tmp_path: Path) -> None:
     draw = {"count": 3, "options": {"cell.sensors.tracker_noise_m": {"log_uniform": [1e-6, 1e-4]}}}
@@ -38,17 +47,9 @@ def test_more_seeds_draws_or_values_leave_the_rows_that_there_were(tmp_path: Pat
 
 
 def test_groups_and_draws_of_a_data_set(tmp_path: Path) -> None:
-    given = {
-        "kind": "calibrate",
-        "seeds": None,
-        "grid": None,
-        "options": None,
-        "poses": [str(UR5 / "random.csv")],
-    }
-
     def resamples(**resampling: object) -> list[str]:
         return [
-            row.resample for row in read_study(write_study(tmp_path, **given, resampling=resampling)).rows
+            row.resample for row in read_study(write_study(tmp_path, **DATA_SET, resampling=resampling)).rows
         ]
 
     assert resamples(bootstrap=3) == ["all", "bootstrap 1", "bootstrap 2", "bootstrap 3"]
@@ -56,7 +57,7 @@ def test_groups_and_draws_of_a_data_set(tmp_path: Path) -> None:
     assert len(resamples(leave_one_out="pose")) == 1 + 20
     with refused("E-STUDY-011", "station"):
         resamples(leave_one_out="station")
-    assert len(read_study(write_study(tmp_path, **given)).rows) == 1
+    assert len(read_study(write_study(tmp_path, **DATA_SET)).rows) == 1
 
 
 @pytest.mark.parametrize(
@@ -95,15 +96,8 @@ def test_what_is_refused(changes: dict, code: str, names: tuple[str, ...], tmp_p
     ],
 )
 def test_resampling_that_is_refused(resampling: dict, code: str, tmp_path: Path) -> None:
-    given = {
-        "kind": "calibrate",
-        "seeds": None,
-        "grid": None,
-        "options": None,
-        "poses": [str(UR5 / "random.csv")],
-    }
     with refused(code):
-        read_study(write_study(tmp_path, **given, resampling=resampling))
+        read_study(write_study(tmp_path, **DATA_SET, resampling=resampling))
 
 
 def test_a_two_stage_study_takes_the_robots_own_files(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from flexcal.errors import FlexcalError, InputError
-from flexcal.parallel.ordered import combined_groups, value_of, values_in_order
+from flexcal.parallel.ordered import combined_groups, value_of
 from flexcal.parallel.outcome import Outcome, TaskError, run_task
 from flexcal.parallel.workers import Workers
 
@@ -123,10 +123,6 @@ class DaskCluster(Workers):
         finally:
             if client.status == "running":
                 client.cancel([*running, shared])
-
-    def values(self, function: Callable[..., V], tasks: Iterable[Any], *common: Any) -> Iterator[V]:
-        """As `Workers.values`; raises `FlexcalError` as `results` does."""
-        return values_in_order(self.results(function, tasks, *common))
 
     def reduced(
         self,

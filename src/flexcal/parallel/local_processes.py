@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from dataclasses import dataclass
-from itertools import chain
 from typing import Any, TypeVar
 
 from flexcal.parallel.common_values import CommonValues
-from flexcal.parallel.ordered import combined_groups, values_in_order
 from flexcal.parallel.outcome import Outcome, TaskError, run_task
 from flexcal.parallel.worker_processes import WorkerTask, interrupts_left_to_this_process
 from flexcal.parallel.workers import Workers
@@ -84,20 +82,6 @@ class LocalProcesses(Workers):
             if running:
                 self.close()
 
-    def values(self, function: Callable[..., V], tasks: Iterable[Any], *common: Any) -> Iterator[V]:
-        """As `Workers.values`."""
-        return values_in_order(self.results(function, tasks, *common))
-
-    def reduced(
-        self,
-        function: Callable[..., V],
-        groups: Sequence[Sequence[Any]],
-        combine: Callable[[V, V], V],
-        *common: Any,
-    ) -> Iterator[V]:
-        """As `Workers.reduced`; values are combined in this process, as they come."""
-        return combined_groups(self.values(function, chain.from_iterable(groups), *common), groups, combine)
-
     def close(self) -> None:
         """As `Workers.close`; what still runs is killed."""
         if self._pool is not None:
@@ -110,16 +94,25 @@ class LocalProcesses(Workers):
                 from joblib.externals.loky.process_executor import ProcessPoolExecutor
 
                 self._pool = ProcessPoolExecutor(self._jobs, env=_ENVIRONMENT)
-            return self._pool.submit(WorkerTask(_run_numbered), shared, numbered)
+            try:
+                return self._pool.submit(WorkerTask(_run_numbered), shared, numbered)
+            except _errors_of_the_pool() as problem:  # a worker was killed since the last future ended
+                broken: Future[Any] = Future()
+                broken.set_exception(problem)
+                return broken
+
+
+def _errors_of_the_pool() -> tuple[type[Exception], ...]:
+    from joblib.externals.loky.process_executor import ShutdownExecutorError
+
+    return BrokenExecutor, ShutdownExecutorError
 
 
 def _is_broken(future: Future[Outcome[V]]) -> bool:
     """Whether the pool ended before the task did."""
     if future.cancelled() or not future.done():
         return True
-    from joblib.externals.loky.process_executor import ShutdownExecutorError
-
-    return isinstance(future.exception(), (BrokenExecutor, ShutdownExecutorError))
+    return isinstance(future.exception(), _errors_of_the_pool())
 
 
 def _outcome(future: Future[Outcome[V]], numbered: _Numbered) -> Outcome[V]:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from itertools import chain
+from collections.abc import Callable, Generator, Iterable, Iterator
 from typing import Any, TypeVar
 
-from flexcal.parallel.ordered import combined_groups
 from flexcal.parallel.outcome import Outcome, run_task
 from flexcal.parallel.workers import Workers
 
@@ -31,16 +29,6 @@ class ThisProcess(Workers):
     def values(self, function: Callable[..., V], tasks: Iterable[Any], *common: Any) -> Iterator[V]:
         """As `Workers.values`; the exception of a task is raised as it is."""
         return (function(task, *common) for task in tasks)
-
-    def reduced(
-        self,
-        function: Callable[..., V],
-        groups: Sequence[Sequence[Any]],
-        combine: Callable[[V, V], V],
-        *common: Any,
-    ) -> Iterator[V]:
-        """As `Workers.reduced`."""
-        return combined_groups(self.values(function, chain.from_iterable(groups), *common), groups, combine)
 
     def close(self) -> None:
         """As `Workers.close`: nothing was started."""

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from itertools import chain
 from typing import Any, TypeVar
 
+from flexcal.parallel.ordered import combined_groups, values_in_order
 from flexcal.parallel.outcome import Outcome
 
 V = TypeVar("V")
@@ -30,11 +32,10 @@ class Workers(ABC):
         iterator is closed before its end, the tasks that are left are cancelled.
         """
 
-    @abstractmethod
     def values(self, function: Callable[..., V], tasks: Iterable[Any], *common: Any) -> Iterator[V]:
         """`function(task, *common)` of every task, in their order. The error of a task is raised here."""
+        return values_in_order(self.results(function, tasks, *common))
 
-    @abstractmethod
     def reduced(
         self,
         function: Callable[..., V],
@@ -47,6 +48,7 @@ class Workers(ABC):
         The tree depends on the number of tasks alone: neighbours are combined, then their pairs, and so on. On a cluster no worker and not
         this process hold more than a few values at a time. The error of a task is raised here.
         """
+        return combined_groups(self.values(function, chain.from_iterable(groups), *common), groups, combine)
 
     @abstractmethod
     def close(self) -> None:

@@ -20,6 +20,7 @@ from flexcal.calibration.comparison.common_poses import (
 from flexcal.calibration.comparison.explanations import LEVEL, Explanation, candidates_of, chance_of, explain
 from flexcal.calibration.comparison.joint_covariance import difference_of_known
 from flexcal.calibration.comparison.model_covariance import (
+    common_targets,
     estimated,
     is_geometric,
     place_of,
@@ -161,7 +162,7 @@ def compare_geometry(
         Where the two measured no point in common, or no common joint range.
     """
     pair = (first, second)
-    targets = _common_targets(model, pair)
+    targets = _targets(model, pair)
     limits = common_ranges(model, pair)
     nominal = model.with_estimated_springs(first.values)
     names = moving_names(nominal, pair)
@@ -298,12 +299,12 @@ def _both(names: Sequence[str], pair: Sequence[Estimate]) -> list[str]:
     return [n for n in names if all(n in e.parameters and e.std(n) for e in pair)]
 
 
-def _common_targets(model: RobotModel, pair: Sequence[Estimate]) -> list[str]:
-    first, second = (targets_of(model, estimate) for estimate in pair)
-    common = [name for name in first if name in second]
+def _targets(model: RobotModel, pair: Sequence[Estimate]) -> list[str]:
+    common = common_targets(model, pair)
     if not common:
+        first, second = (", ".join(targets_of(model, estimate)) for estimate in pair)
         raise FlexcalError(
             "E-CAL-033",
-            f"the two calibrations measured no point in common ({', '.join(first)}; {', '.join(second)}), so they cannot be compared.",
+            f"the two calibrations measured no point in common ({first}; {second}), so they cannot be compared.",
         )
     return common

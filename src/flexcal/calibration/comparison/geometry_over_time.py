@@ -20,12 +20,12 @@ from flexcal.calibration.comparison.common_poses import (
 )
 from flexcal.calibration.comparison.explanations import Explanation, candidates_of, explain
 from flexcal.calibration.comparison.model_covariance import (
+    common_targets,
     estimated,
     is_geometric,
     place_of,
     size_of,
     split_of,
-    targets_of,
     waves_of,
 )
 from flexcal.calibration.measurement import random_poses, seen_from_base
@@ -118,7 +118,12 @@ def geometry_trend(
     their prior. Raises `FlexcalError` where they measured no point in common, or no common joint range.
     """
     limits = common_ranges(model, estimates)
-    targets = _common_targets(model, estimates)
+    targets = common_targets(model, estimates)
+    if not targets:
+        raise FlexcalError(
+            "E-CAL-036",
+            f"the robot's {len(estimates)} calibrations measured no point in common, so its geometry was not compared over time.",
+        )
     nominal = model.with_estimated_springs(estimates[0].values)
     first = estimated(nominal, estimates[0])
     known = first.values
@@ -221,14 +226,3 @@ def _each(whiten: np.ndarray, sources: np.ndarray) -> np.ndarray:
 def _alone(place: np.ndarray, own: np.ndarray) -> np.ndarray:
     """Columns (3 N, 3) that are of the poses `own` (N,) alone."""
     return place * np.repeat(own, 3)[:, None]
-
-
-def _common_targets(model: RobotModel, estimates: Sequence[Estimate]) -> list[str]:
-    every = [targets_of(model, estimate) for estimate in estimates]
-    common = [name for name in every[0] if all(name in other for other in every)]
-    if not common:
-        raise FlexcalError(
-            "E-CAL-036",
-            f"the robot's {len(estimates)} calibrations measured no point in common, so its geometry was not compared over time.",
-        )
-    return common

@@ -107,6 +107,12 @@ def targets_of(model: RobotModel, estimate: Estimate) -> list[str]:
     return [name for name in told if name in model.points] or [next(iter(model.points))]
 
 
+def common_targets(model: RobotModel, estimates: Sequence[Estimate]) -> list[str]:
+    """Points on the tool that all calibrations measured."""
+    first, *others = (targets_of(model, estimate) for estimate in estimates)
+    return [name for name in first if all(name in other for other in others)]
+
+
 def place_of(model: RobotModel, target: str) -> list[str]:
     """Parameters of the place of a point on the tool."""
     if target == next(iter(model.points)):

@@ -78,6 +78,7 @@ class Recheck:
             self._plan(console, self.plan)
             return
         from flexcal.jobs.recheck import recheck_robot
+        from flexcal.report.layout import counted
 
         require_robot_and_files(self.robot, self.poses, "POSES")
         with console.progress() as progress:
@@ -98,7 +99,7 @@ class Recheck:
         for remark in checked.remarks:
             console.say(remark)
         console.say(
-            f"wrote {self.out / 'visits.json'}: {_counted(len(checked.dates), 'visit')} since this calibration"
+            f"wrote {self.out / 'visits.json'}: {counted(len(checked.dates), 'visit')} since this calibration"
         )
         console.say(f"wrote {self.out / 'report.html'}")
         document = checked.document()
@@ -143,7 +144,3 @@ class Recheck:
             planned.document(),
             f"{measure_command(planned.file, self.robot, 'visit')}{import_command(self.robot, 'visit.csv')}",
         )
-
-
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

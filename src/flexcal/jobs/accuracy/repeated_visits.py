@@ -30,8 +30,8 @@ from flexcal.jobs.inputs import (
     require_distinct_files,
     stored_estimates,
 )
-from flexcal.jobs.pages import REPORT, PlottedResult
-from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, header, write_results
+from flexcal.jobs.pages import PlottedFolder
+from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, header
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.layout import Page
@@ -40,7 +40,7 @@ from flexcal.units import MILLIMETRE
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Repeatability(PlottedResult):
+class Repeatability(PlottedFolder):
     """Result of `repeatability`: pose accuracy and repeatability of ISO 9283:1998 from repeated visits.
 
     Attributes
@@ -85,17 +85,6 @@ class Repeatability(PlottedResult):
             if (spread := document[f"ap_{kind}_mm"]) is not None
         ]
         return "\n".join([self.headline, *accuracy, *self.remarks])
-
-    def write(self, folder: str | Path) -> None:
-        """Write results.json and report.html to a folder.
-
-        Parameters
-        ----------
-        folder : str or Path
-            The folder, which is created where it is missing.
-        """
-        write_results(Path(folder), self.document())
-        self.report(Path(folder) / REPORT)
 
     def _page(self) -> Page:
         return repeatability_page(

@@ -17,8 +17,7 @@ from flexcal.errors import FlexcalError, InputError, naming
 from flexcal.jobs.inputs import (
     CalibratedRobot,
     is_station_identified,
-    refused_remark,
-    unmeasured_lengths_remark,
+    use_remarks,
     with_temperature,
 )
 from flexcal.jobs.pages import Result
@@ -225,7 +224,7 @@ def compensate(
         origin,
         nominal,
         robot.measured,
-        remarks=(*refused_remark(robot), *unmeasured_lengths_remark(robot), *warm),
+        remarks=(*use_remarks(robot), *warm),
     )
 
 

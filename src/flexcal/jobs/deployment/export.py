@@ -26,9 +26,8 @@ from flexcal.jobs.deployment.actuator_export import actuator_remarks, identified
 from flexcal.jobs.inputs import (
     CalibratedRobot,
     held_at,
-    refused_remark,
     stored_estimates,
-    unmeasured_lengths_remark,
+    use_remarks,
 )
 from flexcal.jobs.pages import Result
 from flexcal.model.robot import RobotModel, with_blocks
@@ -193,8 +192,7 @@ def export_robot(
         rendered = render(format, probable, nominal)
     written = write_rendered(probable, path, rendered)
     remarks = (
-        *refused_remark(robot),
-        *unmeasured_lengths_remark(robot),
+        *use_remarks(robot),
         *actuator_remarks(robot, format),
         *warm,
     )

@@ -11,7 +11,7 @@ import numpy as np
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.data.poses import ToolTargets, read_commands, write_targets
 from flexcal.errors import FlexcalError
-from flexcal.jobs.inputs import CalibratedRobot, refused_remark, unmeasured_lengths_remark, with_temperature
+from flexcal.jobs.inputs import CalibratedRobot, use_remarks, with_temperature
 from flexcal.jobs.pages import Result
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import carried_mass, certain_flank, points_kinematics, tool_at_rest
@@ -124,7 +124,7 @@ def predict(
         tool,
         beside,
         certain,
-        (*refused_remark(robot), *unmeasured_lengths_remark(robot), *warm),
+        (*use_remarks(robot), *warm),
     )
 
 

@@ -17,7 +17,7 @@ from flexcal.jobs.deployment.controller_poses import ControllerPoses
 from flexcal.jobs.deployment.filtered_program import FilteredProgram, ToolPoses
 from flexcal.jobs.deployment.path_corrections import PathCorrections, deviations_of_targets, path_remarks
 from flexcal.jobs.deployment.program_files import output_places, read_program, written_files
-from flexcal.jobs.inputs import CalibratedRobot, held_at, refused_remark, unmeasured_lengths_remark
+from flexcal.jobs.inputs import CalibratedRobot, held_at, use_remarks
 from flexcal.jobs.result_files import RunRecord
 from flexcal.model.robot import RobotModel, with_point_at_frame
 from flexcal.model.statics import tool_at_rest
@@ -141,8 +141,7 @@ def filter_program(
     missed = deviations_of_targets(program.moves, deviations, len(q))
     before, corrected = (ToolPoses.of(places, program.targets, each) for each in (q, commands))
     remarks = (
-        *refused_remark(robot),
-        *unmeasured_lengths_remark(robot),
+        *use_remarks(robot),
         *warm,
         *_convention_remarks(joints),
         *_tool_remarks(program, places.tool),

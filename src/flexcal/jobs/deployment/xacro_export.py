@@ -12,7 +12,7 @@ from flexcal.errors import InputError, unreadable
 from flexcal.export import XacroExport, XacroSource, Zeros, render_xacro, shifted_limits
 from flexcal.files.transaction import atomic_path
 from flexcal.jobs.deployment.export import identified_robot
-from flexcal.jobs.inputs import held_at, refused_remark, unmeasured_lengths_remark
+from flexcal.jobs.inputs import held_at, use_remarks
 from flexcal.jobs.pages import Result
 
 
@@ -117,7 +117,7 @@ def export_xacro(
     source = XacroSource(xacro or robot.nominal.urdf, arguments or {}, packages or {})
     export = render_xacro(model, robot.nominal, source, zeros)
     folder, files, changes, main = _below_one_folder(export)
-    remarks = [*export.remarks, *refused_remark(robot), *unmeasured_lengths_remark(robot), *warm]
+    remarks = [*export.remarks, *use_remarks(robot), *warm]
     if joint_limits is not None:
         offsets = dict(zip(model.joint_names, model.joint_offsets.tolist(), strict=True))
         try:

@@ -17,7 +17,7 @@ from flexcal.jobs.fleet.parameters import ParameterSpread
 from flexcal.jobs.fleet.rechecks import LatestRecheck
 from flexcal.jobs.fleet_prior import comparable_terms
 from flexcal.report.layout import counted
-from flexcal.report.results import TOLERANCE_STATES
+from flexcal.report.results import TOLERANCE_STATES, is_drifting
 from flexcal.units import MILLIMETRE
 
 
@@ -81,9 +81,7 @@ def fleet_document(
             "results": sum(counts.values()),
             "rows": gathered.table.frame.height,
             **{state: states[state] for state in ("out", "within", "undecided", "not_judged")},
-            "drifting": sum(
-                bool(r["drifts"] or r["drifting_parameters"] or r["geometry_drift"]) for r in robots
-            ),
+            "drifting": sum(is_drifting(robot) for robot in robots),
             "error_trends_tested": len(tested),
             "parameter_trends_tested": len(drifts),
             "robots_with_parameter_trends": len({drift.robot for drift in drifts}),

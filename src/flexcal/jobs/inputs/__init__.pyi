@@ -28,8 +28,8 @@ from .stored_model import (
     measured_points,
     refused_remark,
     stored_estimates,
-    unmeasured_lengths_remark,
     unmeasured_targets_remark,
+    use_remarks,
 )
 
 __all__ = [
@@ -61,7 +61,7 @@ __all__ = [
     "robot_provenance",
     "stored_estimates",
     "temperature_remarks",
-    "unmeasured_lengths_remark",
     "unmeasured_targets_remark",
+    "use_remarks",
     "with_temperature",
 ]

@@ -159,6 +159,11 @@ def unmeasured_lengths_remark(calibrated: CalibratedRobot) -> tuple[str, ...]:
     )
 
 
+def use_remarks(calibrated: CalibratedRobot) -> tuple[str, ...]:
+    """Remarks on the use of a calibration that was not trusted, or that read inclinometers alone; none for others."""
+    return (*refused_remark(calibrated), *unmeasured_lengths_remark(calibrated))
+
+
 def measured_points(nominal: RobotModel, blocks: Mapping[Block, Estimate]) -> tuple[str, ...]:
     """Points measured in the calibration among `blocks`; none without one."""
     if "calibration" not in blocks:

@@ -4,6 +4,7 @@ from .customer import customer_report
 from .report import REPORT, folder_page, report_folder, two_stage_study
 from .result import (
     Identification,
+    PlottedFolder,
     PlottedResult,
     ReportedResult,
     Result,
@@ -16,6 +17,7 @@ from .result import (
 __all__ = [
     "REPORT",
     "Identification",
+    "PlottedFolder",
     "PlottedResult",
     "ReportedResult",
     "Result",

@@ -87,6 +87,24 @@ class PlottedResult(Result):
         return path
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class PlottedFolder(PlottedResult):
+    """Plotted result with a folder of results.json and report.html."""
+
+    def write(self, folder: str | Path) -> None:
+        """Write results.json and report.html to a folder.
+
+        Parameters
+        ----------
+        folder : str or Path
+            The folder, which is created where it is missing.
+        """
+        from flexcal.jobs.pages.report import REPORT
+
+        write_results(Path(folder), self.document())
+        self.report(Path(folder) / REPORT)
+
+
 class WrittenResult(SummarisedResult):
     """Result with a folder of files, and a report that is made from them."""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -33,7 +32,7 @@ from flexcal.jobs.inputs import (
     reference_temperature,
     with_temperature,
 )
-from flexcal.jobs.pages import REPORT, PlottedResult
+from flexcal.jobs.pages import PlottedFolder
 from flexcal.jobs.recheck.data_errors import DataErrors, disagreeing_poses, misread_visit
 from flexcal.jobs.recheck.document import SHIFT, UNSEEN, drift_block, recheck_block
 from flexcal.jobs.recheck.judgement_words import (
@@ -42,14 +41,14 @@ from flexcal.jobs.recheck.judgement_words import (
     judgement_sentence,
     telling_sentence,
 )
-from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, header, write_results
+from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, header
 from flexcal.model.kinematics import depends_on_temperature
 from flexcal.report.layout import Page
 from flexcal.report.pages import RecheckStudy, recheck_page
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Recheck(PlottedResult):
+class Recheck(PlottedFolder):
     """Result of `recheck`: whether a robot is as calibrated.
 
     Attributes
@@ -232,17 +231,6 @@ class Recheck(PlottedResult):
             f"{told}, although against the calibration it is not as calibrated ({judgement_sentence(absolute)}); a later visit that is "
             "as this one is not as calibrated either"
         )
-
-    def write(self, folder: str | Path) -> None:
-        """Write results.json and report.html to a folder.
-
-        Parameters
-        ----------
-        folder : str or Path
-            The folder, which is created where it is missing.
-        """
-        write_results(Path(folder), self.document())
-        self.report(Path(folder) / REPORT)
 
     def _page(self) -> Page:
         return recheck_page(RecheckStudy(self.model.name, self.document()))

@@ -101,45 +101,44 @@ class ResamplingConfig:
             raise FlexcalError("E-STUDY-007", "a jackknife needs at least 2 groups.")
 
 
-@dataclass(frozen=True)
-class VirtualCalibrationConfig:
-    """Calibrations of virtual robots with known true parameters, which measured positions alone identify.
+@dataclass(frozen=True, kw_only=True)
+class VariedConfig:
+    """Tasks on a `robot`. `options` hold for all, `grid` lists values of which every combination runs, `draw` draws combinations at random.
 
-    `options` hold for all tasks, `grid` lists values of which every combination runs, `draw` draws combinations at random; names of options
-    are those of `VirtualCalibrationOptions`, with dots for those of the cell.
+    Names are those of the options of the kind, with dots for those of the cell.
+    """
+
+    robot: str
+    options: dict[str, Any] = field(default_factory=dict)
+    grid: dict[str, list[Any]] = field(default_factory=dict)
+    draw: DrawConfig | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class VirtualCalibrationConfig(VariedConfig):
+    """Calibrations of virtual robots with known true parameters, which measured positions alone identify; options as of
+    `VirtualCalibrationOptions`.
     """
 
     kind: Literal["virtual_calibration"]
-    robot: str
     seeds: SeedsConfig
-    options: dict[str, Any] = field(default_factory=dict)
-    grid: dict[str, list[Any]] = field(default_factory=dict)
-    draw: DrawConfig | None = None
 
 
-@dataclass(frozen=True)
-class TwoStageConfig:
+@dataclass(frozen=True, kw_only=True)
+class TwoStageConfig(VariedConfig):
     """Two-stage calibrations of virtual robots, as of 'flexcal demo'; options as of `TwoStageOptions`."""
 
     kind: Literal["two_stage"]
-    robot: str
     seeds: SeedsConfig
-    options: dict[str, Any] = field(default_factory=dict)
-    grid: dict[str, list[Any]] = field(default_factory=dict)
-    draw: DrawConfig | None = None
 
 
-@dataclass(frozen=True)
-class CalibrateConfig:
+@dataclass(frozen=True, kw_only=True)
+class CalibrateConfig(VariedConfig):
     """Calibrations on files of measured `poses`, resampled, or with other options; these as of `CalibrateOptions`."""
 
     kind: Literal["calibrate"]
-    robot: str
     poses: tuple[str, ...]
     resampling: ResamplingConfig | None = None
-    options: dict[str, Any] = field(default_factory=dict)
-    grid: dict[str, list[Any]] = field(default_factory=dict)
-    draw: DrawConfig | None = None
 
 
 StudyConfig = VirtualCalibrationConfig | TwoStageConfig | CalibrateConfig

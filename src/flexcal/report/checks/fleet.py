@@ -42,28 +42,7 @@ def fleet_checks(document: Mapping[str, Any]) -> tuple[Check, ...]:
                 "bad" if counts["out"] else "care" if counts["undecided"] else "good",
             )
         )
-    tested = len(with_trends(document))
-    trends = [robot["trend"] for robot in document["robots"] if robot["trend"] is not None]
-    checks.append(
-        Check(
-            "Does any robot drift?",
-            f"{counts['drifting']} of {tested} with trends do."
-            if counts["drifting"]
-            else f"No significant trend of the errors of {counted(len(trends), 'robot')}; their 95 % intervals allow up to "
-            f"{significant(max(trend['high'] for trend in trends), 2)} mm a year."
-            if trends
-            else "Neither single parameters nor the geometry as a whole, of "
-            f"{counted(counts['geometry_trends_tested'], 'robot')}, have a significant trend, "
-            "but no robot has three dated verifications of one calibration."
-            if tested
-            else "No robot has three dated visits.",
-            "care"
-            if counts["drifting"]
-            else "good"
-            if trends and min(trend["visits"] for trend in trends) >= _TELLING_VISITS
-            else "unknown",
-        )
-    )
+    checks.append(_check_drift(document))
     if counts["rechecked"]:
         checks.append(
             Check(
@@ -81,3 +60,26 @@ def fleet_checks(document: Mapping[str, Any]) -> tuple[Check, ...]:
             )
         )
     return tuple(checks)
+
+
+def _check_drift(document: Mapping[str, Any]) -> Check:
+    """Whether errors, single parameters or the geometry as a whole of a robot have a significant trend."""
+    question, counts, tested = "Does any robot drift?", document["counts"], len(with_trends(document))
+    if counts["drifting"]:
+        return Check(question, f"{counts['drifting']} of {tested} with trends do.", "care")
+    if not tested:
+        return Check(question, "No robot has three dated visits.", "unknown")
+    trends = [robot["trend"] for robot in document["robots"] if robot["trend"] is not None]
+    if not trends:
+        answer = (
+            "Neither single parameters nor the geometry as a whole, of "
+            f"{counted(counts['geometry_trends_tested'], 'robot')}, have a significant trend, "
+            "but no robot has three dated verifications of one calibration."
+        )
+        return Check(question, answer, "unknown")
+    answer = (
+        f"No significant trend of the errors of {counted(len(trends), 'robot')}; their 95 % intervals allow up to "
+        f"{significant(max(trend['high'] for trend in trends), 2)} mm a year."
+    )
+    telling = min(trend["visits"] for trend in trends) >= _TELLING_VISITS
+    return Check(question, answer, "good" if telling else "unknown")

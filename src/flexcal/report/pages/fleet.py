@@ -24,7 +24,7 @@ from flexcal.report.layout import (
     worst,
 )
 from flexcal.report.layout import Block as PageBlock
-from flexcal.report.results import drifts, tolerance_kept, with_trends
+from flexcal.report.results import is_drifting, tolerance_kept, with_trends
 from flexcal.report.sections import parameter_spreads_section, provenance_section, trends_section
 
 _LISTED = 300
@@ -70,7 +70,7 @@ def _verdict(document: Mapping[str, Any]) -> Verdict:
             "How many drift?",
             str(counts["drifting"]),
             f"of {len(with_trends(document))} with trends",
-            _named(sorted(robot["robot"] for robot in document["robots"] if drifts(robot)))
+            _named(sorted(robot["robot"] for robot in document["robots"] if is_drifting(robot)))
             or "None significantly, after correction for the number of tests.",
         ),
         Fact(
@@ -126,7 +126,7 @@ def _robots(document: Mapping[str, Any]) -> Section:
 def _needs_attention(robot: Mapping[str, Any]) -> bool:
     return bool(
         robot["state"] in ("out", "undecided")
-        or drifts(robot)
+        or is_drifting(robot)
         or robot["outlying_parameters"]
         or (robot["recheck"] is not None and (robot["recheck"]["changed"] or robot["recheck"]["alarms"]))
     )

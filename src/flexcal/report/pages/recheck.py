@@ -18,6 +18,7 @@ from flexcal.report.layout import (
     Table,
     Text,
     Verdict,
+    counted,
     document_millimetres,
     significant,
 )
@@ -156,7 +157,7 @@ def _checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
             "Does anything drift over the visits?",
             f"{' or '.join(alarms)}: see the cumulative sums."
             if alarms
-            else f"Not beyond chance in {len(drift['visits'])} visit{'' if len(drift['visits']) == 1 else 's'}.",
+            else f"Not beyond chance in {counted(len(drift['visits']), 'visit')}.",
             "care" if alarms else "good" if len(drift["visits"]) > 1 else "unknown",
         ),
     ]

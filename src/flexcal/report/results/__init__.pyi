@@ -1,6 +1,6 @@
 from .change_wording import amount, chance_in_words, change_sentence, explanation_in_words
 from .fitted_response import FittedResponse, fitted_responses
-from .fleet_robots import TOLERANCE_STATES, drifts, tolerance_kept, with_trends
+from .fleet_robots import TOLERANCE_STATES, is_drifting, tolerance_kept, with_trends
 from .identifiability import IdentifiableParameters
 from .measured_response import MeasuredResponse, relative_to_diagonal, uncertainty_sentence
 from .particulars import NOT_GIVEN, MeasurementDetails
@@ -31,9 +31,9 @@ __all__ = [
     "binomial_interval",
     "chance_in_words",
     "change_sentence",
-    "drifts",
     "explanation_in_words",
     "fitted_responses",
+    "is_drifting",
     "parameter_changes",
     "relative_to_diagonal",
     "study_level_rows",

@@ -29,6 +29,6 @@ def with_trends(document: Mapping[str, Any]) -> Sequence[str]:
     ]
 
 
-def drifts(robot: Mapping[str, Any]) -> bool:
+def is_drifting(robot: Mapping[str, Any]) -> bool:
     """Whether a robot of the document has a significant trend of its errors, of a parameter or of the geometry as a whole."""
     return bool(robot["drifts"] or robot["drifting_parameters"] or robot["geometry_drift"])
