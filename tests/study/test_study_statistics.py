@@ -50,6 +50,9 @@ def test_coverage_of_intervals_that_are_right_and_of_those_that_are_too_small() 
     small = study_statistics(table(intervals(errors, 0.5)))["coverage"]
     assert small["share"] == pytest.approx(0.6729, abs=0.015) and small["high"] < 0.95  # 2 Φ(0.98) − 1
     assert set(small["parameters"]) == {"p0", "p1", "p2"}
+    assert right["ratio"] == pytest.approx(1, abs=0.05) and small["ratio"] == pytest.approx(
+        2 * right["ratio"]
+    )
 
 
 def test_the_interval_of_the_share_of_all_knows_that_those_of_a_task_are_not_independent() -> None:
@@ -153,6 +156,37 @@ def test_a_spread_unlike_the_stated_one_is_said(factor: float, status: str) -> N
     results |= {"tasks": {"total": 61, "done": 61, "failed": 0}, **study_statistics(studied)}
     checks = study_page(StudyReport(results, studied)).verdict.checks
     assert [check.status for check in checks] == ["good", "good", status]
+
+
+@pytest.mark.parametrize(
+    ("std", "status", "said"),
+    [
+        (1.0, "good", "."),
+        (1.06, "good", "a little too large"),
+        (1.3, "care", "are too large"),
+        (0.7, "bad", "are too small"),
+    ],
+)
+def test_a_share_that_surely_but_hardly_differs_from_the_stated_one_is_no_fault(
+    std: float, status: str, said: str
+) -> None:
+    """Errors of standard deviation 1: 95 % of intervals for 1.06 hold 96.2 % of the truth."""
+    errors = np.random.default_rng(9).standard_normal((3000, 4))
+    studied = table(intervals(errors, std))
+    results = {
+        "study": "virtual_calibration",
+        "name": "s",
+        "error": "verification",
+        "has_truth": True,
+        "command": "",
+        "provenance": {},
+    }
+    results |= {"tasks": {"total": 3000, "done": 3000, "failed": 0}, **study_statistics(studied)}
+    check = study_page(StudyReport(results, studied)).verdict.checks[-1]
+    assert check.status == status and said in check.answer
+    if std != 1.0:
+        times = float(check.answer.split(" times the stated")[0].split()[-1])
+        assert times == pytest.approx(1 / std, rel=0.03)
 
 
 def test_names_and_messages_are_text_in_the_page(tmp_path) -> None:

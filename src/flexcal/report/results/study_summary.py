@@ -65,8 +65,8 @@ def binomial_interval(inside: float, count: float) -> tuple[float, float]:
 def coverage(table: StudyTable, rows: np.ndarray | None = None) -> dict[str, Any]:
     """How often 95 % intervals hold the true value: of every parameter, and of all, with the 95 % intervals of these shares.
 
-    Tasks of one seed share the drawn robot and its noise, as the intervals of one task do: only seeds are independent. `rows` (N,) is a
-    mask.
+    Tasks of one seed share the drawn robot and its noise, as the intervals of one task do: only seeds are independent. `ratio` is the root
+    mean square of the errors over their stated standard deviations, and of all parameters the median. `rows` (N,) is a mask.
     """
     chosen = np.ones(len(table), bool) if rows is None else rows
     drawn = _drawn_robots(table)
@@ -81,6 +81,8 @@ def coverage(table: StudyTable, rows: np.ndarray | None = None) -> dict[str, Any
         held += inside
         known += told
         bounds = _clustered_interval(inside, told, drawn)
+        estimate, std = (table.numbers(f"{name}.{what}")[told] for what in ("estimate", "std"))
+        apart = (estimate - truth[told])[std > 0] / std[std > 0]
         parameters[name] = {
             "tasks": count,
             "inside": int(inside.sum()),
@@ -88,14 +90,17 @@ def coverage(table: StudyTable, rows: np.ndarray | None = None) -> dict[str, Any
         } | {
             "low": bounds[0],
             "high": bounds[1],
+            "ratio": float(np.sqrt((apart**2).mean())) if len(apart) else None,
         }
     some = known > 0
     bounds = _clustered_interval(held, known, drawn) if some.any() else None
+    ratios = [item["ratio"] for item in parameters.values() if item["ratio"] is not None]
     return {
         "tasks": int(some.sum()),
         "share": float(held.sum() / known.sum()) if some.any() else None,
         "low": None if bounds is None else bounds[0],
         "high": None if bounds is None else bounds[1],
+        "ratio": float(np.median(ratios)) if ratios else None,
         "parameters": parameters,
     }
 
