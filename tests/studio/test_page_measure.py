@@ -65,6 +65,11 @@ def text_field(page: Any, label: str) -> Any:
     return page.get_by_text(label, exact=True).locator("xpath=following::input[1]")
 
 
+def type_point(page: Any, *values: str) -> None:
+    for axis, value in zip("xyz", values, strict=True):
+        page.get_by_label(f"{axis} / mm").fill(value)
+
+
 def press(page: Any, name: str) -> None:
     page.get_by_role("button", name=name).click()
 
@@ -149,9 +154,7 @@ def test_a_typed_point(page: Any, running: Any, cell: Any) -> None:
     begin(page, process.url)
     press(page, "Take this point")
     page.get_by_text("type x, y and z of pose 1 first").wait_for(timeout=WAIT)
-    for axis, value in (("x", "534.8619"), ("y", "-572.7086"), ("z", "901.3214")):
-        page.get_by_label(f"{axis} / mm").fill(value)
-        page.get_by_label(f"{axis} / mm").press("Tab")
+    type_point(page, "534.8619", "-572.7086", "901.3214")
     press(page, "Take this point")
     page.get_by_text("Next: pose 2").wait_for(timeout=WAIT)
     (row,) = rows(folder)
@@ -162,8 +165,54 @@ def test_a_typed_point(page: Any, running: Any, cell: Any) -> None:
     assert row["station"] == "tracker"
 
     choose(page, "Station", "moved")
-    page.get_by_label("x / mm").fill("612.3456")
-    page.get_by_label("x / mm").press("Tab")
-    press(page, "Take this point")
+    type_point(page, "612.3456", "0", "901.3214")
+    page.get_by_label("z / mm").press("Enter")
     page.get_by_text("Next: pose 3").wait_for(timeout=WAIT)
     assert [row["station"] for row in rows(folder)] == ["tracker", "moved"]
+    assert [float(rows(folder)[-1][axis]) for axis in "xyz"] == pytest.approx([0.6123456, 0.0, 0.9013214])
+
+
+def test_no_number_that_was_not_typed_is_in_a_row(page: Any, running: Any) -> None:
+    """Not that of the last row, nor zero; a request that the browser repeats is no other row; what is typed stays until it is taken."""
+    process, folder = running
+    begin(page, process.url)
+    sent: list[str] = []
+    page.on("request", lambda request: sent.append(request.url) if "/enter/" in request.url else None)
+    type_point(page, "534.8619", "-572.7086", "901.3214")
+    press(page, "Take this point")
+    page.get_by_text("Next: pose 2").wait_for(timeout=WAIT)
+    again = [*sent, f"{process.url}enter/[]", f"{process.url}enter/{{}}"]
+    status = "url => fetch(url).then(answer => answer.status)"
+    assert [page.evaluate(status, url) for url in again] == [204, 400, 400]
+    fields = [page.get_by_label(f"{axis} / mm") for axis in "xyz"]
+    page.wait_for_function("document.querySelector('form fieldset:enabled')")
+    assert [field.input_value() for field in fields] == [""] * 3
+    for typed, told in (
+        (("1", "", "3"), "y / mm is empty: type x, y and z of pose 2 first"),
+        (("1", "2", " "), "z / mm is empty"),
+        (("1", "2,5", "3"), "'2,5' is not a number"),
+        (("nan", "2", "3"), "'nan' is not a number"),
+        (("1", "2", "1_0"), "'1_0' is not a number"),
+        (("1", "2", "<b>3</b>"), "'<b>3</b>' is not a number"),
+    ):
+        type_point(page, *typed)
+        press(page, "Take this point")
+        page.get_by_text(told).wait_for(timeout=WAIT)
+        assert [field.input_value() for field in fields] == list(typed)
+    assert len(rows(folder)) == 1
+
+
+def test_a_point_is_of_the_pose_that_was_next_as_it_was_begun(page: Any, running: Any) -> None:
+    """Where another pose has become the next one meanwhile, that is said, and the second press confirms it."""
+    process, folder = running
+    begin(page, process.url)
+    page.get_by_label("x / mm").fill("534.8619")
+    press(page, "Skip the next pose")
+    page.get_by_text("Next: pose 2").wait_for(timeout=WAIT)
+    type_point(page, "534.8619", "-572.7086", "901.3214")
+    press(page, "Take this point")
+    page.get_by_text("the next pose has become pose 2 since this point was begun").wait_for(timeout=WAIT)
+    assert rows(folder) == []
+    press(page, "Take this point")
+    page.get_by_text("Next: pose 3").wait_for(timeout=WAIT)
+    assert [row["pose"] for row in rows(folder)] == ["2"]

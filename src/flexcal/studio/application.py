@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -41,7 +42,7 @@ def run_studio(folder: Path, host: str, port: int | None, ready: Callable[[Studi
 
 
 def _serve(project: Project, host: str, port: int | None, ready: Callable[[StudioServer], None]) -> None:
-    from flexcal.studio.server import NO_CONTENT, Answer, ProjectFiles, Route, StudioServer
+    from flexcal.studio.server import NO_CONTENT, Answer, ProjectFiles, Route, StudioServer, said
     from flexcal.studio.steps import CalibrateStep, CompareStep, MeasureStep, PlanStep, RobotStep, VerifyStep
     from flexcal.studio.window import Window
 
@@ -59,7 +60,20 @@ def _serve(project: Project, host: str, port: int | None, ready: Callable[[Studi
             window.post(lambda: window.go_to(title))
             return NO_CONTENT
 
-        routes |= {"pick": pick, "step": step}
+        def enter(text: str) -> Answer:
+            try:
+                texts = json.loads(text)
+            except ValueError:
+                texts = None
+            if (
+                not isinstance(texts, dict)
+                or "once" not in texts
+                or not all(isinstance(one, str) for one in texts.values())
+            ):
+                return said(400, "This is not what the form of the window sends.")
+            return NO_CONTENT if window.enter(texts) else said(409, "Not taken; the window says why.")
+
+        routes |= {"pick": pick, "step": step, "enter": enter}
         try:
             with suppress(KeyboardInterrupt):
                 ready(server)

@@ -1,4 +1,4 @@
-from .answer import NO_CONTENT, Answer, Route
+from .answer import NO_CONTENT, Answer, Route, said
 from .gate import Gate, Passage
 from .project_files import ProjectFiles
 from .studio_server import StudioServer
@@ -13,4 +13,5 @@ __all__ = [
     "Route",
     "StudioServer",
     "limit_uploads",
+    "said",
 ]

@@ -4,22 +4,11 @@ from __future__ import annotations
 
 import re
 import secrets
+from pathlib import Path
 
 from flexcal.studio.server.answer import Answer
 
-_PASS_ON = (
-    "{{const make=document.createElement;document.createElement=function(...given){{const made=make.apply(this,given);"
-    'if(made instanceof HTMLScriptElement)made.nonce="{nonce}";return made}}}}'
-)
-"""viser's page unpacks its program into a script element that it creates: scripts that a script creates are trusted as it is."""
-
-_HOLD_CLICKS = (
-    "{let typed=-1e9;addEventListener('input',()=>{typed=performance.now()},true);addEventListener('click',event=>{"
-    "const button=event.target.closest?.('button'),left=typed+100-performance.now();if(button&&event.isTrusted&&left>0){"
-    "event.stopPropagation();event.preventDefault();setTimeout(()=>button.click(),left)}},true)}"
-)
-"""viser sends at most one message of its fields and buttons in 50 ms, the last: a button that is pressed just after a number was typed, or
-while a busy page has not looked at the number yet, would be sent in its place."""
+_OURS = Path(__file__).with_name("page.js").read_text("utf-8")
 
 
 def window_page(page: bytes, host: str) -> Answer:
@@ -30,7 +19,7 @@ def window_page(page: bytes, host: str) -> Answer:
     """
     nonce = secrets.token_urlsafe(18)
     marked = re.sub(rb"<script(?=[\s>])", f'<script nonce="{nonce}"'.encode(), page)
-    first = f'<script nonce="{nonce}">{_PASS_ON.format(nonce=nonce)}{_HOLD_CLICKS}</script>'.encode()
+    first = f'<script nonce="{nonce}">{_OURS}</script>'.encode()
     whole = marked.replace(b"<head>", b"<head>" + first, 1)
     policy = (
         f"default-src 'none'; script-src 'nonce-{nonce}' 'unsafe-eval' blob:; style-src 'unsafe-inline'; "

@@ -1,5 +1,6 @@
 from .command_box import CommandBox
 from .course_figure import error_course
+from .entry import entry_form
 from .figures_panel import FiguresPanel
 from .fold import add_fold
 from .joint_units import joint_unit
@@ -27,6 +28,7 @@ __all__ = [
     "add_sections",
     "add_verdict",
     "command_text",
+    "entry_form",
     "error_course",
     "facts",
     "figure_tab",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
 if TYPE_CHECKING:
@@ -32,6 +33,12 @@ class Step(ABC):
 
     def tick(self) -> None:  # noqa: B027  a step that nothing arrives at has nothing to do
         """Look at what may arrive by itself; called some times a second."""
+
+    def enter(self, texts: Mapping[str, str]) -> None:  # noqa: B027  a step without an `entry_form` is sent nothing
+        """Take what was typed into the step's `entry_form`: texts by label, and as "of" what `data-of` of the page had then.
+
+        Raises `InputError` for texts that cannot be taken; they stay in their fields.
+        """
 
     def close(self) -> None:  # noqa: B027  elements and figures are removed by the window
         """Remove the step's nodes from the scene."""

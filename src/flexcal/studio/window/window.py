@@ -7,7 +7,8 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
@@ -30,6 +31,8 @@ _PERIOD = 0.2
 """Seconds between looks at the folder and the command that runs."""
 _TICK = 0.1
 """Seconds between looks at what arrives at the open step by itself."""
+_PATIENCE = 10.0
+"""Seconds that a form waits for its turn."""
 _WIDTH = 400
 _DESCRIBING = (ROBOT, ".urdf")
 """Endings of the files that describe the robot without its estimates; plans and measurements do not."""
@@ -91,6 +94,7 @@ class Window:
         self._add_hotkeys(titles)
         self.selection.listen(self._selected)
         self._open: Step | None = None
+        self._entered = ""
         first = self.choices.get("step", titles[0])
         self._going: str | None = None
         self._open_step(first if first in titles else titles[0])
@@ -116,6 +120,29 @@ class Window:
     def post(self, action: Callable[[], None]) -> None:
         """Have what a click asks for carried out by the thread of `run`, in order; an error is shown as its sentence."""
         self._actions.put(action)
+
+    def enter(self, texts: Mapping[str, str]) -> bool:
+        """Have the open step take what was typed into its form, and say whether it did; called in any other thread than that of `run`."""
+        taken: Future[bool] = Future()
+
+        def take() -> None:
+            if not taken.set_running_or_notify_cancel():
+                return  # the page was told that it was not taken
+            try:
+                if self._open is not None and texts["once"] != self._entered:  # a browser may send it again
+                    self.say("")
+                    self._open.enter(texts)
+                    self._entered = texts["once"]
+                taken.set_result(True)
+            except BaseException:
+                taken.set_result(False)
+                raise
+
+        self.post(take)
+        try:
+            return taken.result(_PATIENCE)
+        except TimeoutError:
+            return False if taken.cancel() else taken.result()
 
     def _carry_out(self, action: Callable[[], None]) -> None:
         try:

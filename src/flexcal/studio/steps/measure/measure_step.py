@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import PurePath
 from typing import Any, cast
 
@@ -113,6 +113,11 @@ class MeasureStep(Step):
         """Take the rows that have come."""
         if self.measuring.is_ready and self._source is not None:
             self._source.tick()
+
+    def enter(self, texts: Mapping[str, str]) -> None:
+        """Take a row that was typed."""
+        if self.measuring.is_ready and self._source is not None:
+            self._source.enter(texts)
 
     def close(self) -> None:
         """Take the ghost out of the scene, and the hot keys."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from hashlib import sha256
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -23,6 +24,11 @@ class NextPose:
     q: np.ndarray
     payload: float | None = None
     planned: bool = True
+
+    @property
+    def key(self) -> str:
+        """Text that another pose does not have."""
+        return f"{self.number} {sha256(self.q.tobytes()).hexdigest()[:16]} {self.payload}"
 
 
 def orders(series: Series) -> tuple[Order, ...]:

@@ -27,7 +27,8 @@ def pose_card(model: RobotModel, pose: NextPose, place: str) -> str:
     payload = "" if pose.payload is None else paragraph(f"payload {pose.payload:g} kg")
     reserve = _reserve(model, pose.q)
     return (
-        f'<div style="margin:0.2em 0.5em;font-size:1.15em;font-weight:700;">Next: pose {pose.number}'
+        f'<div data-of="{escape(pose.key, quote=True)}" '
+        f'style="margin:0.2em 0.5em;font-size:1.15em;font-weight:700;">Next: pose {pose.number}'
         f'<span style="font-weight:400;font-size:0.75em;opacity:0.8;"> · {escape(place)}</span></div>'
         '<div role="group" aria-label="joint positions of the next pose" style="display:grid;grid-template-columns:1fr 1fr;'
         f'gap:0.1em 0.6em;margin:0 0.5em 0.3em;">{cells}</div>{payload}'

@@ -41,6 +41,9 @@ class RowSource(ABC):
     def measure_next(self) -> None:  # noqa: B027  another program measures
         """Measure the next pose."""
 
+    def enter(self, texts: Mapping[str, str]) -> None:  # noqa: B027  nothing is typed
+        """Take what was typed, as `Step.enter`."""
+
     @property
     def following(self) -> NextPose | None:
         """The pose that is to be measured next; None where there is none, or it is not known yet."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
+import re
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -11,14 +11,14 @@ import numpy as np
 
 from flexcal.errors import InputError
 from flexcal.studio.steps.measure.row_source import RowSource
+from flexcal.studio.window import entry_form
 from flexcal.units import MILLIMETRE
 
 if TYPE_CHECKING:
-    from flexcal.studio.steps.measure.measuring import Measuring
-    from flexcal.studio.window import Window
+    from flexcal.studio.steps.measure.next_pose import NextPose
 
-_SETTLING = 0.4
-"""Seconds within which the browser sends a number after the key that ended it; the press of a button arrives at once."""
+_LABELS = ("x / mm", "y / mm", "z / mm")
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,2})?", re.ASCII)
 
 
 class TypedSource(RowSource):
@@ -26,57 +26,55 @@ class TypedSource(RowSource):
 
     title = "typed"
 
-    def __init__(self, window: Window, measuring: Measuring, refresh: Callable[[], None]):
-        super().__init__(window, measuring, refresh)
-        self._taken: tuple[float, ...] | None = None
-        self._due: float | None = None
-
     def add(self) -> None:
         """Add a field a coordinate, and the button that takes them."""
-        gui = self.window.gui
-        self._fields = [gui.add_number(f"{axis} / mm", 0.0, step=0.0001) for axis in "xyz"]
-        self.window.button("Take this point (N)", self.measure_next, main=True)
+        self.window.gui.add_html(entry_form(_LABELS, "Take this point (Enter)"))
 
     def measure_next(self) -> None:
-        """Take the point, when the last number that was typed has arrived too."""
-        self._due = time.monotonic() + _SETTLING
+        """Say what is to be done; raises `InputError` where no pose is next."""
+        self.window.say(f"type x, y and z of pose {self._pose().number}, then Enter.")
 
-    def tick(self) -> None:
-        """Take the point that is due; raises `InputError` where it was not typed, and where no pose is next."""
-        if self._due is not None and time.monotonic() >= self._due:
-            self._due = None
-            self._take_point()
-
-    def _take_point(self) -> None:
+    def enter(self, texts: Mapping[str, str]) -> None:
+        """Take the point; raises `InputError` where it was not typed whole, and where it is not of the next pose."""
         from flexcal.data.poses import DEFAULT_SIGMA, PoseSet
         from flexcal.jobs.guidance import cells_of
 
-        series, pose = self.measuring.series, self.following
-        values = tuple(float(field.value) for field in self._fields)
-        if pose is None:
-            raise InputError("E-STUDIO-034", "no pose is next, so the point is of none; choose a pose first.")
-        if values == self._taken or not any(values):
-            raise InputError("E-STUDIO-035", f"type x, y and z of pose {pose.number} first.")
+        series, pose = self.measuring.series, self._pose()
+        position = MILLIMETRE * np.array([[self._number(texts, label, pose.number) for label in _LABELS]])
+        if texts.get("of") != pose.key:
+            raise InputError(
+                "E-STUDIO-044",
+                f"the next pose has become pose {pose.number} since this point was begun; take it again if it is of that pose.",
+            )
         last = None if series.poses is None else series.poses.subset([len(series.poses) - 1])
-        model = series.model
         poses = PoseSet(
             q=pose.q[None],
-            position=np.array([values]) * MILLIMETRE,
+            position=position,
             sigma=np.full((1, 3), DEFAULT_SIGMA),
             torque=None,
             payload=None if pose.payload is None else np.array([pose.payload]),
-            target=np.array([model.point().name]),
+            target=np.array([series.model.point().name]),
             station=np.array([self.measuring.station]),
             temperature=None,
             pose=np.array([pose.number]),
             sigma_given=False,
         )
         if last is not None:
-            poses = replace(
-                poses,
-                target=last.target,
-                sigma=last.sigma,
-                sigma_given=last.sigma_given,
-            )
+            poses = replace(poses, target=last.target, sigma=last.sigma, sigma_given=last.sigma_given)
         self.take(cells_of(poses))
-        self._taken = values
+
+    def _pose(self) -> NextPose:
+        pose = self.following
+        if pose is None:
+            raise InputError("E-STUDIO-034", "no pose is next, so the point is of none; choose a pose first.")
+        return pose
+
+    def _number(self, texts: Mapping[str, str], label: str, pose: int) -> float:
+        text = texts.get(label, "").strip().replace("\N{MINUS SIGN}", "-")
+        if not text:
+            raise InputError("E-STUDIO-035", f"{label} is empty: type x, y and z of pose {pose} first.")
+        if _NUMBER.fullmatch(text) is None:
+            raise InputError(
+                "E-STUDIO-045", f"{label}: '{text}' is not a number; type it as 534.8619, with a point."
+            )
+        return float(text)

@@ -47,16 +47,6 @@ class JointSliders:
         with add_fold(gui, "Limits in the URDF"):
             gui.add_html(limits_table(model))
 
-    def follow(self) -> None:
-        """Set the sliders to where the robot is, which something else may have moved."""
-        q = self._window.robot.q
-        if q is None or len(q) != len(self._sliders):
-            return
-        for slider, value in zip(self._sliders, q / self._units, strict=True):
-            value = float(np.clip(value, slider.min, slider.max))
-            if abs(slider.value - value) > 0.06:
-                slider.value = value
-
     def _moved(self) -> None:
         self._window.robot.pose(np.array([slider.value for slider in self._sliders]) * self._units)
 
