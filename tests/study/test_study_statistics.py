@@ -137,7 +137,7 @@ def test_a_jackknife_of_means_gives_their_standard_error() -> None:
     assert block["parameters"]["a"]["spread"] == pytest.approx(np.std(means[1:], ddof=1))
 
 
-@pytest.mark.parametrize(("factor", "status"), [(1.0, "good"), (3.0, "care"), (0.25, "care")])
+@pytest.mark.parametrize(("factor", "status"), [(1.0, "good"), (3.0, "bad"), (0.25, "good")])
 def test_a_spread_unlike_the_stated_one_is_said(factor: float, status: str) -> None:
     rng = np.random.default_rng(8)
     names = ["all", *(f"bootstrap {k}" for k in range(60))]
@@ -156,6 +156,8 @@ def test_a_spread_unlike_the_stated_one_is_said(factor: float, status: str) -> N
     results |= {"tasks": {"total": 61, "done": 61, "failed": 0}, **study_statistics(studied)}
     checks = study_page(StudyReport(results, studied)).verdict.checks
     assert [check.status for check in checks] == ["good", "good", status]
+    assert ("too small for these data" in checks[-1].answer) == (factor > 1)
+    assert ("too large" in checks[-1].answer) is False  # errors that resamples share are in none of them
 
 
 @pytest.mark.parametrize(
