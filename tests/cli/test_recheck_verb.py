@@ -51,6 +51,11 @@ def test_visits_are_kept_and_compared_with_the_first(folder: Path, capsys) -> No
     # the same files again are the same visit
     again = said(capsys, robot, folder / "second.csv", "--date", "2026-03-11")
     assert "are the visit of 2026-03-10 already" in " ".join(again["remarks"])
+    # and so is a copy of them, in another order of rows
+    header, rows = read_csv(folder / "second.csv")
+    write_csv(folder / "copy.csv", header, rows[::-1])
+    copied = said(capsys, robot, folder / "copy.csv", "--date", "2026-03-12")
+    assert "the same readings are the visit of 2026-03-10 already" in " ".join(copied["remarks"])
     stored = json.loads((home / "visits.json").read_text("utf-8"))
     assert [visit["date"] for visit in stored["visits"]] == ["2026-01-10", "2026-02-10", "2026-03-10"]
     assert [visit["reference"] for visit in stored["visits"]] == [True, False, False]

@@ -22,7 +22,6 @@ from flexcal.calibration.recheck import (
     drift_sums,
     errors_from_calibration,
     errors_from_reference,
-    explaining_alarms,
     judge_visit,
     possible_changes,
 )
@@ -298,29 +297,6 @@ def test_a_slow_drift_is_found_by_the_sums_before_any_visit_shows_it() -> None:
     )
 
 
-def test_a_step_is_told_from_a_drift_and_from_other_joints() -> None:
-    """Another joint, of whose shift a visit shows half, raises its sum too and is not named."""
-    rng = np.random.default_rng(6)
-
-    def visits(course: np.ndarray) -> list[list[ShiftAtVisit]]:
-        noise = 0.5 * rng.normal(size=(len(course), 2))
-        return [
-            [
-                ShiftAtVisit("joint_5", 0.5 * c + n[0], 0.5, 0.3, "a"),
-                ShiftAtVisit("joint_2", c + n[1], 0.5, 0.3, "a"),
-            ]
-            for c, n in zip(course, noise, strict=True)
-        ]
-
-    for course, told in (((np.arange(40) >= 12) * 1.0, "step"), (0.1 * np.arange(40), "drift")):
-        sums = drift_sums(visits(course))
-        assert sum(item.gradual for item in sums) == 2
-        (found,) = explaining_alarms(sums)
-        assert found.subject == "joint_2" and found.course == told
-        assert told == "drift" or abs(found.stepped - 12) <= 2
-    assert explaining_alarms(drift_sums([*visits(np.zeros(20)), *[[]] * 5])) == ()
-
-
 def test_real_poses_left_out_are_as_calibrated_and_a_shifted_column_is_named(examples: Path) -> None:
     model = RobotModel.from_yaml(examples / "ur5_tracker" / "robot.yaml", estimates=False)
     poses = read_poses(examples / "ur5_tracker" / "grid.csv", model)
@@ -376,8 +352,29 @@ def test_errors_in_the_data_are_named(visited: Visited) -> None:
 def test_a_reference_that_was_not_as_calibrated_is_said_to_differ(visited: Visited) -> None:
     q = np.repeat(visited.q, 3, axis=0)
     wrong = visited.shop.measured(visited.robot.model, q, arm=visited.shop.arm.turned(2, 8e-4))
-    found = recheck(visited.robot, visited.visit(), reference=wrong)
-    assert not found.judged.as_calibrated and "that visit is what differs" in found.summary()
+    back = recheck(visited.robot, visited.visit(), reference=wrong)
+    assert not back.judged.as_calibrated and back.headline.startswith("as calibrated (p = ")
+    assert "the reference visit was not: against the calibration joint_2 shifted by +0.8" in back.headline
+    assert (
+        "since then joint_2 shifted by −0.8" in back.headline
+        and "make this visit the reference" in back.headline
+    )
+    # as at the reference: nothing has just moved
+    still = recheck(visited.robot, visited.visit(arm=visited.shop.arm.turned(2, 8e-4)), reference=wrong)
+    assert still.verdict == "as_at_reference" and still.headline.startswith(
+        "since the reference visit as it was then (p = "
+    )
+    assert "the robot differed already then, and does now: joint_2 shifted by +0." in still.headline
+    assert still.numbers["suspects"][0]["subject"] == "joint_2" and still.tools[0].mean > 4e-4
+    # another joint since
+    more = recheck(
+        visited.robot, visited.visit(arm=visited.shop.arm.turned(2, 8e-4).turned(3, 6e-4)), reference=wrong
+    )
+    assert more.headline.startswith("since the reference visit joint_3 shifted by +0.")
+    assert (
+        "it differed already then: joint_2 shifted by +0.8" in more.headline
+        and "; and now: " in more.headline
+    )
 
 
 def _renamed(estimate):

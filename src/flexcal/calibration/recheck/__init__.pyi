@@ -1,9 +1,10 @@
 from .change_effects import PossibleChange, possible_changes
-from .cumulative_sums import AVERAGE_RUN, DriftSum, ShiftAtVisit, drift_sums, explaining_alarms
+from .cumulative_sums import AVERAGE_RUN, DriftSum, ShiftAtVisit, drift_sums
 from .detection import DetectionLimit, detection_limits
 from .displaced_tool import MovedTool, TellingPose, moved_tool, telling_pose
-from .global_test import FALSE_ALARM, GlobalTest
+from .global_test import FALSE_ALARM, VISIT_ALARM, GlobalTest
 from .judged_visit import JudgedVisit, Suspect, judge_visit
+from .visit_courses import VisitCourse, visit_courses
 from .visit_errors import (
     LEAST_MATCHED,
     Compared,
@@ -17,6 +18,7 @@ __all__ = [
     "AVERAGE_RUN",
     "FALSE_ALARM",
     "LEAST_MATCHED",
+    "VISIT_ALARM",
     "Compared",
     "DetectionLimit",
     "DriftSum",
@@ -27,15 +29,16 @@ __all__ = [
     "ShiftAtVisit",
     "Suspect",
     "TellingPose",
+    "VisitCourse",
     "VisitErrors",
     "detection_limits",
     "drift_sums",
     "errors_from_calibration",
     "errors_from_reference",
-    "explaining_alarms",
     "judge_visit",
     "moved_tool",
     "planned_errors",
     "possible_changes",
     "telling_pose",
+    "visit_courses",
 ]

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal
 
 import numpy as np
 
-AVERAGE_RUN = 200.0
-"""Average number of visits between two false alarms of all sums together."""
+from flexcal.calibration.recheck.global_test import FALSE_ALARM, VISIT_ALARM
+
+AVERAGE_RUN = 1 / (FALSE_ALARM - VISIT_ALARM)
+"""Average number of visits between two false alarms of all sums together: what the test of each visit leaves."""
 ALLOWANCE = 0.25
 """Difference, in standard deviations, that a sum lets pass at each visit: small, for slow drifts; it finds twice that soonest."""
-ALIKE = 2 * np.log(20.0)
-"""Difference of twice the log-likelihood below which two changes explain the same about as well: odds of 20."""
 _STATES = 120
 
 
@@ -37,9 +36,7 @@ class DriftSum:
 
     They add up what each visit differs from the mean of those before it, in standard deviations; that is independent from visit to visit,
     although all visits are compared with the same calibration or reference (Hawkins 1987). After an alarm a sum stays where it is.
-    `alarm` is the index of the visit that passed the limit, None if none did; `since` that from which the sum grew. `drift` and `step`
-    are how much more likely a shift in proportion to the number of visits, and one at once before visit `stepped`, make the visits than no
-    change: twice the logarithm of the largest likelihood ratio.
+    `alarm` is the index of the visit that passed the limit, None if none did; `since` that from which the sum grew.
     """
 
     subject: str
@@ -48,21 +45,6 @@ class DriftSum:
     limit: float
     alarm: int | None
     since: int | None
-    drift: float = 0.0
-    step: float = 0.0
-    stepped: int = 0
-
-    @property
-    def gain(self) -> float:
-        """Of the likelier of both."""
-        return max(self.drift, self.step)
-
-    @property
-    def course(self) -> Literal["drift", "step", "either"]:
-        """Which of both is likelier by odds of 20, if one is."""
-        if abs(self.drift - self.step) < ALIKE:
-            return "either"
-        return "drift" if self.drift > self.step else "step"
 
     @property
     def gradual(self) -> bool:
@@ -70,16 +52,6 @@ class DriftSum:
         if self.alarm is None or self.alarm == 0:
             return False
         return max(self.upward[self.alarm - 1], self.downward[self.alarm - 1]) > self.limit / 2
-
-
-def explaining_alarms(sums: Sequence[DriftSum]) -> tuple[DriftSum, ...]:
-    """Subjects whose change explains the visits about as well as that of any, the best first; none where no sum raised an alarm over
-    several visits. A change of one subject raises the sums of others too.
-    """
-    if not any(item.gradual for item in sums):
-        return ()
-    best = max(item.gain for item in sums)
-    return tuple(sorted((item for item in sums if item.gain > best - ALIKE), key=lambda item: -item.gain))
 
 
 def drift_sums(visits: Sequence[Sequence[ShiftAtVisit]]) -> tuple[DriftSum, ...]:
@@ -128,24 +100,7 @@ def _sum(subject: str, visits: Sequence[Sequence[ShiftAtVisit]], limit: float) -
             if value.max() > limit:
                 alarm, since = k, int(start[int(value.argmax())])
         sums[:, k] = value
-    drift, step, stepped = _courses(seen, np.array(there))
-    return DriftSum(subject, sums[0], sums[1], limit, alarm, since, drift, step, stepped)
-
-
-def _courses(shifts: Sequence[ShiftAtVisit], visits: np.ndarray) -> tuple[float, float, int]:
-    """`drift`, `step` and `stepped` of `DriftSum` from the shifts at the visits of these indices."""
-    values = innovations(shifts)
-
-    def likelier(course: np.ndarray) -> float:
-        expected = innovations(
-            [replace(item, estimate=float(c)) for item, c in zip(shifts, course, strict=True)]
-        )
-        return float(expected @ values) ** 2 / max(float(expected @ expected), 1e-300)
-
-    starts = range(1, len(visits))
-    drift = max((likelier(np.maximum(0.0, visits - visits[k - 1])) for k in starts), default=0.0)
-    step = max(((likelier((visits >= visits[k]) * 1.0), int(visits[k])) for k in starts), default=(0.0, 0))
-    return drift, step[0], step[1]
+    return DriftSum(subject, sums[0], sums[1], limit, alarm, since)
 
 
 @lru_cache

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.recheck.global_test import FALSE_ALARM, GlobalTest
+from flexcal.calibration.recheck.global_test import FALSE_ALARM, VISIT_ALARM, GlobalTest
 
 FOUND = 0.95
 """Probability with which a shift counts as found."""
@@ -42,7 +42,7 @@ class DetectionLimit:
 def detection_limits(test: GlobalTest, shift: float) -> tuple[DetectionLimit, ...]:
     """Power of a visit's test for a `shift`, rad (of sliding joints m), of every joint, and the shifts found in 95 % of visits."""
     unseen = [
-        DetectionLimit(c.subject, c.units[0], np.inf, FALSE_ALARM, np.inf, np.inf)
+        DetectionLimit(c.subject, c.units[0], np.inf, VISIT_ALARM, np.inf, np.inf)
         for c in test.unseen
         if c.kind == "joint_shifted"
     ]

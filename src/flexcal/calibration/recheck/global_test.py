@@ -11,7 +11,11 @@ from flexcal.calibration.recheck.change_effects import PossibleChange
 from flexcal.calibration.recheck.visit_errors import VisitErrors
 
 FALSE_ALARM = 0.01
-"""Probability of an alarm where nothing changed."""
+"""Probability of an alarm at a visit where nothing changed, of all tests together."""
+VISIT_ALARM = 0.008
+"""That of the test of the visit alone; the sums over the visits have the rest."""
+ALIKE = 2 * np.log(20.0)
+"""Difference of twice the log-likelihood below which two changes explain the same about as well: odds of 20."""
 _DRAWS = 20_000
 _RANK = 1e-6
 _SEEN = 1e-3
@@ -79,7 +83,7 @@ class GlobalTest:
     @property
     def level(self) -> float:
         """p-value of a single part at which the whole is at the level of false alarms."""
-        return float(self.least[int(FALSE_ALARM * len(self.least))])
+        return float(self.least[int(VISIT_ALARM * len(self.least))])
 
     def probability(self, values: np.ndarray) -> float:
         """Probability that chance makes the errors (3 K,), m, as conspicuous."""

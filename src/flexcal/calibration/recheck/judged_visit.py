@@ -8,8 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.calibration.recheck.change_effects import PossibleChange, possible_changes, wrong_readings
-from flexcal.calibration.recheck.cumulative_sums import ALIKE, ShiftAtVisit
-from flexcal.calibration.recheck.global_test import FALSE_ALARM, GlobalTest, SeenChange, seen_change
+from flexcal.calibration.recheck.cumulative_sums import ShiftAtVisit
+from flexcal.calibration.recheck.global_test import (
+    ALIKE,
+    FALSE_ALARM,
+    VISIT_ALARM,
+    GlobalTest,
+    SeenChange,
+    seen_change,
+)
 from flexcal.calibration.recheck.visit_errors import VisitErrors
 from flexcal.estimation import student_quantile
 
@@ -89,8 +96,8 @@ class JudgedVisit:
 
     @property
     def as_calibrated(self) -> bool:
-        """Whether nothing speaks against the calibration, at 1 % false alarms."""
-        return self.probability > FALSE_ALARM
+        """Whether nothing speaks against what the visit is compared with, at the false alarms of a visit."""
+        return self.probability > VISIT_ALARM
 
     @property
     def verdict(self) -> str:
@@ -150,7 +157,7 @@ def _judge(errors: VisitErrors) -> JudgedVisit:
     probability = test.probability(errors.errors)
     shifts = tuple(_suspect(test, item, 1) for item in test.seen if len(item.change.names) == 1)
     together = _together(test)
-    suspects = _suspects(test) if probability <= FALSE_ALARM else ()
+    suspects = _suspects(test) if probability <= VISIT_ALARM else ()
     return JudgedVisit(test, probability, suspects, together, shifts)
 
 

@@ -146,7 +146,7 @@ def errors_from_reference(
     squares, count = (sum(parts) for parts in zip(*repeated, strict=True))
     if count >= _LEAST_REPEATS:
         freedom, noise, size = float(count), "repeats", squares / count
-    turned = _turns(here, base, first)
+    turned = frame_turns(here, base, first)
     weights = [np.repeat(1 / np.sqrt(group.count[pairs[:, k]]), 3) for k, group in enumerate((now, then))]
     own, common = (size * w[:, None] * independent * w for w in weights)
     warmed = _warmed(here, first, reference.subset(then.first[pairs[:, 1]]), covariance)
@@ -279,8 +279,8 @@ def _warmed(model: RobotModel, poses: PoseSet, reference: PoseSet, covariance: E
     return (covariance.roots - before.roots).reshape(3 * len(poses), -1)
 
 
-def _turns(here: RobotModel, base: RobotModel, poses: PoseSet) -> np.ndarray:
-    """Rotations (K, 3, 3) from the reference's instrument frame to that of the visit."""
+def frame_turns(here: RobotModel, base: RobotModel, poses: PoseSet) -> np.ndarray:
+    """Rotations (K, 3, 3) at poses from the instrument's frame as the robot `base` has it to that of `here`."""
     from flexcal.model.parts import vector_rotation
 
     turned = []

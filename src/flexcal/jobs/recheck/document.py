@@ -9,7 +9,7 @@ import numpy as np
 
 from flexcal.calibration.recheck import (
     AVERAGE_RUN,
-    FALSE_ALARM,
+    VISIT_ALARM,
     DetectionLimit,
     DriftSum,
     JudgedVisit,
@@ -17,7 +17,8 @@ from flexcal.calibration.recheck import (
     Suspect,
     TellingPose,
 )
-from flexcal.jobs.recheck.judgement_words import suspect_in_words
+from flexcal.jobs.recheck.judgement_words import judgement_sentence, suspect_in_words
+from flexcal.jobs.recheck.visit_course import CourseOverVisits
 from flexcal.model.robot import RobotModel
 from flexcal.units import MILLIMETRE
 
@@ -30,6 +31,8 @@ UNSEEN = 20e-3
 def recheck_block(
     judged: JudgedVisit,
     absolute: JudgedVisit | None,
+    at_reference: JudgedVisit | None,
+    suspects: Sequence[Suspect],
     reference_date: str | None,
     tools: Sequence[MovedTool],
     telling: TellingPose | None,
@@ -43,20 +46,17 @@ def recheck_block(
     return {
         "verdict": judged.verdict,
         "probability": judged.probability,
-        "false_alarm": FALSE_ALARM,
+        "false_alarm": VISIT_ALARM,
         "compared": errors.compared,
         "reference": reference_date,
         "noise": errors.noise,
         "instrument": judged.instrument,
         "poses": len(errors.poses),
-        "suspects": [
-            _suspect_block(s, tool, errors.model) for s, tool in zip(judged.suspects, tools, strict=True)
-        ],
+        "suspects": [_suspect_block(s, tool, errors.model) for s, tool in zip(suspects, tools, strict=True)],
         "together": judged.together,
         "telling_pose": None if telling is None else {"q": telling.q, "apart_mm": telling.apart / MILLIMETRE},
-        "against_calibration": None
-        if absolute is None
-        else {"verdict": absolute.verdict, "probability": absolute.probability},
+        "against_calibration": _judgement_block(absolute),
+        "reference_against_calibration": _judgement_block(at_reference),
         "expected_mm": expected / MILLIMETRE,
         "power": power_block(limits),
         "each": [
@@ -66,8 +66,23 @@ def recheck_block(
     }
 
 
-def drift_block(drifts: Sequence[DriftSum], dates: Sequence[str], alarms: Sequence[str]) -> dict[str, Any]:
-    """Block `drift`: cumulative sums over the visits of these dates; `alarms` are subjects that explain them."""
+def _judgement_block(judged: JudgedVisit | None) -> dict[str, Any] | None:
+    if judged is None:
+        return None
+    return {
+        "verdict": judged.verdict,
+        "probability": judged.probability,
+        "sentence": judgement_sentence(judged),
+    }
+
+
+def drift_block(
+    drifts: Sequence[DriftSum],
+    dates: Sequence[str],
+    alarms: Sequence[str],
+    course: CourseOverVisits | None,
+) -> dict[str, Any]:
+    """Block `drift`: cumulative sums over the visits of these dates; `alarms` are subjects that explain them, by their `course`."""
     return {
         "average_run": AVERAGE_RUN,
         "limit": drifts[0].limit if drifts else None,
@@ -82,6 +97,8 @@ def drift_block(drifts: Sequence[DriftSum], dates: Sequence[str], alarms: Sequen
             }
             for item in drifts
         },
+        "alarms": list(alarms),
+        "courses": [] if course is None else course.document(),
     }
 
 

@@ -15,7 +15,15 @@ from flexcal.errors import InputError
 from flexcal.files.formats import block_sha256, provenance, sha256_of
 from flexcal.jobs.inputs import CalibratedRobot, image_provenance, require_distinct_files
 from flexcal.jobs.recheck.result import Recheck, recheck
-from flexcal.jobs.recheck.visit_history import Readings, Visit, read_visits, with_visit, write_visits
+from flexcal.jobs.recheck.visit_course import CourseOverVisits
+from flexcal.jobs.recheck.visit_history import (
+    Readings,
+    Visit,
+    read_visits,
+    same_visit,
+    with_visit,
+    write_visits,
+)
 from flexcal.jobs.result_files import RunRecord
 from flexcal.progress import Progress, silent
 
@@ -53,11 +61,15 @@ def recheck_robot(
     calibration = block_sha256(robot.stored, "calibration")
     digests = {f"{k}. {file.name}": sha256_of(file) for k, file in enumerate(files, start=1)}
     stored = read_visits(out, robot.nominal.name)
-    same = next((v for v in stored if (v.files, v.calibration) == (digests, calibration)), None)
-    again = None if same is None or day is None or same.date == when else same.date
-    when = when if same is None else same.date
+    readings = Readings.of(poses)
     # visits compared with another calibration, as before the last one, are kept and do not count
-    before = [v for v in stored if v.calibration == calibration and v.files != digests and v.date <= when]
+    comparable = [v for v in stored if v.calibration == calibration]
+    same = next((v for v in comparable if same_visit(v.readings, readings)), None)
+    renamed = same is not None and sorted(same.files.values()) != sorted(digests.values())
+    renamed = renamed or (same is not None and sorted(same.files) != sorted(digests))
+    again = same.date if same is not None and (renamed or (day is not None and same.date != when)) else None
+    when = when if same is None else same.date
+    before = [v for v in comparable if v is not same and v.date <= when]
     references = [k for k, v in enumerate(before) if v.reference]
     base = before[references[-1]] if references else None
     before = before[references[-1] :] if references else before
@@ -79,20 +91,24 @@ def recheck_robot(
         reference_date=base.date if base is not None and judged.absolute is not None else None,
         becomes_reference=becomes,
         again=again,
+        repeated=_repeated(readings, before),
         record=RunRecord(origin | image_provenance(files), command),
     )
     series = _series(judged, base, calibration)
     shifts = [item for item in judged.judged.at_visit(series) if item.std < _LARGEST]
     history = [*before, _visit(judged, when, digests, calibration, shifts)]
+    errors = judged.judged.test.errors
     judged = replace(
         judged,
         dates=tuple(v.date for v in history),
         drifts=drift_sums([v.shifts if v.steady else [] for v in history]),
+        course=CourseOverVisits.of(robot.model, errors, when, before, base),
     )
     visit = replace(
         history[-1],
         reference=becomes,
-        alarms=[item.subject for item in judged.alarms],
+        alarms=list(judged.alarms),
+        sentence=judged.headline,
     )
     progress("writing", 0.5)
     judged.write(out)
@@ -116,11 +132,24 @@ def _visit(
         reference=False,
         verdict=judged.verdict,
         sentence=judged.headline,
-        probability=judged.judged.probability,
+        probability=judged.probability,
         shifts=shifts,
         readings=Readings.of(judged.poses),
         alarms=[],
         suspects=judged.numbers["suspects"],
+        placed=judged.judged.test.errors.placed,
+    )
+
+
+def _repeated(readings: Readings, before: Sequence[Visit]) -> str | None:
+    """That some of the readings are of a visit before, in words; None where all are new."""
+    shared = [(readings.shared(visit.readings), visit.date) for visit in before]
+    most, when = max(shared, default=(0, ""))
+    if not most:
+        return None
+    return (
+        f"{most} of the {len(readings.pose)} readings are those of the visit of {when}, to the last digit: they tell nothing new, and the "
+        "test takes them for new ones; give a file with this visit alone"
     )
 
 

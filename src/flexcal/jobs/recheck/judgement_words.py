@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from flexcal.calibration.recheck import (
-    AVERAGE_RUN,
     FALSE_ALARM,
-    DriftSum,
+    VISIT_ALARM,
     JudgedVisit,
     MovedTool,
     Suspect,
     TellingPose,
 )
+from flexcal.jobs.recheck.visit_course import CourseOverVisits
 from flexcal.model.robot import EXPANSION, RobotModel
 from flexcal.report.results import amount
 from flexcal.units import MILLIMETRE
@@ -27,8 +27,8 @@ _SMALL = 0.5
 """Share of the calibrated robot's expected error below which a displacement of the tool hardly matters."""
 
 
-def judgement_sentence(judged: JudgedVisit) -> str:
-    """What the visit says of the robot."""
+def judgement_sentence(judged: JudgedVisit, course: CourseOverVisits | None = None) -> str:
+    """What the visit says of the robot; with the `course` over all visits, since when, and at which rate."""
     chance = _chance(judged.probability)
     errors = judged.test.errors
     count = len(errors.errors) / 3
@@ -41,8 +41,8 @@ def judgement_sentence(judged: JudgedVisit) -> str:
         if moved:
             place = "the instrument, or the base of the robot, stands elsewhere"
             told = place if judged.place is None else suspect_in_words(judged.place, judged.test.errors.model)
-            return f"{told}; beside that the robot is as calibrated{_as_far_as_seen(judged)} ({chance}; false alarms {FALSE_ALARM:.0%})"
-        return f"as calibrated ({chance}; false alarms {FALSE_ALARM:.0%})"
+            return f"{told}; beside that the robot is as calibrated{_as_far_as_seen(judged)} ({chance}; false alarms {VISIT_ALARM:.1%})"
+        return f"as calibrated ({chance}; false alarms {VISIT_ALARM:.1%})"
     lead = "the instrument, or the base of the robot, stands elsewhere; beside that: " if moved else ""
     if not judged.suspects:
         if judged.together > FALSE_ALARM:
@@ -54,7 +54,10 @@ def judgement_sentence(judged: JudgedVisit) -> str:
             f"{lead}recalibrate ({size}): the errors are not those of shifted joints, a bumped tool, growth or a moved instrument, all "
             "together; if the instrument is noisier than at the calibration, or poses were not those commanded, measure again first"
         )
-    return f"{lead}{', or '.join(suspect_in_words(s, judged.test.errors.model) for s in judged.suspects)} ({chance})"
+    if course is not None and course.drifting:
+        return f"{lead}{course.drift_words} ({chance})"
+    told = ", or ".join(suspect_in_words(s, judged.test.errors.model) for s in judged.suspects)
+    return f"{lead}{told} ({chance}){'' if course is None else course.since_words}"
 
 
 def effect_sentence(judged: JudgedVisit, tools: Sequence[MovedTool], expected: float) -> str:
@@ -115,23 +118,6 @@ def telling_sentence(judged: JudgedVisit, telling: TellingPose | None, noise: fl
         f"the pose that best tells {first} from {second}: q = {q}, where they put the point "
         f"{telling.apart / MILLIMETRE:.3f} mm apart"
         + (f", which takes about {readings} readings" if readings > 1 else "")
-    )
-
-
-def alarm_sentence(alarms: Sequence[DriftSum], dates: Sequence[str]) -> str:
-    """What `alarms`, the most likely first, say of the visits of these dates."""
-    item = alarms[0]
-    names = " or ".join(
-        f"the {other.subject}" if other.subject == "payload" else other.subject for other in alarms
-    )
-    many = len(alarms) == 1 and item.subject.startswith("all ")
-    drifts = f"{names} drift{'' if many else 's'} slowly over the visits to {dates[-1]}"
-    before = f" between the visits of {dates[item.stepped - 1]} and {dates[item.stepped]}"
-    steps = f"{names} changed at once{before}"
-    told = {"drift": drifts, "step": steps, "either": f"{drifts}, or changed at once{before}"}[item.course]
-    return (
-        f"{told}: that adds up beyond chance, though no visit shows it (cumulative sum; one false alarm in {AVERAGE_RUN:.0f} visits; a "
-        "tool or an instrument that creeps looks much the same)"
     )
 
 

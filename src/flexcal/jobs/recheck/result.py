@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -18,7 +18,6 @@ from flexcal.calibration.recheck import (
     detection_limits,
     errors_from_calibration,
     errors_from_reference,
-    explaining_alarms,
     judge_visit,
     moved_tool,
     telling_pose,
@@ -36,11 +35,12 @@ from flexcal.jobs.pages import PlottedFolder
 from flexcal.jobs.recheck.data_errors import DataErrors, disagreeing_poses, misread_visit
 from flexcal.jobs.recheck.document import SHIFT, UNSEEN, drift_block, recheck_block
 from flexcal.jobs.recheck.judgement_words import (
-    alarm_sentence,
     effect_sentence,
     judgement_sentence,
     telling_sentence,
 )
+from flexcal.jobs.recheck.visit_course import CourseOverVisits
+from flexcal.jobs.recheck.visit_history import AS_AT_REFERENCE
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, header
 from flexcal.model.kinematics import depends_on_temperature
 from flexcal.report.layout import Page
@@ -77,12 +77,14 @@ class Recheck(PlottedFolder):
         What is wrong with the data, where that explains the errors.
     fitted : tuple of str
         How many of the points the calibration was fitted to, in words.
-    reference_changed : bool
-        Whether the reference visit was itself not as calibrated, where this one is.
+    at_reference : JudgedVisit or None
+        The judgement of the reference visit against the calibration, where it or this one differs from that.
     becomes_reference : bool
         Whether later visits of a folder are compared with this one.
     again : str or None
-        Date under which the same files are stored already, where another was given.
+        Date under which the same readings are stored already, where another date or file was given.
+    repeated : str or None
+        How many of the readings are of a visit before, in words.
     unmatched : bool
         Whether a reference visit was given that has fewer than four poses in common with this one.
     reference_date : str or None
@@ -91,6 +93,8 @@ class Recheck(PlottedFolder):
         Dates of the visits behind `drifts`, this one included.
     drifts : tuple of DriftSum
         Cumulative sums over the stored visits.
+    course : CourseOverVisits or None
+        Since when, and whether at once or more and more, by all stored visits.
     record : RunRecord
         What the result comes from.
     """
@@ -106,19 +110,50 @@ class Recheck(PlottedFolder):
     warm: tuple[str, ...] = ()
     mistake: DataErrors | None = None
     fitted: tuple[str, ...] = ()
-    reference_changed: bool = False
+    at_reference: JudgedVisit | None = None
     becomes_reference: bool = False
     again: str | None = None
+    repeated: str | None = None
     unmatched: bool = False
     reference_date: str | None = None
     dates: tuple[str, ...] = ()
     drifts: tuple[DriftSum, ...] = ()
+    course: CourseOverVisits | None = None
     record: RunRecord = NOT_RECORDED
 
     @property
     def verdict(self) -> str:
         """The judgement as a word, as in results.json."""
-        return "wrong_reading" if self.mistake is not None else self.judged.verdict
+        if self.mistake is not None:
+            return "wrong_reading"
+        if self._still_differs and self.judged.verdict == "as_calibrated":
+            return AS_AT_REFERENCE
+        return self.judged.verdict
+
+    @property
+    def probability(self) -> float:
+        """That chance makes errors as conspicuous in a robot as calibrated."""
+        judged = (
+            self.absolute if self.absolute is not None and self.verdict == AS_AT_REFERENCE else self.judged
+        )
+        return judged.probability
+
+    @property
+    def _differed(self) -> bool:
+        """Whether the reference visit was not as calibrated itself."""
+        return self.at_reference is not None and not self.at_reference.as_calibrated
+
+    @property
+    def _still_differs(self) -> bool:
+        """Whether that is so still."""
+        return self._differed and self.absolute is not None and not self.absolute.as_calibrated
+
+    @property
+    def shown(self) -> JudgedVisit:
+        """The judgement whose suspects are what the tool is off by: against the calibration where nothing changed since a reference visit
+        that differed from it.
+        """
+        return self.absolute if self.absolute is not None and self.verdict == AS_AT_REFERENCE else self.judged
 
     @property
     def headline(self) -> str:
@@ -131,7 +166,26 @@ class Recheck(PlottedFolder):
         own = ""
         if self.fitted and self.judged.as_calibrated and self.judged.test.errors.compared == "calibration":
             own = f"the calibration was fitted to {self.fitted[0]}, so they cannot judge it; measure others: "
-        return own + judgement_sentence(self.judged) + effect_sentence(self.judged, self.tools, self.expected)
+        told = judgement_sentence(self.judged, self.course)
+        effect = effect_sentence(self.shown, self.tools, self.expected)
+        if not self._differed or self.absolute is None or self.at_reference is None:
+            return own + told + effect
+        day = "" if self.reference_date is None else f" of {self.reference_date}"
+        then, now = judgement_sentence(self.at_reference), judgement_sentence(self.absolute)
+        unchanged = told.replace("as calibrated", "as it was then")
+        if not self._still_differs:
+            if self.judged.as_calibrated:
+                return f"{now}, and since the reference visit{day}: {unchanged}; that visit was not as calibrated ({then})"
+            return (
+                f"{now}; the reference visit{day} was not: against the calibration {then} then, and since then {told}{effect}; make this "
+                "visit the reference (--reference)"
+            )
+        if self.judged.as_calibrated:
+            return (
+                f"since the reference visit{day} {unchanged}; against the calibration the robot differed already then, and does now: "
+                f"{now}{effect}"
+            )
+        return f"since the reference visit{day} {told}{effect}; against the calibration it differed already then: {then}; and now: {now}"
 
     def summary(self) -> str:
         """The judgement, what would have been found, and remarks."""
@@ -152,16 +206,17 @@ class Recheck(PlottedFolder):
         return sentence + (f"; not seen: {', '.join(lost)}" if lost else "")
 
     @property
-    def alarms(self) -> tuple[DriftSum, ...]:
-        """Of the cumulative sums, where one passed its limit over several visits, those of subjects whose change explains the visits, the
-        most likely first; where the visit itself shows a change, only of what that may be.
+    def alarms(self) -> tuple[str, ...]:
+        """What drifts, or changed at an earlier visit, where sums over several visits passed their limit or this visit itself shows it;
+        empty where a visit's own verdict says all.
         """
-        named = {suspect.change.subject for suspect in self.judged.suspects}
-        return tuple(
-            item
-            for item in explaining_alarms(self.drifts)
-            if self.judged.as_calibrated or item.subject in named
-        )
+        course = self.course
+        if course is None:
+            return ()
+        if self.judged.as_calibrated:
+            passed = tuple(item.subject for item in self.drifts if item.gradual)
+            return (course.subjects or passed) if passed else ()
+        return course.subjects if course.drifting and self.judged.suspects else ()
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:
@@ -170,8 +225,10 @@ class Recheck(PlottedFolder):
         remarks = [*self.poses.notes, *ignored_columns_remarks(self.poses, ("temperature",)), *self.warm]
         if self.again is not None:
             remarks.append(
-                f"the same files are the visit of {self.again} already, which keeps its date; take it out of visits.json to give another"
+                f"the same readings are the visit of {self.again} already, which keeps its date; take it out of visits.json to give another"
             )
+        if self.repeated is not None:
+            remarks.append(self.repeated)
         if self.outside:
             remarks.append(self.outside)
         if judged.instrument == "declared":
@@ -180,14 +237,19 @@ class Recheck(PlottedFolder):
                 "joint, or another that only turns or moves the whole, cannot be seen then"
             )
         noise = float(np.sqrt(np.trace(errors.own) / len(errors.own)))
-        if telling := telling_sentence(judged, self.telling, noise):
+        if telling := telling_sentence(self.shown, self.telling, noise):
             remarks.append(telling)
         if judged.verdict == "instrument_moved" and any(limit.found >= UNSEEN for limit in self.limits):
             remarks.append(
                 "a point that is fixed to the robot's base, measured with the others, tells a moved instrument from a shift of a joint "
                 "that only turns or moves the whole"
             )
-        if self.absolute is not None and not self.absolute.as_calibrated and judged.as_calibrated:
+        if (
+            self.absolute is not None
+            and not self.absolute.as_calibrated
+            and judged.as_calibrated
+            and not self._differed
+        ):
             remarks.append(
                 "since the reference visit nothing changed; against the calibration itself: "
                 + judgement_sentence(self.absolute)
@@ -207,19 +269,21 @@ class Recheck(PlottedFolder):
                 "the scatter is that of the calibration, which may contain errors of its model; a reference visit that measures every pose "
                 "three times tells the robot's own, and makes the test sharper"
             )
-        if self.absolute is not None and self.absolute.as_calibrated and not judged.as_calibrated:
-            remarks.append(self._against_calibration(self.absolute))
+        if (
+            self.absolute is not None
+            and self.absolute.as_calibrated
+            and not judged.as_calibrated
+            and not self._differed
+        ):
+            remarks.append(
+                f"against the calibration itself the robot is {judgement_sentence(self.absolute)}: what changed since the reference visit "
+                "is less than that comparison shows"
+            )
         if self.becomes_reference:
             remarks.append(self._as_reference)
-        if self.alarms:
-            remarks.append(alarm_sentence(self.alarms, self.dates))
+        if self.alarms and self.judged.as_calibrated and self.course is not None:
+            remarks.append(self.course.alarm_sentence(self.alarms))
         return tuple(remarks)
-
-    def _against_calibration(self, absolute: JudgedVisit) -> str:
-        told = f"against the calibration itself the robot is {judgement_sentence(absolute)}"
-        if self.reference_changed:
-            return f"{told}, and at the reference visit it was not: that visit is what differs; make this one the reference (--reference)"
-        return f"{told}: what changed since the reference visit is less than that comparison shows"
 
     @property
     def _as_reference(self) -> str:
@@ -241,7 +305,7 @@ class Recheck(PlottedFolder):
             **header("recheck"),
             "robot": self.model.name,
             "recheck": self.numbers,
-            "drift": drift_block(self.drifts, self.dates, [item.subject for item in self.alarms]),
+            "drift": drift_block(self.drifts, self.dates, self.alarms, self.course),
             "sentence": self.headline,
             "power_sentence": self.power_sentence,
             "remarks": list(self.remarks),
@@ -254,6 +318,8 @@ class Recheck(PlottedFolder):
         return recheck_block(
             self.judged,
             self.absolute,
+            self.at_reference if self._differed else None,
+            self.shown.suspects,
             self.reference_date,
             self.tools,
             self.telling,
@@ -339,29 +405,33 @@ def recheck(
         mistake = None if refit or unknown else misread_visit(model, poses, expected, compared)
     if mistake is None and judged.verdict == "recalibrate":
         mistake = disagreeing_poses(judged, poses, compared)
-    reference_changed = False
-    if reference is not None and absolute.as_calibrated and not judged.as_calibrated:
-        then = against_calibration(reference)
-        reference_changed = then is not None and not then.as_calibrated
+    at_reference = None
+    if reference is not None and not (absolute.as_calibrated and judged.as_calibrated):
+        at_reference = against_calibration(reference)
     ranges, targets = robot.blocks["calibration"].ranges, poses.targets
-    suspects = judged.suspects
-    return Recheck(
+    found = Recheck(
         model=model,
         poses=poses,
         judged=judged,
         absolute=absolute if relative is not None else None,
         limits=detection_limits(judged.test, SHIFT),
-        tools=tuple(moved_tool(model, ranges, suspect, targets) for suspect in suspects),
-        telling=telling_pose(model, ranges, (suspects[0], suspects[1]), targets)
-        if len(suspects) > 1
-        else None,
+        tools=(),
+        telling=None,
         expected=expected,
         outside=outside_ranges(robot, poses.q),
         warm=warm,
         mistake=mistake,
         fitted=fitted_points(robot, poses),
-        reference_changed=reference_changed,
+        at_reference=at_reference,
         unmatched=reference is not None and relative is None,
+    )
+    suspects = found.shown.suspects
+    return replace(
+        found,
+        tools=tuple(moved_tool(model, ranges, suspect, targets) for suspect in suspects),
+        telling=telling_pose(model, ranges, (suspects[0], suspects[1]), targets)
+        if len(suspects) > 1
+        else None,
     )
 
 

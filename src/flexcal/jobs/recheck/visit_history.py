@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -17,6 +18,8 @@ from flexcal.files.structuring import structure
 from flexcal.files.transaction import current_path, write_text
 from flexcal.jobs.result_files import json_text
 
+AS_AT_REFERENCE = "as_at_reference"
+"""Verdict where nothing changed since a reference visit that was not as calibrated itself."""
 VISITS = "visits.json"
 """File of the visits, in the folder of `--out`."""
 _SCHEMA = 1
@@ -50,6 +53,17 @@ class Readings:
             None if poses.temperature is None else poses.temperature.tolist(),
         )
 
+    def shared(self, other: Readings) -> int:
+        """Number of rows that another visit has too: joint positions, point and coordinates equal to a nanometre."""
+        return sum((Counter(self._rows) & Counter(other._rows)).values())
+
+    @property
+    def _rows(self) -> list[tuple[str, ...]]:
+        return [
+            (target, *(f"{value:.9f}" for value in (*q, *position)))
+            for target, q, position in zip(self.target, self.q, self.position, strict=True)
+        ]
+
     def poses(self, sigma: float) -> PoseSet:
         """The pose set; `sigma`, m, is that of each coordinate where none was given."""
         position = np.array(self.position, dtype=float).reshape(-1, 3)
@@ -77,7 +91,7 @@ class Visit:
     date : str
         ISO 8601 date.
     files : mapping of str
-        SHA-256 of the files of measured poses by name; the same files are the same visit.
+        SHA-256 of the files of measured poses by name; the same readings are the same visit, whatever the file is called.
     calibration : str
         SHA-256 of the calibration that it was compared with.
     reference : bool
@@ -94,6 +108,8 @@ class Visit:
         Joints whose cumulative sums had passed their limit.
     suspects : list
         Changes that explain the errors, as in results.json.
+    placed : bool
+        Whether the place of the instrument was fitted to it.
     """
 
     date: str
@@ -107,11 +123,12 @@ class Visit:
     readings: Readings
     alarms: list[str]
     suspects: list[Any]
+    placed: bool = False
 
     @property
     def steady(self) -> bool:
-        """Whether the visit shows no change of the robot on its own, so that its shifts count for cumulative sums."""
-        return self.verdict in ("as_calibrated", "instrument_moved")
+        """Whether the visit shows no change of the robot since what it was compared with, so that its shifts count for cumulative sums."""
+        return self.verdict in ("as_calibrated", AS_AT_REFERENCE, "instrument_moved")
 
 
 @dataclass(frozen=True)
@@ -152,10 +169,16 @@ def read_visits(folder: Path, robot: str) -> tuple[Visit, ...]:
 
 
 def with_visit(visits: Sequence[Visit], visit: Visit) -> tuple[Visit, ...]:
-    """Visits with one more, by date; one of the same files and calibration is replaced."""
-    same = [v for v in visits if (v.files, v.calibration) == (visit.files, visit.calibration)]
-    others = [v for v in visits if v not in same]
+    """Visits with one more, by date; one of the same readings and calibration is replaced."""
+    others = [
+        v for v in visits if v.calibration != visit.calibration or not same_visit(v.readings, visit.readings)
+    ]
     return tuple(sorted([*others, visit], key=lambda v: v.date))
+
+
+def same_visit(one: Readings, other: Readings) -> bool:
+    """Whether two visits are the same measurements, in whatever order and files."""
+    return one.shared(other) == len(one.pose) == len(other.pose)
 
 
 def write_visits(folder: Path, robot: str, visits: Sequence[Visit]) -> None:

@@ -26,6 +26,7 @@ from flexcal.report.sections import provenance_section
 
 _HEADLINES = {
     "as_calibrated": "As calibrated",
+    "as_at_reference": "As at the reference visit, which differs from the calibration",
     "joint_shifted": "A joint shifted",
     "tool_bumped": "Tool bumped",
     "thermal_growth": "Thermal growth",
@@ -84,7 +85,7 @@ def recheck_page(study: RecheckStudy) -> Page:
     )
     verdict = Verdict(
         _status(block),
-        _HEADLINES[block["verdict"]],
+        _headline(results),
         _sentence(results["sentence"]),
         facts,
         (),
@@ -106,9 +107,22 @@ def recheck_page(study: RecheckStudy) -> Page:
     )
 
 
+def _headline(results: Mapping[str, Any]) -> str:
+    block, drift = results["recheck"], results["drift"]
+    courses = {item["course"] for item in drift["courses"]}
+    if block["verdict"] in ("joint_shifted", "tool_bumped", "thermal_growth", "payload_changed", "ambiguous"):
+        if courses == {"drift"}:
+            return "It drifts from visit to visit"
+        if block["reference_against_calibration"] is not None:
+            return f"Since the reference visit: {_HEADLINES[block['verdict']].lower()}"
+    return _HEADLINES[block["verdict"]]
+
+
 def _as_calibrated(block: Mapping[str, Any]) -> str:
     if block["verdict"] == "wrong_reading":
         return "Measure again"
+    if block["verdict"] == "as_at_reference":
+        return "As at the reference"
     return {"good": "Yes", "care": "As far as seen"}.get(_status(block), "No")
 
 
@@ -128,7 +142,7 @@ def _tool_off(block: Mapping[str, Any]) -> str:
 def _status(block: Mapping[str, Any]) -> Status:
     if block["verdict"] == "as_calibrated":
         return "care" if block.get("fitted") and block["compared"] == "calibration" else "good"
-    return "care" if block["verdict"] in ("instrument_moved", "wrong_reading") else "bad"
+    return "care" if block["verdict"] in ("instrument_moved", "wrong_reading", "as_at_reference") else "bad"
 
 
 def _sentence(text: str) -> str:
@@ -138,7 +152,7 @@ def _sentence(text: str) -> str:
 def _checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
     block, drift = results["recheck"], results["drift"]
     lost = [name for name, joint in block["power"]["joints"].items() if joint["found_95_percent"] is None]
-    alarms = [name for name, item in drift["sums"].items() if item["drifts"]]
+    alarms = drift["alarms"]
     checks = [
         Check("Is the robot as calibrated?", _sentence(results["sentence"]), _status(block)),
         Check(
@@ -155,7 +169,7 @@ def _checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
         ),
         Check(
             "Does anything drift over the visits?",
-            f"{' or '.join(alarms)}: see the cumulative sums."
+            f"{' or '.join(alarms)}."
             if alarms
             else f"Not beyond chance in {counted(len(drift['visits']), 'visit')}.",
             "care" if alarms else "good" if len(drift["visits"]) > 1 else "unknown",
