@@ -1,10 +1,10 @@
 from .change_effects import PossibleChange, possible_changes
+from .course_likelihood import VisitCourse, visit_courses
 from .cumulative_sums import AVERAGE_RUN, DriftSum, ShiftAtVisit, drift_sums
 from .detection import DetectionLimit, detection_limits
 from .displaced_tool import MovedTool, TellingPose, moved_tool, telling_pose
 from .global_test import FALSE_ALARM, VISIT_ALARM, GlobalTest
 from .judged_visit import JudgedVisit, Suspect, judge_visit
-from .visit_courses import VisitCourse, visit_courses
 from .visit_errors import (
     LEAST_MATCHED,
     Compared,
