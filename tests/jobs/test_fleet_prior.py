@@ -26,11 +26,11 @@ from flexcal.files.formats import write_estimates
 from flexcal.jobs.calibration import calibrate_robot
 from flexcal.jobs.fleet_prior import (
     FLEET,
-    CalibratedMember,
+    Member,
     alike,
     pool_fleet,
     pooled_prior,
-    read_fleet_prior,
+    read_model_prior,
 )
 
 NOISE = 5e-5
@@ -42,7 +42,7 @@ class Pooled:
 
     fleet: Fleet
     model: RobotModel
-    members: Sequence[CalibratedMember]
+    members: Sequence[Member]
     prior: FleetPrior
 
 
@@ -83,7 +83,7 @@ def pooled(
     model = RobotModel.from_yaml(write_robot(folder))
     fleet = Fleet.drawn(rng, spread, soft=len(terms) > 1)
     fits = [fitted(model, fleet.robot(rng), poses, rng, None, terms) for _ in range(robots)]
-    members = [CalibratedMember(f"robot_{k}", model, fit.estimate) for k, fit in enumerate(fits)]
+    members = [Member(f"robot_{k}", model, fit.estimate) for k, fit in enumerate(fits)]
     return Pooled(fleet, model, members, pooled_prior(members))
 
 
@@ -161,9 +161,11 @@ def test_the_file_has_the_prior_and_refuses_other_robots(six: Pooled, tmp_path: 
         calibrate_robot(file, [measured], terms=["kinematic"])
         files.append(file)
     out = tmp_path / "prior.yaml"
-    members = [m for file in files if (m := CalibratedMember.read(file.parent.name, file))]
-    prior = pool_fleet(members, out)
-    again = read_fleet_prior(out, six.model)
+    members = [m for file in files if (m := Member.read(file.parent.name, file).get("calibration"))]
+    prior = pool_fleet({"calibration": members}, out)[0].geometry
+    again = read_model_prior(out, six.model).geometry
+    assert prior is not None
+    assert again is not None
     assert again.names == prior.names
     assert again.robots == ("robot_0", "robot_1", "robot_2")
     np.testing.assert_allclose(again.covariance, prior.covariance, rtol=1e-12, atol=1e-20)
@@ -196,14 +198,14 @@ def test_the_file_has_the_prior_and_refuses_other_robots(six: Pooled, tmp_path: 
     urdf = odd.parent / "arm.urdf"
     urdf.write_text(urdf.read_text().replace('xyz="0.42', 'xyz="0.43'))
     with refused("E-PRIOR-007", "joint_3", "10 mm"):
-        read_fleet_prior(out, RobotModel.from_yaml(odd))
+        read_model_prior(out, RobotModel.from_yaml(odd))
     # a robot with this prior would count the others twice
     calibrate_robot(new, [few], prior=out)
     with refused("E-PRIOR-005", "new"):
-        pool_fleet([*members, *([late] if (late := CalibratedMember.read("new", new)) else [])], out)
-    assert CalibratedMember.read("odd", odd) is None
+        pool_fleet({"calibration": [*members, Member.read("new", new)["calibration"]]}, out)
+    assert not Member.read("odd", odd)
     with refused("E-PRIOR-002", "at least 3", "2"):
-        pool_fleet(members[:2], out)
+        pool_fleet({"calibration": members[:2]}, out)
     with refused("E-PRIOR-003", "odd", "robot_0", "joint_3"):
         pooled_prior([*members, replace(members[1], name="odd", model=RobotModel.from_yaml(odd))])
 
@@ -232,7 +234,7 @@ def test_one_robot_that_was_measured_twice_is_named(six: Pooled) -> None:
     rng = np.random.default_rng(80)
     robot = six.fleet.robot(rng)
     twice = [
-        CalibratedMember(name, six.model, fitted(six.model, robot, 30, rng, None).estimate)
+        Member(name, six.model, fitted(six.model, robot, 30, rng, None).estimate)
         for name in ("once", "again")
     ]
     assert not alike(six.members)
@@ -258,7 +260,9 @@ def test_the_fleet_writes_the_prior_of_its_model(
     assert "from 3 robots (cell_0, cell_1, cell_2)" in said
     assert "without cell_0_backup, whose calibration is the same as that of cell_0" in said
     assert "without cell_3, calibrated with a prior of other robots" in said
-    assert read_fleet_prior(out, six.model).robots == ("cell_0", "cell_1", "cell_2")
+    told = read_model_prior(out, six.model).geometry
+    assert told is not None
+    assert told.robots == ("cell_0", "cell_1", "cell_2")
 
 
 def test_robots_with_other_terms_are_refused(six: Pooled) -> None:

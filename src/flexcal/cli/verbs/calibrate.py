@@ -76,7 +76,8 @@ class Calibrate:
     hold_out: Annotated[MaybeText, arg(metavar="COLUMN", help_behavior_hint="")] = None
     """Column of POSES: the measurements with each of its values are left out of a further calibration in turn, and compared with it."""
     prior: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="")] = None
-    """Prior of the geometry from other robots of the model, as 'flexcal fleet --prior' writes it: fewer poses are then enough."""
+    """Prior from other robots of the model, as 'flexcal fleet --prior' writes it: fewer poses are then enough. Its stiffness is taken where
+    none was identified of this robot."""
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
     """Folder for report.html, results.json, points.csv and estimates.yaml (then not beside robot.yaml); without it there is no report."""
     write_point: bool = False

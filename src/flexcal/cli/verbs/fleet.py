@@ -37,7 +37,8 @@ class Fleet:
     ] = None
     """Largest P90 of errors, mm, for robots whose robot.yaml has no tolerance."""
     prior: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="")] = None
-    """Write what the calibrated robots tell of their model to this file (.yaml), for 'calibrate --prior' of the next."""
+    """Write what the robots tell of their model, geometry, stiffness and friction, to this file (.yaml), for --prior of 'calibrate',
+    'identify stiffness' and 'identify dynamics' of the next."""
     json: Json = False
 
     def run(self) -> None:

@@ -14,6 +14,7 @@ from flexcal.cli.arguments.shared_options import (
     EstimatesFolder,
     Jobs,
     Json,
+    MaybePath,
     On,
     Paths,
     Robot,
@@ -64,6 +65,8 @@ class IdentifyDynamics:
     """Use separate motor and arm equations for elastic joints, and identify the drive stiffness; needs logs with the arm side (qa1…).
     With the tilts of the bearings too (qax1…, qay1…) their stiffness is identified."""
     learn_residual: Annotated[bool, arg(help=_LEARNING)] = False
+    prior: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="")] = None
+    """Prior of the friction from other robots of the model, as 'flexcal fleet --prior' writes it; not used where it does not fit."""
     accept: Accept = ()
     jobs: Jobs = 1
     on: On = None
@@ -98,6 +101,7 @@ class IdentifyDynamics:
                 flexible=self.flexible,
                 learn_residual=self.learn_residual,
                 accept_weight="weight" in self.accept,
+                prior=self.prior,
                 out=self.out,
                 command=command_line(),
                 jobs=self.jobs,

@@ -11,6 +11,7 @@ from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import (
     EstimatesFolder,
     Json,
+    MaybePath,
     Paths,
     Robot,
     file_argument,
@@ -48,6 +49,8 @@ class IdentifyStiffness:
     """Search for a start: multi-start with gradients, or differential evolution in place of the paper's genetic algorithm."""
     seed: Annotated[int, arg(metavar="N")] = 0
     """Seed of the search for a start."""
+    prior: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="")] = None
+    """Prior of the stiffness from other robots of the model, as 'flexcal fleet --prior' writes it; not used where it does not fit."""
     out: EstimatesFolder = None
     json: Json = False
 
@@ -67,6 +70,7 @@ class IdentifyStiffness:
                 weighting=self.weighting,
                 search=self.search,
                 seed=self.seed,
+                prior=self.prior,
                 out=self.out,
                 command=command_line(),
                 progress=progress,

@@ -12,7 +12,7 @@ from flexcal.data.poses import read_grouped_poses, read_poses, tables_of
 from flexcal.files.formats import provenance, read_estimates, sha256_of
 from flexcal.jobs.calibration.procedure import calibrate
 from flexcal.jobs.calibration.result import Calibration
-from flexcal.jobs.fleet_prior import FLEET, read_fleet_prior
+from flexcal.jobs.fleet_prior import FLEET, PooledUse, conflict_after, read_model_prior, with_stiffness
 from flexcal.jobs.inputs import image_provenance, require_distinct_files
 from flexcal.jobs.result_files import estimates_target
 from flexcal.model.robot import RobotModel, with_blocks
@@ -40,7 +40,8 @@ def calibrate_robot(
     instrument; the scatter of robot and model are found from the points. `hold_out` names a column: the measurements with each of its
     values are left out in turn.
 
-    `prior` is a file with the prior of other robots of the model, as `pool_fleet` writes it.
+    `prior` is a file with the prior of other robots of the model, as `pool_fleet` writes it: of the geometry, and of the stiffness of
+    springs that were not identified of this robot.
 
     With `out`, estimates, results.json, points.csv, arm.npz, gravity_loads.npz and report.html go to that folder, and nothing beside
     robot.yaml changes. Raises `FlexcalError` as reading and `fit_geometry` do; nothing is written then.
@@ -59,7 +60,10 @@ def calibrate_robot(
     else:
         poses, groups = read_grouped_poses(files, model, hold_out)
         labels = hold_out, groups
-    fleet = None if prior is None else read_fleet_prior(prior, bare)
+    others = None if prior is None else read_model_prior(prior, bare)
+    springs = None
+    if others is not None:
+        model, springs = with_stiffness(model, others.stiffness)
     progress("reading", 1.0)
     calibration = calibrate(
         model,
@@ -69,19 +73,23 @@ def calibrate_robot(
         secant_scale=secant_scale,
         elasticity=elasticity,
         hold_out=labels,
-        prior=fleet,
+        prior=None if others is None else others.geometry,
         progress=progress,
     )
     origin = provenance([robot_file, bare.urdf, *files], None, source if blocks else None, tuple(blocks))
     origin |= image_provenance(files)
     if prior is not None:
         origin[f"input.{FLEET}"] = sha256_of(prior)
+    pooled = None
+    if springs is not None and prior is not None:
+        pooled = PooledUse("stiffness", str(prior), springs, conflict_after(springs, calibration.estimate))
     estimate = replace(calibration.estimate, provenance=origin | dict(calibration.estimate.provenance))
     result = replace(
         calibration,
         estimate=estimate,
         nominal=bare,
         stiffness=blocks.get("stiffness"),
+        pooled_stiffness=pooled,
         estimates=target,
         command=command,
     ).marked()

@@ -204,9 +204,14 @@ def _mislabelled(outliers: Sequence[Outlier]) -> Sequence[str]:
 
 
 def _nominal_springs(fit: GeometricFit) -> Sequence[str]:
-    """Springs that stage 1 did not identify have a declared prior of their own in place of its posterior."""
+    """Springs that stage 1 did not identify have a declared prior of their own in place of its posterior, but those of other robots."""
     springs = [p for p in fit.prior.parameters if p.name.endswith(".stiffness")]
-    nominal = [p.name.removesuffix(".stiffness") for p in springs if np.isfinite(p.prior_std)]
+    pooled = fit.model.prior.parameters
+    nominal = [
+        p.name.removesuffix(".stiffness")
+        for p in springs
+        if np.isfinite(p.prior_std) and p.name not in pooled
+    ]
     if not nominal:
         return ()
     which = "" if len(nominal) == len(springs) else f" of {', '.join(nominal)}"

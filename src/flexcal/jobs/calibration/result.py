@@ -57,6 +57,7 @@ from flexcal.jobs.calibration.remarks import calibration_remarks, floor_remark, 
 from flexcal.jobs.calibration.sockets import base_remark, place_remarks, scale_document, scale_remark
 from flexcal.jobs.calibration.subsample import calibration_subsample_remark, subsample_document
 from flexcal.jobs.calibration.thermal import thermal_document
+from flexcal.jobs.fleet_prior import PooledUse
 from flexcal.jobs.inputs import REFUSED, CalibratedRobot
 from flexcal.jobs.pages import Identification
 from flexcal.jobs.result_files import (
@@ -119,6 +120,8 @@ class Calibration(Identification):
         Errors at groups of measurements that were left out whole, where they were asked for.
     orientation_before : OrientationErrors or None
         Errors of the orientations of the uncalibrated robot, where they were measured.
+    pooled_stiffness : PooledUse or None
+        Stiffness from other robots of the model, in place of one that was identified.
     estimates : Path or None
         File that the estimate was stored in.
     command : str
@@ -139,6 +142,7 @@ class Calibration(Identification):
     everywhere: ErrorStatistics | None = None
     held_out: HeldOut | HeldOutTilts | None = None
     orientation_before: OrientationErrors | None = None
+    pooled_stiffness: PooledUse | None = None
     estimates: Path | None = None
     command: str = ""
 
@@ -263,7 +267,8 @@ class Calibration(Identification):
         agreement, scale = PlaceAgreement.of(selected), scale_document(selected)
         coupling = self.coupling
         fleet = fleet_document(selected)
-        misfits = coupling is not None or contradicts(fleet)
+        pooled = self.pooled_stiffness
+        misfits = coupling is not None or contradicts(fleet) or (pooled is not None and pooled.contradicted)
         floor = None if misfits else RepeatabilityFloor.of(selected)
         learning = LearningCurve.of(selected)
         bearings = bearing_remarks(self.bearings, selected)
@@ -323,6 +328,7 @@ class Calibration(Identification):
             "scale": scale,
             "bearings": bearings_block(self.bearings),
             "fleet": fleet,
+            "pooled_stiffness": None if pooled is None else pooled.document(),
             "temperature": thermal_document(selected),
             "stage1": None if self.stiffness is None else {"misfit": misfit_document(self.stiffness.misfit)},
             "remarks": [
@@ -331,6 +337,7 @@ class Calibration(Identification):
                 *scale_remark(scale),
                 *base_remark(selected),
                 *fleet_remarks(fleet),
+                *([] if pooled is None else pooled.remarks),
                 *([] if self.levels is None or coupling is not None else [self.levels.sentence]),
                 *calibration_remarks(selected, self._cause),
                 *(() if blamed else bearings),

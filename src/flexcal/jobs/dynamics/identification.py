@@ -16,6 +16,7 @@ from flexcal.errors import InputError
 from flexcal.jobs.dynamics.flexible_model import require_flexible_bearings, require_flexible_drives
 from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
 from flexcal.jobs.dynamics.result import DynamicsIdentification
+from flexcal.jobs.fleet_prior import ModelPrior, with_friction
 from flexcal.jobs.inputs import require_distinct_files
 from flexcal.jobs.logs import (
     HoldOutLogs,
@@ -49,6 +50,7 @@ def identify_dynamics(
     flexible: bool = False,
     learn_residual: bool = False,
     accept_weight: bool = False,
+    prior: ModelPrior | None = None,
     jobs: int = 1,
     on: str | None = None,
     progress: Progress = silent,
@@ -79,6 +81,8 @@ def identify_dynamics(
         Whether to learn what the estimate misses of the torques; needs scikit-learn.
     accept_weight : bool
         Whether torques unlike the links' weight are accepted, as of balanced arms and guessed masses.
+    prior : ModelPrior, optional
+        Friction of other robots of the model, the prior of that of this one where it fits; where it does not, by a test, it is not used.
     jobs : int
         Number of logs read in parallel, each in its own process.
     on : str, optional
@@ -149,6 +153,9 @@ def identify_dynamics(
         essential = essential_parameters(train, estimate)
         if selection.uncertainty is not None:
             estimate = selection.uncertainty.widened(estimate)
+        use = None
+        if prior is not None:
+            estimate, use = with_friction(estimate, prior, ", ".join(selection.labels))
         external = None
         if model.force_sensor is not None:
             wide = replace(observation, terms=(*observation.terms, ExternalExcess()))
@@ -176,6 +183,7 @@ def identify_dynamics(
             weight_shares={} if accept_weight else weight_shares(train, estimate),
             external=external,
             learned=learned,
+            pooled=use,
             predictions=tuple(divided.predictions(observation, estimate)),
             seconds=time.perf_counter() - begun,
         )

@@ -8,10 +8,11 @@ from pathlib import Path
 
 from flexcal.dynamics.estimators import ESTIMATORS, EstimatorName
 from flexcal.dynamics.torque_model import velocity_options
-from flexcal.files.formats import provenance, read_estimates
+from flexcal.files.formats import provenance, read_estimates, sha256_of
 from flexcal.jobs.dynamics.identification import identify_dynamics
 from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
 from flexcal.jobs.dynamics.result import DynamicsIdentification
+from flexcal.jobs.fleet_prior import FLEET, read_model_prior
 from flexcal.jobs.result_files import RunRecord, estimates_target
 from flexcal.model.robot import RobotModel, with_blocks
 from flexcal.progress import Progress, silent
@@ -27,6 +28,7 @@ def identify_robot_dynamics(
     flexible: bool = False,
     learn_residual: bool = False,
     accept_weight: bool = False,
+    prior: Path | None = None,
     out: Path | None = None,
     command: str = "",
     jobs: int = 1,
@@ -36,8 +38,9 @@ def identify_robot_dynamics(
     """`identify_dynamics` of the robot of a robot.yaml, and storing of the block `dynamics`.
 
     The robot starts from nominal and the other blocks. With `out`, estimates, results.json, predictions.npz and report.html go to that
-    folder. A learned residual goes beside the estimates as learned_residual.npz where cross-validation finds it worth anything. Raises
-    `FlexcalError` as `identify_dynamics` does, and where the place of a file is taken; nothing is written then.
+    folder. `prior` is a file with the friction of other robots of the model, as `pool_fleet` writes it. A learned residual goes beside
+    the estimates as learned_residual.npz where cross-validation finds it worth anything. Raises `FlexcalError` as `identify_dynamics` does,
+    and where the place of a file is taken; nothing is written then.
     """
     bare = RobotModel.from_yaml(robot_file, estimates=False)
     source = bare.path.parent / bare.config.estimates
@@ -54,6 +57,7 @@ def identify_robot_dynamics(
         flexible=flexible,
         learn_residual=learn_residual,
         accept_weight=accept_weight,
+        prior=None if prior is None else read_model_prior(prior, bare),
         jobs=jobs,
         on=on,
         progress=progress,
@@ -70,6 +74,9 @@ def identify_robot_dynamics(
     everything = origin  # hashing goes through the whole logs
     if validate:
         everything = provenance([robot_file, bare.urdf, *logs, *validate], options, used, tuple(blocks))
+    if prior is not None and identified.pooled is not None and identified.pooled.used:
+        origin = {**origin, f"input.{FLEET}": sha256_of(prior)}
+        everything = {**everything, f"input.{FLEET}": origin[f"input.{FLEET}"]}
     result = replace(
         identified,
         estimate=replace(identified.estimate, provenance=origin),

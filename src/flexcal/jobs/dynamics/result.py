@@ -21,6 +21,7 @@ from flexcal.errors import FlexcalError
 from flexcal.files.formats import Block
 from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
 from flexcal.jobs.dynamics.remarks import dynamics_notes, dynamics_remarks, selection_remark
+from flexcal.jobs.fleet_prior import PooledUse
 from flexcal.jobs.logs import Preprocessing
 from flexcal.jobs.pages import TorqueIdentification, summary_row
 from flexcal.jobs.result_files import (
@@ -79,6 +80,8 @@ class DynamicsIdentification(TorqueIdentification):
         How much of the measured external torques appears in the motors' torques; None without a force sensor.
     learned : LearnedDynamics or None
         Learned residual torques, where they were asked for.
+    pooled : PooledUse or None
+        What it had from other robots of the model.
     seconds : float
         Duration of the identification.
     estimates : Path or None
@@ -103,6 +106,7 @@ class DynamicsIdentification(TorqueIdentification):
     weight_shares: Mapping[str, GravityRatio]
     external: ExternalShare | None
     learned: LearnedDynamics | None
+    pooled: PooledUse | None
     seconds: float
     estimates: Path | None = None
     record: RunRecord = NOT_RECORDED
@@ -220,7 +224,11 @@ class DynamicsIdentification(TorqueIdentification):
             "external_share": None if self.external is None else asdict(self.external),
             "selection_remark": selection_remark(self.friction, self.estimate),
             "remarks": list(dynamics_remarks(self.train, self.estimate)),
-            "notes": list(dynamics_notes(self.train, self.estimate, self.estimator)),
+            "pooled": None if self.pooled is None else self.pooled.document(),
+            "notes": [
+                *([] if self.pooled is None else self.pooled.remarks),
+                *dynamics_notes(self.train, self.estimate, self.estimator),
+            ],
             "weight_shares": {
                 joint: asdict(share) for joint, share in self.weight_shares.items() if share.unlike
             },

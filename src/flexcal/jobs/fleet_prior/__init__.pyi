@@ -1,16 +1,36 @@
+from .fleet_pooling import pool_fleet
+from .friction_prior import with_friction
 from .geometry_information import OF_THE_CELL
-from .pooling import FEWEST, FLEET, CalibratedMember, alike, comparable_terms, pool_fleet, pooled_prior
-from .prior_file import read_fleet_prior, write_fleet_prior
+from .geometry_pooling import alike, pooled_prior
+from .member import FEWEST, FLEET, POOLED, Member, comparable_terms
+from .model_prior import ModelPrior
+from .pooled_use import PooledUse
+from .pooled_values import PoolConflict, PooledValues, conflict
+from .prior_file import read_model_prior, write_model_prior
+from .stiffness_prior import conflict_after, stiffness_conflict, with_stiffness
+from .value_pooling import pool_friction, pool_springs
 
 __all__ = [
     "FEWEST",
     "FLEET",
     "OF_THE_CELL",
-    "CalibratedMember",
+    "POOLED",
+    "Member",
+    "ModelPrior",
+    "PoolConflict",
+    "PooledUse",
+    "PooledValues",
     "alike",
     "comparable_terms",
+    "conflict",
+    "conflict_after",
     "pool_fleet",
+    "pool_friction",
+    "pool_springs",
     "pooled_prior",
-    "read_fleet_prior",
-    "write_fleet_prior",
+    "read_model_prior",
+    "stiffness_conflict",
+    "with_friction",
+    "with_stiffness",
+    "write_model_prior",
 ]

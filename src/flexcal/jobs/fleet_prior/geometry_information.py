@@ -64,7 +64,7 @@ def geometry_information(
     across = across * unit / std[:, None]
     matrix = across.T @ information @ across
     vector = across.T @ (right + information @ (start / std))
-    return _combinations(*_without(matrix, vector, len(names)), sizes)
+    return independent_combinations(*_without(matrix, vector, len(names)), sizes)
 
 
 def _without(matrix: np.ndarray, vector: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -77,7 +77,10 @@ def _without(matrix: np.ndarray, vector: np.ndarray, count: int) -> tuple[np.nda
     return matrix[own, own] - across @ inner @ across.T, vector[own] - across @ inner @ (vector[other] / size)
 
 
-def _combinations(matrix: np.ndarray, vector: np.ndarray, sizes: np.ndarray) -> Measured:
+def independent_combinations(matrix: np.ndarray, vector: np.ndarray, sizes: np.ndarray) -> Measured:
+    """Combinations of parameters with independent errors of variance 1 that tell as much as an information `matrix` (p, p) and right-hand
+    side (p,), both in units of `sizes` (p,).
+    """
     values, vectors = np.linalg.eigh((matrix + matrix.T) / 2)
     kept = values > max(_TOLD, _RANK * float(values.max(initial=0.0)))
     root = np.sqrt(values[kept])

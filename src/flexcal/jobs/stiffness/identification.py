@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from flexcal.data.plans import MultisinePlan
-from flexcal.elasticity.identification import MultiStart, Search, fit_springs
+from flexcal.elasticity.identification import MultiStart, Search, SpringFit, fit_springs
 from flexcal.elasticity.response_model import CovarianceWeighting, Weighting
 from flexcal.frequency.periodic import FrequencyResponse
+from flexcal.jobs.fleet_prior import ModelPrior, PooledUse, stiffness_conflict, with_stiffness
 from flexcal.jobs.stiffness.remarks import further_joints, stiffness_remarks
 from flexcal.jobs.stiffness.result import StiffnessIdentification
 from flexcal.model.robot import RobotModel
@@ -29,6 +30,7 @@ def identify_stiffness(
     weighting: Weighting = _WEIGHTING,
     search: Search = _SEARCH,
     seed: int = 0,
+    prior: ModelPrior | None = None,
     progress: Progress = silent,
 ) -> StiffnessIdentification:
     """Fit stiffness and damping of drives and bearings to frequency responses (Neubauer et al. 2015, §4.2).
@@ -53,6 +55,9 @@ def identify_stiffness(
         Search for the start of the fit.
     seed : int
         Seed of the search.
+    prior : ModelPrior, optional
+        Stiffness of other robots of the model, the prior of the springs where it fits this robot; where it does not, by a test, the
+        responses are fitted without.
     progress : Progress
         Called with the stage and the share of it that is done.
 
@@ -84,16 +89,20 @@ def identify_stiffness(
     >>> bool(low < model.value("joint_2.drive.stiffness") < high)
     True
     """
-    fit = fit_springs(
-        model,
-        responses,
-        rng=np.random.default_rng([seed, 1]),
-        inertias_known=inertias_known,
-        plan=plan,
-        weighting=weighting,
-        search=search,
-        progress=progress,
-    )
+
+    def fitted(robot: RobotModel) -> SpringFit:
+        return fit_springs(
+            robot,
+            responses,
+            rng=np.random.default_rng([seed, 1]),
+            inertias_known=inertias_known,
+            plan=plan,
+            weighting=weighting,
+            search=search,
+            progress=progress,
+        )
+
+    fit, use = _with_others(model, prior, fitted)
     measured = {response.pose for response in responses}
     return StiffnessIdentification(
         model=fit.robot(model),
@@ -105,5 +114,36 @@ def identify_stiffness(
         if plan is None
         else tuple(k + 1 for k in range(len(plan.poses)) if k not in measured),
         further_joints=further_joints(fit.estimate, model),
-        remarks=stiffness_remarks(fit, model),
+        remarks=(*(() if use is None else use.remarks), *stiffness_remarks(fit, model)),
+        pooled=use,
     )
+
+
+def _with_others(
+    model: RobotModel, prior: ModelPrior | None, fitted: Callable[[RobotModel], SpringFit]
+) -> tuple[SpringFit, PooledUse | None]:
+    """Fit with the stiffness of other robots as prior, or without where that does not fit this one, and what was used of it.
+
+    Whether it fits is told by the responses alone: a fit that is pulled to a wrong stiffness may find the errors elsewhere.
+    """
+    alone = fitted(model)
+    if prior is None:
+        return alone, None
+    pooled = prior.stiffness
+
+    def unused(why: str) -> tuple[SpringFit, PooledUse]:
+        return alone, PooledUse("stiffness", prior.source, None, used=False, unused=why)
+
+    if pooled is None:
+        return unused("it has none")
+    started, taken = with_stiffness(model, pooled)
+    if taken is None:
+        return unused("the robot declares none of its springs")
+    axes = pooled.condition
+    own = model.bearings if alone.bearings is None else alone.bearings.taken
+    if axes and own != axes:
+        return unused(f"it is of bearings '{axes}', and this robot was fitted with bearings '{own}'")
+    test = stiffness_conflict(taken, alone.estimate)
+    if test is not None and test.contradicted:
+        return alone, PooledUse("stiffness", prior.source, taken, test, used=False)
+    return fitted(started.with_bearings(own)), PooledUse("stiffness", prior.source, taken, test)

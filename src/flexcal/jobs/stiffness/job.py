@@ -14,7 +14,8 @@ from flexcal.elasticity.response_model import (
     UniformWeighting,
     Weighting,
 )
-from flexcal.files.formats import provenance, read_estimates
+from flexcal.files.formats import provenance, read_estimates, sha256_of
+from flexcal.jobs.fleet_prior import FLEET, read_model_prior
 from flexcal.jobs.inputs import common_plan, plan_files, read_responses
 from flexcal.jobs.result_files import RunRecord, estimates_target
 from flexcal.jobs.stiffness.identification import identify_stiffness
@@ -44,6 +45,7 @@ def identify_robot_stiffness(
     weighting: WeightingName = "covariance",
     search: SearchName = "multi-start",
     seed: int = 0,
+    prior: Path | None = None,
     out: Path | None = None,
     command: str = "",
     progress: Progress = silent,
@@ -52,7 +54,8 @@ def identify_robot_stiffness(
 
     The robot starts from nominal, the block `dynamics`, and the geometry of the block `calibration`; what that one says of stiffness
     and inertia came from here and is left out. The reference motion is that of plan.yaml beside the responses. With `out`, estimates,
-    results.json, fitted_responses.npz and report.html go to that folder. Raises `FlexcalError` as `identify_stiffness` does; nothing is
+    results.json, fitted_responses.npz and report.html go to that folder. `prior` is a file with the stiffness of other robots of the model,
+    as `pool_fleet` writes it. Raises `FlexcalError` as `identify_stiffness` does; nothing is
     written then.
     """
     bare = RobotModel.from_yaml(robot_file, estimates=False)
@@ -64,6 +67,7 @@ def identify_robot_stiffness(
     if calibrated is not None:
         geometric = {n: v for n, v in calibrated.values.items() if n.rpartition(".")[2] in _GEOMETRIC}
         model = model.with_values(geometric)
+    others = None if prior is None else read_model_prior(prior, bare)
     inputs, responses = read_responses(files, bare)
     plans = plan_files(inputs)
     identified = identify_stiffness(
@@ -74,6 +78,7 @@ def identify_robot_stiffness(
         weighting=_WEIGHTINGS[weighting],
         search=_SEARCHES[search],
         seed=seed,
+        prior=others,
         progress=progress,
     )
     options = {"inertias_known": inertias_known, "weighting": weighting, "search": search, "seed": seed}
@@ -81,6 +86,8 @@ def identify_robot_stiffness(
     origin = provenance(
         [robot_file, bare.urdf, *inputs, *plans], options, source if blocks else None, tuple(blocks)
     )
+    if prior is not None and identified.pooled is not None and identified.pooled.used:
+        origin[f"input.{FLEET}"] = sha256_of(prior)
     result = replace(
         identified,
         estimate=replace(identified.estimate, provenance=origin),

@@ -11,6 +11,7 @@ import numpy as np
 
 from flexcal.elasticity.identification import SpringFit
 from flexcal.files.formats import Block
+from flexcal.jobs.fleet_prior import PooledUse
 from flexcal.jobs.pages import Identification, summary_row
 from flexcal.jobs.result_files import (
     NOT_RECORDED,
@@ -50,6 +51,8 @@ class StiffnessIdentification(Identification):
         Joints that robot.yaml declares rigid and that got a drive spring.
     remarks : tuple of str
         One sentence each, the most important last.
+    pooled : PooledUse, optional
+        What it had from other robots of the model.
     estimates : Path, optional
         The file that the estimate was stored in.
     record : RunRecord
@@ -63,6 +66,7 @@ class StiffnessIdentification(Identification):
     missing_poses: tuple[int, ...]
     further_joints: tuple[str, ...]
     remarks: tuple[str, ...]
+    pooled: PooledUse | None = None
     estimates: Path | None = None
     record: RunRecord = NOT_RECORDED
 
@@ -123,6 +127,7 @@ class StiffnessIdentification(Identification):
             },
             "bearings": response_bearings_block(self.fit.bearings),
             "further_joints": list(self.further_joints),
+            "pooled": None if self.pooled is None else self.pooled.document(),
             "remarks": list(self.remarks),
             "parameters": quantities(estimate),
             "verdict": self.trust.document(),

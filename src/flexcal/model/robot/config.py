@@ -98,8 +98,8 @@ class PriorConfig:
     """Prior standard deviations (1σ) of nominal values: mass (relative), centre of mass (m), rotor inertia (relative), stiffness
     (relative), and the torque constants behind the motor torques that a controller gives (relative; 0 for measured torques).
 
-    `length` (m) and `angle` (rad) are those of the joints' geometric errors, and `parameters` those of single ones by name; a geometric
-    parameter without is estimated from the measurements alone.
+    `length` (m) and `angle` (rad) are those of the joints' geometric errors, and `parameters` those of single ones by name, relative for a
+    stiffness; a geometric parameter without is estimated from the measurements alone.
     """
 
     mass: float = 0.07

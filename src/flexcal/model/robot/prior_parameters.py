@@ -71,7 +71,8 @@ def sensor_parameters(sensor: ArmSensor, sample_time: float) -> tuple[Parameter,
 
 
 def springs_and_rotors(model: RobotModel) -> tuple[Parameter, ...]:
-    """Stiffness and damping of every spring, with wide priors, and the rotor inertias of the driven joints with robot.yaml's prior.
+    """Stiffness and damping of every spring, with wide priors where the robot has no prior of one by name, and the rotor inertias of the
+    driven joints with robot.yaml's prior.
 
     Raises `FlexcalError` for one without a positive value.
     """
@@ -87,7 +88,7 @@ def springs_and_rotors(model: RobotModel) -> tuple[Parameter, ...]:
     def spring(name: str) -> Parameter:
         value, known = model.value(name), name.split(".")[0] in declared_joints
         softest = -np.inf if known or name.endswith(".damping") else value / SOFTEST_FURTHER_SPRING
-        width = SPRING_LOG_STD if known else FURTHER_SPRING_LOG_STD
+        width = model.prior.parameters.get(name, SPRING_LOG_STD if known else FURTHER_SPRING_LOG_STD)
         return Parameter(name, unit_of(name), value, lower=softest, prior_std=width, scale="log")
 
     return (*map(spring, names), *(declared_parameter(model, name) for name in rotors))
@@ -118,6 +119,8 @@ def declared_parameter(model: RobotModel, name: str) -> Parameter:
 
 
 def _std(model: RobotModel, name: str, key: str) -> float:
+    if key == "stiffness" and name in model.prior.parameters:
+        return model.prior.parameters[name]
     if name == "payload.mass":
         payload = model.payload
         assert payload is not None

@@ -237,12 +237,12 @@ class RobotModel:
         return replace(self, config=replace(self.config, bearings=bearings))
 
     def with_priors(self, stds: Mapping[str, float]) -> RobotModel:
-        """Robot with priors of some geometric parameters, centred on their nominal values.
+        """Robot with priors of some geometric parameters and stiffnesses, centred on their nominal values.
 
         Parameters
         ----------
         stds : mapping of float
-            Standard deviations, m or rad, by name of the parameter.
+            Standard deviations, m or rad, relative for a stiffness, by name of the parameter.
 
         Returns
         -------

@@ -12,7 +12,7 @@ from flexcal.calibration.verification import CALIBRATED, MeasuredPoints
 from flexcal.estimation import Estimate
 from flexcal.report.checks.bearing_axes import check_bearings
 from flexcal.report.checks.elastic_model import check_misfit, read_misfit
-from flexcal.report.checks.fleet_prior import check_fleet
+from flexcal.report.checks.fleet_prior import check_fleet, check_pooled_stiffness
 from flexcal.report.checks.places import check_places
 from flexcal.report.checks.pose_errors import (
     check_drift,
@@ -65,6 +65,7 @@ def calibration_checks(
         *([] if results.get("places") is None else [check_places(results["places"])]),
         *check_bearings(results.get("bearings")),
         *check_fleet(results.get("fleet")),
+        *check_pooled_stiffness(results.get("pooled_stiffness")),
         *_stage_one_checks(results.get("stage1")),
     )
 

@@ -34,3 +34,18 @@ def check_fleet(block: Mapping[str, Any] | None) -> tuple[Check, ...]:
             "fleet",
         ),
     )
+
+
+def check_pooled_stiffness(block: Mapping[str, Any] | None) -> tuple[Check, ...]:
+    """The check from the block `pooled_stiffness` of results.json; none where the stiffness is not from other robots, or fits."""
+    if block is None or block["conflict"] is None or not block["conflict"]["contradicted"]:
+        return ()
+    return (
+        Check(
+            "Has the robot springs like those that its stiffness is from?",
+            f"No (p = {block['conflict']['probability']:.2g}): the stiffness of the {len(block['robots'])} others does not fit this robot. "
+            "Identify its stiffness, or calibrate it without --prior.",
+            "bad",
+            "fleet",
+        ),
+    )

@@ -1,87 +1,37 @@
-"""Pooling of calibrated robots of a model into the prior of the next."""
+"""Pooling of the geometry of calibrated robots of a model into the prior of the next."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations
-from pathlib import Path
 
 import numpy as np
 
 from flexcal.calibration.error_model import TRANSMISSION
 from flexcal.calibration.fit import FleetPrior, base_errors, plausible_size
 from flexcal.errors import FlexcalError
-from flexcal.estimation import Estimate, Measured, population
-from flexcal.files.formats import block_sha256, read_estimates
+from flexcal.estimation import Measured, population
 from flexcal.jobs.fleet_prior.geometry_information import (
     OF_THE_CELL,
     geometry_information,
     is_geometric_error,
 )
 from flexcal.jobs.fleet_prior.kinematics import difference
-from flexcal.jobs.fleet_prior.prior_file import write_fleet_prior
+from flexcal.jobs.fleet_prior.member import FEWEST, Member
 from flexcal.model.robot import RobotModel, unit_in
 
-FEWEST = 3
-"""Least number of robots: two that happen to be alike, or are one that was measured twice, would pass for a model whose robots do not
-differ; of three it shows.
-"""
 _ALIKE = 3.0
 """Largest reduced chi-square of the difference between two measurements of one robot, whose errors are not known exactly."""
 _FAR_APART = 10.0
 """Factor by which those of other pairs are larger, in the median, where two measurements are of one robot."""
 _FEWEST_COMBINATIONS = 5
-FLEET = "fleet"
-"""Entry of the provenance of a calibration that had a prior of other robots."""
 _SAME = 1e-6
 """Relative singular value of combinations below which both calibrations tell nothing of one."""
 _TOLD = 0.9
 """Variance of a mean, relative to the plausible one, below which the robots tell something of it."""
 
 
-@dataclass(frozen=True, eq=False)
-class CalibratedMember:
-    """A calibrated robot of the fleet: nominal `model`, its `estimate` and the file of that."""
-
-    name: str
-    model: RobotModel
-    estimate: Estimate
-    source: Path | None = None
-
-    @classmethod
-    def read(cls, name: str, robot_file: Path, estimates: Path | None = None) -> CalibratedMember | None:
-        """The robot of a robot.yaml, with the calibration in an estimates file, by default its own; None without one."""
-        model = RobotModel.from_yaml(robot_file, estimates=False)
-        source = estimates or model.path.parent / model.config.estimates
-        calibration = read_estimates(source).get("calibration") if source.exists() else None
-        return None if calibration is None else cls(name, model, calibration, source)
-
-    @property
-    def has_prior(self) -> bool:
-        """Whether it was calibrated with a prior of other robots."""
-        return f"input.{FLEET}" in self.estimate.provenance
-
-    @property
-    def terms(self) -> tuple[str, ...]:
-        """Terms of its calibration, without transmission errors, which are each robot's own."""
-        return comparable_terms(self.estimate.provenance.get("option.terms", ""))
-
-
-def comparable_terms(stored: str) -> tuple[str, ...]:
-    """Terms of a calibration that decide what its parameters mean: all but transmission errors, which are waves about the mean."""
-    return tuple(sorted(term for term in stored.split() if TRANSMISSION not in term))
-
-
-def pool_fleet(members: Sequence[CalibratedMember], out: Path) -> FleetPrior:
-    """Pool calibrated robots, and write the prior to `out`; raises `FlexcalError` as `pooled_prior` does."""
-    prior = pooled_prior(members)
-    digests = {m.name: block_sha256(m.source, "calibration") for m in members if m.source is not None}
-    write_fleet_prior(out, prior, members[0].model, digests)
-    return prior
-
-
-def pooled_prior(members: Sequence[CalibratedMember]) -> FleetPrior:
+def pooled_prior(members: Sequence[Member]) -> FleetPrior:
     """Prior for a further robot of the model of some calibrated ones (`estimation.population`).
 
     Raises `FlexcalError` for fewer than three robots, robots of other kinematics or with other terms, and those that were calibrated with
@@ -110,7 +60,7 @@ def pooled_prior(members: Sequence[CalibratedMember]) -> FleetPrior:
     return prior.among(name for name, known in zip(names, told, strict=True) if known)
 
 
-def alike(members: Sequence[CalibratedMember]) -> list[tuple[str, str, float]]:
+def alike(members: Sequence[Member]) -> list[tuple[str, str, float]]:
     """Pairs of robots that are as alike as two measurements of one: their names, and how many times as far apart other pairs are.
 
     By the chi-square of what both calibrations tell against one set of parameters for both; the number of times is the median over pairs of
@@ -135,7 +85,7 @@ def alike(members: Sequence[CalibratedMember]) -> list[tuple[str, str, float]]:
     ]
 
 
-def _measured(members: Sequence[CalibratedMember]) -> tuple[list[str], np.ndarray, list[Measured]]:
+def _measured(members: Sequence[Member]) -> tuple[list[str], np.ndarray, list[Measured]]:
     """Parameters of the robots themselves, their plausible sizes, and what each calibration tells of them."""
     model = members[0].model
     base = base_errors(model)
@@ -146,7 +96,7 @@ def _measured(members: Sequence[CalibratedMember]) -> tuple[list[str], np.ndarra
     return names, sizes, [geometry_information(member.estimate, names, cell, sizes) for member in members]
 
 
-def _require_alike(members: Sequence[CalibratedMember]) -> None:
+def _require_alike(members: Sequence[Member]) -> None:
     if len(members) < FEWEST:
         raise FlexcalError(
             "E-PRIOR-002",

@@ -1,0 +1,54 @@
+"""A robot of a fleet with one block of its estimates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from flexcal.calibration.error_model import TRANSMISSION
+from flexcal.estimation import Estimate
+from flexcal.files.formats import Block, read_estimates
+from flexcal.model.robot import RobotModel
+
+FEWEST = 3
+"""Least number of robots: two that happen to be alike, or are one that was measured twice, would pass for a model whose robots do not
+differ; of three it shows.
+"""
+FLEET = "fleet"
+"""Entry of the provenance of an estimate that had a prior of other robots."""
+POOLED: tuple[Block, ...] = ("calibration", "stiffness", "dynamics")
+"""Blocks of which a prior has something."""
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """A robot of the fleet: nominal `model`, the `estimate` of a `block` and the file of that."""
+
+    name: str
+    model: RobotModel
+    estimate: Estimate
+    source: Path | None = None
+    block: Block = "calibration"
+
+    @classmethod
+    def read(cls, name: str, robot_file: Path, estimates: Path | None = None) -> dict[Block, Member]:
+        """The robot of a robot.yaml, by the blocks that an estimates file, by default its own, has of those that can be pooled."""
+        model = RobotModel.from_yaml(robot_file, estimates=False)
+        source = estimates or model.path.parent / model.config.estimates
+        blocks = read_estimates(source) if source.exists() else {}
+        return {block: cls(name, model, blocks[block], source, block) for block in POOLED if block in blocks}
+
+    @property
+    def has_prior(self) -> bool:
+        """Whether it was identified with a prior of other robots."""
+        return f"input.{FLEET}" in self.estimate.provenance
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Terms of its calibration, without transmission errors, which are each robot's own."""
+        return comparable_terms(self.estimate.provenance.get("option.terms", ""))
+
+
+def comparable_terms(stored: str) -> tuple[str, ...]:
+    """Terms of a calibration that decide what its parameters mean: all but transmission errors, which are waves about the mean."""
+    return tuple(sorted(term for term in stored.split() if TRANSMISSION not in term))
