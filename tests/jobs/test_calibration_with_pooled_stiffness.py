@@ -9,7 +9,13 @@ from simulated_fleet import RIGID, Fleet, SimulatedRobot, random_poses, write_po
 from flexcal.estimation import Estimate, Parameter, Parameters
 from flexcal.files.formats import write_estimates
 from flexcal.jobs.calibration import calibrate_robot
-from flexcal.jobs.fleet_prior import ModelPrior, PooledValues, read_model_prior, with_stiffness, write_model_prior
+from flexcal.jobs.fleet_prior import (
+    ModelPrior,
+    PooledValues,
+    read_model_prior,
+    with_stiffness,
+    write_model_prior,
+)
 from flexcal.model.robot import RobotModel
 
 STIFFNESS = np.array([9e4, 6e4, 4e4])
@@ -93,7 +99,9 @@ def test_a_robots_own_estimate_comes_first(prior: Path, tmp_path: Path) -> None:
     )
     estimate = Estimate(items, 1e-6 * np.eye(2), 2, (), (True, True), 0.0, 0.0, 100, "converged", "", 1)
     write_estimates(robot.parent / "estimates.yaml", "stiffness", estimate)
-    model, taken = with_stiffness(RobotModel.from_yaml(robot), read_model_prior(prior, RobotModel.from_yaml(robot)).stiffness)
+    model, taken = with_stiffness(
+        RobotModel.from_yaml(robot), read_model_prior(prior, RobotModel.from_yaml(robot)).stiffness
+    )
     assert taken is not None
     assert taken.names == (NAMES[2],)
     np.testing.assert_allclose([model.value(n) for n in NAMES], [*own[:2], STIFFNESS[2]])
