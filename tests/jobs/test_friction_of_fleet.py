@@ -102,10 +102,10 @@ def test_other_friction_terms_are_said(fleet: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_intervals_with_the_others_hold_the_truth(tmp_path: Path) -> None:
-    """Six fleets of eight robots, and six further robots of each with noisy logs; one of a hundred is called another by chance."""
+    """Four fleets of eight robots, and six further robots of each with noisy logs; one of a hundred is called another by chance."""
     rng = np.random.default_rng(7)
-    held, ratio, strangers = [], [], 0
-    for number in range(6):
+    held, before, ratio, strangers = [], [], [], 0
+    for number in range(4):
         folder, members = tmp_path / str(number), []
         for k in range(8):
             robot = logged(folder / f"cell_{k}", np.exp(SPREAD * rng.standard_normal(4)), rng, 10.0, 1.0)
@@ -114,17 +114,17 @@ def test_intervals_with_the_others_hold_the_truth(tmp_path: Path) -> None:
         pool_fleet({"dynamics": members}, folder / "prior.yaml")
         for k in range(6):
             factors = np.exp(SPREAD * rng.standard_normal(4))
-            robot = logged(folder / f"next_{k}", factors, rng, 8.0, 10.0)
+            robot = logged(folder / f"next_{k}", factors, rng, 12.0, 5.0)
             alone, found = identified(robot).estimate, identified(robot, folder / "prior.yaml")
             assert found.pooled is not None
             strangers += found.pooled.contradicted
             for name, factor in zip(NAMES, factors, strict=True):
-                low, high = found.estimate.interval(name) or (-np.inf, np.inf)
-                held.append(low < factor * TRUTH[name] < high)
+                for estimate, inside in ((alone, before), (found.estimate, held)):
+                    low, high = estimate.interval(name) or (-np.inf, np.inf)
+                    inside.append(low < factor * TRUTH[name] < high)
                 ratio.append((found.estimate.std(name) or np.nan) / (alone.std(name) or np.nan))
-    print(
-        f"{100 * np.mean(held):.1f} % of {len(held)} intervals, {np.nanmedian(ratio):.2f} times as wide, {strangers} strangers of 36"
-    )
-    assert 0.9 < np.mean(held) < 0.995
+    said = f"{100 * np.mean(held):.1f} % of {len(held)} intervals ({100 * np.mean(before):.1f} % without the others)"
+    print(f"{said}, {np.nanmedian(ratio):.2f} times as wide, {strangers} strangers of 24")
+    assert np.mean(held) > 0.9
     assert np.nanmedian(ratio) < 0.8
     assert strangers <= 2
