@@ -3,6 +3,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 # matrices are small here: more BLAS threads only get in each other's way
 export OPENBLAS_NUM_THREADS ?= 1
+# else every process compiles what has changed since the installation, and all tests
+unexport PYTHONDONTWRITEBYTECODE
 SOURCES := pyproject.toml CMakeLists.txt $(wildcard kernels/* runtime/include/flexcal/*.hpp runtime/include/flexcal/runtime/*.hpp)
 
 .PHONY: install demo test test-all coverage sanitize check bench docs wheels clean
@@ -29,16 +31,18 @@ demo: install
 	cp demo/report.html report.html
 	@echo "open report.html"
 
-# two processes, a file always in one of them: its fixtures are made once
+# two processes, a file always in one of them: its fixtures are made once; in the order of names, else the long files of one test come last
+PARALLEL := -n 2 --dist loadfile --no-loadscope-reorder
+
 test: $(VENV)/.developer
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(BIN)/python -m pytest $(PARALLEL)
 
 test-all: $(VENV)/.developer sanitize
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m ""
+	$(BIN)/python -m pytest $(PARALLEL) -m ""
 
 # the lines and branches that these tests reach: a summary, and pages in build/coverage
 coverage: $(VENV)/.developer
-	$(BIN)/python -m pytest -n 2 --dist loadfile --cov --cov-report=term:skip-covered --cov-report=html
+	$(BIN)/python -m pytest $(PARALLEL) --cov --cov-report=term:skip-covered --cov-report=html
 
 # the kernels' tests on a build that checks every access to memory and every undefined operation; needs g++
 SANITIZED := build/sanitize

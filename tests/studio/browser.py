@@ -14,6 +14,7 @@ from pathlib import Path
 
 ARGUMENTS = [
     "--no-sandbox",
+    "--disable-gpu-compositing",
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
