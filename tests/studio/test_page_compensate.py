@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,11 @@ import calibrated_ur5
 import polars as pl
 import pytest
 from browser import studio
-from page_elements import WAIT, fill, go_to, press, see
+from page_elements import WAIT, choose, fill, go_to, press, see
 
 from flexcal import read_poses
+from flexcal.calibration.measurement import predict_measurements
+from flexcal.data.poses import write_poses
 from flexcal.jobs.inputs import CalibratedRobot
 
 _TYPE_WHILE_BUSY = """([field, text]) => setTimeout(() => {
@@ -55,9 +58,23 @@ def test_targets_are_compensated_and_the_customer_gets_a_report(page: Any, tmp_p
         commands = pl.read_csv(folder / "commands.csv")
         assert commands["pose"].to_list() == poses.pose[:5].tolist()
 
+        # what a tracker sees at these commands when the calibrated robot is the real one
+        q = commands.select([f"q{k}" for k in range(1, 7)]).to_numpy()
+        corrected = replace(poses.subset(slice(0, 5)), q=q)
+        seen = predict_measurements(robot.model, corrected).position
+        write_poses(folder / "corrected.csv", replace(corrected, position=seen))
+        write_poses(folder / "nominal.csv", poses.subset(slice(0, 5)))
+
         press(page, "Export")
         fill(page, "Robot no.", "<b>UR5-7</b>")
         see(page, "--robot-serial")
         press(page, "Write the customer's report")
         page.get_by_role("link", name="open calibration/customer.html").wait_for(timeout=WAIT)
         assert "&lt;b&gt;UR5-7&lt;/b&gt;" in (folder / "calibration" / "customer.html").read_text("utf-8")
+        choose(page, "Measured at nominal commands", "nominal.csv")
+        choose(page, "Measured at corrected commands", "corrected.csv")
+        see(page, "--before nominal.csv --after corrected.csv")
+        press(page, "Write the certificate")
+        page.get_by_role("link", name="open certificate.html").wait_for(timeout=WAIT)
+        see(page, "mm after compensation")
+        assert "&lt;b&gt;UR5-7&lt;/b&gt;" in (folder / "certificate.html").read_text("utf-8")

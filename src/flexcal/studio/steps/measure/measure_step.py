@@ -10,6 +10,7 @@ from flexcal.errors import FlexcalError, InputError
 from flexcal.studio.steps.measure.accuracy_course import accuracy_course
 from flexcal.studio.steps.measure.followed_source import FileSource, FolderSource
 from flexcal.studio.steps.measure.guide import Answer
+from flexcal.studio.steps.measure.imported_source import ImportedSource
 from flexcal.studio.steps.measure.measuring import Measuring
 from flexcal.studio.steps.measure.next_pose import ORDERS
 from flexcal.studio.steps.measure.pose_list import pose_list, row_keys
@@ -20,7 +21,13 @@ from flexcal.studio.steps.measure.typed_source import TypedSource
 from flexcal.studio.steps.measure.virtual_source import VirtualSource
 from flexcal.studio.window import Place, Step, Window, paragraph
 
-_SOURCES: tuple[type[RowSource], ...] = (TypedSource, FileSource, FolderSource, VirtualSource)
+_SOURCES: tuple[type[RowSource], ...] = (
+    TypedSource,
+    FileSource,
+    FolderSource,
+    ImportedSource,
+    VirtualSource,
+)
 
 
 class MeasureStep(Step):

@@ -1,4 +1,4 @@
-"""The calibrated robot for other programs, and the report for a customer."""
+"""The calibrated robot for other programs, the report for a customer and the accuracy certificate."""
 
 from __future__ import annotations
 
@@ -8,35 +8,37 @@ from flexcal.errors import FlexcalError
 from flexcal.jobs.result_files import RESULTS
 from flexcal.studio.commands import CommandRun, command_line
 from flexcal.studio.project import CALIBRATION, VERIFICATION
+from flexcal.studio.steps.verify.certificate_form import CertificateForm
 from flexcal.studio.steps.verify.export_formats import ExportFormat, complete_formats, export_formats
+from flexcal.studio.steps.verify.particulars import Particulars
 from flexcal.studio.window import Place, Step, Window, command_text, file_link, paragraph
 
 _SMALL = 0.01
 """Error, mm, that an exported file may have without a warning."""
 _CUSTOMER = "customer.html"
-_PARTICULARS = {
-    "--instrument": "Device",
-    "--instrument-serial": "Its no.",
-    "--robot-serial": "Robot no.",
-    "--operator": "By",
-    "--date": "Date",
-}
 
 
 class Exports(Step):
-    """A format and its command line; the customer's report and its particulars; what they wrote, as links."""
+    """A format and its command line; the customer's report and the certificate with their particulars; what they wrote, as links."""
 
     title = "Export"
 
     def __init__(self, window: Window):
         super().__init__(window)
         self._formats: list[ExportFormat] = []
+        self._certificate: CertificateForm | None = None
         self._told = ""
         self._shown: object = None
 
     def open(self) -> None:
-        """Add the place of formats and report."""
-        self._place = Place(self.window.gui)
+        """Add the places of formats, report and certificate, and the particulars."""
+        gui = self.window.gui
+        self._place = Place(gui)
+        with gui.add_folder("Report for the customer"):
+            self._particulars = Particulars(self.window, self._show_lines)
+            self._report_place = Place(gui)
+        with gui.add_folder("Accuracy certificate"):
+            self._certificate_place = Place(gui)
 
     def refresh(self) -> None:
         """Show formats and links anew where files have changed."""
@@ -51,8 +53,10 @@ class Exports(Step):
                 self.window.gui.add_html(paragraph(self.window.project.told(str(problem)), "bad"))
                 return
             self._add_formats()
-            with self.window.gui.add_folder("Report for the customer"):
-                self._add_report()
+        with self._report_place.anew():
+            self._add_report()
+        with self._certificate_place.anew():
+            self._certificate = CertificateForm(self.window, self._particulars, self._show_anew)
 
     def _add_formats(self) -> None:
         window, gui = self.window, self.window.gui
@@ -106,27 +110,17 @@ class Exports(Step):
                 "to fill in by hand."
             )
         )
-        fields = {
-            option: gui.add_text(label, window.choices.get(option, ""))
-            for option, label in _PARTICULARS.items()
-        }
-        line = gui.add_html("")
-
-        def arguments() -> tuple[str, ...]:
-            given = [(option, field.value.strip()) for option, field in fields.items()]
-            return ("report", folder, "--customer", *(word for pair in given if pair[1] for word in pair))
-
-        def show() -> None:
-            for option, field in fields.items():
-                window.choices.put(option, field.value)
-            line.content = _line(arguments())
-
-        for field in fields.values():
-            field.on_update(lambda _: window.post(show))
-        window.button("Write the customer's report", lambda: window.command(arguments(), self._show_anew))
-        show()
+        self._report = lambda: ("report", folder, "--customer", *self._particulars.options)
+        self._report_line = gui.add_html(_line(self._report()))
+        window.button("Write the customer's report", lambda: window.command(self._report(), self._show_anew))
         if (window.project.folder / folder / _CUSTOMER).is_file():
             gui.add_html(file_link(f"{folder}/{_CUSTOMER}", f"open {folder}/{_CUSTOMER}"))
+
+    def _show_lines(self) -> None:
+        """Show the command lines with the present particulars."""
+        if self._certificate is not None:
+            self._report_line.content = _line(self._report())
+            self._certificate.show_line()
 
 
 def _line(arguments: tuple[str, ...]) -> str:

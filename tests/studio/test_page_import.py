@@ -1,0 +1,52 @@
+"""A file of another program, imported from the page."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+import pytest
+from browser import studio
+from page_elements import WAIT, choose, count_rows, fill, go_to, press, see
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "ur5_tracker"
+
+
+def test_columns_and_units_of_another_program(page: Any, tmp_path: Path) -> None:
+    """Looked at first, then the rows of the session; a second import goes beside them and replaces nothing."""
+    pytest.importorskip("viser", reason="viser is absent: pip install 'flexcal[studio]'")
+    folder = tmp_path / "ur5"
+    folder.mkdir()
+    for name in ("robot.yaml", "ur5.urdf"):
+        shutil.copy(EXAMPLE / name, folder / name)
+    rows = pl.read_csv(EXAMPLE / "random.csv", comment_prefix="#")
+    foreign = {f"A{k} [deg]": np.rad2deg(rows[f"q{k}"]) for k in range(1, 7)}
+    foreign |= {f"{axis.upper()} [mm]": 1000 * rows[axis] for axis in "xyz"}
+    pl.DataFrame(foreign).write_csv(folder / "tracker export.csv", separator=";")
+    with studio(folder) as running:
+        page.goto(running.url)
+        go_to(page, "Measure")
+        see(page, "no rows yet")
+        choose(page, "Rows come from", "a file in another format")
+        see(page, "flexcal import robot.yaml 'tracker export.csv' --out poses.csv")
+        press(page, "Show how it is read")
+        see(page, "done in")
+        assert not (folder / "poses.csv").exists()
+        fill(page, "Columns", "q1='A1 [deg]")
+        see(page, "Columns: No closing quotation")
+        fill(page, "Columns", "")
+        press(page, "Import")
+        page.get_by_role("link", name="pose 20", exact=True).wait_for(timeout=WAIT)
+        assert count_rows(folder / "poses.csv") == 20
+        taken = pl.read_csv(folder / "poses.csv")
+        assert np.allclose(taken.select("q1", "x"), rows.select("q1", "x"), rtol=0, atol=1e-9)
+        see(page, "--out 'tracker export-imported.csv'")
+        press(page, "Import")
+        see(page, "is written beside poses.csv")
+        assert count_rows(folder / "tracker export-imported.csv") == 20
+        press(page, "Import")
+        see(page, "tracker export-imported.csv is there already")
+    assert count_rows(folder / "poses.csv") == 20
