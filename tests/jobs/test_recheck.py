@@ -136,6 +136,14 @@ def test_a_visit_and_its_reference_are_each_taken_at_their_own_temperature(visit
         assert found.verdict == "as_calibrated" and "not used" not in found.summary()
     given = recheck(robot, at(8.0, q, told=False), reference=stored, temperature=holds + 8.0)
     assert given.verdict == "as_calibrated"
+    # a sensor that fails for a moment does not make a wrong reading
+    failing = at(8.0, q)
+    assert failing.temperature is not None
+    failing.temperature[3] = -20.0
+    mended = recheck(robot, failing, reference=stored)
+    assert (
+        mended.verdict == "as_calibrated" and "left out, because the temperature is far" in mended.summary()
+    )
     # what is not told shows as growth, and is said
     silent = recheck(robot, at(8.0, q), reference=replace(stored, temperature=None))
     assert silent.verdict == "thermal_growth" and "the reference visit has no temperature" in silent.summary()

@@ -165,24 +165,26 @@ def errors_from_reference(
 
 
 def planned_errors(
-    model: RobotModel, poses: PoseSet, *, compared: Compared, placed: bool, rounds: int = 1
+    model: RobotModel, poses: PoseSet, *, compared: Compared, placed: bool, rounds: int = 1, readings: int = 1
 ) -> VisitErrors:
     """Errors of a visit that is yet to be made, all zero, at `poses` whose points are not measured.
 
-    Compared with a reference visit, that reads every pose `rounds` times. The size of the scatter is taken as known.
+    The visit reads every pose `readings` times, and a reference visit `rounds` times as often. The size of the scatter is taken as known.
     """
     first = replace(_points(poses), position=predict_measurements(model, poses).position)
     covariance = prediction_errors_with_covariance(model, first)[1]
     independent = _independent(covariance, model)
     roots = covariance.roots.reshape(3 * len(first), -1)
     absolute = compared == "calibration"
-    common = roots @ roots.T + _of_the_day(model, len(first)) if absolute else independent / rounds
+    common = (
+        roots @ roots.T + _of_the_day(model, len(first)) if absolute else independent / (rounds * readings)
+    )
     freedom = covariance.freedom if absolute else _scatter_freedom(covariance)
     return VisitErrors(
         model,
         first,
         np.zeros(3 * len(first)),
-        independent,
+        independent / readings,
         common,
         freedom,
         compared,

@@ -4,6 +4,7 @@ from .held_out import held_out_group
 from .ignored_columns import ignored_columns_remarks
 from .job import calibrate_robot
 from .joint_ranges import outside_ranges
+from .odd_temperatures import plausible_temperatures, with_plausible_temperatures
 from .procedure import calibrate, requested_terms
 from .result import Calibration
 from .subsample import subsample_document, verification_subsample_remark
@@ -20,8 +21,10 @@ __all__ = [
     "ignored_columns_remarks",
     "measurement_digests",
     "outside_ranges",
+    "plausible_temperatures",
     "requested_terms",
     "sampled",
     "subsample_document",
     "verification_subsample_remark",
+    "with_plausible_temperatures",
 ]

@@ -67,4 +67,4 @@ def with_plausible_temperatures(poses: PoseSet, kept: np.ndarray) -> PoseSet:
             f"the column 'temperature' is up to {highest:.1f}, taken as °C, which is warm for an arm: if it is in Fahrenheit, declare "
             "`unit: degF` for it under `signals:` of robot.yaml, else expansion and temperatures are wrong"
         )
-    return replace(poses.subset(kept) if not kept.all() else poses, notes=tuple(notes))
+    return replace(poses.subset(kept) if not kept.all() else poses, notes=tuple(dict.fromkeys(notes)))

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from flexcal.calibration.fit import with_reference_temperature
 from flexcal.calibration.measurement import predict_measurements, register
 from flexcal.data.poses import PoseSet
+from flexcal.jobs.calibration import plausible_temperatures
 from flexcal.jobs.guidance.consistency import FEWEST, ConsistentRows
 from flexcal.jobs.guidance.disturbances import Disturbance, most_probable, verified
 from flexcal.jobs.guidance.estimate import SessionEstimate
 from flexcal.jobs.guidance.unknowns import Unknowns
 from flexcal.model.robot import RobotModel
+from flexcal.units import COLDEST, HOTTEST
 
 _MOST = 8
 """Most disturbances that are told apart in one series."""
@@ -35,12 +38,14 @@ class Analysis:
     @classmethod
     def of(cls, model: RobotModel, rows: PoseSet) -> Analysis:
         """Analysis of rows measured with the robot `model` as described, not calibrated."""
-        predicted = predict_measurements(model, rows).located
+        likely = with_likely_temperatures(rows)
+        model = with_reference_temperature(model, likely)
+        predicted = predict_measurements(model, likely).located
         consistent = ConsistentRows.of(predicted, rows)
         used = consistent.used
         if used.sum() < FEWEST:
             return cls(rows, consistent, None, ())
-        kept = rows.subset(used)
+        kept = likely.subset(used)
         start = register(model, kept, predicted[used])
         unknowns = Unknowns.of(start, kept)
         estimate = SessionEstimate.of(start, kept, unknowns)
@@ -99,3 +104,13 @@ class Analysis:
                 return shift, own
             first += size
         raise ValueError(item)
+
+
+def with_likely_temperatures(rows: PoseSet) -> PoseSet:
+    """Rows with the median in place of temperatures that cannot be the arm's, as of a sensor that failed for a moment."""
+    if rows.temperature is None:
+        return rows
+    likely = plausible_temperatures(rows) & (rows.temperature >= COLDEST) & (rows.temperature <= HOTTEST)
+    if likely.all() or not likely.any():
+        return rows
+    return replace(rows, temperature=np.where(likely, rows.temperature, np.median(rows.temperature[likely])))

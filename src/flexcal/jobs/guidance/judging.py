@@ -9,13 +9,13 @@ import numpy as np
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.plans import PosePlan
 from flexcal.data.poses import PoseSet
-from flexcal.jobs.guidance.analysis import Analysis
+from flexcal.jobs.guidance.analysis import Analysis, with_likely_temperatures
 from flexcal.jobs.guidance.consistency import FEWEST, length_ratio
 from flexcal.jobs.guidance.disturbances import Disturbance
 from flexcal.jobs.guidance.judgement import Finding, Judgement, moved_far_text, p_text, radius
 from flexcal.jobs.inputs import Misreading, misread_point, other_pose, planned_pose
 from flexcal.model.robot import RobotModel
-from flexcal.units import MILLIMETRE
+from flexcal.units import MILLIMETRE, temperature_fault
 
 _CERTAIN = 5.5
 """Standard deviations by which a row must be off to be noticed, about the one at p = 1e-3 among a hundred rows."""
@@ -67,7 +67,27 @@ class RowJudge:
                 return replace(
                     self._fitting(), code=item.kind, sentence=finding.sentence, pose=finding.pose, p=item.p
                 )
-        return self._repeat() or self._fitting()
+        return self._odd_temperature() or self._repeat() or self._fitting()
+
+    def _odd_temperature(self) -> Judgement | None:
+        """Judgement of a row whose temperature cannot be the arm's; None for others."""
+        rows = self.after.rows
+        if rows.temperature is None:
+            return None
+        value = float(rows.temperature[-1])
+        likely = with_likely_temperatures(rows).temperature
+        assert likely is not None
+        if likely[-1] == value:
+            return None
+        pose = int(rows.pose[-1])
+        fault = temperature_fault(value)
+        told = (
+            f"the temperature of pose {pose} {fault}"
+            if fault
+            else f"the temperature of pose {pose}, {value:.1f} °C, is far from those of the others, {likely[-1]:.1f} °C in the median: "
+            "correct it, or the calibration leaves the row out."
+        )
+        return replace(self._fitting(), code="outlier", sentence=told)
 
     @property
     def _row(self) -> PoseSet:

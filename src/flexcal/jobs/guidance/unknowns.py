@@ -13,8 +13,12 @@ from flexcal.model.robot import RobotModel
 
 _REACH = 2.0
 """Largest change of stiffness, inertia and payload, in units of their prior, about which points are linearised."""
+_WARMED = 1.0
+"""Differences of the temperature, K, above which an expansion of the arm is allowed for."""
 TERMS = ("kinematic", "backlash", "gravity_compliance")
-"""Terms that are fitted during the measurement, all with the plausible sizes of their parameters as prior."""
+"""Terms that are fitted during the measurement, beside the expansion of the arm where rows have its temperature; all with the plausible
+sizes of their parameters as prior.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +37,8 @@ class Unknowns:
     @classmethod
     def of(cls, model: RobotModel, poses: PoseSet) -> Unknowns:
         """Parameters that move the measured points of `poses`, with plausible sizes, and the model's knowledge of its elasticity."""
-        free = geometric_parameters(model, poses, TERMS)
+        warmed = poses.temperature is not None and np.ptp(poses.temperature) > _WARMED
+        free = geometric_parameters(model, poses, (*TERMS, "thermal") if warmed else TERMS)
         elastic = ElasticPrior.of(model, poses)
         sizes = np.array([plausible_size(model, name) for name in free.names])
         count = len(sizes)

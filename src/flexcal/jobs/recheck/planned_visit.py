@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,15 +23,14 @@ from flexcal.design.poses import measurement_order, measuring_noise, random_cand
 from flexcal.design.scene import CollisionChecker, MeasuringSetup
 from flexcal.errors import FlexcalError
 from flexcal.jobs.inputs import CalibratedRobot, robot_provenance
-from flexcal.jobs.recheck.document import SHIFT, UNSEEN, power_block
-from flexcal.jobs.recheck.pose_choice import best_poses
+from flexcal.jobs.recheck.document import SHIFT, power_block
+from flexcal.jobs.recheck.longer_tool import ROUNDS, LongerTools, all_points, found_in_words, longer_tools
+from flexcal.jobs.recheck.pose_choice import PoseInformation, best_poses
 from flexcal.jobs.result_files import RunRecord
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 
 PLAN = "plan.yaml"
-ROUNDS = 3
-"""Number of readings of every pose at the reference visit for which the power is predicted."""
 _CANDIDATES = 400
 
 
@@ -46,6 +45,10 @@ class PlannedVisit:
     limits : mapping of tuple of DetectionLimit
         Shifts of single joints that are found, by what the visit is compared with: "calibration", "reference" (each pose read once) and
         "reference_repeated" (each read three times), and the same with "_refit" where the instrument was moved in between.
+    points : tuple of str
+        Points that are read at every pose.
+    longer : LongerTools or None
+        What a longer tool would find, where these points do not find 0.05 mrad of every joint.
     file : Path
         File of the plan.
     record : RunRecord
@@ -54,6 +57,8 @@ class PlannedVisit:
 
     plan: PosePlan
     limits: Mapping[str, tuple[DetectionLimit, ...]]
+    points: tuple[str, ...]
+    longer: LongerTools | None
     file: Path
     record: RunRecord
 
@@ -64,6 +69,8 @@ class PlannedVisit:
             "poses": len(self.plan),
             "seed": self.plan.seed,
             "power": {name: power_block(limits) for name, limits in self.limits.items()},
+            "points": list(self.points),
+            "longer_tools": None if self.longer is None else self.longer.document(),
             **self.record.document(),
         }
 
@@ -77,10 +84,12 @@ class PlannedVisit:
         }
         told = []
         for name, word in words.items():
-            told.append(f"{word}: {_found(self.limits[name])}")
+            told.append(f"{word}: {found_in_words(self.limits[name])}")
         told.append(
-            f"the first of these, with the instrument set up anew: {_found(self.limits['reference_repeated_refit'])}"
+            f"the first of these, with the instrument set up anew: {found_in_words(self.limits['reference_repeated_refit'])}"
         )
+        if self.longer is not None:
+            told += self.longer.lines
         return tuple(told)
 
 
@@ -107,12 +116,13 @@ def plan_visit(
     checker, setup = CollisionChecker(model), MeasuringSetup.declared(model, None)
     progress("candidates", 0.0)
     candidates = _candidates(robot, checker, setup, max(_CANDIDATES, 4 * count), seed)
-    progress("candidates", 0.5)
-    chosen = best_poses(model, candidates, count, refit=refit)
+    each = [replace(candidates, target=np.full(len(candidates), name)) for name in robot.measured]
+    progress("candidates", 0.4)
+    chosen = best_poses(PoseInformation.of(model, each), count, refit=refit)
     order = measurement_order(checker, candidates.q[chosen]).order
-    poses = candidates.subset(chosen[order])
-    plan = PosePlan(q=poses.q, seed=seed, name="recheck")
-    progress("candidates", 1.0)
+    poses = all_points([rows.subset(chosen[order]) for rows in each])
+    plan = PosePlan(q=candidates.q[chosen[order]], seed=seed, name="recheck")
+    progress("candidates", 0.7)
     limits = {}
     designs: tuple[tuple[str, Compared, int], ...] = (
         ("calibration", "calibration", 1),
@@ -124,8 +134,12 @@ def plan_visit(
             errors = planned_errors(model, poses, compared=compared, placed=placed, rounds=rounds)
             test = GlobalTest.of(errors, possible_changes(model, errors.at))
             limits[name + suffix] = detection_limits(test, SHIFT)
+    design = limits["reference_repeated_refit" if refit else "reference_repeated"]
+    longer = longer_tools(model, candidates, design, count, refit=refit)
+    progress("candidates", 1.0)
     write_plan(out / PLAN, plan)
-    return PlannedVisit(plan, limits, out / PLAN, RunRecord(robot_provenance(robot.nominal, []), command))
+    record = RunRecord(robot_provenance(robot.nominal, []), command)
+    return PlannedVisit(plan, limits, robot.measured, longer, out / PLAN, record)
 
 
 def _candidates(
@@ -173,15 +187,3 @@ def _within(
             share = (q[:, k] - q[:, k].min()) / max(float(np.ptp(q[:, k])), 1e-12)
             q[:, k] = low + share * (high - low)
     return q[~checker.collides(q)]
-
-
-def _found(limits: tuple[DetectionLimit, ...]) -> str:
-    told = []
-    for limit in limits:
-        unit = "mrad" if limit.unit == "rad" else "mm"
-        told.append(
-            f"{limit.subject} not seen"
-            if limit.found >= UNSEEN
-            else f"{limit.subject} {limit.found * 1e3:.3f} {unit}"
-        )
-    return ", ".join(told)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.recheck import planned_errors, possible_changes
+from flexcal.calibration.recheck import planned_errors
 from flexcal.data.poses import PoseSet
-from flexcal.model.robot import RobotModel
+from flexcal.model.robot import GEOMETRY, STATION, RobotModel
 
 _SWEEPS = 5
 _FLOOR = 1e-6
@@ -19,14 +20,14 @@ _SAME = 0.02
 """Least share of a shift that a rival leaves unexplained; less counts as the same."""
 
 
-def best_poses(model: RobotModel, candidates: PoseSet, count: int, *, refit: bool) -> np.ndarray:
+def best_poses(information: PoseInformation, count: int, *, refit: bool) -> np.ndarray:
     """Indices (count,) of the candidates that make the least certain shift of a joint as certain as can be.
 
     The criterion is the sum over the joints of (v_k / least v_k)² (1 + w (mean 1/(1 − R²) − 1)): v_k is the variance of the shift of joint
     k alone, relative to that of as many copies of the best pose for it, and R² what a shift of another joint or a bump of the tool
     explains of it, or another place of the instrument, which is fitted with `refit`. Greedily, then by exchange.
     """
-    choice = _Criterion.of(model, candidates, count, refit=refit)
+    choice = _Criterion.of(information, count, refit=refit)
     chosen: list[int] = []
     total = choice.start
     for _ in range(count):
@@ -45,6 +46,61 @@ def best_poses(model: RobotModel, candidates: PoseSet, count: int, *, refit: boo
 
 
 @dataclass(frozen=True, eq=False)
+class PoseInformation:
+    """Information (C, p, p) of every candidate on the shifts of `joints` joints, a bump of the whole tool (3), and the place of the
+    instrument (6).
+    """
+
+    matrices: np.ndarray
+    joints: int
+
+    @classmethod
+    def of(cls, model: RobotModel, candidates: Sequence[PoseSet]) -> PoseInformation:
+        """That of candidates that are measured at several points, each a pose set of one point."""
+        white = [WhitenedColumns.of(model, rows) for rows in candidates]
+        return cls(np.sum([item.information for item in white], axis=0), white[0].joints)
+
+    def deviations(self, chosen: np.ndarray, *, refit: bool) -> np.ndarray:
+        """Standard deviations (J,) of shifts of single joints by the `chosen` candidates; large where a joint is not seen."""
+        total = self.matrices[chosen].sum(axis=0) + _start(self.matrices)
+        if refit:
+            place = slice(self.joints + 3, None)
+            total = total - _explained(total[None], slice(None), place)[0]
+        single = np.diag(total)[: self.joints]
+        return 1 / np.sqrt(np.maximum(single, 1e-30))
+
+
+@dataclass(frozen=True, eq=False)
+class WhitenedColumns:
+    """Derivatives (C, 3, p) of a point at C candidates by the shifts of `joints` joints, a bump of the whole tool and the place of the
+    instrument, in standard deviations of a reading.
+    """
+
+    columns: np.ndarray
+    joints: int
+
+    @classmethod
+    def of(cls, model: RobotModel, rows: PoseSet) -> WhitenedColumns:
+        """Those of one point."""
+        errors = planned_errors(model, rows, compared="reference", placed=False)
+        names = [f"{joint.name}.offset" for joint in model.motor_joints]
+        joints = len(names)
+        names += [f"tool.{key}" for key in GEOMETRY if key.startswith("length")]
+        names += [f"station.{rows.station[0]}.{key}" for key in STATION]
+        own = np.array([errors.own[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] for k in range(len(rows))])
+        return cls(np.linalg.solve(np.linalg.cholesky(own), errors.at.jacobian(names)), joints)
+
+    @property
+    def information(self) -> np.ndarray:
+        """Information (C, p, p)."""
+        return np.swapaxes(self.columns, 1, 2) @ self.columns
+
+
+def _start(information: np.ndarray) -> np.ndarray:
+    return 1e-6 * np.diag(np.diag(information.mean(axis=0)) + 1e-12)
+
+
+@dataclass(frozen=True, eq=False)
 class _Criterion:
     """`information` (C, p, p) of every candidate on the shifts of J joints, then a bump of the tool (3), then the place of the instrument
     (6), which is fitted to the visit where it is `placed` anew; `seen` (J,) joints, and `least` (J,) variances of single shifts.
@@ -57,20 +113,12 @@ class _Criterion:
     placed: bool
 
     @classmethod
-    def of(cls, model: RobotModel, candidates: PoseSet, count: int, *, refit: bool) -> _Criterion:
-        errors = planned_errors(model, candidates, compared="reference", placed=False)
-        kinds = ("joint_shifted", "tool_bumped", "instrument_moved")
-        changes = possible_changes(model, errors.at)
-        columns = [change.columns for kind in kinds for change in changes if change.kind == kind]
-        joints = sum(change.kind == "joint_shifted" for change in changes)
-        own = np.array([errors.own[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] for k in range(len(candidates))])
-        white = np.linalg.solve(np.linalg.cholesky(own), np.hstack(columns).reshape(len(candidates), 3, -1))
-        information = np.swapaxes(white, 1, 2) @ white
-        largest = information[:, range(joints), range(joints)].max(axis=0)
-        start = 1e-6 * np.diag(np.diag(information.mean(axis=0)) + 1e-12)
+    def of(cls, information: PoseInformation, count: int, *, refit: bool) -> _Criterion:
+        matrices, joints = information.matrices, range(information.joints)
+        largest = matrices[:, joints, joints].max(axis=0)
         return cls(
-            information,
-            start,
+            matrices,
+            _start(matrices),
             largest > _FLOOR * largest.max(),
             1 / (count * np.maximum(largest, 1e-30)),
             refit,

@@ -24,7 +24,13 @@ from flexcal.calibration.recheck import (
 )
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
-from flexcal.jobs.calibration import fitted_points, ignored_columns_remarks, outside_ranges
+from flexcal.jobs.calibration import (
+    fitted_points,
+    ignored_columns_remarks,
+    outside_ranges,
+    plausible_temperatures,
+    with_plausible_temperatures,
+)
 from flexcal.jobs.inputs import (
     CalibratedRobot,
     is_station_identified,
@@ -373,9 +379,11 @@ def recheck(
     'as_calibrated'
     """
     model = robot.model
+    poses = with_likely_temperatures(robot, poses)
     _require(robot, poses)
     poses, warm = with_temperature(robot, poses, temperature)
     if reference is not None:
+        reference = with_likely_temperatures(robot, reference)
         _require(robot, reference)
         warm = (*warm, *_reference_temperature(robot, poses, reference))
     unknown = any(not is_station_identified(model, station) for station in poses.stations)
@@ -433,6 +441,13 @@ def recheck(
         if len(suspects) > 1
         else None,
     )
+
+
+def with_likely_temperatures(robot: CalibratedRobot, poses: PoseSet) -> PoseSet:
+    """Poses without those whose temperature cannot be the arm's, where the calibrated robot depends on it, and a note on them."""
+    if not depends_on_temperature(robot.model):
+        return poses
+    return with_plausible_temperatures(poses, plausible_temperatures(poses))
 
 
 def _reference_temperature(robot: CalibratedRobot, poses: PoseSet, reference: PoseSet) -> tuple[str, ...]:

@@ -12,12 +12,13 @@ import numpy as np
 from flexcal.errors import InputError
 from flexcal.studio.steps.measure.row_source import RowSource
 from flexcal.studio.window import entry_form
-from flexcal.units import MILLIMETRE
+from flexcal.units import MILLIMETRE, temperature_fault
 
 if TYPE_CHECKING:
     from flexcal.studio.steps.measure.next_pose import NextPose
 
 _LABELS = ("x / mm", "y / mm", "z / mm")
+_TEMPERATURE = "arm / °C"
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,2})?", re.ASCII)
 
 
@@ -28,7 +29,13 @@ class TypedSource(RowSource):
 
     def add(self) -> None:
         """Add a field a coordinate, and the button that takes them."""
-        self.window.gui.add_html(entry_form(_LABELS, "Take this point (Enter)"))
+        self.window.gui.add_html(entry_form(self._labels, "Take this point (Enter)"))
+
+    @property
+    def _labels(self) -> tuple[str, ...]:
+        """The coordinates, and the temperature of the arm where the rows so far have one."""
+        poses = self.measuring.series.poses
+        return _LABELS if poses is None or poses.temperature is None else (*_LABELS, _TEMPERATURE)
 
     def measure_next(self) -> None:
         """Say what is to be done; raises `InputError` where no pose is next."""
@@ -55,7 +62,7 @@ class TypedSource(RowSource):
             payload=None if pose.payload is None else np.array([pose.payload]),
             target=np.array([series.model.point().name]),
             station=np.array([self.measuring.station]),
-            temperature=None,
+            temperature=self._temperature(texts, pose.number),
             pose=np.array([pose.number]),
             sigma_given=False,
         )
@@ -69,10 +76,21 @@ class TypedSource(RowSource):
             raise InputError("E-STUDIO-034", "no pose is next, so the point is of none; choose a pose first.")
         return pose
 
+    def _temperature(self, texts: Mapping[str, str], pose: int) -> np.ndarray | None:
+        if _TEMPERATURE not in self._labels:
+            return None
+        value = self._number(texts, _TEMPERATURE, pose)
+        fault = temperature_fault(value)
+        if fault:
+            raise InputError("E-STUDIO-049", f"{_TEMPERATURE} {fault}")
+        return np.array([value])
+
     def _number(self, texts: Mapping[str, str], label: str, pose: int) -> float:
         text = texts.get(label, "").strip().replace("\N{MINUS SIGN}", "-")
         if not text:
-            raise InputError("E-STUDIO-035", f"{label} is empty: type x, y and z of pose {pose} first.")
+            raise InputError(
+                "E-STUDIO-035", f"{label} is empty: type {', '.join(self._labels)} of pose {pose} first."
+            )
         if _NUMBER.fullmatch(text) is None:
             raise InputError(
                 "E-STUDIO-045", f"{label}: '{text}' is not a number; type it as 534.8619, with a point."
