@@ -65,9 +65,8 @@ def test_the_bound_is_that_of_the_true_arm(shop: Workshop, told: LongerTools) ->
     for k, limit in enumerate(tool.limits, start=1):
         apart = (arm.turned(k, 1e-6).points(tool.q) - arm.points(tool.q)) / 1e-6
         ratios.append(limit.std / (NOISE * np.sqrt(1 + 1 / ROUNDS) / np.linalg.norm(apart)))
-    # of one size, which is that of the calibrated scatter over the noise of the instrument alone
-    np.testing.assert_allclose(ratios, ratios[0], rtol=0.03)
-    assert 0.8 < ratios[0] < 1.5
+    # what the scatter of the arm adds to the noise of the instrument: 15 µrad of each joint, about half of that noise at a point
+    np.testing.assert_allclose(ratios, np.sqrt(1 + 0.5**2), rtol=0.12)
 
 
 def test_what_is_proposed_is_enough_and_in_words(told: LongerTools) -> None:
@@ -132,7 +131,6 @@ def test_such_a_tool_finds_a_twentieth_of_a_milliradian_of_any_joint(
             moved = shop.arm if joint == 0 else shop.arm.turned(joint, SHIFT * (1 if k % 2 else -1))
             found[joint] += not arm.judged(moved).as_calibrated
             visits[joint] += 1
-    print(found, visits)
     assert binom.sf(found[0] - 1, 200, 0.01) > 1e-3, found
     assert (binom.cdf(found[1:], visits[1:], 0.95) > 1e-3).all(), found
     assert found[1:].sum() >= 0.95 * visits[1:].sum(), found
