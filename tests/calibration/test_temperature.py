@@ -141,6 +141,24 @@ def test_an_arm_that_warms_by_12_kelvin_is_as_accurate_as_one_at_rest(measured: 
     assert p90(without.model, replace(unseen, temperature=None)) > 2 * still
 
 
+def test_links_that_warm_up_differently_are_no_drift_of_the_instrument(measured: Callable) -> None:
+    """A base column that grows looks like an instrument that sinks; an instrument that drifts sideways is no arm's."""
+    warm = np.array([1.0, 0.8, 0.6, 0.3, 0.1, 0.0])
+    model, poses, unseen = measured(31, gradient=warm)
+    calibration = calibrate(model, poses)
+    assert "thermal_links" in calibration.selected.terms
+    assert "thermal_stations" not in calibration.selected.terms
+    still = p90(
+        calibrate(*measured(31, rise=1e-9)[:2], terms=["kinematic"]).model, measured(31, rise=1e-9)[2]
+    )
+    assert p90(calibration.model, unseen) < 1.2 * still
+    model, poses, _ = measured(34, growth=0.0)
+    assert poses.temperature is not None
+    aside = np.outer(poses.temperature - COLD, [2e-5, 0.0, 0.0])
+    terms = calibrate(model, replace(poses, position=poses.position + aside)).selected.terms
+    assert "thermal_stations" in terms and "thermal_links" not in terms
+
+
 def test_time_widens_the_interval_of_an_arm_that_only_warms_up(measured: Callable) -> None:
     model, poses, _ = measured(22, profile=warming)
     calibration = calibrate(model, poses, terms=["kinematic", "thermal"])

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.calibration.error_model import order_folds, repeated_pose_numbers, workspace_folds
-from flexcal.calibration.fit import LEAST_POSES, GeometricFit, fit_geometry
+from flexcal.calibration.fit import LEAST_POSES, THERMAL, GeometricFit, fit_geometry
 from flexcal.calibration.measurement import Readings
 from flexcal.calibration.term_selection.candidates import candidates
 from flexcal.calibration.term_selection.trials import TermComparison, TermTrials, not_tried
@@ -17,6 +17,8 @@ from flexcal.model.robot import RobotModel
 FOLDS = 8
 FINER = {"thermal_links": "thermal"}
 """Terms that say in more detail what another one says, and are tried where that was taken."""
+_INSTRUMENT, _LINKS = "thermal_stations", "thermal_links"
+"""Terms that look alike where the links warm up differently: a base column that grows lifts the arm as an instrument that sinks does."""
 MANY_POSES = 10 * FOLDS
 """Number of different poses from which whole folds are left out rather than single poses."""
 
@@ -116,6 +118,9 @@ def select_terms(
 
     `fitted` is a fit of the base terms to these poses, or more, without springs: where there is one it is the one, or its start.
 
+    Where a change of the instrument with temperature was taken and the expansion of single links explains the points about as well, that is
+    taken in its place: it is the robot's, and compensation needs it.
+
     The random effects `transmission` are none of the terms: beside them compliance of every joint, which moves the points much alike,
     would not be found.
     """
@@ -153,6 +158,21 @@ def select_terms(
     remaining = grow([kind for kind in open_terms.kinds if kind not in FINER], 0.0)
     finer = [kind for kind in open_terms.kinds if FINER.get(kind) in chosen]
     remaining += grow(finer, 0.0) if finer else []
+    if _INSTRUMENT in chosen and _LINKS in open_terms.kinds and _LINKS not in chosen:
+        plain = tuple(term for term in chosen if term not in THERMAL)
+        beside = tuple(
+            term for term in chosen if term in THERMAL and term not in (_INSTRUMENT, FINER[_LINKS])
+        )
+        options = [(*plain, FINER[_LINKS], _LINKS), (*plain, *beside, FINER[_LINKS], _LINKS)]
+        tried = [trials.compare_sets(chosen, terms, _LINKS) for terms in options]
+        row = next((one for one in tried if one.taken), tried[-1])
+        if row.taken:
+            remaining = [term for term in remaining if term != _LINKS]
+            reason = f"the arm's own links explain the same: {row.reason}"
+            rows = [replace(r, taken=False, reason=reason) if r.term == _INSTRUMENT else r for r in rows]
+            rows.append(row)
+            left.pop(_LINKS, None)
+            chosen = row.terms
     joints = [term for kind in remaining for term in open_terms.single.get(kind, ())]
     if joints:
         grow(joints, 2 * np.log(len(joints)))

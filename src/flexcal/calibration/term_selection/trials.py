@@ -127,6 +127,16 @@ class TermTrials:
             reason = f"lowers the mean error at left-out poses from {change} and the BIC by {-bic:.0f}"
         return self._row(term, terms, bic, taken=taken, reason=reason)
 
+    def compare_sets(self, chosen: tuple[str, ...], terms: tuple[str, ...], term: str) -> TermComparison:
+        """Comparison of other terms, with `term`, with the chosen ones: taken where errors at left-out poses are no larger beyond the
+        standard error.
+        """
+        old, new = self.fit(chosen), self.fit(terms)
+        gains = [self._gain(old, new, k) for k in self.deciding]
+        change = f"the mean error at left-out poses goes from {_change(old, new, self.deciding)}"
+        taken = all(gain > -error for gain, error in gains)
+        return self._row(term, terms, self._criterion(old, new), taken=taken, reason=change)
+
     def fit(self, terms: tuple[str, ...]) -> LeaveOutErrors:
         """Fit of some terms, with springs and inertia as in the base fit."""
         if terms not in self._fits:
