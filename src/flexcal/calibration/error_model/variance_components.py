@@ -17,6 +17,8 @@ _CLEAR_GAIN = 3.0
 """Gain in log-likelihood from which a stated sigma counts as too large (p = 0.01, one parameter at its bound)."""
 _SUPPORTED = 2.7
 """Gain in log-likelihood from which a component is significant (p = 0.01, one variance at its bound of zero)."""
+_CERTAIN = 12.0
+"""Component, relative to its standard deviation, from which it is significant without a trial: its variance is 6 of its own from zero."""
 _LARGEST = 30.0
 """Upper bound of a component, relative to the variance about the fit."""
 _NEGLIGIBLE = 1e-4
@@ -121,24 +123,31 @@ class LinearFit:
     def _supported(
         self, names: list[str], scale: np.ndarray, variances: np.ndarray, likelihood: float, share: float
     ) -> tuple[list[str], np.ndarray, np.ndarray]:
-        """Model error, and the components of repeatability supported by the data, by backward elimination with a likelihood-ratio test."""
+        """Model error, and the components of repeatability supported by the data, by backward elimination with a likelihood-ratio test.
+
+        Components far from zero are not tried: the likelihood falls by much more than the test asks for.
+        """
         seen = [k for k in range(len(names)) if names[k] in _ALWAYS or variances[k] > _NEGLIGIBLE * scale[k]]
         names, scale, variances = [names[k] for k in seen], scale[seen], variances[seen]
-        while len(names) > 1:
+        optional = {name for name in names[1:] if name not in _ALWAYS and not self._favour(name)}
+        if optional:
+            spread = self._uncertainties(names, variances, share)
+            stds = zip(names, np.sqrt(variances).tolist(), strict=True)
+            optional -= {name for name, std in stds if std > _CERTAIN * spread[name]}
+        while optional:
             trials = []
             for k in range(1, len(names)):
-                if names[k] in _ALWAYS or self._favour(names[k]):
+                if names[k] not in optional:
                     continue
                 rest = [i for i in range(len(names)) if i != k]
                 near = variances[rest] / scale[rest]
                 near[0] += variances[k] / scale[k] / 2
                 maximum = self._maximum([names[i] for i in rest], scale[rest], share, near)
                 trials.append((maximum[1], maximum[0], rest))
-            if not trials:
-                break
             best, kept, rest = max(trials, key=lambda trial: trial[0])
             if likelihood - best > _SUPPORTED:
                 break
+            optional -= {*names} - {names[i] for i in rest}
             names, scale, variances, likelihood = [names[i] for i in rest], scale[rest], kept, best
         return names, scale, variances
 

@@ -25,6 +25,8 @@ _DECODED = 100_000
 """Rows of Parquet that are decoded together: to slice some, all of their row group is."""
 _PEEKED = 2**16
 """Bytes of a table that are read, for every line of its header, to see which columns hold texts."""
+_SMALL = 300_000
+"""Bytes of CSV that are read cell by cell sooner than Polars is imported."""
 _QUOTED = 20
 """Largest number of characters of a number that a message quotes."""
 
@@ -331,9 +333,11 @@ def _whole_lines(stream: BinaryIO, size: int | None) -> Iterator[bytes]:
 
 
 def _parse(file: TableFile, content: bytes, texts: Collection[str], line: int) -> dict[str, np.ndarray]:
+    texts = {*texts, *file.unread}
+    if len(content) < _SMALL:
+        return _read_cells(file, content, texts, line)
     import polars as pl
 
-    texts = {*texts, *file.unread}
     schema = {name: pl.String if name in texts else pl.Float64 for name in file.columns}
     try:
         frame = pl.read_csv(io.BytesIO(content), has_header=False, schema=schema)
@@ -357,7 +361,7 @@ def _array(series: pl.Series) -> np.ndarray:
 
 
 def _read_cells(file: TableFile, content: bytes, texts: Collection[str], line: int) -> dict[str, np.ndarray]:
-    """Read cell by cell, slowly, to find the first fault; raises `InputError` there."""
+    """Read cell by cell, which tells where the first fault is; raises `InputError` there."""
     cells: dict[str, list[Any]] = {name: [] for name in file.columns}
     for number, raw in enumerate(content.split(b"\n"), start=line):
         text = _decoded(file.path, raw, number).strip("\r")

@@ -8,17 +8,19 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from flexcal.dynamics.diagnostics import TorquePrediction
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, write_estimates
 from flexcal.files.transaction import write_text
-from flexcal.jobs.result_files import ESTIMATES, write_predictions, write_results
+from flexcal.jobs.result_files import ESTIMATES, write_results
 from flexcal.model.robot import RobotModel
 from flexcal.report.layout import Page, write_page
+
+if TYPE_CHECKING:
+    from flexcal.dynamics.diagnostics import TorquePrediction
 
 
 class SummarisedResult(ABC):
@@ -191,6 +193,8 @@ class TorqueIdentification(Identification):
 
     def write_arrays(self, folder: Path) -> None:
         """Leave predictions.npz in a folder."""
+        from flexcal.jobs.result_files import write_predictions
+
         write_predictions(folder, self.predictions)
 
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from flexcal.calibration.diagnostics import BearingAxes
 from flexcal.calibration.fit import GeometricFit
-from flexcal.elasticity.identification import ResponseBearings
 from flexcal.units import MILLIMETRE
+
+if TYPE_CHECKING:
+    from flexcal.elasticity.identification import ResponseBearings
 
 _AXES = {"before": "fixed to the parent link", "after": "that turn with the child link"}
 
