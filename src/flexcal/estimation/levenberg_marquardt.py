@@ -16,7 +16,7 @@ _ROUNDING = 1e-13
 _STATIONARY = 1e-3
 _EXACT = 1e-16
 _CLOSE = 0.1
-"""Relative offset and deviation of the gain ratio from 1 below which a minimum is near, and the damping falls ever faster."""
+"""Relative offset and deviation of the gain ratio from 1 below which a minimum is near: the damping starts lower and falls ever faster."""
 _CANNOT_STEP = {
     True: ("converged", "the cost no longer changes beyond rounding"),
     False: ("stalled", "no step lowers the cost, although it is not at a minimum"),
@@ -52,7 +52,8 @@ def minimise(
     Damping follows the gain ratio (Nielsen 1999; Madsen, Nielsen, Tingleff 2004, alg. 3.16) in coordinates scaled by the
     largest column norms seen (Moré 1978). Robust losses are reweighted at every linearisation; the weighted quadratic
     bounds them from above, so the gain ratio keeps its meaning. Near the minimum, while the gain ratio stays near 1, each
-    fall of the damping is three times the last one, or weak directions would take a dozen steps. Steps are clipped at the
+    fall of the damping is three times the last one, and a fit that starts near it starts with less, or weak directions would take a
+    dozen steps. Steps are clipped at the
     bounds, and a coordinate that is at one and pushed outwards rests for that step. Directions without information are not
     moved.
 
@@ -80,6 +81,8 @@ def minimise(
         known = singular > 1e-13 * np.max(singular, initial=0.0)
         left, singular, right = left[:, known].T @ target, singular[known], right[known]
         offset = float(np.linalg.norm(left)) / norm if norm > 0 else 0.0
+        if not iteration:
+            damping *= min(1.0, offset / _CLOSE) ** 2
         if offset <= tolerance:
             status, message = "converged", f"relative offset {offset:.1e}"
             break

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -41,17 +41,27 @@ class ArmColumns:
 
     at: PredictedMeasurements
 
-    def column(self, name: str) -> np.ndarray:
-        """Derivative (R, 3) of the readings by a parameter, natural units; raises `FlexcalError` for one without effect."""
-        owner, _, key = name.rpartition(".")
-        if owner.startswith("point."):
-            return self._point(owner.removeprefix("point."), key)
-        if name in self.at.model.geometry_columns:
-            return self._by_geometry[:, :, self.at.model.geometry_columns[name]]
-        kind = "transmission" if key.startswith(("transmission_", RATIO)) else key
-        if kind in _BY_KEY:
-            return _BY_KEY[kind](self, owner, key)
-        return np.matmul(self._by_load, self.at.by_row(self._load(name))[:, :, None])[:, :, 0]
+    def columns(self, names: Sequence[str]) -> np.ndarray:
+        """Derivatives (R, 3, p) of the readings by p parameters, natural units; raises `FlexcalError` for one without effect."""
+        result = np.empty((len(self.at.readings.row), 3, len(names)))
+        places, errors, loads = self.at.model.geometry_columns, {}, {}
+        for k, name in enumerate(names):
+            owner, _, key = name.rpartition(".")
+            kind = "transmission" if key.startswith(("transmission_", RATIO)) else key
+            if owner.startswith("point."):
+                result[:, :, k] = self._point(owner.removeprefix("point."), key)
+            elif name in places:
+                errors[k] = places[name]
+            elif kind in _BY_KEY:
+                result[:, :, k] = _BY_KEY[kind](self, owner, key)
+            else:
+                loads[k] = self._load(name)
+        if errors:
+            result[:, :, list(errors)] = self._by_geometry[:, :, list(errors.values())]
+        if loads:
+            load = self.at.by_row(np.stack(list(loads.values()), axis=2))
+            result[:, :, list(loads)] = np.matmul(self._by_load, load)
+        return result
 
     @cached_property
     def _by_motion(self) -> np.ndarray:

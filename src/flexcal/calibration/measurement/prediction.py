@@ -147,16 +147,21 @@ class PredictedMeasurements:
 
         Raises `FlexcalError` for a name without effect on the readings.
         """
-        result, arm = np.zeros((len(self.readings.row), 3, len(names))), ArmColumns(self)
-        joints = self.model.joint_names
+        result = np.zeros((len(self.readings.row), 3, len(names)))
+        joints, of_arm = self.model.joint_names, []
         for k, name in enumerate(names):
             owner, _, key = name.rpartition(".")
             if owner.startswith("station.") and key in STATION:
                 rows, columns = self._by_station(owner.removeprefix("station."))
                 result[rows, :, k] = columns[:, :, STATION.index(key)]
                 continue
-            kind = next((kind for kind in KINDS if owner not in joints and kind.owns(name)), None)
-            result[:, :, k] = arm.column(name) if kind is None else kind.column(self, name)
+            kind = None if owner in joints else next((kind for kind in KINDS if kind.owns(name)), None)
+            if kind is None:
+                of_arm.append(k)
+            else:
+                result[:, :, k] = kind.column(self, name)
+        if of_arm:
+            result[:, :, of_arm] = ArmColumns(self).columns([names[k] for k in of_arm])
         return result
 
     @cached_property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -86,17 +87,17 @@ class Readings:
             return lengths if name == ROBOT else np.zeros_like(lengths)
         return lengths & (self.scatter == name)[:, None]
 
-    @property
+    @cached_property
     def instruments(self) -> tuple[str, ...]:
         """Components of the scatter of single points besides `ROBOT`."""
         return () if self.scatter is None else tuple(n for n in OF_INSTRUMENTS if (self.scatter == n).any())
 
-    @property
+    @cached_property
     def turns(self) -> int:
         """Number of orientations M."""
         return int((~self.points).sum())
 
-    @property
+    @cached_property
     def points(self) -> np.ndarray:
         """Readings (R,) that are points."""
         return (self.unit != RADIANS).all(axis=1)
@@ -130,6 +131,8 @@ def _scatter_names(poses: PoseSet, readings: int) -> np.ndarray | None:
 
     The first kind whose noise is stated, or the first of all, has that of the robot.
     """
+    if poses.kind is None and poses.camera is None and poses.socket is None:
+        return None
     kind = kind_names(poses)
     kind[poses.tilted] = ROBOT
     there = [name for name in (POINTS, *OF_INSTRUMENTS) if (kind == name).any()]

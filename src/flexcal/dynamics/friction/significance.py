@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import stdtr
 
 from flexcal.dynamics.estimators import weighted_least_squares
 from flexcal.dynamics.inverse_model import BaseParameters, Observation
@@ -50,6 +49,8 @@ class CandidateFit:
         times the number of parameters (Bonferroni). The covariance allows for noise with a memory; a term that acts at one joint counts.
         At least eight degrees of freedom are taken: torques that a model with too few terms misses pass for noise with a long memory.
         """
+        from scipy.special import stdtr
+
         estimate = self.estimate([*before, *group])
         ratios = [
             abs(estimate.parameters[number].value) / np.sqrt(estimate.covariance[number, number])
