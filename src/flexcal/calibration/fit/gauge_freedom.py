@@ -121,7 +121,8 @@ def with_calibrated_points(nominal: RobotModel, model: RobotModel, targets: Sequ
 
 def point_uncertainty(model: RobotModel, target: str) -> float:
     """Standard deviation (1σ distance, m) of a measured point's place in its frame, by the posterior of `model`."""
-    spread = propagated_covariance_root(model, lambda changed: found_xyz(changed, target))
+    owners = {"tool", f"point.{target}", model.joints[model.point(target).joint].name}
+    spread = propagated_covariance_root(model, lambda changed: found_xyz(changed, target), owners)
     return float(np.linalg.norm(spread))
 
 

@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 import numpy as np
 
 from flexcal.model.robot.robot_model import RobotModel
 
 
-def propagated_covariance_root(model: RobotModel, result: Callable[[RobotModel], np.ndarray]) -> np.ndarray:
+def propagated_covariance_root(
+    model: RobotModel, result: Callable[[RobotModel], np.ndarray], owners: Collection[str] | None = None
+) -> np.ndarray:
     """Square root (size, k) of the first-order covariance of `result` (size,) over the posterior of `model`.
 
     Its k columns are what one standard deviation in each independent direction of the estimated parameters changes, by central
-    differences over one standard deviation of each; k = 0 where nothing was estimated.
+    differences over one standard deviation of each; k = 0 where nothing was estimated. The result depends on parameters of the joints,
+    points and other `owners` alone, where these are given.
     """
     posterior = model.posterior
-    known = [name for name in posterior.parameters.names if posterior.determines(name)]
+    names = posterior.parameters.names
+    if owners is not None:
+        names = [name for name in names if name.rpartition(".")[0] in owners]
+    known = [name for name in names if posterior.determines(name)]
     if not known:
         return np.zeros((len(result(model)), 0))
     parameters, covariance = posterior.parameters.subset(known), posterior.marginal(known)
