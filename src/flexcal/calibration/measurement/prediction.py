@@ -148,7 +148,7 @@ class PredictedMeasurements:
         Raises `FlexcalError` for a name without effect on the readings.
         """
         result = np.zeros((len(self.readings.row), 3, len(names)))
-        joints, of_arm = self.model.joint_names, []
+        joints, of_arm = self.model.joint_names, list[int]()
         for k, name in enumerate(names):
             owner, _, key = name.rpartition(".")
             if owner.startswith("station.") and key in STATION:
