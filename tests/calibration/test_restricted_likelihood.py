@@ -119,3 +119,27 @@ def test_components_are_those_of_a_search_without_derivatives() -> None:
     found, _ = fit.scatter(stated=True)
     assert found.angular == 0
     np.testing.assert_allclose([found.robot, found.order], 1e-5 * np.abs(best.x), rtol=1e-4)
+
+
+@pytest.mark.parametrize("share", [0.3, 1.0, 3.0])
+def test_a_component_far_from_zero_would_have_passed_the_trial(share: float) -> None:
+    """Scatter of the joints from a little to most of the whole: the likelihood falls by far more than 2.7 without it."""
+    rng = np.random.default_rng(7)
+    visits = np.arange(300)
+    readings = Readings(visits, np.full((300, 3), METRES), np.zeros((300, 3)))
+    free, turns = rng.normal(size=(300, 3, 5)), rng.normal(size=(300, 3, 4))
+    turned = np.matmul(turns, 2e-5 * np.sqrt(share) * rng.normal(size=(300, 4, 1)))[:, :, 0]
+    residual = 2e-5 * rng.normal(size=(300, 3)) + turned
+    nothing = np.zeros((300, 3, 0))
+    fit = LinearFit(residual, free, nothing, nothing, readings, turns, ErrorGroups(visits))
+    found, spread = fit.scatter(stated=False)
+    assert found.angular > 12 * spread["angular"]
+    alone = replace(fit, turns=np.zeros_like(turns)).scatter(stated=False)[0]
+    assert alone.angular == 0
+    names = ("robot", "angular")
+    gain = (log_likelihood(fit, names, found) - log_likelihood(fit, ("robot",), alone)) / 2.7
+    assert gain > 5
+
+
+def log_likelihood(fit: LinearFit, names: tuple[str, ...], scatter: ErrorComponents) -> float:
+    return -0.5 * RestrictedLikelihood.of(PointSums.of(fit), names, scatter).deviance

@@ -17,8 +17,10 @@ _CLEAR_GAIN = 3.0
 """Gain in log-likelihood from which a stated sigma counts as too large (p = 0.01, one parameter at its bound)."""
 _SUPPORTED = 2.7
 """Gain in log-likelihood from which a component is significant (p = 0.01, one variance at its bound of zero)."""
-_CERTAIN = 12.0
-"""Component, relative to its standard deviation, from which it is significant without a trial: its variance is 6 of its own from zero."""
+_CERTAIN = 6.0
+"""Variance, relative to its standard deviation, from which a component is significant without a trial."""
+_TOLD_APART = 1e6
+"""Condition number of the correlation of the variances up to which their standard deviations are of use for that."""
 _LARGEST = 30.0
 """Upper bound of a component, relative to the variance about the fit."""
 _NEGLIGIBLE = 1e-4
@@ -131,9 +133,7 @@ class LinearFit:
         names, scale, variances = [names[k] for k in seen], scale[seen], variances[seen]
         optional = {name for name in names[1:] if name not in _ALWAYS and not self._favour(name)}
         if optional:
-            spread = self._uncertainties(names, variances, share)
-            stds = zip(names, np.sqrt(variances).tolist(), strict=True)
-            optional -= {name for name, std in stds if std > _CERTAIN * spread[name]}
+            optional -= self._certain(names, variances, share)
         while optional:
             trials = []
             for k in range(1, len(names)):
@@ -150,6 +150,18 @@ class LinearFit:
             optional -= {*names} - {names[i] for i in rest}
             names, scale, variances, likelihood = [names[i] for i in rest], scale[rest], kept, best
         return names, scale, variances
+
+    def _certain(self, names: list[str], variances: np.ndarray, share: float) -> set[str]:
+        """Components whose variance is many of its standard deviations from zero, by the average information; none if that is singular."""
+        information = 0.5 * self._at(names, variances, share).information
+        sizes = np.sqrt(np.maximum(np.diag(information), 0.0))
+        if not sizes.all():
+            return set()
+        related = information / (sizes * sizes[:, None])
+        if np.linalg.cond(related) > _TOLD_APART:
+            return set()
+        stds = np.sqrt(np.diag(np.linalg.inv(related))) / sizes
+        return {name for name, far in zip(names, variances > _CERTAIN * stds, strict=True) if far}
 
     def _favour(self, name: str) -> float:
         """Power of a standard deviation in the prior factor of the likelihood: 1 for transmission errors, together 1 for other model
