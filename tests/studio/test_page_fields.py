@@ -40,12 +40,8 @@ def project(tmp_path: Path) -> Path:
     return folder
 
 
-def place(project: Path) -> tuple[float, ...]:
-    return tuple(RobotModel.from_yaml(project / "robot.yaml").config.points["smr"].xyz)
-
-
-def test_fields_and_the_button_after_them(page: Any, project: Path) -> None:
-    """Three coordinates and the button that writes them."""
+def test_all_that_is_typed_arrives(page: Any, project: Path) -> None:
+    """Coordinates before the button that writes them; numbers of a plan in its command line, an emptied one as it is shown again."""
     with studio(project) as running:
         page.goto(running.url)
         page.get_by_label("x / mm").fill("1", timeout=WAIT)
@@ -53,13 +49,9 @@ def test_fields_and_the_button_after_them(page: Any, project: Path) -> None:
         labels = [f"{axis} / mm" for axis in "xyz"]
         page.evaluate(AT_ONCE, [labels, ["12.5", "-34.5", "56.5"], "Write to robot.yaml"])
         page.get_by_role("button", name="Take the last change back").wait_for(timeout=WAIT)
-    assert place(project) == pytest.approx((0.0125, -0.0345, 0.0565))
+        place = RobotModel.from_yaml(project / "robot.yaml").config.points["smr"].xyz
+        assert tuple(place) == pytest.approx((0.0125, -0.0345, 0.0565))
 
-
-def test_fields_of_a_plan(page: Any, project: Path) -> None:
-    """All numbers of a form are in its command line, an emptied one as it is shown again."""
-    with studio(project) as running:
-        page.goto(running.url)
         go_to(page, "Plan")
         page.get_by_text("More", exact=True).click(timeout=WAIT)
         candidates = page.get_by_label("Random candidates")
