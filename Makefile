@@ -47,7 +47,7 @@ coverage: $(VENV)/.developer
 # the kernels' tests on a build that checks every access to memory and every undefined operation; needs g++
 SANITIZED := build/sanitize
 PRELOADED = $(foreach library,asan ubsan stdc++,$(shell g++ -print-file-name=lib$(library).so))
-KERNEL_TESTS := tests/test_kernels.py tests/runtime/test_runtime_equality.py tests/model tests/virtual_cell/test_stepping.py
+KERNEL_TESTS := tests/test_kernels.py tests/frequency/test_covariance.py tests/runtime/test_runtime_equality.py tests/model tests/virtual_cell/test_stepping.py
 
 sanitize: $(VENV)/.developer
 	PATH="$(CURDIR)/$(BIN):$$PATH" cmake -S . -B $(SANITIZED) -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_COMPILER=g++ -DSANITIZE=ON \

@@ -9,6 +9,7 @@ NB_MODULE(KERNELS, m) {
     m.attr("avx2") = false;
 #endif
     bind_closed_loop(m);
+    bind_frequency(m);
     bind_geared_loop(m);
     bind_runtime(m);
     bind_tree(m);

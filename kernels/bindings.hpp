@@ -3,6 +3,7 @@
 #include <nanobind/nanobind.h>
 
 void bind_closed_loop(nanobind::module_& m);
+void bind_frequency(nanobind::module_& m);
 void bind_geared_loop(nanobind::module_& m);
 void bind_runtime(nanobind::module_& m);
 void bind_tree(nanobind::module_& m);

@@ -10,7 +10,7 @@ from flexcal.model.robot import RobotModel
 
 @pytest.mark.skipif(not _kernels.avx2, reason="this processor runs only one of the builds")
 def test_builds_agree_bit_by_bit(tx90l: RobotModel, rng: np.random.Generator) -> None:
-    """On what this processor makes of the same tree, regressor with its adjoint, and triangle: else results would depend on the machine."""
+    """On what this processor makes of the same tree, regressor with its adjoint, triangle and covariance: else results would depend on the machine."""
     from flexcal import _kernels_avx2
 
     arm = tx90l.joints
@@ -24,6 +24,7 @@ def test_builds_agree_bit_by_bit(tx90l: RobotModel, rng: np.random.Generator) ->
     )
     states = rng.normal(size=(3, 101, 6))
     geometry = 1e-3 * rng.normal(size=(6, 6))
+    scatter = [rng.normal(size=shape) for shape in ((7, 4, 4, 3, 2), (7, 3, 3, 2), (7, 4, 4, 2))]
     found = []
     for build in (_kernels, _kernels_avx2):
         out = np.zeros((360, 101))
@@ -33,7 +34,9 @@ def test_builds_agree_bit_by_bit(tx90l: RobotModel, rng: np.random.Generator) ->
         adjoint = tree.torque_regressor_adjoint(geometry, tx90l.gravity, *states, places, out)
         factor = np.zeros((60, 60))
         build.update(factor, out[:60].copy())
-        found.append((out, adjoint, factor))
+        covariance = np.zeros((7, 12, 12, 2))
+        build.scatter_covariance(*scatter, 3, 9.0, covariance)
+        found.append((out, adjoint, factor, covariance))
     for ours, theirs in zip(*found, strict=True):
         np.testing.assert_array_equal(ours, theirs)
     assert np.abs(found[0][0]).max() > 1.0
@@ -101,6 +104,10 @@ _SHAPES = {
     "gains": (2, 3),
     "torque": (7, 2),
     "angle_log": (7, 2),
+    "white": (5, 3, 4, 2, 2),
+    "right": (5, 2, 2, 2),
+    "left": (5, 3, 3, 2),
+    "covariance": (5, 6, 6, 2),
 }
 _INDICES = {"places", "motors", "twists"}
 _WRITTEN = {
@@ -114,7 +121,7 @@ _WRITTEN = {
     "torque_log",
     "arm_log",
 }
-_WRITTEN |= {"angle", "applied", "angle_log"}
+_WRITTEN |= {"angle", "applied", "angle_log", "covariance"}
 _POINT = ("placement", "translation", "target", "geometry", "tool", "q", "deflection")
 _REST = ("stiffness", "geometry", "mass", "first_moment", "payload", "payload_point", "gravity", "q")
 _MOTION = ("geometry", "gravity", "q", "dq", "ddq", "places")
@@ -150,6 +157,7 @@ _KERNELS = [
     ("torque_regressor_adjoint", (*_MOTION, "weights"), {}),
     ("build", ("placements", "translations", "normals", "bearings"), {"parents": [-1, 0, 1], "prismatic": [False] * 3}),
     ("update", ("triangle", "rows"), {}),
+    ("scatter_covariance", ("white", "right", "left", "covariance"), {"window": 3, "freedom": 9.0}),
     ("closed_loop", (*_LOOP, *_SIGNALS), {**_PLANT, "encoder_resolution": 0.0, "rate_filter": 1.0}),
     ("geared_loop", (*_GEARED, *_SIGNALS[1:3], "angle_log", "torque_log"), {**_PLANT, "count": 0.0, "filter": 1.0}),
 ]  # fmt: skip
@@ -233,6 +241,8 @@ def test_what_is_read_is_converted(tx90l: RobotModel, rng: np.random.Generator) 
         ("closed_loop", {"motors": np.array([0, 4])}, "outside"),
         ("closed_loop", {"motors": np.array([0, 1]), "twists": np.array([4, -1])}, "outside"),
         ("geared_loop", {"motors": np.array([0, 4])}, "outside"),
+        ("scatter_covariance", {"window": 0}, "between one"),
+        ("scatter_covariance", {"window": 6}, "between one"),
     ],
 )
 def test_indices_and_numbers_are_checked(tx90l: RobotModel, kernel: str, changed: dict, words: str) -> None:

@@ -95,6 +95,14 @@ class Tree:
     ) -> np.ndarray: ...
 
 def update(triangle: np.ndarray, rows: np.ndarray) -> None: ...
+def scatter_covariance(
+    white: np.ndarray,
+    right: np.ndarray,
+    left: np.ndarray,
+    window: int,
+    freedom: float,
+    covariance: np.ndarray,
+) -> None: ...
 def closed_loop(
     step: int,
     model: int,

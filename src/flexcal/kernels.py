@@ -5,8 +5,8 @@ from __future__ import annotations
 from flexcal import _kernels
 
 if _kernels.avx2:
-    from flexcal._kernels_avx2 import RuntimeRobot, Tree, closed_loop, update
+    from flexcal._kernels_avx2 import RuntimeRobot, Tree, closed_loop, scatter_covariance, update
 else:
-    from flexcal._kernels import RuntimeRobot, Tree, closed_loop, update
+    from flexcal._kernels import RuntimeRobot, Tree, closed_loop, scatter_covariance, update
 
-__all__ = ["RuntimeRobot", "Tree", "closed_loop", "update"]
+__all__ = ["RuntimeRobot", "Tree", "closed_loop", "scatter_covariance", "update"]

@@ -7,9 +7,8 @@ from flexcal.frequency.periodic import kronecker, pool_noise, pose_response
 from flexcal.frequency.periodic.covariance import (
     input_gain,
     output_noise,
-    shrink_to_diagonal,
-    transform_covariance,
 )
+from flexcal.kernels import scatter_covariance
 
 NOISES = {
     "encoder": {"position_noise": 2e-5},
@@ -70,9 +69,9 @@ def test_propagation_through_the_division(rng):
     found = (g @ gamma + noise[:, :n]) @ np.linalg.inv(gamma + noise[:, n:])
     errors = np.swapaxes(found - g, 1, 2).reshape(draws, -1)
     sample = errors.T @ errors.conj() / draws
-    predicted = kronecker(input_gain(gamma[None, None]), output_noise(g[None], (root @ root.conj().T)[None]))[
-        0
-    ]
+    predicted = kronecker(
+        input_gain(np.linalg.inv(gamma)[None, None]), output_noise(g[None], (root @ root.conj().T)[None])
+    )[0]
     size = np.sqrt(np.outer(np.diag(predicted), np.diag(predicted)).real)
     np.testing.assert_allclose(sample / size, predicted / size, atol=0.04)
 
@@ -84,31 +83,58 @@ def test_pool_is_a_moving_mean_of_constant_width(rng):
     np.testing.assert_allclose(pool_noise(values, bins, np.array([7]), 50), [values.mean(0)])
 
 
-def test_transform_is_the_kronecker_congruence(rng):
-    right, left, inner = (
-        complex_normal(rng, 4, 3, 3),
-        complex_normal(rng, 4, 3, 3),
-        complex_normal(rng, 4, 9, 9),
-    )
-    inner = inner @ np.swapaxes(inner, 1, 2).conj()
-    factor = np.stack([np.kron(a, b) for a, b in zip(right, left, strict=True)])
-    np.testing.assert_allclose(kronecker(right, left), factor)
-    np.testing.assert_allclose(
-        transform_covariance(inner, right, left),
-        factor @ inner @ np.swapaxes(factor, 1, 2).conj(),
-        atol=1e-12,
-    )
+def pooled(white, right, left, count, freedom):
+    """The kernel's covariance (L, n m, n m) of scatter (L, m, R, n)."""
+    lines, m, _, n = white.shape
+    out = np.empty((lines, n * m, n * m), complex)
+    parts = [
+        np.ascontiguousarray(values).view(float).reshape(*values.shape, 2) for values in (white, right, left)
+    ]
+    scatter_covariance(*parts, count, freedom, out.view(float).reshape(*out.shape, 2))
+    return out
+
+
+@pytest.mark.parametrize(
+    ("lines", "m", "n", "members", "count"),
+    [(37, 3, 3, 4, 15), (9, 4, 2, 3, 9), (2, 1, 1, 2, 1), (6, 2, 3, 1, 2)],
+)
+def test_pooled_scatter_is_shrunk_and_carried_back(rng, lines, m, n, members, count):
+    """Against windows, shrinkage and Kronecker products as one writes them; sensors make m larger than n."""
+    white = complex_normal(rng, lines, m, members, n)
+    right, left = (np.tril(complex_normal(rng, lines, size, size)) for size in (n, m))
+    freedom = 0.7 * members * count
+    found = pooled(white, right, left, count, freedom)
+    for k in range(lines):
+        first = min(max(k - count // 2, 0), lines - count)
+        vectors = white[first : first + count].transpose(0, 2, 3, 1).reshape(-1, n * m)
+        sample = vectors.T @ vectors.conj() / len(vectors)
+        variance = np.diag(np.diag(sample).real)
+        chance = (np.trace(variance) ** 2 - np.sum(variance**2)) / freedom
+        power = np.sum(np.abs(sample - variance) ** 2)
+        kept = 1.0 - chance / power if power > chance else 0.0
+        shrunk = variance + kept * (sample - variance) + 1e-12 * np.eye(n * m)
+        factor = np.kron(right[k], left[k])
+        expected = factor @ shrunk @ factor.conj().T
+        np.testing.assert_allclose(found[k], expected, rtol=1e-12, atol=1e-13 * np.abs(expected).max())
+        np.testing.assert_array_equal(found[k], found[k].conj().T)
+
+
+def test_kronecker_product_of_every_line(rng):
+    right, left = complex_normal(rng, 4, 3, 3), complex_normal(rng, 4, 2, 2)
+    expected = np.stack([np.kron(a, b) for a, b in zip(right, left, strict=True)])
+    np.testing.assert_allclose(kronecker(right, left), expected)
 
 
 def test_shrinkage_drops_chance_and_keeps_correlation(rng):
     freedom, p = 45, 9
+    one = np.ones((200, 1, 1), complex), np.tile(np.eye(p, dtype=complex), (200, 1, 1))
     independent = complex_normal(rng, 200, p, freedom)
     sample = independent @ np.swapaxes(independent, 1, 2).conj() / freedom
-    shrunk = shrink_to_diagonal(sample, freedom)
+    shrunk = pooled(independent[..., None], *one, 1, freedom)
     off = ~np.eye(p, dtype=bool)
     assert np.abs(shrunk[:, off]).mean() < 0.3 * np.abs(sample[:, off]).mean()
     assert np.linalg.cond(shrunk).mean() < 0.5 * np.linalg.cond(sample).mean()
     common = independent + 2.0 * complex_normal(rng, 200, 1, freedom)
     sample = common @ np.swapaxes(common, 1, 2).conj() / freedom
-    shrunk = shrink_to_diagonal(sample, freedom)
+    shrunk = pooled(common[..., None], *one, 1, freedom)
     assert np.abs(shrunk[:, off]).mean() > 0.95 * np.abs(sample[:, off]).mean()

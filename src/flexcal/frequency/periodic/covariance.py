@@ -5,10 +5,11 @@ vec() stacks columns throughout: element (i, j) of G is entry j·n_y + i. Covari
 
 import numpy as np
 
+from flexcal.kernels import scatter_covariance
+
 _SMALLEST_RELATIVE_STD = (
     1e-10  # no entry of a covariance is claimed to be known better: rounding is not noise
 )
-_LINES_TOGETHER = 64  # their covariances of 36 elements fit a processor's second cache
 
 
 def vec(matrices: np.ndarray) -> np.ndarray:
@@ -53,15 +54,13 @@ def output_noise(response: np.ndarray, column: np.ndarray) -> np.ndarray:
     return left @ column @ _dagger(left)
 
 
-def input_gain(torque: np.ndarray) -> np.ndarray:
-    """Right factor (L, n, n) of the covariance of vec G: the mean over realisations of conj((Γ Γᴴ)⁻¹), Γ (R, L, n, E).
+def input_gain(inverse: np.ndarray) -> np.ndarray:
+    """Right factor (L, n, n) of the covariance of vec G: the mean over realisations of conj((Γ Γᴴ)⁻¹), from Γ⁻¹ (R, L, n, n).
 
     From δG = (δQ̈ - G δΓ) Γ⁻¹ with the same noise, independent, in every experiment:
     cov(vec G) = conj((Γ Γᴴ)⁻¹) ⊗ cov(N_y - G N_u).
     """
-    square = torque @ _dagger(torque)
-    identity = np.broadcast_to(np.eye(square.shape[-1]), square.shape)
-    gain = np.linalg.solve(square, identity).conj().mean(0)
+    gain = (np.swapaxes(inverse, -1, -2) @ inverse.conj()).mean(0)
     return 0.5 * (gain + _dagger(gain))
 
 
@@ -82,8 +81,10 @@ def total_covariance(
     pooled over `count` neighbouring lines after whitening by that gain: from the left by L with
     L Lᴴ = G Θ Gᴴ + `noise`, where Θ is the (diagonal) input-referred disturbance found in the window, friction above
     all, and `noise` (L, n, n) the equation error of output_noise; from the right by P with P Pᴴ = `gain`. Poles and
-    zeros stay as sharp as they are in G. In the whitened coordinates the pooled covariance is shrunk to its diagonal
-    (Ledoit and Wolf; intensity of Schäfer and Strimmer 2005 for complex normal scatter), then carried back.
+    zeros stay as sharp as they are in G. In the whitened coordinates the pooled covariance of p = m n elements is shrunk to its
+    diagonal (Ledoit and Wolf; for complex normal scatter, Schäfer and Strimmer 2005), then carried back: the intensity
+    min(1, Σ var(s_ij) / Σ |s_ij|²) over i ≠ j, with var(s_ij) = s_ii s_jj / freedom, leaves a true correlation alone and removes what
+    chance alone would give; the result is positive definite where the diagonal is.
     Degrees of freedom: (R - 1) · count, before shrinkage.
     """
     members, lines, m, n = realisations.shape
@@ -92,13 +93,13 @@ def total_covariance(
     scatter = (realisations - realisations.mean(0)) * np.sqrt(members / (members - 1.0))
     right = np.linalg.cholesky(gain)
     # all members in one system a line: (L, n, R m), then (L, m, R n)
-    balanced = np.linalg.solve(right, scatter.transpose(1, 3, 0, 2).reshape(lines, n, -1))
+    balanced = np.linalg.inv(right) @ scatter.transpose(1, 3, 0, 2).reshape(lines, n, -1)
     balanced = balanced.reshape(lines, n, members, m).transpose(0, 3, 2, 1).reshape(lines, m, -1)
 
     driven = response[:, :n]
-    at_input = np.linalg.solve(driven, np.concatenate([balanced[:, :n], noise[:, :n, :n]], -1))
-    input_scatter = at_input[:, :, : members * n]
-    input_noise = np.linalg.solve(driven, _dagger(at_input[:, :, members * n :]))
+    inverse = np.linalg.inv(driven)
+    input_scatter = inverse @ balanced[:, :n]
+    input_noise = inverse @ noise[:, :n, :n] @ _dagger(inverse)
     significant = 1.0 + 2.0 / np.sqrt((members - 1) * count)  # what the noise may well explain shapes nothing
     disturbance = (np.abs(input_scatter) ** 2).mean(-1) - significant * _diagonal(input_noise)
     disturbance = np.maximum(pool_noise(disturbance, at, at, count), 0.0)
@@ -109,55 +110,18 @@ def total_covariance(
     shape = shape + (_SMALLEST_RELATIVE_STD * size)[:, :, None] ** 2 * np.eye(m)
     left = np.linalg.cholesky(0.5 * (shape + _dagger(shape)))
 
-    white = np.linalg.solve(left, balanced).reshape(lines, m, members, n) / np.sqrt(members)
-    vectors = white.transpose(0, 3, 1, 2).reshape(lines, n * m, members)
-    of_mean = right / np.sqrt(members)
+    white = (np.linalg.inv(left) @ balanced).reshape(lines, m, members, n)
     freedom = float((members - 1) * count)
     total = np.empty((lines, n * m, n * m), complex)
-    for first in range(0, lines, _LINES_TOGETHER):
-        own = slice(first, first + _LINES_TOGETHER)
-        starts = _window_start(at[own], lines, count)
-        near = slice(starts[0], starts[-1] + count)
-        squares = vectors[near] @ _dagger(vectors[near])
-        pooled = shrink_to_diagonal(pool_noise(squares, at[near], at[own], count), freedom)
-        pooled += 1e-12 * np.eye(n * m)  # keeps it definite where a scatter is exactly nil
-        total[own] = transform_covariance(pooled, of_mean[own], left[own])
+    scatter_covariance(
+        _parts(white), _parts(right / np.sqrt(members)), _parts(left), count, freedom, _parts(total)
+    )
     return total, freedom
 
 
-def shrink_to_diagonal(covariance: np.ndarray, freedom: float) -> np.ndarray:
-    """Sample covariances (L, p, p) of complex normal vectors with `freedom` degrees of freedom, shrunk towards their diagonals.
-
-    The intensity min(1, Σ var(s_ij) / Σ |s_ij|²) over i ≠ j, with var(s_ij) = s_ii s_jj / freedom, leaves a true
-    correlation alone and removes what chance alone would give; the result is positive definite where the diagonal is.
-    """
-    variance = _diagonal(covariance)
-    shrunk = covariance.copy()
-    index = np.arange(covariance.shape[-1])
-    shrunk[:, index, index] = 0.0
-    chance = (variance.sum(-1) ** 2 - (variance**2).sum(-1)) / freedom
-    real, imaginary = np.real(shrunk), np.imag(shrunk)
-    power = np.einsum("kij,kij->k", real, real) + np.einsum("kij,kij->k", imaginary, imaginary)
-    intensity = np.divide(chance, power, out=np.ones_like(chance), where=power > chance)
-    shrunk *= (1.0 - intensity)[:, None, None]
-    shrunk[:, index, index] = variance
-    return shrunk
-
-
-def transform_covariance(covariance: np.ndarray, right: np.ndarray, left: np.ndarray) -> np.ndarray:
-    """Covariance of vec(L Y Pᵀ) from that of vec(Y), (L, m n, m n), for batched L = `left` and P = `right`."""
-    half = _from_left(covariance, right, left)
-    result = _from_left(_dagger(half), right, left)
-    result += _dagger(result)
-    result *= 0.5
-    return result
-
-
-def _from_left(matrix: np.ndarray, right: np.ndarray, left: np.ndarray) -> np.ndarray:
-    """Product (right ⊗ left) · matrix without forming the Kronecker product."""
-    lines, n, m = *right.shape[:2], left.shape[-1]
-    columns = (right @ matrix.reshape(lines, n, -1)).reshape(lines, n, m, -1)
-    return (left[:, None] @ columns).reshape(matrix.shape)
+def _parts(values: np.ndarray) -> np.ndarray:
+    """Real and imaginary parts (…, 2) of complex numbers, as the kernels take them."""
+    return np.ascontiguousarray(values).view(float).reshape(*values.shape, 2)
 
 
 def _dagger(matrix: np.ndarray) -> np.ndarray:

@@ -102,9 +102,11 @@ def _odd_bins(signal: np.ndarray, periods: int, bins: np.ndarray) -> np.ndarray:
     turned.real, turned.imag = folded[0].T, -folded[1].T
     turned *= _quarter_turn(quarter)
     first = bins % 4 == 1
-    phasors = np.fft.fft(turned, axis=1)[:, np.where(first, bins // 4, quarter - 1 - bins // 4)].T
-    phasors.imag *= np.where(first, 1.0, -1.0)[:, None]
-    return phasors.reshape(bins.size, *signal.shape[1:])
+    phasors = np.fft.fft(turned, axis=1, out=turned).take(
+        np.where(first, bins // 4, quarter - 1 - bins // 4), axis=1
+    )
+    phasors.imag *= np.where(first, 1.0, -1.0)
+    return phasors.T.reshape(bins.size, *signal.shape[1:])
 
 
 @lru_cache(maxsize=1)

@@ -97,18 +97,23 @@ class PoseRecords:
 
     def difference(self, part: int) -> np.ndarray:
         """(plus - minus)/2 of a kept spectrum, or plus alone: (R, E, bins, columns)."""
-        plus = self._stack(part, 1)
-        return 0.5 * (plus - self._stack(part, -1)) if self.plan.signs else plus
+        spectra = self._stack(part, 1)
+        if self.plan.signs:
+            spectra -= self._stack(part, -1)
+            spectra *= 0.5
+        return spectra
 
     def half_sum(self, part: int) -> np.ndarray:
         """(plus + minus)/2 of a kept spectrum, of a plan with both signs: (R, E, bins, columns)."""
-        return 0.5 * (self._stack(part, 1) + self._stack(part, -1))
+        spectra = self._stack(part, 1)
+        spectra += self._stack(part, -1)
+        spectra *= 0.5
+        return spectra
 
     def _stack(self, part: int, sign: int) -> np.ndarray:
-        experiments = range(len(self.plan.joints))
-        return np.stack(
-            [[self._kept[r, e, sign][part] for e in experiments] for r in range(self.plan.realisations)]
-        )
+        realisations, experiments = self.plan.realisations, len(self.plan.joints)
+        kept = [self._kept[r, e, sign][part] for r in range(realisations) for e in range(experiments)]
+        return np.stack(kept).reshape(realisations, experiments, *kept[0].shape)
 
 
 def by_pose(

@@ -12,7 +12,7 @@ from flexcal.data.recordings import Recording
 from flexcal.errors import FlexcalError, InputError
 from flexcal.files.formats import ArrayForm, NpzFile, write_npz
 from flexcal.files.transaction import current_path
-from flexcal.frequency.periodic.averages import Average, average_response, right_divide
+from flexcal.frequency.periodic.averages import Average, average_response
 from flexcal.frequency.periodic.covariance import input_gain, kronecker, output_noise, total_covariance, vec
 from flexcal.frequency.periodic.pose_records import PoseRecords, by_pose
 from flexcal.frequency.periodic.steady_state import experiment_spectra, keep_periods, odd_distortion
@@ -382,13 +382,13 @@ def response_of(
             "arithmetic, h1 or joint_input_output.",
         )
     try:
-        realisations = right_divide(spectra.outputs, spectra.torque)
-        gain = input_gain(spectra.torque)
+        inverse = np.linalg.inv(spectra.torque)
     except np.linalg.LinAlgError as problem:
         raise FlexcalError(
             "E-FRF-039",
             "the torque of the experiments leaves an axis unexcited at some line (Γ is singular).",
         ) from (problem)
+    realisations, gain = spectra.outputs @ inverse, input_gain(inverse)
     mean = realisations.mean(0)
     noise = output_noise(mean, spectra.noise)
     total, freedom = total_covariance(realisations, mean, noise, gain, pooled_lines)

@@ -31,7 +31,7 @@ def keep_periods(plan: MultisinePlan, recording: Recording) -> tuple[np.ndarray,
         return np.hstack([q[:, axes], s, u[:, axes]])
 
     mean = np.full(len(position), 1.0 / len(position)) @ position
-    whole = columns(np.array([*plan.lines, *plan.detection_lines], int))
+    whole = columns(np.concatenate([plan.lines, plan.detection_lines]))
     kept = (mean, *np.split(whole, [len(plan.lines)]))
     return kept if noise_in_half_sum(plan) else (*kept, columns(noise_lines(plan)))
 
