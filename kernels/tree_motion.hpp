@@ -32,11 +32,11 @@ struct Step {
 template <class S>
 class TreeMotion {
   public:
-    TreeMotion(const Tree& tree, const double* geometry, Vector3 gravity) : tree_(tree), n_(tree.size()), up_(lift(-1.0 * gravity)) {
+    TreeMotion(const Tree& tree, const double* geometry, Vector3 gravity) : tree_(tree), n_(tree.size()), up_(lift<S>(-1.0 * gravity)) {
         const std::vector<Prepared> prepared = tree.prepare(geometry);
         for (int i = 0; i < n_; ++i) {
             const Prepared& p = prepared[i];
-            fixed_.push_back({lift(p.translation), lift(p.aligned), lift(p.bearing_inverse), lift(tree.joints[i].bearing.z), p.offset});
+            fixed_.push_back({lift<S>(p.translation), lift<S>(p.aligned), lift<S>(p.bearing_inverse), lift<S>(tree.joints[i].bearing.z), p.offset});
             paths_.push_back(tree.path(i));
         }
         steps_.resize(n_);
@@ -106,9 +106,6 @@ class TreeMotion {
         Vector<S> axis;
         double offset;
     };
-
-    static Vector<S> lift(Vector3 a) { return {broadcast<S>(a.x), broadcast<S>(a.y), broadcast<S>(a.z)}; }
-    static RotationOf<S> lift(const Rotation& r) { return {lift(r.x), lift(r.y), lift(r.z)}; }
 
     const Tree& tree_;
     int n_;

@@ -24,28 +24,30 @@ struct ElasticAxis {
 
 // The gravity load of one pose on some axes, base to tool, within a joint too, as the tree has them. About a revolute joint's axes the load
 // is a moment, along a prismatic joint's it is a force: ∂V/∂q_k = -g·(m a_k), and no later axis changes its direction.
-class GravityLoad {
+template <class S>
+class GravityLoadOf {
   public:
-    GravityLoad(const Tree& tree, const std::vector<ElasticAxis>& axes, const double* geometry, const Masses& masses, Vector3 gravity)
-        : tree_(tree), axes_(axes), masses_(masses), gravity_(gravity), prepared_(tree.prepare(geometry)), frames_(tree.size()),
+    GravityLoadOf(const Tree& tree, const std::vector<ElasticAxis>& axes, const double* geometry, const Masses& masses, Vector3 gravity)
+        : tree_(tree), axes_(axes), masses_(masses), gravity_(lift<S>(gravity)), frames_(tree.size()),
           mass_(tree.size()), moment_(tree.size()), axis_(axes.size()), turned_(axes.size()),
           beyond_(static_cast<std::size_t>(tree.size()) * tree.size(), 0) {
+        for (const Prepared& joint : tree.prepare(geometry)) prepared_.push_back(lift<S>(joint));
         for (int i = 0; i < tree.size(); ++i)
             for (int j = i; j >= 0; j = tree.joints[j].parent) beyond_[j * tree.size() + i] = 1;
     }
 
     // q: (n,); deflection: (n, 3)
-    void move(const double* q, const double* deflection, double payload) {
+    void move(const S* q, const S* deflection, S payload) {
         const int n = tree_.size();
         q_ = q, deflection_ = deflection, payload_ = payload;
         for (int i = 0; i < n; ++i) {
             const int parent = tree_.joints[i].parent;
             frames_[i] = tree_.advance(i, prepared_[i], parent < 0 ? nullptr : &frames_[parent], q[i], deflection + 3 * i);
-            mass_[i] = masses_.mass[i];
-            Vector3 own = vector3(masses_.first_moment + 3 * i);
+            mass_[i] = broadcast<S>(masses_.mass[i]);
+            Vector<S> own = lift<S>(vector3(masses_.first_moment + 3 * i));
             if (i == masses_.payload_joint) {
                 mass_[i] += payload;
-                own = own + payload * masses_.payload_point;
+                own = own + payload * lift<S>(masses_.payload_point);
             }
             moment_[i] = mass_[i] * frames_[i].origin + frames_[i].link * own;
         }
@@ -58,32 +60,32 @@ class GravityLoad {
         }
         for (std::size_t k = 0; k < axes_.size(); ++k) {
             const int joint = axes_[k].joint;
-            const Frames& f = frames_[joint];
+            const FramesOf<S>& f = frames_[joint];
             axis_[k] = axes_[k].component == 0 ? f.tilt_x : axes_[k].component == 1 ? f.tilt_y : f.axis;
             turned_[k] = slides(static_cast<int>(k)) ? mass_[joint] * axis_[k] : cross(axis_[k], moment_[joint] - mass_[joint] * f.origin);
         }
     }
 
     // -∂V/∂q_k
-    double load(int k) const { return dot(gravity_, turned_[k]); }
+    S load(int k) const { return dot(gravity_, turned_[k]); }
 
     // ∂²V/∂q_k∂q_j for k before j, or j itself
-    double stiffness(int k, int j) const {
+    S stiffness(int k, int j) const {
         const bool carried = beyond_[axes_[k].joint * tree_.size() + axes_[j].joint];
-        return carried && !slides(k) ? -dot(gravity_, cross(axis_[k], turned_[j])) : 0.0;
+        return carried && !slides(k) ? -dot(gravity_, cross(axis_[k], turned_[j])) : S{};
     }
 
     // ∂(∂V/∂q_k) by mass and first moment of each link, (4 n,), written where not zero
-    void regressor(int k, double* row) const {
+    void regressor(int k, S* row) const {
         const int joint = axes_[k].joint;
-        const Vector3 lever = cross(gravity_, axis_[k]);  // g·(a × r) = (g × a)·r
+        const Vector<S> lever = cross(gravity_, axis_[k]);  // g·(a × r) = (g × a)·r
         for (int i = 0; i < tree_.size(); ++i) {
             if (!beyond_[joint * tree_.size() + i]) continue;
             if (slides(k)) {
                 row[4 * i] = -dot(gravity_, axis_[k]);
                 continue;
             }
-            const Rotation& r = frames_[i].link;
+            const RotationOf<S>& r = frames_[i].link;
             row[4 * i] = -dot(lever, frames_[i].origin - frames_[joint].origin);
             row[4 * i + 1] = -dot(lever, r.x);
             row[4 * i + 2] = -dot(lever, r.y);
@@ -92,30 +94,30 @@ class GravityLoad {
     }
 
     // ∂(∂V/∂q_k) by geometry, (6 n,), written where not zero
-    void coupling(int k, double* row) const {
+    void coupling(int k, S* row) const {
         const int n = tree_.size(), joint = axes_[k].joint;
         for (int i = 0; i < n; ++i) {
             const bool outside = beyond_[joint * n + i] && i != joint;
             const bool inside = beyond_[i * n + joint];
             if (!outside && !inside) continue;
-            const Frames& f = frames_[i];
-            const Vector3 turns[3] = {f.axis, f.misalignment_1, f.misalignment_2};
+            const FramesOf<S>& f = frames_[i];
+            const Vector<S> turns[3] = {f.axis, f.misalignment_1, f.misalignment_2};
             const bool sliding = tree_.joints[i].prismatic;
             // a misalignment turns about the joint's place before the prismatic motion
-            const double slid = sliding ? q_[i] + prepared_[i].offset + deflection_[3 * i + 2] : 0.0;
-            const Vector3 moved = moment_[i] - mass_[i] * (f.origin - slid * f.axis);
+            const S slid = sliding ? q_[i] + prepared_[i].offset + deflection_[3 * i + 2] : S{};
+            const Vector<S> moved = moment_[i] - mass_[i] * (f.origin - slid * f.axis);
             // fixed to the parent, the bearing tilts the offset with everything beyond
             const bool tilted = i == joint && tree_.tilts_first && axes_[k].component != 2;
             for (int g = 0; g < 3; ++g) {
                 const bool before = inside && !(g == 0 && tilted);
                 row[geometry_size * i + g] = before         ? -dot(gravity_, cross(turns[g], turned_[k]))
-                                             : slides(k)    ? 0.0
+                                             : slides(k)    ? S{}
                                                             : -dot(gravity_, cross(axis_[k], cross(turns[g], moved)));
             }
-            if (sliding) row[geometry_size * i] = inside || slides(k) ? 0.0 : -mass_[i] * dot(gravity_, cross(axis_[k], f.axis));
+            if (sliding) row[geometry_size * i] = inside || slides(k) ? S{} : -mass_[i] * dot(gravity_, cross(axis_[k], f.axis));
             if (!beyond_[joint * n + i] || slides(k)) continue;
-            const double carried = mass_[i] - masses_.mass[i] - (i == masses_.payload_joint ? payload_ : 0.0);
-            const Vector3 lengths[3] = {f.link.x, f.link.y, f.link.z};
+            const S carried = mass_[i] - masses_.mass[i] - (i == masses_.payload_joint ? payload_ : S{});
+            const Vector<S> lengths[3] = {f.link.x, f.link.y, f.link.z};
             for (int g = 0; g < 3; ++g) row[geometry_size * i + 3 + g] = -carried * dot(gravity_, cross(axis_[k], lengths[g]));
         }
     }
@@ -126,15 +128,16 @@ class GravityLoad {
     const Tree& tree_;
     const std::vector<ElasticAxis>& axes_;
     const Masses& masses_;
-    const Vector3 gravity_;
-    const std::vector<Prepared> prepared_;
-    std::vector<Frames> frames_;
-    std::vector<double> mass_;
-    std::vector<Vector3> moment_, axis_, turned_;
+    const Vector<S> gravity_;
+    std::vector<PreparedOf<S>> prepared_;
+    std::vector<FramesOf<S>> frames_;
+    std::vector<S> mass_;
+    std::vector<Vector<S>> moment_, axis_, turned_;
     std::vector<char> beyond_;  // beyond[j * n + i]: link i is carried by joint j
-    const double* q_ = nullptr;
-    const double* deflection_ = nullptr;
-    double payload_ = 0;
+    const S* q_ = nullptr;
+    const S* deflection_ = nullptr;
+    S payload_{};
 };
+using GravityLoad = GravityLoadOf<double>;
 
 }  // namespace flexcal

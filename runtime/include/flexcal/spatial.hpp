@@ -12,7 +12,31 @@ struct Plain {
     using type = S;
 };
 
-// S is double, or several samples side by side (lanes.hpp).
+// S is double, or several samples side by side, for which these are specialised.
+template <class S>
+S cosine(S a);
+template <class S>
+S sine(S a);
+template <class S>
+S square_root(S a);
+template <class S>
+bool any_nonzero(S a);
+template <class S>
+bool all_positive(S a);
+template <>
+inline double cosine(double a) { return std::cos(a); }
+template <>
+inline double sine(double a) { return std::sin(a); }
+template <>
+inline double square_root(double a) { return std::sqrt(a); }
+template <>
+inline bool any_nonzero(double a) { return a != 0; }
+template <>
+inline bool all_positive(double a) { return a > 0; }
+
+template <class S>
+inline S broadcast(double a) { return S{} + a; }
+
 template <class S>
 struct Vector {
     S x, y, z;
@@ -44,6 +68,10 @@ template <class S>
 inline Vector<S> operator*(const RotationOf<S>& r, const Vector<S>& v) { return v.x * r.x + v.y * r.y + v.z * r.z; }
 template <class S>
 inline RotationOf<S> operator*(const RotationOf<S>& a, const RotationOf<S>& b) { return {a * b.x, a * b.y, a * b.z}; }
+template <class S>
+inline Vector<S> lift(Vector3 a) { return {broadcast<S>(a.x), broadcast<S>(a.y), broadcast<S>(a.z)}; }
+template <class S>
+inline RotationOf<S> lift(const Rotation& r) { return {lift<S>(r.x), lift<S>(r.y), lift<S>(r.z)}; }
 inline Rotation identity() { return {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}; }
 template <class S>
 inline RotationOf<S> transpose(const RotationOf<S>& r) {
@@ -62,16 +90,19 @@ inline void turn_z(RotationOf<S>& r, S c, S s) {
     r.y = c * r.y - s * r.x;
     r.x = x;
 }
-inline void turn_z(Rotation& r, double angle) { turn_z(r, std::cos(angle), std::sin(angle)); }
-inline void turn_y(Rotation& r, double angle) {
-    const double c = std::cos(angle), s = std::sin(angle);
-    const Vector3 z = c * r.z + s * r.x;
+template <class S>
+inline void turn_z(RotationOf<S>& r, typename Plain<S>::type angle) { turn_z<S>(r, cosine<S>(angle), sine<S>(angle)); }
+template <class S>
+inline void turn_y(RotationOf<S>& r, typename Plain<S>::type angle) {
+    const S c = cosine<S>(angle), s = sine<S>(angle);
+    const Vector<S> z = c * r.z + s * r.x;
     r.x = c * r.x - s * r.z;
     r.z = z;
 }
-inline void turn_x(Rotation& r, double angle) {
-    const double c = std::cos(angle), s = std::sin(angle);
-    const Vector3 y = c * r.y + s * r.z;
+template <class S>
+inline void turn_x(RotationOf<S>& r, typename Plain<S>::type angle) {
+    const S c = cosine<S>(angle), s = sine<S>(angle);
+    const Vector<S> y = c * r.y + s * r.z;
     r.z = c * r.z - s * r.y;
     r.y = y;
 }

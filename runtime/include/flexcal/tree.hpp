@@ -23,20 +23,28 @@ struct Joint {
 };
 
 // The frames that one joint passes through at one pose; each rotation axis is what a Jacobian column needs.
-struct Frames {
-    Vector3 origin;
-    Vector3 misalignment_1, misalignment_2, axis, tilt_y, tilt_x;
-    Rotation link;
+template <class S>
+struct FramesOf {
+    Vector<S> origin;
+    Vector<S> misalignment_1, misalignment_2, axis, tilt_y, tilt_x;
+    RotationOf<S> link;
 };
+using Frames = FramesOf<double>;
 
 // Everything about a joint that is the same at all poses.
-struct Prepared {
-    Vector3 translation;        // with the length error of the parent joint
-    Rotation aligned;           // placement · misalignments · bearing frame
-    Vector3 normal_1, normal_2; // misalignment axes, in the parent link
-    Rotation bearing_inverse;
-    double offset;
+template <class S>
+struct PreparedOf {
+    Vector<S> translation;        // with the length error of the parent joint
+    RotationOf<S> aligned;        // placement · misalignments · bearing frame
+    Vector<S> normal_1, normal_2; // misalignment axes, in the parent link
+    RotationOf<S> bearing_inverse;
+    S offset;
 };
+using Prepared = PreparedOf<double>;
+template <class S>
+inline PreparedOf<S> lift(const Prepared& p) {
+    return {lift<S>(p.translation), lift<S>(p.aligned), lift<S>(p.normal_1), lift<S>(p.normal_2), lift<S>(p.bearing_inverse), broadcast<S>(p.offset)};
+}
 
 struct Tree {
     std::vector<Joint> joints;
@@ -59,17 +67,18 @@ struct Tree {
     }
 
     // deflection: tilt_x, tilt_y, twist of this joint
-    Frames advance(int i, const Prepared& joint, const Frames* parent, double q, const double* deflection) const {
-        const Rotation base = parent ? parent->link : identity();
-        Frames f;
+    template <class S>
+    FramesOf<S> advance(int i, const PreparedOf<S>& joint, const FramesOf<S>* parent, typename Plain<S>::type q, const S* deflection) const {
+        const RotationOf<S> base = parent ? parent->link : lift<S>(identity());
+        FramesOf<S> f;
         f.origin = base * joint.translation;
         if (parent) f.origin = f.origin + parent->origin;
         f.misalignment_2 = base * joint.normal_2;
         f.misalignment_1 = base * joint.normal_1;
-        Rotation r = base * joint.aligned;
+        RotationOf<S> r = base * joint.aligned;
         if (tilts_first) tilt(f, r, deflection);
         f.axis = r.z;
-        const double motion = q + joint.offset + deflection[2];
+        const S motion = q + joint.offset + deflection[2];
         if (joints[i].prismatic) {
             f.origin = f.origin + motion * f.axis;
         } else {
@@ -80,11 +89,12 @@ struct Tree {
         return f;
     }
 
-    static void tilt(Frames& f, Rotation& r, const double* deflection) {
+    template <class S>
+    static void tilt(FramesOf<S>& f, RotationOf<S>& r, const S* deflection) {
         f.tilt_y = r.y;
-        if (deflection[1] != 0) turn_y(r, deflection[1]);
+        if (any_nonzero<S>(deflection[1])) turn_y(r, deflection[1]);
         f.tilt_x = r.x;
-        if (deflection[0] != 0) turn_x(r, deflection[0]);
+        if (any_nonzero<S>(deflection[0])) turn_x(r, deflection[0]);
     }
 
     std::vector<int> path(int joint) const {
