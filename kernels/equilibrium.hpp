@@ -14,6 +14,7 @@ namespace flexcal {
 struct EquilibriumOutput {
     double* deflection;  // (samples, n, 3): tilt_x, tilt_y, twist
     double* compliance;  // (samples, d, d) or null: inverse of springs + gravity stiffness
+    double* by_offset;   // (samples, d, n) or null: ∂(∂V/∂q) by the offset of each joint
     double* regressor;   // (samples, d, 4 n) or null: ∂(∂V/∂q) by mass and first moment of each link
     double* coupling;    // (samples, d, 6 n) or null: ∂(∂V/∂q) by geometry
 };
@@ -45,6 +46,10 @@ class PosesAtRest {
                 step_[k] = broadcast<Lanes>(1);
                 cholesky_solve(hessian_, d_, step_.data());
                 write(step_.data(), d_, out.compliance + (first * d_ + k) * d_, d_ * d_);
+            }
+            if (out.by_offset) {
+                for (int i = 0; i < n_; ++i) row_[i] = load_.by_offset(k, i);
+                write(row_.data(), n_, out.by_offset + (first * d_ + k) * n_, d_ * n_);
             }
             if (out.regressor) {
                 std::fill(row_.begin(), row_.end(), Lanes{});

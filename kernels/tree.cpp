@@ -33,7 +33,7 @@ Tree make_tree(const std::vector<int>& parents, const std::vector<bool>& prismat
 }
 
 nb::tuple point(const Tree& tree, int joint, nb::handle placement_, nb::handle translation_, nb::handle target_, nb::handle geometry_,
-                nb::handle tool_, nb::handle q_, nb::handle deflection_, bool jacobians) {
+                nb::handle tool_, nb::handle q_, nb::handle deflection_, bool jacobians, bool parameters) {
     const std::size_t n = tree.size();
     if (joint < 0 || joint >= static_cast<int>(n)) throw nb::value_error("the point's joint is out of range");
     const auto placement = reals(placement_, {3, 3}, "placement");
@@ -45,12 +45,13 @@ nb::tuple point(const Tree& tree, int joint, nb::handle placement_, nb::handle t
     const std::size_t samples = q.shape(0);
     const auto deflection = reals(deflection_, {samples, n, 3}, "deflection");
     Buffer position({samples, 3}), orientation({samples, 3, 3});
-    Buffer by_geometry({jacobians ? samples : 0, 6, 6 * (n + 1)}), by_motion({jacobians ? samples : 0, 6, 3 * n});
+    const bool geometric = jacobians && parameters;
+    Buffer by_geometry({geometric ? samples : 0, 6, 6 * (n + 1)}), by_motion({jacobians ? samples : 0, 6, 3 * n});
     const Target hung{joint, rotation(placement.data()), vector3(translation.data()), vector3(target.data())};
     {
         nb::gil_scoped_release release;
         point_kinematics(tree, hung, geometry.data(), tool.data(), q.data(), deflection.data(), static_cast<std::ptrdiff_t>(samples),
-                         {position.data.get(), orientation.data.get(), jacobians ? by_geometry.data.get() : nullptr,
+                         {position.data.get(), orientation.data.get(), geometric ? by_geometry.data.get() : nullptr,
                           jacobians ? by_motion.data.get() : nullptr});
     }
     return nb::make_tuple(position.release(), orientation.release(), by_geometry.release(), by_motion.release());
@@ -86,22 +87,23 @@ struct Loaded {
 
 nb::tuple equilibrium(const Tree& tree, const std::vector<std::pair<int, int>>& axes, nb::handle stiffness_, nb::handle geometry, nb::handle mass,
                       nb::handle first_moment, nb::handle payload, int payload_joint, nb::handle payload_point, nb::handle gravity, nb::handle q,
-                      bool sensitivities) {
+                      bool sensitivities, bool parameters) {
     const std::size_t n = tree.size(), d = axes.size();
     const Loaded arm(tree, axes, geometry, mass, first_moment, payload, payload_joint, payload_point, gravity, q);
     const auto stiffness = reals(stiffness_, {d}, "stiffness");
     const std::size_t samples = arm.samples;
-    Buffer deflection({samples, n, 3}), compliance({sensitivities ? samples : 0, d, d}), regressor({sensitivities ? samples : 0, d, 4 * n}),
-        coupling({sensitivities ? samples : 0, d, 6 * n});
+    const std::size_t derived = sensitivities ? samples : 0, parametric = sensitivities && parameters ? samples : 0;
+    Buffer deflection({samples, n, 3}), compliance({derived, d, d}), by_offset({derived, d, n}), regressor({parametric, d, 4 * n}),
+        coupling({parametric, d, 6 * n});
     double residual = 0;
     {
         nb::gil_scoped_release release;
+        const auto wanted = [](const Buffer& buffer) { return buffer.shape[0] ? buffer.data.get() : nullptr; };
         residual = static_equilibrium(tree, arm.axes, stiffness.data(), arm.geometry.data(), arm.masses, vector3(arm.gravity.data()),
                                       arm.q.data(), static_cast<std::ptrdiff_t>(samples),
-                                      {deflection.data.get(), sensitivities ? compliance.data.get() : nullptr,
-                                       sensitivities ? regressor.data.get() : nullptr, sensitivities ? coupling.data.get() : nullptr});
+                                      {deflection.data.get(), wanted(compliance), wanted(by_offset), wanted(regressor), wanted(coupling)});
     }
-    return nb::make_tuple(deflection.release(), compliance.release(), regressor.release(), coupling.release(), residual);
+    return nb::make_tuple(deflection.release(), compliance.release(), by_offset.release(), regressor.release(), coupling.release(), residual);
 }
 
 nb::tuple loads(const Tree& tree, const std::vector<std::pair<int, int>>& axes, nb::handle geometry, nb::handle mass, nb::handle first_moment,
@@ -175,11 +177,14 @@ void bind_tree(nb::module_& m) {
                     nb::arg("normals"), nb::arg("bearings"), nb::arg("tilts_first") = false)
         .def("point", &point, nb::arg("joint"), nb::arg("placement"), nb::arg("translation"), nb::arg("target"), nb::arg("geometry"),
              nb::arg("tool"), nb::arg("q"), nb::arg("deflection"), nb::arg("jacobians"),
-             "Position (samples, 3), orientation (samples, 3, 3), Jacobians by geometry (samples, 6, 6 n + 6) and motion (samples, 6, 3 n).")
+             nb::arg("parameters") = true,
+             "Position (samples, 3), orientation (samples, 3, 3), Jacobians by geometry (samples, 6, 6 n + 6), of `parameters` only, and motion "
+             "(samples, 6, 3 n).")
         .def("equilibrium", &equilibrium, nb::arg("axes"), nb::arg("stiffness"), nb::arg("geometry"), nb::arg("mass"), nb::arg("first_moment"),
              nb::arg("payload"), nb::arg("payload_joint"), nb::arg("payload_point"), nb::arg("gravity"), nb::arg("q"), nb::arg("sensitivities"),
-             "Deflection (samples, n, 3), compliance (samples, d, d), gravity regressor (samples, d, 4 n), its coupling with geometry "
-             "(samples, d, 6 n), largest last Newton step (rad).")
+             nb::arg("parameters") = true,
+             "Deflection (samples, n, 3), compliance (samples, d, d), coupling of gravity's load with joint offsets (samples, d, n) and, of "
+             "`parameters` only, its regressor (samples, d, 4 n) and coupling with all geometry (samples, d, 6 n); largest last Newton step (rad).")
         .def("gravity_loads", &loads, nb::arg("axes"), nb::arg("geometry"), nb::arg("mass"), nb::arg("first_moment"), nb::arg("payload"),
              nb::arg("payload_joint"), nb::arg("payload_point"), nb::arg("gravity"), nb::arg("q"), nb::arg("deflection"),
              "Gravity's load on the axes (samples, d), the stiffness by which it changes (samples, d, d), and the regressor and coupling of "

@@ -45,6 +45,7 @@ class Tree:
         q: np.ndarray,
         deflection: np.ndarray,
         jacobians: bool,
+        parameters: bool = True,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]: ...
     def equilibrium(
         self,
@@ -59,7 +60,8 @@ class Tree:
         gravity: np.ndarray,
         q: np.ndarray,
         sensitivities: bool,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]: ...
+        parameters: bool = True,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]: ...
     def gravity_loads(
         self,
         axes: list[tuple[int, int]],

@@ -93,28 +93,27 @@ class GravityLoadOf {
         }
     }
 
+    // ∂(∂V/∂q_k) by the offset of joint i
+    S by_offset(int k, int i) const {
+        const int n = tree_.size(), joint = axes_[k].joint;
+        const bool inside = beyond_[i * n + joint];
+        if (!inside && !beyond_[joint * n + i]) return S{};
+        if (tree_.joints[i].prismatic) return inside || slides(k) ? S{} : -mass_[i] * dot(gravity_, cross(axis_[k], frames_[i].axis));
+        // fixed to the parent, the bearing tilts the offset with everything beyond
+        const bool tilted = i == joint && tree_.tilts_first && axes_[k].component != 2;
+        return by_turn(k, i, frames_[i].axis, inside && !tilted);
+    }
+
     // ∂(∂V/∂q_k) by geometry, (6 n,), written where not zero
     void coupling(int k, S* row) const {
         const int n = tree_.size(), joint = axes_[k].joint;
         for (int i = 0; i < n; ++i) {
-            const bool outside = beyond_[joint * n + i] && i != joint;
             const bool inside = beyond_[i * n + joint];
-            if (!outside && !inside) continue;
+            if (!inside && !beyond_[joint * n + i]) continue;
             const FramesOf<S>& f = frames_[i];
-            const Vector<S> turns[3] = {f.axis, f.misalignment_1, f.misalignment_2};
-            const bool sliding = tree_.joints[i].prismatic;
-            // a misalignment turns about the joint's place before the prismatic motion
-            const S slid = sliding ? q_[i] + prepared_[i].offset + deflection_[3 * i + 2] : S{};
-            const Vector<S> moved = moment_[i] - mass_[i] * (f.origin - slid * f.axis);
-            // fixed to the parent, the bearing tilts the offset with everything beyond
-            const bool tilted = i == joint && tree_.tilts_first && axes_[k].component != 2;
-            for (int g = 0; g < 3; ++g) {
-                const bool before = inside && !(g == 0 && tilted);
-                row[geometry_size * i + g] = before         ? -dot(gravity_, cross(turns[g], turned_[k]))
-                                             : slides(k)    ? S{}
-                                                            : -dot(gravity_, cross(axis_[k], cross(turns[g], moved)));
-            }
-            if (sliding) row[geometry_size * i] = inside || slides(k) ? S{} : -mass_[i] * dot(gravity_, cross(axis_[k], f.axis));
+            row[geometry_size * i] = by_offset(k, i);
+            row[geometry_size * i + 1] = by_turn(k, i, f.misalignment_1, inside);
+            row[geometry_size * i + 2] = by_turn(k, i, f.misalignment_2, inside);
             if (!beyond_[joint * n + i] || slides(k)) continue;
             const S carried = mass_[i] - masses_.mass[i] - (i == masses_.payload_joint ? payload_ : S{});
             const Vector<S> lengths[3] = {f.link.x, f.link.y, f.link.z};
@@ -123,6 +122,17 @@ class GravityLoadOf {
     }
 
   private:
+    // ∂(∂V/∂q_k) by a turn within joint i: of axis k with everything beyond it, or of what axis k carries.
+    S by_turn(int k, int i, const Vector<S>& turn, bool of_axis) const {
+        if (of_axis) return -dot(gravity_, cross(turn, turned_[k]));
+        if (slides(k)) return S{};
+        const FramesOf<S>& f = frames_[i];
+        // a misalignment turns about the joint's place before the prismatic motion
+        const S slid = tree_.joints[i].prismatic ? q_[i] + prepared_[i].offset + deflection_[3 * i + 2] : S{};
+        const Vector<S> moved = moment_[i] - mass_[i] * (f.origin - slid * f.axis);
+        return -dot(gravity_, cross(axis_[k], cross(turn, moved)));
+    }
+
     bool slides(int k) const { return axes_[k].component == 2 && tree_.joints[axes_[k].joint].prismatic; }
 
     const Tree& tree_;

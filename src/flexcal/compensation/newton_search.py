@@ -152,7 +152,14 @@ class CommandSearch:
         payload, warm = (None if own is None else own[rows] for own in (self.payload, self.temperature))
         target = self.aim.target[rows]
         return tool_at_rest(
-            self.model, q, payload, target, flank=flank, jacobians=jacobians, temperature=warm
+            self.model,
+            q,
+            payload,
+            target,
+            flank=flank,
+            jacobians=jacobians,
+            parameters=False,
+            temperature=warm,
         )
 
     def _evaluate(self, rows: np.ndarray, q: np.ndarray, *, jacobians: bool) -> None:

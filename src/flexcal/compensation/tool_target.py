@@ -86,5 +86,5 @@ class ToolPoseTarget:
 
     def nominal(self, model: RobotModel, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Residual (N, m) and its negative Jacobian (N, m, n) of an undeflected robot at `q` (N, n)."""
-        at = points_kinematics(model, q, None, self.target, jacobians=True)
+        at = points_kinematics(model, q, None, self.target, jacobians=True, parameters=False)
         return self.residual(at), self.own_rows(at.motion_jacobian[:, :, :, 2]) @ motor_motion(model)

@@ -51,13 +51,14 @@ def point_kinematics(
     *,
     point: str | None = None,
     jacobians: bool = True,
+    parameters: bool = True,
 ) -> PointKinematics:
     """Forward kinematics of a target in the robot's base frame.
 
     `q` (samples, n) rad or m, motor side referred to the joint; `deflection` (samples, N, 3) rad: tilt about the bearing's x, its y,
     and what the arm turns beyond `q`, or beyond the relation of a joint without motor (backlash, spring twist, transmission error); zero
-    when left out. Without `jacobians` these come back empty. NaN where a loop does not close. Raises `FlexcalError` for an unknown point
-    or a wrong number of joints.
+    when left out. Without `jacobians` these come back empty, that by geometry without `parameters`. NaN where a loop does not close. Raises
+    `FlexcalError` for an unknown point or a wrong number of joints.
     """
     q = joint_batch(model, q)
     target = model.point(point)
@@ -78,9 +79,12 @@ def point_kinematics(
         q if motion is None else motion.q,
         np.ascontiguousarray(own) if motion is None else motion.deflection,
         jacobians,
+        parameters,
     )
     if motion is not None and jacobians:
         twists = by_motion[:, :, 2::3]
+        by_motion = by_motion + twists @ motion.by_motion
+    if motion is not None and len(geometry):
         by_errors = twists @ motion.by_geometry
         by_errors[:, :, : 6 * joints] += geometry[:, :, : 6 * joints]
         for joint in set(model.branching) & set(model.path_to(target.joint)):
@@ -89,5 +93,4 @@ def point_kinematics(
                 place, parent = slice(first, first + 3), 6 * model.joints[joint].parent + 3
                 by_errors[:, :, place] += np.eye(6, 3) if parent < 0 else geometry[:, :, parent : parent + 3]
         geometry = np.concatenate([by_errors, geometry[:, :, 6 * joints :]], axis=2)
-        by_motion = by_motion + twists @ motion.by_motion
     return PointKinematics(position, orientation, geometry, by_motion.reshape(len(by_motion), 6, joints, 3))

@@ -33,7 +33,7 @@ def reach_points(
     """
     q = np.clip(joint_batch(model, q), lower, upper)
     for _ in range(STEPS):
-        motion = point_kinematics(model, q, point=point)
+        motion = point_kinematics(model, q, point=point, parameters=False)
         columns = motion.motion_jacobian[:, :3, :, 2] @ motor_motion(model)
         missing = position - motion.position
         step = damped_step(columns, missing, DAMPING)

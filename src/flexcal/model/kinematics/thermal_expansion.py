@@ -76,8 +76,10 @@ def expanded(
             position[own] += rise[own, None] * grown
     geometry, motion = at.geometry_jacobian, at.motion_jacobian
     if len(geometry):
-        geometry, motion = geometry.copy(), motion.copy()
+        geometry = geometry.copy()
         geometry[:, :3] *= factor[:, None, None]
+    if len(motion):
+        motion = motion.copy()
         motion[:, :3] *= factor[:, None, None, None]
     return replace(at, position=position, geometry_jacobian=geometry, motion_jacobian=motion)
 

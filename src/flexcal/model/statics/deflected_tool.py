@@ -40,7 +40,7 @@ class ToolAtRest:
         by_joint = by_motion[:, :, :, 2].copy()
         if len(axes):
             by_load = np.matmul(by_motion[:, :, axes[:, 0], axes[:, 1]], self.rest.compliance)
-            by_joint -= np.matmul(by_load, self.rest.coupling[:, :, : 6 * len(self.model.joints) : 6])
+            by_joint -= np.matmul(by_load, self.rest.by_offset)
         return by_joint @ transmission_slopes(self.model, self.q)
 
 
@@ -72,6 +72,7 @@ def tool_at_rest(
     flank: np.ndarray | None = None,
     elastic: bool = True,
     jacobians: bool = False,
+    parameters: bool = True,
     force: np.ndarray | None = None,
     temperature: np.ndarray | None = None,
 ) -> ToolAtRest:
@@ -93,6 +94,8 @@ def tool_at_rest(
         Whether the arm deflects; without, it is rigid.
     jacobians : bool
         Whether derivatives are computed too.
+    parameters : bool
+        Whether those by the robot's parameters are among them; `ToolAtRest.command_jacobian` does without.
     force : ndarray, optional
         Force (N, 3), N in the base frame, on the points; none by default.
     temperature : ndarray, optional
@@ -121,17 +124,19 @@ def tool_at_rest(
     """
     masses = carried_mass(model, payload, len(q))
     if force is None:
-        rest = static_equilibrium(model, q, masses, flank=flank, elastic=elastic, sensitivities=jacobians)
+        rest = static_equilibrium(
+            model, q, masses, flank=flank, elastic=elastic, sensitivities=jacobians, parameters=parameters
+        )
     else:
         rest = _pulled(model, q, masses, target, force, flank, elastic=elastic)
     if temperature is None or not depends_on_temperature(model):
-        at = points_kinematics(model, q, rest.deflection, target, jacobians=jacobians)
+        at = points_kinematics(model, q, rest.deflection, target, jacobians=jacobians, parameters=parameters)
         return ToolAtRest(model, q, rest, at)
     rise = temperature_rise(model, temperature)
     bent = rest.deflection.copy()
     bent[:, :, 2] += np.outer(rise, model.thermal.zero_drift)
     ends = point_ends(model, target)
-    at = points_kinematics(model, q, bent, target, jacobians=jacobians)
+    at = points_kinematics(model, q, bent, target, jacobians=jacobians, parameters=parameters)
     return ToolAtRest(model, q, replace(rest, deflection=bent), expanded(model, q, at, target, ends, rise))
 
 
@@ -157,16 +162,24 @@ def _pulled(
 
 
 def points_kinematics(
-    model: RobotModel, q: np.ndarray, deflection: np.ndarray | None, target: np.ndarray, *, jacobians: bool
+    model: RobotModel,
+    q: np.ndarray,
+    deflection: np.ndarray | None,
+    target: np.ndarray,
+    *,
+    jacobians: bool,
+    parameters: bool = True,
 ) -> PointKinematics:
     """`point_kinematics` with a different point (N,) in every row."""
     names = list(dict.fromkeys(target.tolist()))
     if len(names) < 2:
-        return point_kinematics(model, q, deflection, point=next(iter(names), None), jacobians=jacobians)
+        return point_kinematics(
+            model, q, deflection, point=next(iter(names), None), jacobians=jacobians, parameters=parameters
+        )
     rows = [np.flatnonzero(target == name) for name in names]
     moved = [None if deflection is None else deflection[own] for own in rows]
     parts = [
-        point_kinematics(model, q[own], bent, point=name, jacobians=jacobians)
+        point_kinematics(model, q[own], bent, point=name, jacobians=jacobians, parameters=parameters)
         for name, own, bent in zip(names, rows, moved, strict=True)
     ]
     order = np.argsort(np.concatenate(rows), kind="stable")

@@ -47,8 +47,9 @@ class Equilibrium:
     without one, backlash included; `torque` (samples, N) N m of the motor, or what stands in its place, on the arm that holds gravity;
     `flank` (samples, N) the side of its backlash that the arm rests on, the sign of that torque, 0 where there is none; `axes` (d, 2)
     joint and component of each elastic coordinate; `compliance` (samples, d, d) rad/(N m), the inverse of spring plus gravity stiffness;
-    `regressor` (samples, d, 4 N): the gravity load on each coordinate by mass and first moment of each link; `coupling`
-    (samples, d, G) the same by the errors of `RobotModel.geometry_columns`. The last three are empty without sensitivities.
+    `by_offset` (samples, d, N): the gravity load on each coordinate by the offset of each joint; `regressor` (samples, d, 4 N) the same by
+    mass and first moment of each link; `coupling` (samples, d, G) by the errors of `RobotModel.geometry_columns`. The last four are
+    empty without sensitivities, the last two without those by parameters.
     """
 
     deflection: np.ndarray
@@ -56,6 +57,7 @@ class Equilibrium:
     flank: np.ndarray
     axes: np.ndarray
     compliance: np.ndarray
+    by_offset: np.ndarray
     regressor: np.ndarray
     coupling: np.ndarray
 
@@ -87,19 +89,25 @@ def _solve(
     payload: np.ndarray,
     *,
     sensitivities: bool,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Elastic deflection (samples, N, 3) beside `slack` (samples, N), compliance, regressor and coupling of `Equilibrium`."""
+    parameters: bool = True,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Elastic deflection (samples, N, 3) beside `slack` (samples, N), compliance, by_offset, regressor and coupling of `Equilibrium`."""
+    samples, joints = len(q), len(model.joints)
     if not axes:
-        samples, joints = len(q), len(model.joints)
-        errors = len(model.geometry_columns)
-        shapes = ((samples, joints, 3), (samples, 0, 0), (samples, 0, 4 * joints), (samples, 0, errors))
-        deflection, compliance, regressor, coupling = (np.zeros(shape) for shape in shapes)
-        return deflection, compliance, regressor, coupling
-    solve = _independent if model.relations is None else related_equilibrium
+        deflection, by_offset = np.zeros((samples, joints, 3)), np.zeros((samples, 0, joints))
+        regressor = np.zeros((samples, 0, 4 * joints))
+        coupling = np.zeros((samples, 0, len(model.geometry_columns)))
+        return deflection, np.zeros((samples, 0, 0)), by_offset, regressor, coupling
     try:
-        deflection, compliance, regressor, coupling, step = solve(
-            model, axes, stiffness, q, slack, payload, sensitivities=sensitivities
-        )
+        if model.relations is None:
+            deflection, compliance, by_offset, regressor, coupling, step = _independent(
+                model, axes, stiffness, q, slack, payload, sensitivities=sensitivities, parameters=parameters
+            )
+        else:
+            deflection, compliance, regressor, coupling, step = related_equilibrium(
+                model, axes, stiffness, q, slack, payload, sensitivities=sensitivities
+            )
+            by_offset = coupling[:, :, : 6 * joints : 6]
     except ValueError as problem:
         raise FlexcalError(
             "E-MODEL-006", f"{model.name}: {problem}; check the stiffnesses in robot.yaml and the payload."
@@ -109,7 +117,7 @@ def _solve(
             "E-MODEL-007",
             f"{model.name}: no stable equilibrium was found (last step {step:.1e} rad); check the stiffnesses.",
         )
-    return deflection, compliance, regressor, coupling
+    return deflection, compliance, by_offset, regressor, coupling
 
 
 def _independent(
@@ -121,8 +129,9 @@ def _independent(
     payload: np.ndarray,
     *,
     sensitivities: bool,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:
-    """`related_equilibrium` of a robot whose joints all have motors."""
+    parameters: bool,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:
+    """As `_solve`, of a robot whose joints all have motors, and the last step, rad."""
     declared = model.payload
     return model.tree.equilibrium(
         axes,
@@ -136,6 +145,7 @@ def _independent(
         model.gravity,
         q + slack,
         sensitivities,
+        parameters,
     )
 
 
@@ -229,7 +239,7 @@ def _held_rigidly(
     """Gravity load (samples, d) N m on springs of unbounded stiffness about the `axes`, their deflection, regressor and coupling."""
     q = joint_batch(model, q)
     masses = payload_batch(model, payload, len(q))
-    deflection, _, regressor, coupling = _solve(
+    deflection, _, _, regressor, coupling = _solve(
         model, axes, np.full(len(axes), _RIGID), q, np.zeros((len(q), 1)), masses, sensitivities=sensitivities
     )
     joints, components = (list(column) for column in zip(*axes, strict=True)) if axes else ([], [])
@@ -244,6 +254,7 @@ def static_equilibrium(
     flank: np.ndarray | None = None,
     elastic: bool = True,
     sensitivities: bool = False,
+    parameters: bool = True,
 ) -> Equilibrium:
     """Rest position of every pose for motors held at `q` (samples, n), to 1e-12 rad.
 
@@ -252,7 +263,8 @@ def static_equilibrium(
     of the torque at rest itself, but for an arm that hangs within its gap, where either sign would pull it across: there one of the
     two is taken. Without `elastic` the arm is rigid and only backlash and gravity compliance displace it. Lateral compliance tilts
     axes without a change of the load on springs, some 1e-3 of it; what drives twist less because they harden is that of the undeflected
-    arm's load. Raises `FlexcalError` where springs cannot carry the arm.
+    arm's load. `sensitivities` are by `parameters` too, or by joint offsets alone. Raises `FlexcalError` where springs cannot carry the
+    arm.
     """
     q = joint_batch(model, q)
     masses = payload_batch(model, payload, len(q))
@@ -277,7 +289,14 @@ def static_equilibrium(
         """Slack, deflection beside it, torque and derivatives."""
         slack = free[rows] - rest[rows] * model.drives.backlash
         deflection, *derivatives = _solve(
-            model, axes, stiffness, q[rows], slack, masses[rows], sensitivities=sensitivities
+            model,
+            axes,
+            stiffness,
+            q[rows],
+            slack,
+            masses[rows],
+            sensitivities=sensitivities,
+            parameters=parameters,
         )
         torque = load[rows].copy()
         torque[:, sprung] = -model.springs.stiffness[sprung, 2] * deflection[:, sprung, 2]
