@@ -70,16 +70,15 @@ def rotation_wxyz(rotation: np.ndarray) -> np.ndarray:
     squares = np.stack([1 + a + e + i, 1 + a - e - i, 1 - a + e - i, 1 - a - e + i])
     largest = np.argmax(squares, axis=0)
     q = np.stack([squares[0], h - f, c - g, d - b], axis=-1)
-    if largest.any():
-        for k, components in enumerate(
-            (
-                (h - f, squares[1], b + d, c + g),
-                (c - g, b + d, squares[2], f + h),
-                (d - b, c + g, f + h, squares[3]),
-            ),
-            1,
-        ):
-            q = np.where((largest == k)[..., None], np.stack(components, axis=-1), q)
+    others = (
+        (h - f, squares[1], b + d, c + g),
+        (c - g, b + d, squares[2], f + h),
+        (d - b, c + g, f + h, squares[3]),
+    )
+    for k, components in enumerate(others, 1):
+        own = largest == k
+        if own.any():
+            q = np.where(own[..., None], np.stack(components, axis=-1), q)
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return np.where(q[..., :1] < 0, -q, q)
 
