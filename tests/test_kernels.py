@@ -10,7 +10,7 @@ from flexcal.model.robot import RobotModel
 
 @pytest.mark.skipif(not _kernels.avx2, reason="this processor runs only one of the builds")
 def test_builds_agree_bit_by_bit(tx90l: RobotModel, rng: np.random.Generator) -> None:
-    """On what this processor makes of the same tree, regressor with its adjoint, triangle and covariance: else results would depend on the machine."""
+    """On what this processor makes of the same numbers, by every kernel in lanes: else results would depend on the machine."""
     from flexcal import _kernels_avx2
 
     arm = tx90l.joints
