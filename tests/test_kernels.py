@@ -6,6 +6,7 @@ import pytest
 from flexcal import _kernels
 from flexcal.kernels import update
 from flexcal.model.robot import RobotModel
+from flexcal.model.statics import static_equilibrium
 
 
 @pytest.mark.skipif(not _kernels.avx2, reason="this processor runs only one of the builds")
@@ -40,6 +41,23 @@ def test_builds_agree_bit_by_bit(tx90l: RobotModel, rng: np.random.Generator) ->
     for ours, theirs in zip(*found, strict=True):
         np.testing.assert_array_equal(ours, theirs)
     assert np.abs(found[0][0]).max() > 1.0
+
+
+def test_a_pose_at_rest_does_not_depend_on_those_beside_it(
+    tx90l: RobotModel, rng: np.random.Generator
+) -> None:
+    """Seven poses, four at a time, against one by one; and derivatives by offsets against those by all parameters."""
+    q, payload = rng.uniform(-1.5, 1.5, (7, 6)), rng.uniform(0.0, 6.0, 7)
+    together = static_equilibrium(tx90l, q, payload, sensitivities=True)
+    alone = [static_equilibrium(tx90l, q[[k]], payload[[k]], sensitivities=True) for k in range(7)]
+    for name in ("deflection", "torque", "compliance", "by_offset", "regressor", "coupling"):
+        expected = np.concatenate([getattr(one, name) for one in alone])
+        np.testing.assert_array_equal(getattr(together, name), expected)
+    assert np.abs(together.deflection).max() > 1e-4
+    command = static_equilibrium(tx90l, q, payload, sensitivities=True, parameters=False)
+    np.testing.assert_array_equal(command.by_offset, together.coupling[:, :, ::6])
+    np.testing.assert_array_equal(command.compliance, together.compliance)
+    assert not len(command.coupling) and not len(command.regressor)
 
 
 @pytest.mark.parametrize("rows", [1, 3, 39, 128, 1001])

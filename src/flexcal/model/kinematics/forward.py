@@ -83,14 +83,16 @@ def point_kinematics(
     )
     if motion is not None and jacobians:
         twists = by_motion[:, :, 2::3]
+        if parameters:
+            by_errors = twists @ motion.by_geometry
+            by_errors[:, :, : 6 * joints] += geometry[:, :, : 6 * joints]
+            for joint in set(model.branching) & set(model.path_to(target.joint)):
+                first = model.geometry_columns.get(f"{model.joints[joint].name}.{ORIGIN[0]}")
+                if first is not None:
+                    place, parent = slice(first, first + 3), 6 * model.joints[joint].parent + 3
+                    by_errors[:, :, place] += (
+                        np.eye(6, 3) if parent < 0 else geometry[:, :, parent : parent + 3]
+                    )
+            geometry = np.concatenate([by_errors, geometry[:, :, 6 * joints :]], axis=2)
         by_motion = by_motion + twists @ motion.by_motion
-    if motion is not None and len(geometry):
-        by_errors = twists @ motion.by_geometry
-        by_errors[:, :, : 6 * joints] += geometry[:, :, : 6 * joints]
-        for joint in set(model.branching) & set(model.path_to(target.joint)):
-            first = model.geometry_columns.get(f"{model.joints[joint].name}.{ORIGIN[0]}")
-            if first is not None:
-                place, parent = slice(first, first + 3), 6 * model.joints[joint].parent + 3
-                by_errors[:, :, place] += np.eye(6, 3) if parent < 0 else geometry[:, :, parent : parent + 3]
-        geometry = np.concatenate([by_errors, geometry[:, :, 6 * joints :]], axis=2)
     return PointKinematics(position, orientation, geometry, by_motion.reshape(len(by_motion), 6, joints, 3))
