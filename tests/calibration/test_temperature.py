@@ -214,5 +214,9 @@ def test_an_expansion_of_no_material_is_said(measured: Callable) -> None:
     third = replace(poses, temperature=COLD + (poses.temperature - COLD) / 3)
     remarks = calibrate(model, third, terms=["kinematic", "thermal"]).document()["remarks"]
     assert any("which no arm's material does" in remark for remark in remarks)
+    cold_hall = replace(poses, temperature=1.8 * (poses.temperature - COLD) + 35.0)
+    remarks = calibrate(model, cold_hall, terms=["kinematic", "thermal"]).document()["remarks"]
+    assert any("less than cast iron or steel does: if the column is in Fahrenheit" in r for r in remarks)
     plain = calibrate(model, poses, terms=["kinematic", "thermal"]).document()["remarks"]
+    assert not any("Fahrenheit" in remark for remark in plain)
     assert any("per kelvin" in remark for remark in plain) and not any("material" in r for r in plain)

@@ -370,7 +370,7 @@ def test_a_reference_that_was_not_as_calibrated_is_said_to_differ(visited: Visit
     # as at the reference: nothing has just moved
     still = recheck(visited.robot, visited.visit(arm=visited.shop.arm.turned(2, 8e-4)), reference=wrong)
     assert still.verdict == "as_at_reference" and still.headline.startswith(
-        "since the reference visit as it was then (p = "
+        "nothing changed since the reference visit: as it was then (p = "
     )
     assert "the robot differed already then, and does now: joint_2 shifted by +" in still.headline
     assert still.numbers["suspects"][0]["subject"] == "joint_2" and still.tools[0].mean > 4e-4

@@ -11,6 +11,8 @@ from flexcal.units import MILLIMETRE
 _MICRO = 1e-6
 _METALS = 30.0
 """Expansion, µm/m/K, above that of aluminium and magnesium."""
+_IRON = 10.0
+"""Expansion, µm/m/K, below that of cast iron and steel."""
 _WORTH = 0.02
 """Attenuation from which it has a sentence."""
 
@@ -85,6 +87,11 @@ def _expansion(fit: GeometricFit, told: TemperatureEvidence) -> str:
         odd = (
             ", which no arm's material does: the column is not the temperature of the links, or something else goes with it, as the scale "
             "of the instrument"
+        )
+    elif high < _IRON and low > 0:
+        odd = (
+            ", less than cast iron or steel does: if the column is in Fahrenheit, declare `unit: degF` for it under `signals:`; else its "
+            "sensor warms up more than the links, or scatters"
         )
     size = f"{(low + high) / 2:.1f} ± {(high - low) / 2:.1f} µm/m"
     return f"the {of} expands by {size} per kelvin of the column 'temperature' (95 %){odd}; {where}"

@@ -178,20 +178,18 @@ class Recheck(PlottedFolder):
             return own + told + effect
         day = "" if self.reference_date is None else f" of {self.reference_date}"
         then, now = judgement_sentence(self.at_reference), judgement_sentence(self.absolute)
-        unchanged = told.replace("as calibrated", "as it was then")
+        unchanged = f"nothing changed since the reference visit{day}: {told.replace('as calibrated', 'as it was then')}"
+        moved = effect.replace("the tool is off by", "the tool is off from where it was then by")
         if not self._still_differs:
             if self.judged.as_calibrated:
-                return f"{now}, and since the reference visit{day}: {unchanged}; that visit was not as calibrated ({then})"
+                return f"{now}, and {unchanged}; that visit was not as calibrated ({then})"
             return (
-                f"{now}; the reference visit{day} was not: against the calibration {then} then, and since then {told}{effect}; make this "
+                f"{now}; the reference visit{day} was not: against the calibration {then} then, and since then {told}{moved}; make this "
                 "visit the reference (--reference)"
             )
         if self.judged.as_calibrated:
-            return (
-                f"since the reference visit{day} {unchanged}; against the calibration the robot differed already then, and does now: "
-                f"{now}{effect}"
-            )
-        return f"since the reference visit{day} {told}{effect}; against the calibration it differed already then: {then}; and now: {now}"
+            return f"{unchanged}; against the calibration the robot differed already then, and does now: {now}{effect}"
+        return f"since the reference visit{day} {told}{moved}; against the calibration it differed already then: {then}; and now: {now}"
 
     def summary(self) -> str:
         """The judgement, what would have been found, and remarks."""

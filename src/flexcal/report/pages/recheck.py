@@ -73,7 +73,7 @@ def recheck_page(study: RecheckStudy) -> Page:
             "How far is the tool off now?",
             _tool_off(block),
             "mm",
-            f"{'By what it was. ' if len(block['suspects']) > 1 else ''}At 95 % of the poses; "
+            f"{_since(block)}{'By what it was. ' if len(block['suspects']) > 1 else ''}At 95 % of the poses; "
             f"{document_millimetres(block['expected_mm'])} mm (rms) are expected of the calibrated robot.",
         ),
         Fact(
@@ -124,6 +124,13 @@ def _as_calibrated(block: Mapping[str, Any]) -> str:
     if block["verdict"] == "as_at_reference":
         return "As at the reference"
     return {"good": "Yes", "care": "As far as seen"}.get(_status(block), "No")
+
+
+def _since(block: Mapping[str, Any]) -> str:
+    """From when the displacement of the tool counts, where the reference visit was not as calibrated itself."""
+    if block["reference_against_calibration"] is None or block["verdict"] == "as_at_reference":
+        return ""
+    return "Since the reference visit, which differed from the calibration. "
 
 
 def _shift_unit(block: Mapping[str, Any]) -> str:
@@ -240,7 +247,8 @@ def _power_section(block: Mapping[str, Any]) -> Section:
             f"{block['power']['shift'] * 1e3:g}: found with",
         ),
         rows,
-        note="At 1 % false alarms of the whole. The last but one column is that of the best test for this joint alone (Neyman and "
+        note=f"At {100 * block['false_alarm']:.1g} % false alarms of the visit. The last but one column is that of the best test for this "
+        "joint alone (Neyman and "
         "Pearson), by the Cramér-Rao bound of these poses and this noise: no evaluation of the same measurements finds less.",
     )
     return Section("power", "What would have been found", "", (table,))
@@ -251,7 +259,8 @@ def _drift_section(drift: Mapping[str, Any]) -> Section:
         "figure-drift",
         "Cumulative sums over the visits",
         cumulative_sums(drift),
-        f"Every sum adds up what a visit differs from those before it. Beyond the dashed limits (± {drift['limit']:.2f}) a joint drifts; "
+        "Every sum adds up what a visit differs from those before it; visits that show a change on their own do not count, and their "
+        f"verdict says it. Beyond the dashed limits (± {drift['limit']:.2f}) a joint drifts; "
         f"false alarms of all sums together are {drift['average_run']:.0f} visits apart on average, or more.",
         "Upward and downward cumulative sums of every joint against the visits.",
     )
