@@ -40,7 +40,7 @@ class VisitCourse:
     quantile : float
         Half-width of their 95 % intervals in standard deviations (Student).
     remainder : float
-        Probability that chance leaves what the course does not explain of all visits.
+        Probability that chance leaves what the course does not explain: of all coordinates, or of the sizes of this change at the visits.
     score : float
         Twice the negative log-likelihood, with what Schwarz's criterion adds.
     """
@@ -87,10 +87,13 @@ def visit_courses(
     for change in changes:
         own = slice(place, place + len(change.names))
         place = own.stop
+        free, free_rank = _free_gain(seen, last.common, columns[:, own] / scale[own])
         for k, (kind, since, first, _) in enumerate(courses):
             inverse, rank = _inverse(information[k, own, own])
             estimate = inverse @ right[k, own]
-            misfit = whole - float(right[k, own] @ estimate)
+            gain = float(right[k, own] @ estimate)
+            misfit = whole - gain
+            uneven = chance_of_squares(max(free - gain, 0.0), max(free_rank - rank, 1), freedom)
             cost = (
                 misfit if not np.isfinite(freedom) else (freedom + count) * float(np.log1p(misfit / freedom))
             )
@@ -103,7 +106,7 @@ def visit_courses(
                     estimate / scale[own],
                     np.sqrt(np.diag(inverse)) / scale[own],
                     student_quantile(0.975, freedom) if np.isfinite(freedom) else 1.96,
-                    float(chance_of_squares(misfit, count - rank, freedom)),
+                    float(min(chance_of_squares(misfit, count - rank, freedom), uneven)),
                     cost + rank * float(np.log(count)) + 2 * float(np.log(kinds.count(change.kind))),
                 )
             )
@@ -186,23 +189,39 @@ def _filtered(
     """Sum of squares of the innovations, their number, and of each of the G `courses` (G, V) the information (G, p, p) of all `columns`
     (m, p) and its right-hand side (G, p).
     """
-    mean, covariance = np.zeros(len(common)), common
-    expected = np.zeros((len(courses), *columns.shape))
     information = np.zeros((len(courses), columns.shape[1], columns.shape[1]))
     right = np.zeros((len(courses), columns.shape[1]))
     whole, count = 0.0, 0
-    for k, visit in enumerate(visits):
-        root = np.linalg.cholesky(covariance + visit.own)
-        inverse = np.linalg.inv(root)
-        value = visit.errors - mean
-        effect = courses[:, k, None, None] * columns - expected
-        white, scaled = inverse @ value, inverse @ effect
+    for visit, (white, scaled) in zip(visits, _innovations(visits, common, columns, courses), strict=True):
         whole += float(white @ white)
         count += len(white) - visit.unknown
         information += np.swapaxes(scaled, 1, 2) @ scaled
         right += np.swapaxes(scaled, 1, 2) @ white
+    return whole, count, information, right
+
+
+def _free_gain(visits: Sequence[_Aligned], common: np.ndarray, columns: np.ndarray) -> tuple[float, int]:
+    """Sum of squares that one change explains with a size of its own at every visit, and the number of these."""
+    pairs = list(_innovations(visits, common, columns, np.eye(len(visits))))
+    effects = np.concatenate([np.hstack(list(scaled)) for _, scaled in pairs])
+    values = np.concatenate([white for white, _ in pairs])
+    inverse, rank = _inverse(effects.T @ effects)
+    right = effects.T @ values
+    return float(right @ inverse @ right), rank
+
+
+def _innovations(
+    visits: Sequence[_Aligned], common: np.ndarray, columns: np.ndarray, courses: np.ndarray
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Whitened innovations (m,) of every visit, and (G, m, p) what each course of every column makes in them."""
+    mean, covariance = np.zeros(len(common)), common
+    expected = np.zeros((len(courses), *columns.shape))
+    for k, visit in enumerate(visits):
+        inverse = np.linalg.inv(np.linalg.cholesky(covariance + visit.own))
+        white = inverse @ (visit.errors - mean)
+        scaled = inverse @ (courses[:, k, None, None] * columns - expected)
+        yield white, scaled
         gain = covariance @ inverse.T
         mean = mean + gain @ white
         expected = expected + gain @ scaled
         covariance = covariance - gain @ gain.T
-    return whole, count, information, right
