@@ -74,11 +74,13 @@ class FrictionPulses:
     def velocity(self) -> np.ndarray:
         """Motor velocities (L, k, E, E) of all orders per N m at the line: v = Y (τ - F v)."""
         lines, orders, count, _ = self.mobility.shape
-        coupled = np.einsum("Lkij,klj->Lkilj", self.mobility, self.coefficients())
-        coupled = coupled.reshape(lines, orders * count, orders * count)
+        size = orders * count
+        coupled = self.mobility[:, :, :, None] * self.coefficients()[:, None]  # (L, k, i, l, j)
+        system = coupled.reshape(lines, size, size)
+        system[:, range(size), range(size)] += 1.0
         driven = np.zeros_like(self.mobility)
         driven[:, orders // 2] = self.mobility[:, orders // 2]
-        moved = np.linalg.solve(np.eye(orders * count) + coupled, driven.reshape(lines, -1, count))
+        moved = np.linalg.solve(system, driven.reshape(lines, -1, count))
         return moved.reshape(self.mobility.shape)
 
     @cached_property

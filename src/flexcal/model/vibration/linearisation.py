@@ -209,12 +209,12 @@ def _by_inertia(
     robot: RobotModel, arm: ElasticArm, at: np.ndarray, owner: str, key: str
 ) -> tuple[np.ndarray, np.ndarray]:
     """∂M and ∂K (d, d) with respect to a mass or centre of mass; both are at most quadratic in it, so central differences are exact."""
-    step = 0.05 * (robot.value(f"{owner}.mass") if key == "mass" else 1.0)
-    step = step if step > 0 else 1.0
-    shift = np.zeros(3) if key == "mass" else step * np.eye(3)["xyz".index(key[-1])]
     payload = robot.payload if owner == "payload" else None
     i = [joint.link for joint in robot.joints].index(owner) if payload is None else payload.joint
     link, carried, results = robot.inertias[i], None, []
+    step = 0.05 * ((link if payload is None else payload).mass if key == "mass" else 1.0)
+    step = step if step > 0 else 1.0
+    shift = np.zeros(3) if key == "mass" else step * np.eye(3)["xyz".index(key[-1])]
     for sign in (1, -1):
         changed = link
         if payload is not None:
