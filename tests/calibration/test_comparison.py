@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dh_arm import HOME, DHArm, postures, tracked, write_poses, write_robot
+from over_seeds import over_seeds
 from refusals import refused
 from scipy.stats import binom
 
@@ -137,19 +138,36 @@ def test_joint_ranges_that_do_not_overlap_are_refused(cell: Cell) -> None:
         compare_geometry(model, pair[0], other)
 
 
+def cell_of(seed: int, folder: Path) -> Cell:
+    """A cell in a folder of the seed."""
+    (folder := folder / str(seed)).mkdir()
+    return Cell(folder)
+
+
+def is_named(seed: int, folder: Path) -> bool:
+    """Whether a zero of the third joint that is 0.1 mrad off is found."""
+    found = cell_of(seed, folder).compared(seed, lambda arm: arm.turned(3, 1e-4))
+    return found.changed and found.explanations[0].subject == "joint_3.offset"
+
+
 @pytest.mark.slow
-def test_power(cell: Cell) -> None:
+def test_power(tmp_path: Path) -> None:
     """A zero that is 0.1 mrad off, five times the noise over the arm's reach, is found and named."""
-    named = 0
-    for seed in range(20):
-        found = cell.compared(300 + seed, lambda arm: arm.turned(3, 1e-4))
-        named += found.changed and found.explanations[0].subject == "joint_3.offset"
-    assert named >= 18
+    assert sum(over_seeds(is_named, range(300, 320), tmp_path)) >= 18
+
+
+def has_changed(seed: int, folder: Path, count: int, spread: float, sigma: float) -> bool:
+    """Whether the same robot, measured again, is said to have changed."""
+
+    def again(rng: np.random.Generator, n: int) -> np.ndarray:
+        return postures(rng, n, spread) if spread else narrow(rng, n)
+
+    return cell_of(seed, folder).compared(seed, same, again, sigma, count).changed
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ["same", "few", "noisy", "narrow"])
-def test_the_same_robot_has_not_changed(cell: Cell, case: str) -> None:
+def test_the_same_robot_has_not_changed(tmp_path: Path, case: str) -> None:
     """Forty robots measured twice, at other poses, with the tracker elsewhere; the second time few poses of small motions, or noise of
     0.1 mm.
     """
@@ -159,14 +177,5 @@ def test_the_same_robot_has_not_changed(cell: Cell, case: str) -> None:
         "noisy": (45, 1.0, 1e-4),
         "narrow": (20, 0.0, SIGMA),
     }[case]
-    changed = 0
-    for seed in range(40):
-        found = cell.compared(
-            100 + seed,
-            same,
-            lambda rng, n: postures(rng, n, spread) if spread else narrow(rng, n),
-            sigma,
-            count,
-        )
-        changed += found.changed
+    changed = sum(over_seeds(has_changed, range(100, 140), tmp_path, count, spread, sigma))
     assert changed <= binom.ppf(0.99, 40, 0.05) and changed <= 2

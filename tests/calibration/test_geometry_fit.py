@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from over_seeds import over_seeds
 from refusals import refused
 
 from flexcal.calibration.diagnostics import implausible_shifts
@@ -119,20 +120,28 @@ def test_without_sigma_the_scatter_stands_for_it(simulate: Callable, tx90l: Robo
         assert found.estimate.std(name) == pytest.approx(stated.estimate.std(name), rel=0.2), name
 
 
+def of_one_robot(seed: int, simulate: Callable, tx90l: RobotModel) -> tuple[list[bool], list[float], float]:
+    """Whether intervals hold the truth, squared errors over variances, and the reduced χ² against the true noise."""
+    simulated = simulate(seed, 50)
+    fit = fit_geometry(tx90l, simulated.poses)
+    expected = fit.estimate.regrouped(simulated.truth)
+    inside, squares = [], []
+    for name in fit.identifiability.kept_names:
+        low, high = fit.estimate.interval(name)  # type: ignore[misc]
+        inside.append(low <= expected[name] <= high)
+        squares.append(((fit.estimate.values[name] - expected[name]) / fit.estimate.std(name)) ** 2)
+    # against the true sigma: the estimated scatter, which is never negative, takes up a part of it by chance
+    squares_of_noise = float(np.sum((fit.residuals / simulated.poses.sigma) ** 2))
+    return inside, squares, squares_of_noise / fit.estimate.degrees_of_freedom
+
+
 def coverage(simulate: Callable, tx90l: RobotModel, seeds: range) -> tuple[float, float, float]:
-    inside, squares, chi2 = [], [], []
-    for seed in seeds:
-        simulated = simulate(seed, 50)
-        fit = fit_geometry(tx90l, simulated.poses)
-        expected = fit.estimate.regrouped(simulated.truth)
-        # against the true sigma: the estimated scatter, which is never negative, takes up a part of it by chance
-        squares_of_noise = float(np.sum((fit.residuals / simulated.poses.sigma) ** 2))
-        chi2.append(squares_of_noise / fit.estimate.degrees_of_freedom)
-        for name in fit.identifiability.kept_names:
-            low, high = fit.estimate.interval(name)  # type: ignore[misc]
-            inside.append(low <= expected[name] <= high)
-            squares.append(((fit.estimate.values[name] - expected[name]) / fit.estimate.std(name)) ** 2)
-    return float(np.mean(inside)), float(np.mean(squares)), float(np.mean(chi2))
+    inside, squares, chi2 = zip(*over_seeds(of_one_robot, seeds, simulate, tx90l), strict=True)
+    return (
+        float(np.mean(np.concatenate(inside))),
+        float(np.mean(np.concatenate(squares))),
+        float(np.mean(chi2)),
+    )
 
 
 def test_intervals_cover_the_regrouped_truth(simulate: Callable, tx90l: RobotModel) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from inclined_arm import AXES, NOISE, ORIGINS, ZEROS, elevation, measured, projection, robot, written
+from over_seeds import over_seeds
 from refusals import refused
 from scipy.spatial.transform import Rotation
 
@@ -126,24 +127,29 @@ def test_bad_input_is_told(tmp_path: Path) -> None:
         fitted(tmp_path, mirrored, "reads: projection")
 
 
-def inside_their_intervals(folder: Path, seeds: range) -> tuple[list[bool], list[bool]]:
+def inside_their_intervals(folder: Path, seeds: range) -> tuple[np.ndarray, np.ndarray]:
     """Whether zeros, and readings at fresh poses of the same robot, lie in their intervals of 95 %."""
-    zeros, readings = [], []
-    for seed in seeds:
-        fit = fitted(folder, measured(seed))
-        for k, name in enumerate(("point.level.zero_x", "point.level.zero_y")):
-            interval = fit.estimate.interval(name)
-            assert interval is not None
-            zeros.append(interval[0] <= ZEROS[k] <= interval[1])
-        fresh = measured(seed, noise=0.0, at=measured(seed + 10_000)[:40, :6])
-        poses = read_poses(written(folder, fresh), fit.model)
-        at, own = predict_measurements(fit.model, poses, jacobians=True), slice(len(poses), None)
-        names = [name for name in fit.estimate.parameters.names if not name.startswith("scatter.")]
-        kept = [fit.estimate.parameters.names.index(name) for name in names]
-        columns = at.jacobian(names)[own, :2].reshape(-1, len(names))
-        spread = np.einsum("ij,jk,ik->i", columns, fit.estimate.covariance[np.ix_(kept, kept)], columns)
-        readings += (np.abs(at.residual[own, :2].ravel()) < 1.96 * np.sqrt(spread)).tolist()
-    return zeros, readings
+    zeros, readings = zip(*over_seeds(inside_of_one_robot, seeds, folder), strict=True)
+    return np.concatenate(zeros), np.concatenate(readings)
+
+
+def inside_of_one_robot(seed: int, folder: Path) -> tuple[list[bool], list[bool]]:
+    """The same of one robot."""
+    (folder := folder / str(seed)).mkdir()
+    fit = fitted(folder, measured(seed))
+    zeros = []
+    for k, name in enumerate(("point.level.zero_x", "point.level.zero_y")):
+        interval = fit.estimate.interval(name)
+        assert interval is not None
+        zeros.append(interval[0] <= ZEROS[k] <= interval[1])
+    fresh = measured(seed, noise=0.0, at=measured(seed + 10_000)[:40, :6])
+    poses = read_poses(written(folder, fresh), fit.model)
+    at, own = predict_measurements(fit.model, poses, jacobians=True), slice(len(poses), None)
+    names = [name for name in fit.estimate.parameters.names if not name.startswith("scatter.")]
+    kept = [fit.estimate.parameters.names.index(name) for name in names]
+    columns = at.jacobian(names)[own, :2].reshape(-1, len(names))
+    spread = np.einsum("ij,jk,ik->i", columns, fit.estimate.covariance[np.ix_(kept, kept)], columns)
+    return zeros, (np.abs(at.residual[own, :2].ravel()) < 1.96 * np.sqrt(spread)).tolist()
 
 
 def test_intervals_of_a_few_robots_cover(tmp_path: Path) -> None:

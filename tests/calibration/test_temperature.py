@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dh_arm import DHArm, postures, tracked, write_robot
+from over_seeds import over_seeds
 from refusals import refused
 from thermal_arm import COLD, ThermalArm, cycling, sensed, warming, write_warm_poses
 
@@ -74,44 +75,44 @@ def test_a_uniform_arm_grows_about_its_base(tx90l: RobotModel) -> None:
     np.testing.assert_allclose(warm, cold * (1 + 12 * GROWTH), rtol=1e-12)
 
 
+def warmed(
+    seed: int,
+    folder: Path,
+    *,
+    count: int = 60,
+    growth: float = GROWTH,
+    rise: float = 12.0,
+    profile: Callable = cycling,
+    noise: float = 0.3,
+    lag: float = 0.0,
+    gradient: np.ndarray | None = None,
+    sigma: float = 2.5e-5,
+) -> tuple[RobotModel, PoseSet, PoseSet]:
+    """A file of poses of an arm that warms up, and the exact points of others, before the same tracker; both are below `folder`."""
+    rng = np.random.default_rng(seed)
+    arm = ThermalArm(
+        DHArm.made(seed), np.full(6, growth), gradient=np.ones(6) if gradient is None else gradient
+    )
+    robot = write_robot(folder)
+    robot.write_text(robot.read_text().replace("[kinematic]", "auto"))
+    model = RobotModel.from_yaml(robot, estimates=False)
+    time, q, others = np.linspace(0, 10800, count), postures(rng, count), postures(rng, 100)
+    temperature, other = profile(time, rise), COLD + rise * rng.uniform(size=100)
+    every = tracked(arm.points(np.concatenate([q, others]), np.concatenate([temperature, other])), rng, 0.0)
+    seen = every[:count] + sigma * rng.normal(size=(count, 3))
+    read = sensed(time, temperature, rng, noise=noise, lag=lag)
+    files = (
+        write_warm_poses(folder / "poses.csv", q, seen, sigma, read, time),
+        write_warm_poses(folder / "others.csv", others, every[count:], sigma, other),
+    )
+    poses, unseen = (read_poses(file, model) for file in files)
+    return model, poses, unseen
+
+
 @pytest.fixture
 def measured(tmp_path: Path) -> Callable:
-    """measured(seed, …): a file of poses of an arm that warms up, and the exact points of others, before the same tracker."""
-
-    def make(
-        seed: int,
-        *,
-        count: int = 60,
-        growth: float = GROWTH,
-        rise: float = 12.0,
-        profile: Callable = cycling,
-        noise: float = 0.3,
-        lag: float = 0.0,
-        gradient: np.ndarray | None = None,
-        sigma: float = 2.5e-5,
-    ) -> tuple[RobotModel, PoseSet, PoseSet]:
-        rng = np.random.default_rng(seed)
-        arm = ThermalArm(
-            DHArm.made(seed), np.full(6, growth), gradient=np.ones(6) if gradient is None else gradient
-        )
-        robot = write_robot(tmp_path)
-        robot.write_text(robot.read_text().replace("[kinematic]", "auto"))
-        model = RobotModel.from_yaml(robot, estimates=False)
-        time, q, others = np.linspace(0, 10800, count), postures(rng, count), postures(rng, 100)
-        temperature, other = profile(time, rise), COLD + rise * rng.uniform(size=100)
-        every = tracked(
-            arm.points(np.concatenate([q, others]), np.concatenate([temperature, other])), rng, 0.0
-        )
-        seen = every[:count] + sigma * rng.normal(size=(count, 3))
-        read = sensed(time, temperature, rng, noise=noise, lag=lag)
-        files = (
-            write_warm_poses(tmp_path / "poses.csv", q, seen, sigma, read, time),
-            write_warm_poses(tmp_path / "others.csv", others, every[count:], sigma, other),
-        )
-        poses, unseen = (read_poses(file, model) for file in files)
-        return model, poses, unseen
-
-    return make
+    """measured(seed, …): `warmed` in a folder of its own."""
+    return lambda seed, **options: warmed(seed, tmp_path, **options)
 
 
 def p90(model: RobotModel, unseen: PoseSet) -> float:
@@ -187,24 +188,30 @@ def test_the_scatter_of_a_sensor_is_told_where_temperature_is_smooth(measured: C
     assert sensor_scatter(replace(poses, temperature=poses.temperature[shuffled], time=None)) is None
 
 
-@pytest.mark.slow
-def test_intervals_of_the_coefficient_cover(measured: Callable) -> None:
-    inside = []
-    for seed in range(100, 180):
-        model, poses, _ = measured(seed)
-        low, high = expansion(calibrate(model, poses, terms=["kinematic", "thermal", "transmission"]))
-        inside.append(low < GROWTH < high)
-    assert 0.88 <= np.mean(inside) <= 0.99
+def coefficient_inside(seed: int, folder: Path) -> bool:
+    """Whether the interval of the coefficient of one arm holds the truth."""
+    (folder := folder / str(seed)).mkdir()
+    model, poses, _ = warmed(seed, folder)
+    low, high = expansion(calibrate(model, poses, terms=["kinematic", "thermal", "transmission"]))
+    return low < GROWTH < high
 
 
 @pytest.mark.slow
-def test_an_arm_without_expansion_hardly_ever_gets_a_term(measured: Callable) -> None:
+def test_intervals_of_the_coefficient_cover(tmp_path: Path) -> None:
+    assert 0.88 <= np.mean(over_seeds(coefficient_inside, range(100, 180), tmp_path)) <= 0.99
+
+
+def gets_a_thermal_term(seed: int, folder: Path) -> bool:
+    """Whether an arm without expansion is given a thermal term."""
+    (folder := folder / str(seed)).mkdir()
+    model, poses, _ = warmed(seed, folder, growth=0.0)
+    return any("thermal" in term for term in calibrate(model, poses).selected.terms)
+
+
+@pytest.mark.slow
+def test_an_arm_without_expansion_hardly_ever_gets_a_term(tmp_path: Path) -> None:
     """With a column that varies by 12 K and no effect."""
-    found = 0
-    for seed in range(300, 330):
-        model, poses, _ = measured(seed, growth=0.0)
-        found += any("thermal" in term for term in calibrate(model, poses).selected.terms)
-    assert found <= 3
+    assert sum(over_seeds(gets_a_thermal_term, range(300, 330), tmp_path)) <= 3
 
 
 def test_an_expansion_of_no_material_is_said(measured: Callable) -> None:

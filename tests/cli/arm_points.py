@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from cli_files import write_csv
+
+from flexcal.cli.main import main
 
 
 def write_points(path: Path, q: np.ndarray, xyz: np.ndarray) -> Path:
@@ -16,10 +21,13 @@ def write_points(path: Path, q: np.ndarray, xyz: np.ndarray) -> Path:
     return write_csv(path, ["pose", *joints, "x", "y", "z"], np.column_stack([1 + np.arange(len(q)), q, xyz]))
 
 
-def prediction_of(run, robot: Path, points: Path, checked: Path, *options: str) -> dict[str, Any]:
+def prediction_of(robot: Path, points: Path, checked: Path, *options: str) -> dict[str, Any]:
     """What `verify` says of the errors at the `checked` points beside those predicted by a calibration with the others."""
-    assert run("calibrate", robot, points, *options).status == 0
-    return run("verify", robot, checked, "--json").document["prediction"]
+    with redirect_stdout(StringIO()):
+        assert main(["calibrate", str(robot), str(points), *options]) == 0
+    with redirect_stdout(StringIO()) as said:
+        assert main(["verify", str(robot), str(checked), "--json"]) == 0
+    return json.loads(said.getvalue())["prediction"]
 
 
 def assert_intervals_cover(predictions: Sequence[dict[str, Any]]) -> None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from arm_points import assert_intervals_cover, prediction_of, write_points
 from delta import Delta, poses, write_robot
+from over_seeds import over_seeds
 from palletiser import turn
 from refusals import assert_refusal
 
@@ -78,18 +80,16 @@ def test_a_rod_that_is_too_short(run, tmp_path: Path) -> None:
     assert_refusal(outcome.err, "E-TABLE-041", "points.csv line", "motor_1 at", "mm apart")
 
 
+def predicted(seed: int, folder: Path) -> dict[str, Any]:
+    """What `verify` says of fresh points of one Delta."""
+    robot, true, rng = write_robot(folder / str(seed)), Delta.drawn(100 + seed), np.random.default_rng(seed)
+    q, fresh = poses(60, rng), poses(60, rng)
+    points = write_points(robot.parent / "points.csv", q, true.measured(q, rng))
+    checked = write_points(robot.parent / "checked.csv", fresh, true.measured(fresh, rng))
+    return prediction_of(robot, points, checked, "--terms", "kinematic")
+
+
 @pytest.mark.slow
-def test_intervals_cover(run, tmp_path: Path) -> None:
+def test_intervals_cover(tmp_path: Path) -> None:
     """Fresh points of 20 Deltas."""
-    predictions = []
-    for seed in range(20):
-        robot, true, rng = (
-            write_robot(tmp_path / str(seed)),
-            Delta.drawn(100 + seed),
-            np.random.default_rng(seed),
-        )
-        q, fresh = poses(60, rng), poses(60, rng)
-        points = write_points(robot.parent / "points.csv", q, true.measured(q, rng))
-        checked = write_points(robot.parent / "checked.csv", fresh, true.measured(fresh, rng))
-        predictions.append(prediction_of(run, robot, points, checked, "--terms", "kinematic"))
-    assert_intervals_cover(predictions)
+    assert_intervals_cover(over_seeds(predicted, range(20), tmp_path))

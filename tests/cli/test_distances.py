@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from over_seeds import over_seeds
 from refusals import assert_refusal
 from stranger_arm import SIX, StrangerArm
 
@@ -337,27 +338,29 @@ def without_wire(text: str) -> str:
     return "\n".join(",".join([*(c := line.split(","))[:6], c[7]]) for line in text.splitlines()) + "\n"
 
 
+def distance_errors(seed: int, folder: Path, kind: str) -> tuple[np.ndarray, float]:
+    """Errors (40,) of distances between positions of one arm's tool over their standard deviations, and the reduced χ² of the fit."""
+    arm, robot, file = measured(folder / str(seed), kind, seed, SIGMA)
+    model = RobotModel.from_yaml(robot)
+    result = calibrate(model, read_poses(file, model), terms=["kinematic"])
+    q = arm.postures(80, np.random.default_rng(7))
+
+    def apart(at: np.ndarray) -> np.ndarray:
+        between = np.linalg.norm(at[:40] - at[40:], axis=1)
+        return between if kind.startswith("wire") else between / between.mean()
+
+    def predicted(robot: RobotModel) -> np.ndarray:
+        return apart(point_kinematics(robot, q, point="smr", jacobians=False).position)
+
+    std = np.linalg.norm(propagated_covariance_root(result.model, predicted), axis=1)
+    return (predicted(result.model) - apart(points(arm, q))) / std, result.estimate.reduced_chi2
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["wire", "wires", "dial", "plane", "line", "sphere"])
 def test_intervals_of_distances_cover(tmp_path: Path, kind: str) -> None:
     """Distances between positions of the tool, relative to their mean where the readings tell no size, on 20 arms."""
-    scores, chi = [], []
-    for seed in range(60, 80):
-        arm, robot, file = measured(tmp_path / str(seed), kind, seed, SIGMA)
-        model = RobotModel.from_yaml(robot)
-        result = calibrate(model, read_poses(file, model), terms=["kinematic"])
-        q = arm.postures(80, np.random.default_rng(7))
-
-        def apart(at: np.ndarray) -> np.ndarray:
-            between = np.linalg.norm(at[:40] - at[40:], axis=1)
-            return between if kind.startswith("wire") else between / between.mean()
-
-        def predicted(robot: RobotModel, q=q) -> np.ndarray:
-            return apart(point_kinematics(robot, q, point="smr", jacobians=False).position)
-
-        std = np.linalg.norm(propagated_covariance_root(result.model, predicted), axis=1)
-        scores.append((predicted(result.model) - apart(points(arm, q))) / std)
-        chi.append(result.estimate.reduced_chi2)
+    scores, chi = zip(*over_seeds(distance_errors, range(60, 80), tmp_path, kind), strict=True)
     assert np.mean(np.abs(scores) < 1.96) > 0.92
     assert 0.75 < np.sqrt(np.mean(np.square(scores))) < 1.2
     assert 0.88 < np.mean(chi) < 1.05

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from over_seeds import over_seeds
 from scipy.optimize import least_squares
 from stranger_arm import PANDA, SIX, StrangerArm
 
@@ -51,9 +52,9 @@ class Measured:
         return self.poses(q, self.arm.measured(q, self.rng, 0.0), None)
 
 
-def wrong_sigmas(folder: Path, seed: int) -> tuple[list[float], float, int]:
+def wrong_sigmas(seed: int, folder: Path) -> tuple[list[float], float, int]:
     """Fresh errors with a wrong sigma over those without one, mean square of the standardised ones, and outliers."""
-    case = Measured.drawn(folder, seed)
+    case = Measured.drawn(folder / str(seed), seed)
     q = case.arm.postures(40, case.rng)
     xyz = case.arm.measured(q, case.rng, np.hypot(case.rng.uniform(3e-5, 1e-4), TRACKER))
     fresh, without = case.fresh(), case.calibrated(q, xyz, None)
@@ -71,13 +72,13 @@ def wrong_sigmas(folder: Path, seed: int) -> tuple[list[float], float, int]:
 def test_a_wrong_sigma_costs_nothing(tmp_path: Path) -> None:
     """From a hundredth to a thousand times the tracker's own, beside 0.03 to 0.1 mm of repeatability."""
     for seed in (61, 62):
-        ratios, _, outliers = wrong_sigmas(tmp_path, seed)
+        ratios, _, outliers = wrong_sigmas(seed, tmp_path)
         assert np.abs(np.array(ratios) - 1).max() < 0.02 and outliers == 0
 
 
 @pytest.mark.slow
 def test_intervals_hold_whatever_the_stated_sigma(tmp_path: Path) -> None:
-    found = [wrong_sigmas(tmp_path, seed) for seed in range(100, 140)]
+    found = over_seeds(wrong_sigmas, range(100, 140), tmp_path)
     assert np.abs(np.array([ratios for ratios, _, _ in found]) - 1).max() < 0.02
     assert 0.8 < np.mean([square for _, square, _ in found]) < 1.25
     assert sum(outliers for *_, outliers in found) <= 2
@@ -272,9 +273,9 @@ def spoiled(
     return q, xyz
 
 
-def alarms(folder: Path, seed: int) -> tuple[bool, bool]:
+def alarms(seed: int, folder: Path) -> tuple[bool, bool]:
     """Whether right data are said to be wrong, and wrong ones are."""
-    case = Measured.drawn(folder, seed, SIX if seed % 2 else PANDA)
+    case = Measured.drawn(folder / str(seed), seed, SIX if seed % 2 else PANDA)
     q = case.arm.postures(40 + seed % 40, case.rng)
     xyz = case.arm.measured(q, case.rng, case.rng.uniform(5e-5, 2e-4))
     sigma = (None, 5e-6, 2e-5)[seed % 3]
@@ -283,12 +284,12 @@ def alarms(folder: Path, seed: int) -> tuple[bool, bool]:
 
 
 def test_wrong_data_are_told_from_noise(tmp_path: Path) -> None:
-    assert [alarms(tmp_path, seed) for seed in range(7)] == [(False, True)] * 7
+    assert [alarms(seed, tmp_path) for seed in range(7)] == [(False, True)] * 7
 
 
 @pytest.mark.slow
 def test_wrong_data_are_told_from_noise_in_a_hundred_robots(tmp_path: Path) -> None:
-    assert [alarms(tmp_path, seed) for seed in range(1000, 1100)] == [(False, True)] * 100
+    assert over_seeds(alarms, range(1000, 1100), tmp_path) == [(False, True)] * 100
 
 
 def test_a_cause_that_is_known_stands_in_place_of_where_to_look(tmp_path: Path) -> None:

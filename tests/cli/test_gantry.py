@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from arm_points import assert_intervals_cover, prediction_of, write_points
 from gantry import Gantry, poses, write_robot
+from over_seeds import over_seeds
 
 from flexcal import RobotModel, read_poses, tool_at_rest
 from flexcal.calibration.measurement import predict_measurements
@@ -53,18 +55,16 @@ def test_leads_are_found(run, tmp_path: Path) -> None:
     assert exported.status == 0 and "transmission error" in exported.out
 
 
+def predicted(seed: int, folder: Path) -> dict[str, Any]:
+    """What `verify` says of fresh points of one gantry."""
+    robot, true, rng = write_robot(folder / str(seed)), Gantry.drawn(100 + seed), np.random.default_rng(seed)
+    q, fresh = poses(60, rng), poses(60, rng)
+    points = write_points(robot.parent / "p.csv", q, true.measured(q, rng))
+    checked = write_points(robot.parent / "fresh.csv", fresh, true.measured(fresh, rng))
+    return prediction_of(robot, points, checked)
+
+
 @pytest.mark.slow
-def test_intervals_cover(run, tmp_path: Path) -> None:
+def test_intervals_cover(tmp_path: Path) -> None:
     """Fresh points of 20 gantries, by default options."""
-    predictions = []
-    for seed in range(20):
-        robot, true, rng = (
-            write_robot(tmp_path / str(seed)),
-            Gantry.drawn(100 + seed),
-            np.random.default_rng(seed),
-        )
-        q, fresh = poses(60, rng), poses(60, rng)
-        points = write_points(robot.parent / "p.csv", q, true.measured(q, rng))
-        checked = write_points(robot.parent / "fresh.csv", fresh, true.measured(fresh, rng))
-        predictions.append(prediction_of(run, robot, points, checked))
-    assert_intervals_cover(predictions)
+    assert_intervals_cover(over_seeds(predicted, range(20), tmp_path))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from over_seeds import over_seeds
 from refusals import assert_refusal, refused
 from stranger_arm import SIX, StrangerArm, rigid, rodrigues, turn
 from test_distances import points, reached
@@ -281,19 +282,21 @@ def test_bad_touches_of_faces_and_axes(tmp_path: Path) -> None:
     fails("E-TOOL-012", [row[:-2] for row in rows], "face", head=header[: -len(",face")])
 
 
+def frame_inside(seed: int, folder: Path, places: list, columns: str) -> np.ndarray:
+    """Whether the six numbers of a frame lie in their intervals, of one uncalibrated arm."""
+    arm = StrangerArm(seed, axes=tuple(SIX), size=1.5, point_error=(0, 0, 0))
+    model = RobotModel.from_yaml(arm.write(folder / str(seed)))
+    file = touched(
+        arm, folder / f"{seed}.csv", places, np.random.default_rng(seed), noise=5e-5, columns=columns
+    )
+    found = identify_work_object(model, read_frame_touches(file, model))
+    origin, angle = off(arm, found)
+    return np.array([np.abs(origin) <= found.half_width, np.abs(angle) <= found.angular_half_width])
+
+
 def coverage(folder: Path, seeds: range, places: list, columns: str) -> float:
     """Share of the six numbers of a frame within their intervals, of uncalibrated arms."""
-    inside = []
-    for seed in seeds:
-        arm = StrangerArm(seed, axes=tuple(SIX), size=1.5, point_error=(0, 0, 0))
-        model = RobotModel.from_yaml(arm.write(folder / str(seed)))
-        file = touched(
-            arm, folder / f"{seed}.csv", places, np.random.default_rng(seed), noise=5e-5, columns=columns
-        )
-        found = identify_work_object(model, read_frame_touches(file, model))
-        origin, angle = off(arm, found)
-        inside += [np.abs(origin) <= found.half_width, np.abs(angle) <= found.angular_half_width]
-    return float(np.mean(inside))
+    return float(np.mean(over_seeds(frame_inside, seeds, folder, places, columns)))
 
 
 def test_intervals_cover_a_few_arms(tmp_path: Path) -> None:
@@ -315,27 +318,30 @@ def test_intervals_of_frames_cover(tmp_path: Path, places: list, columns: str) -
     assert coverage(tmp_path, range(300, 340), places, columns) > 0.9
 
 
+def frame_of_calibrated_inside(seed: int, folder: Path) -> np.ndarray:
+    """The same of an arm that is calibrated with a tracker."""
+    arm, rng = StrangerArm(seed, axes=tuple(SIX), point_error=(0, 0, 0)), np.random.default_rng(seed)
+    folder = folder / str(seed)
+    model = RobotModel.from_yaml(arm.write(folder))
+    q = arm.postures(60, rng)
+    poses = read_poses(arm.write_poses(folder / "points.csv", q, arm.measured(q, rng)), model)
+    model = calibrate(model, poses, terms=["kinematic"]).model
+    file = touched(arm, folder / "touches.csv", named(), rng, noise=5e-5)
+    found = identify_work_object(model, read_frame_touches(file, model))
+    q = arm.postures(300, rng)
+    turned, moved = rigid_motion(
+        points(arm, q), point_kinematics(model, q, point="smr", jacobians=False).position
+    )
+    between = (turned @ PLACE[:3, :3]).T @ found.rotation
+    angle = np.array([between[2, 1], between[0, 2], between[1, 0]])
+    inside = [
+        np.abs(found.origin - turned @ PLACE[:3, 3] - moved) <= found.half_width,
+        np.abs(angle) <= found.angular_half_width,
+    ]
+    return np.array(inside)
+
+
 @pytest.mark.slow
 def test_intervals_of_frames_on_calibrated_arms_cover(tmp_path: Path) -> None:
     """Of 20 arms, each calibrated with a tracker, in the base frame that the calibration gives."""
-    inside = []
-    for seed in range(400, 420):
-        arm, rng = StrangerArm(seed, axes=tuple(SIX), point_error=(0, 0, 0)), np.random.default_rng(seed)
-        folder = tmp_path / str(seed)
-        model = RobotModel.from_yaml(arm.write(folder))
-        q = arm.postures(60, rng)
-        poses = read_poses(arm.write_poses(folder / "points.csv", q, arm.measured(q, rng)), model)
-        model = calibrate(model, poses, terms=["kinematic"]).model
-        file = touched(arm, folder / "touches.csv", named(), rng, noise=5e-5)
-        found = identify_work_object(model, read_frame_touches(file, model))
-        q = arm.postures(300, rng)
-        turned, moved = rigid_motion(
-            points(arm, q), point_kinematics(model, q, point="smr", jacobians=False).position
-        )
-        between = (turned @ PLACE[:3, :3]).T @ found.rotation
-        angle = np.array([between[2, 1], between[0, 2], between[1, 0]])
-        inside += [
-            np.abs(found.origin - turned @ PLACE[:3, 3] - moved) <= found.half_width,
-            np.abs(angle) <= found.angular_half_width,
-        ]
-    assert np.mean(inside) > 0.88
+    assert np.mean(over_seeds(frame_of_calibrated_inside, range(400, 420), tmp_path)) > 0.88

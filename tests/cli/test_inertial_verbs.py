@@ -71,7 +71,8 @@ def test_what_is_said_leads_on(
 ) -> None:
     """The command line after a plan that is not beside its robot finds the robot; so do later verbs estimates that are elsewhere."""
     robot, plan = recorded / "robot.yaml", tmp_path / "plan.yaml"
-    assert main(["design", "trajectory", str(robot), "--count", "1", "--out", str(plan)]) == 0
+    quick = ("--count", "1", "--searches", "1")
+    assert main(["design", "trajectory", str(robot), *quick, "--out", str(plan)]) == 0
     following = capsys.readouterr().out.splitlines()[-1]
     words = following.partition("next: flexcal ")[2].partition(", or ")[0].split()
     words[words.index("exciting")] = str(tmp_path / "exciting")
@@ -136,7 +137,8 @@ def test_the_robot_has_it_and_running_again_changes_nothing(
 
 def test_every_verb_says_what_follows(run, recorded: Path, tmp_path: Path) -> None:
     plan = tmp_path / "trajectory.yaml"
-    design = run("design", "trajectory", recorded / "robot.yaml", "--count", 1, "--out", plan, "--json")
+    quick = ("--count", 1, "--searches", 1, "--criterion", "posterior")
+    design = run("design", "trajectory", recorded / "robot.yaml", *quick, "--out", plan, "--json")
     assert design.document["seconds_on_the_robot"] == pytest.approx(15.0)
     assert design.document["payload"] == 0.0
     assert f"flexcal measure {plan}" in design.err
@@ -232,7 +234,8 @@ def test_a_robot_without_controller_gets_a_plan_that_the_virtual_cell_refuses(
     text = robot.read_text().splitlines(keepends=True)
     robot.write_text("".join(line for line in text if not line.startswith("controller:")))
     plan = robot.parent / "plan.yaml"
-    assert run("design", "trajectory", robot, "--count", 1, "--out", plan).status == 0
+    quick = ("--count", 1, "--searches", 1, "--criterion", "posterior")
+    assert run("design", "trajectory", robot, *quick, "--out", plan).status == 0
     assert read_plan_of(plan, TrajectoryPlan).rate_hz == 1000.0
     measure = ("measure", plan, "--cell", "virtual", "--out", tmp_path / "measured")
     assert_refusal(refused_run(run, tmp_path, *measure), "E-CELL-029")

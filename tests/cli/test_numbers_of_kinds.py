@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from over_seeds import over_seeds
 from stranger_readings import Asked, ReadArm, readings, right
 
 from flexcal import PoseSet, RobotModel, calibrate, read_poses
@@ -67,15 +68,17 @@ def errors(
     return predicted(model) - distances(arm.points(q), sized=sized), std
 
 
-def covered(folder: Path, asked: Sequence[Asked], seed: int) -> tuple[float, float]:
+def covered(seed: int, folder: Path, asked: Sequence[Asked]) -> tuple[float, float]:
     """Shares of parameters and of predictions at fresh poses within 95 % intervals.
 
     True parameters are those of readings without noise, regrouped; those of the base, which follow from how the first station is
     registered, do not count.
     """
     arm = ReadArm.drawn(seed)
-    fit = fitted(folder / "noisy", arm, asked, seed)
-    exact = fitted(folder / "exact", arm, [Asked(a.kind, a.count, 0.0, a.stated) for a in asked], seed)
+    fit = fitted(folder / f"{seed}_noisy", arm, asked, seed)
+    exact = fitted(
+        folder / f"{seed}_exact", arm, [Asked(a.kind, a.count, 0.0, a.stated) for a in asked], seed
+    )
     truth = fit.estimate.regrouped(exact.estimate.values)
     of_arm = [
         p.name for p in fit.estimate.parameters if p.name.startswith(("a2", "a3", "a4", "a5", "a6", "tool"))
@@ -86,15 +89,15 @@ def covered(folder: Path, asked: Sequence[Asked], seed: int) -> tuple[float, flo
     return float(np.mean(inside)), float(np.mean(np.abs(away) < 1.96 * std))
 
 
-def noises(folder: Path, asked: Sequence[Asked], seed: int) -> dict[str, tuple[float, float, bool]]:
+def noises(seed: int, folder: Path, asked: Sequence[Asked]) -> dict[str, tuple[float, float, bool]]:
     """χ², degrees of freedom, and whether the stated noise is contradicted, of all together and of every instrument."""
-    tests = stated_noise(fitted(folder, ReadArm.drawn(seed), asked, seed))
+    tests = stated_noise(fitted(folder / str(seed), ReadArm.drawn(seed), asked, seed))
     return {test.name: (test.chi2, test.freedom, test.contradicted) for test in tests}
 
 
 def test_chi_square_is_one_where_the_noise_is_right(tmp_path: Path) -> None:
     """On few poses too: nothing that the fit estimates of the scatter is in it."""
-    found = np.array([noises(tmp_path, [right("points", 20)], seed)[""][:2] for seed in range(800, 812)])
+    found = np.array([noises(seed, tmp_path, [right("points", 20)])[""][:2] for seed in range(800, 812)])
     mean = np.sum(found[:, 0] * found[:, 1]) / np.sum(found[:, 1])
     assert mean == pytest.approx(1, abs=3 * np.sqrt(2 / np.sum(found[:, 1])))
 
@@ -104,7 +107,7 @@ def test_chi_square_is_one_where_the_noise_is_right(tmp_path: Path) -> None:
 def test_the_instrument_whose_sigma_is_wrong_is_named(tmp_path: Path, factor: float, wrong: str) -> None:
     stated = {"points": 5e-5, "east": 5e-5} | {wrong: 5e-5 * factor}
     asked = [Asked("points", 40, 5e-5, stated["points"]), Asked("wire", 110, 5e-5, stated["east"])]
-    found = noises(tmp_path, asked, 821)
+    found = noises(821, tmp_path, asked)
     assert {name for name, (*_, contradicted) in found.items() if name and contradicted} == {wrong}
     assert found[wrong][0] == pytest.approx(1 / factor**2, rel=0.45)
 
@@ -124,10 +127,10 @@ def test_a_wrong_sigma_is_said(tmp_path: Path) -> None:
     assert by_kind["lengths"]["mean_mm"] == pytest.approx(5e-2 * np.sqrt(2 / np.pi), rel=0.3)
 
 
-def alone_and_together(folder: Path, asked: Sequence[Asked], seed: int) -> np.ndarray:
+def alone_and_together(seed: int, folder: Path, asked: Sequence[Asked]) -> np.ndarray:
     """Root mean square errors of the arm from each kind alone, and from all of them."""
     arm = ReadArm.drawn(seed)
-    model, poses = readings(folder, arm, asked, seed)
+    model, poses = readings(folder / str(seed), arm, asked, seed)
     sets = [*(poses.subset(own) for own in _rows(poses, asked)), poses]
     models = [fit_geometry(model, one, terms=("kinematic",)).model for one in sets]
     return np.array([np.sqrt(np.mean(errors(arm, one, seed)[0] ** 2)) for one in models])
@@ -161,10 +164,10 @@ def true_weights(asked: Sequence[Asked]) -> ErrorComponents:
     return ErrorComponents(share=0.0, **own)
 
 
-def with_true_weights(folder: Path, asked: Sequence[Asked], seed: int) -> float:
+def with_true_weights(seed: int, folder: Path, asked: Sequence[Asked]) -> float:
     """Root mean square error of the arm from all readings, each with the weight of the noise that it was drawn with."""
     arm = ReadArm.drawn(seed)
-    model, poses = readings(folder, arm, asked, seed)
+    model, poses = readings(folder / str(seed), arm, asked, seed)
     fit = PointFit.of(
         model, poses, ("kinematic",), NOTHING_ELASTIC, False, marginalised=False, near={}, progress=silent
     )
@@ -177,7 +180,7 @@ def with_true_weights(folder: Path, asked: Sequence[Asked], seed: int) -> float:
 @pytest.mark.parametrize("case", list(MIXTURES)[1:4])
 def test_more_instruments_do_no_harm(tmp_path: Path, case: str) -> None:
     """Each kind has the weight of its own scatter, whatever is stated of it."""
-    first, second, both = alone_and_together(tmp_path, MIXTURES[case], 831)
+    first, second, both = alone_and_together(831, tmp_path, MIXTURES[case])
     assert both < 1.05 * min(first, second)
 
 
@@ -212,8 +215,8 @@ def test_more_instruments_do_no_harm_on_twenty_arms(tmp_path: Path, case: str) -
     happen to be far smaller than their standard deviation.
     """
     seeds = range(840, 860)
-    found = np.array([alone_and_together(tmp_path / str(s), MIXTURES[case], s) for s in seeds])
-    best = np.array([with_true_weights(tmp_path / str(s), MIXTURES[case], s) for s in seeds])
+    found = np.array(over_seeds(alone_and_together, seeds, tmp_path, MIXTURES[case]))
+    best = np.array(over_seeds(with_true_weights, seeds, tmp_path, MIXTURES[case]))
     better = int(np.argmin(np.log(found[:, :2]).mean(axis=0)))
     ratio = np.log(found[:, 2] / found[:, better])
     assert ratio.mean() < 2 * ratio.std(ddof=1) / np.sqrt(len(ratio))
@@ -226,7 +229,7 @@ def test_more_instruments_do_no_harm_on_twenty_arms(tmp_path: Path, case: str) -
 @pytest.mark.parametrize("kind", list(KINDS))
 def test_intervals_cover(tmp_path: Path, kind: str) -> None:
     """Parameters and predictions of 40 arms that nothing was tuned on; the mean of 40 shares is known to one or two percent."""
-    found = [covered(tmp_path / str(seed), KINDS[kind], seed) for seed in range(860, 900)]
+    found = over_seeds(covered, range(860, 900), tmp_path, KINDS[kind])
     parameters, predictions = np.mean(found, axis=0)
     error = np.std(found, axis=0, ddof=1) / np.sqrt(len(found))
     assert 0.93 - 2 * error[0] < parameters < 0.97 + 2 * error[0]
@@ -237,7 +240,7 @@ def test_intervals_cover(tmp_path: Path, kind: str) -> None:
 @pytest.mark.parametrize("kind", [name for name, asked in KINDS.items() if any(a.stated for a in asked)])
 def test_chi_square_of_every_kind_is_one(tmp_path: Path, kind: str) -> None:
     """Pooled over 40 arms, within three standard deviations of its distribution, which are 5 % or less; false alarms are rare."""
-    found = [noises(tmp_path, KINDS[kind], seed) for seed in range(900, 940)]
+    found = over_seeds(noises, range(900, 940), tmp_path, KINDS[kind])
     chi, freedom = (np.array([one[""][k] for one in found]) for k in (0, 1))
     mean = np.sum(chi * freedom) / np.sum(freedom)
     assert mean == pytest.approx(1, abs=max(0.05, 3 * np.sqrt(2 / np.sum(freedom))))

@@ -5,11 +5,13 @@ from __future__ import annotations
 import csv
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
 from arm_points import assert_intervals_cover, prediction_of, write_points
+from over_seeds import over_seeds
 from palletiser import DRIVES, Palletiser, poses, turn, write_robot
 from refusals import assert_refusal
 
@@ -212,15 +214,17 @@ def test_relations_that_cannot_be(run, tmp_path: Path, right: str, wrong: str, r
     assert_refusal(outcome.err, *refusal)
 
 
+def predicted(seed: int, folder: Path) -> dict[str, Any]:
+    """What `verify` says of fresh points of one palletiser."""
+    robot, true = write_robot(folder / str(seed), mimic=seed % 2 == 0), Palletiser.drawn(100 + seed)
+    rng = np.random.default_rng(seed)
+    q, fresh = poses(70, rng), poses(60, rng)
+    points = write_points(robot.parent / "points.csv", q, true.measured(q, rng))
+    checked = write_points(robot.parent / "checked.csv", fresh, true.measured(fresh, rng))
+    return prediction_of(robot, points, checked, *KINEMATIC)
+
+
 @pytest.mark.slow
-def test_intervals_cover(run, tmp_path: Path) -> None:
+def test_intervals_cover(tmp_path: Path) -> None:
     """95 % intervals of fresh points, of 20 palletisers whose springs are known to 30 % only."""
-    predictions = []
-    for seed in range(20):
-        robot, true = write_robot(tmp_path / str(seed), mimic=seed % 2 == 0), Palletiser.drawn(100 + seed)
-        rng = np.random.default_rng(seed)
-        q, fresh = poses(70, rng), poses(60, rng)
-        points = write_points(robot.parent / "points.csv", q, true.measured(q, rng))
-        checked = write_points(robot.parent / "checked.csv", fresh, true.measured(fresh, rng))
-        predictions.append(prediction_of(run, robot, points, checked, *KINEMATIC))
-    assert_intervals_cover(predictions)
+    assert_intervals_cover(over_seeds(predicted, range(20), tmp_path))

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from over_seeds import over_seeds
 from stranger_arm import SIX, StrangerArm, rigid, rodrigues
 
 from flexcal import RobotModel, calibrate, read_poses
@@ -116,16 +117,20 @@ def test_derivatives_under_a_force(tmp_path: Path) -> None:
         assert np.abs(slope - columns[:, :, k]).max() < 0.02 * scale, name
 
 
+def drives_inside(seed: int, folder: Path) -> list[bool]:
+    """Whether the stiffnesses of one arm's drives lie in their intervals."""
+    arm, robot, file = recorded(folder / str(seed), seed, 1e-5)
+    model = RobotModel.from_yaml(robot)
+    found = calibrate(model, read_poses(file, model), terms=["kinematic"]).estimate
+    inside = []
+    for i, true in enumerate(arm.stiffness):
+        interval = found.interval(f"a{i + 1}.drive.stiffness")
+        assert interval is not None
+        inside.append(interval[0] < true < interval[1])
+    return inside
+
+
 @pytest.mark.slow
 def test_intervals_of_pulled_drives_cover(tmp_path: Path) -> None:
     """Of 15 arms."""
-    inside = []
-    for seed in range(30, 45):
-        arm, robot, file = recorded(tmp_path / str(seed), seed, 1e-5)
-        model = RobotModel.from_yaml(robot)
-        found = calibrate(model, read_poses(file, model), terms=["kinematic"]).estimate
-        for i, true in enumerate(arm.stiffness):
-            interval = found.interval(f"a{i + 1}.drive.stiffness")
-            assert interval is not None
-            inside.append(interval[0] < true < interval[1])
-    assert np.mean(inside) > 0.9
+    assert np.mean(over_seeds(drives_inside, range(30, 45), tmp_path)) > 0.9

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from arm_points import assert_intervals_cover, prediction_of, write_points
+from over_seeds import over_seeds
 from scara import LEAD, Scara, poses, write_robot
 
 from flexcal import RobotModel, tool_at_rest
@@ -71,17 +73,15 @@ def test_a_coupling_that_is_not_as_declared(run, tmp_path: Path, forgotten: bool
     assert "Trusted: no" not in run("calibrate", robot, points, "--terms", "kinematic").out
 
 
+def predicted(seed: int, folder: Path) -> dict[str, Any]:
+    """What `verify` says of fresh points of one SCARA."""
+    robot, true, rng = write_robot(folder / str(seed)), Scara.drawn(100 + seed), np.random.default_rng(seed)
+    points = measured_points(robot.parent / "points.csv", true, 60, rng)
+    fresh = measured_points(robot.parent / "fresh.csv", true, 60, rng)
+    return prediction_of(robot, points, fresh)
+
+
 @pytest.mark.slow
-def test_intervals_cover(run, tmp_path: Path) -> None:
+def test_intervals_cover(tmp_path: Path) -> None:
     """Fresh points of 20 SCARAs, by default options."""
-    predictions = []
-    for seed in range(20):
-        robot, true, rng = (
-            write_robot(tmp_path / str(seed)),
-            Scara.drawn(100 + seed),
-            np.random.default_rng(seed),
-        )
-        points = measured_points(robot.parent / "points.csv", true, 60, rng)
-        fresh = measured_points(robot.parent / "fresh.csv", true, 60, rng)
-        predictions.append(prediction_of(run, robot, points, fresh))
-    assert_intervals_cover(predictions)
+    assert_intervals_cover(over_seeds(predicted, range(20), tmp_path))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from over_seeds import over_seeds
 from stranger_arm import SIX, StrangerArm
 
 from flexcal.calibration.fit import GeometricFit, fit_geometry
@@ -93,13 +94,16 @@ def test_fewer_than_twenty_poses_do_not_tell(tmp_path: Path) -> None:
     assert few.terms == ("kinematic", "backlash") and few.scatter.transmission == 0
 
 
+def without_waves(seed: int, folder: Path, count: int) -> np.ndarray:
+    """Errors at fresh poses of an arm whose gears have no waves."""
+    arm = WavyArm(folder / str(seed), seed, 0.0)
+    return at_fresh_poses(arm, arm.with_and_without(count))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [40, 100])
 def test_gears_without_waves_cost_hardly_anything(tmp_path: Path, count: int) -> None:
-    found = []
-    for seed in range(40):
-        arm = WavyArm(tmp_path, 600 + seed, 0.0)
-        found.append(at_fresh_poses(arm, arm.with_and_without(count)))
+    found = over_seeds(without_waves, range(600, 640), tmp_path, count)
     (with_, inside, _), (without, *_) = np.mean(found, axis=0)
     assert with_ < 1.02 * without
     assert 0.93 < inside < 0.97

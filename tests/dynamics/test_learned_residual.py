@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from over_seeds import over_seeds
 from recovery import driven, recorded
 from refusals import refused
 from scipy.signal import lfilter
@@ -166,10 +167,15 @@ def test_intervals_hold_what_is_measured_next(arm: Observation, some: list[Learn
     assert 0.7 < np.sqrt(np.mean(scaled**2)) < 1.2
 
 
+def covered_in_recording(seed: int, arm: Observation, memory: float) -> np.ndarray:
+    """The same of a recording with noise from a seed."""
+    return covered(arm, Learned.of(arm, seed, memory))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("memory", [0.0, 1.0])
 def test_intervals_hold_what_is_measured_next_over_many_recordings(arm: Observation, memory: float) -> None:
-    scaled = np.concatenate([covered(arm, Learned.of(arm, seed, memory)) for seed in range(20, 30)])
+    scaled = np.concatenate(over_seeds(covered_in_recording, range(20, 30), arm, memory))
     assert 0.93 < np.mean(np.abs(scaled) < 1.96) < 0.98
     assert 0.8 < np.sqrt(np.mean(scaled**2)) < 1.15
 
@@ -185,17 +191,19 @@ def test_where_there_is_nothing_to_learn_it_learns_nothing(arm: Observation) -> 
     np.testing.assert_allclose(std, np.broadcast_to(blocks.physical**2 @ found.shares**2, std.shape) ** 0.5)
 
 
+def of_noise(seed: int, arm: Observation) -> tuple[int, np.ndarray]:
+    """Number of motors of which noise is learned, and the errors that are left beside those before (2,)."""
+    train, after = parts(noisy(swings(arm, seed, SAMPLES), np.random.default_rng(seed), 1.0))
+    found, _, estimate = learned(arm, train)
+    before, left, _ = errors(found, estimate, arm, after)
+    return len(found.learned), size(left) / size(before)
+
+
 @pytest.mark.slow
 def test_learning_noise_is_rare_and_harms_little(arm: Observation) -> None:
     """Ten recordings, two motors each."""
-    taken, ratios = 0, []
-    for seed in range(10):
-        train, after = parts(noisy(swings(arm, seed, SAMPLES), np.random.default_rng(seed), 1.0))
-        found, _, estimate = learned(arm, train)
-        before, left, _ = errors(found, estimate, arm, after)
-        taken += len(found.learned)
-        ratios.append(size(left) / size(before))
-    assert taken <= 5
+    taken, ratios = zip(*over_seeds(of_noise, range(10), arm), strict=True)
+    assert sum(taken) <= 5
     assert np.mean(ratios) < 1.02 and np.max(ratios) < 1.15
 
 

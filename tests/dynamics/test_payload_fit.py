@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import recovery
+from over_seeds import over_seeds
 from refusals import refused
 from two_links import GAINS, HELD, two_links
 from two_links import swings as swing_of
@@ -190,23 +191,27 @@ def scores(folder: Path, seeds: range) -> np.ndarray:
     truth = dict(
         zip(("mass", "com_x", "com_z"), (HELD[0], HELD[1] / HELD[0], HELD[3] / HELD[0]), strict=True)
     )
-    result = []
-    for seed in seeds:
-        rng = np.random.default_rng(seed)
-        noisy = []
-        for m in clean:
-            noise = rng.normal(size=m.torque.shape)
-            for k in range(1, len(noise)):
-                noise[k] += 0.8 * noise[k - 1]
-            noisy.append(replace(m, torque=m.torque + noise))
-        estimate = found(arm, noisy, [True, False]).estimate
-        row = []
-        for key, value in truth.items():
-            interval = estimate.interval(f"payload.{key}")
-            assert interval is not None
-            row.append(2 * (value - sum(interval) / 2) / (interval[1] - interval[0]))
-        result.append(row)
-    return np.array(result)
+    return np.array(over_seeds(of_one_recording, seeds, arm, clean, truth))
+
+
+def of_one_recording(
+    seed: int, arm: Observation, clean: list[Motion], truth: dict[str, float]
+) -> list[float]:
+    """Errors over half the intervals, of one draw of the noise."""
+    rng = np.random.default_rng(seed)
+    noisy = []
+    for m in clean:
+        noise = rng.normal(size=m.torque.shape)
+        for k in range(1, len(noise)):
+            noise[k] += 0.8 * noise[k - 1]
+        noisy.append(replace(m, torque=m.torque + noise))
+    estimate = found(arm, noisy, [True, False]).estimate
+    row = []
+    for key, value in truth.items():
+        interval = estimate.interval(f"payload.{key}")
+        assert interval is not None
+        row.append(2 * (value - sum(interval) / 2) / (interval[1] - interval[0]))
+    return row
 
 
 def test_intervals_are_of_the_size_of_errors(tmp_path: Path) -> None:

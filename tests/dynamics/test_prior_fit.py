@@ -8,6 +8,7 @@ from itertools import repeat
 
 import numpy as np
 import pytest
+from over_seeds import over_seeds
 from refusals import refused
 
 from flexcal.data.plans import FourierPaths, TrajectoryPlan
@@ -161,19 +162,21 @@ def test_covariance_is_true_on_many_robots(tx90l: RobotModel, plan: TrajectoryPl
     assert 0.92 < offsets < 0.98
 
 
+def of_one_robot(
+    seed: int, model: RobotModel, plan: TrajectoryPlan
+) -> tuple[np.ndarray, float, tuple[str, ...]]:
+    """Errors over their standard deviations, the mean square of decorrelated errors, and the names of the parameters."""
+    rng = np.random.default_rng([2024, seed])
+    truth = drawn(model, rng)
+    estimate = fit_inertials(model, plan, synthetic(truth, plan, coloured(plan, rng)))
+    return *errors(estimate, truth), estimate.parameters.names
+
+
 def coverage(model: RobotModel, plan: TrajectoryPlan, seeds: range) -> tuple[float, float, float]:
     """Share of the 95 % intervals that hold the truth, the mean square of decorrelated errors, and that share of the offsets alone."""
-    normalised, together, names = [], [], ()
-    for seed in seeds:
-        rng = np.random.default_rng([2024, seed])
-        truth = drawn(model, rng)
-        estimate = fit_inertials(model, plan, synthetic(truth, plan, coloured(plan, rng)))
-        one, both = errors(estimate, truth)
-        normalised.append(one)
-        together.append(both)
-        names = estimate.parameters.names
+    normalised, together, names = zip(*over_seeds(of_one_robot, seeds, model, plan), strict=True)
     inside = np.abs(normalised) < 1.96
-    offsets = inside[:, [name.endswith(".torque_offset") for name in names]]
+    offsets = inside[:, [name.endswith(".torque_offset") for name in names[0]]]
     return float(np.mean(inside)), float(np.mean(together)), float(np.mean(offsets))
 
 

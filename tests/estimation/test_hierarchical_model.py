@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from over_seeds import over_seeds
 
 from flexcal.estimation import Measured, population
 
@@ -48,16 +49,19 @@ def test_the_same_individuals_give_the_same_numbers() -> None:
     assert (one.covariance == other.covariance).all()
 
 
+def next_inside(seed: int, count: int) -> np.ndarray:
+    """Whether 40 parameters of the next individual lie in their intervals."""
+    rng = np.random.default_rng(seed)
+    spread = 0.15 * np.exp(0.5 * rng.standard_normal(40))
+    every = rng.normal(0, 0.3, 40) + spread * rng.standard_normal((count + 1, 40))
+    result = population(measured(every[:-1], 0.05, rng), np.ones(40), ["a"] * 20 + ["b"] * 20)
+    return np.abs(every[-1] - result.mean) < 1.96 * np.sqrt(np.diag(result.covariance))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("count", "seeds"), [(2, 16), (3, 16), (8, 10), (30, 6)])
 def test_intervals_of_the_next_individual_cover_it(count: int, seeds: int) -> None:
     """Of 95 % intervals, 93 to 97 % within the scatter of so many; spreads differ by factors within a kind."""
-    inside = []
-    for seed in range(100, 100 + seeds):
-        rng = np.random.default_rng(seed)
-        spread = 0.15 * np.exp(0.5 * rng.standard_normal(40))
-        every = rng.normal(0, 0.3, 40) + spread * rng.standard_normal((count + 1, 40))
-        result = population(measured(every[:-1], 0.05, rng), np.ones(40), ["a"] * 20 + ["b"] * 20)
-        inside.append(np.abs(every[-1] - result.mean) < 1.96 * np.sqrt(np.diag(result.covariance)))
+    inside = over_seeds(next_inside, range(100, 100 + seeds), count)
     share, scatter = float(np.mean(inside)), np.sqrt(0.95 * 0.05 / np.size(inside))
     assert 0.93 - 2 * scatter < share < 0.97 + 2 * scatter

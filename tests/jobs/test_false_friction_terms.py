@@ -3,20 +3,22 @@
 from pathlib import Path
 
 import pytest
+from over_seeds import over_seeds
 from planar_arm import Log
 
-from flexcal.jobs.dynamics import DynamicsIdentification, identify_robot_dynamics
+from flexcal.jobs.dynamics import identify_robot_dynamics
 
 
-def selected(folder: Path, log: Log, seed: int) -> DynamicsIdentification:
+def selected(seed: int, folder: Path, log: Log) -> tuple[str, ...]:
+    """Friction terms beside those that every joint has."""
+    (folder := folder / str(seed)).mkdir()
     robot, path = log.write(folder, seed, friction="auto")
-    (folder / "estimates.yaml").unlink(missing_ok=True)
-    return identify_robot_dynamics(robot, [path])
+    return identify_robot_dynamics(robot, [path]).friction.names[3:]
 
 
 def false_terms(folder: Path, memory: float, seeds: range) -> list[tuple[str, ...]]:
     log = Log(torque_noise=0.5, memory=memory)
-    found = [selected(folder, log, seed).friction.names[3:] for seed in seeds]
+    found = over_seeds(selected, seeds, folder, log)
     print(f"memory {memory} s: a false term in {sum(map(bool, found))} of {len(seeds)} logs")
     return [names for names in found if names]
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from over_seeds import over_seeds
 from planar_arm import TRUTH, Log, stribeck, swings, torque
 from scipy.stats import t as student
 
@@ -52,6 +53,14 @@ def inside(found: DynamicsIdentification, seed: int, log: Log) -> tuple[np.ndarr
     return np.concatenate(torques), np.concatenate(frictions), np.array(base)
 
 
+def held(seed: int, folder: Path, log: Log) -> tuple[bool, list[float]]:
+    """Whether a term is taken, and shares of torques, friction and base parameters within the intervals of one log."""
+    (folder := folder / str(seed)).mkdir()
+    robot, path = log.write(folder, seed, friction="auto")
+    found = identify_robot_dynamics(robot, [path])
+    return bool(found.friction.names[3:]), [own.mean() for own in inside(found, seed, log)]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("size", "velocity", "memory"), [(0.4, 0.5, 0.1), (0.7, 0.5, 0.1), (0.7, 1.5, 0.1), (0.7, 0.5, 1.0)]
@@ -60,13 +69,7 @@ def test_friction_that_is_taken_in_some_logs_only(
     size: float, velocity: float, memory: float, tmp_path: Path
 ) -> None:
     log = Log(rate=250.0, torque_noise=0.5, memory=memory, stribeck=size, velocity=velocity)
-    shares, taken = [], []
-    for seed in range(200, 240):
-        robot, path = log.write(tmp_path, seed, friction="auto")
-        (tmp_path / "estimates.yaml").unlink(missing_ok=True)
-        found = identify_robot_dynamics(robot, [path])
-        taken.append(bool(found.friction.names[3:]))
-        shares.append([held.mean() for held in inside(found, seed, log)])
+    taken, shares = zip(*over_seeds(held, range(200, 240), tmp_path, log), strict=True)
     torques, frictions, base = np.mean(shares, axis=0)
     print(
         f"{log}: a term in {np.mean(taken):.2f}; {torques:.3f}, of friction {frictions:.3f}, base {base:.3f}"

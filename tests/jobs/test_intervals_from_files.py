@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from over_seeds import over_seeds
 from planar_arm import TRUTH, Log, torque
 from scipy.stats import t as student
 
@@ -45,15 +46,16 @@ def _torques_inside(found: DynamicsIdentification, estimate: Estimate) -> np.nda
     return np.concatenate(held)
 
 
+def held(seed: int, folder: Path, log: Log, estimator: EstimatorName) -> list[float]:
+    """Share of base parameters and of torques within the intervals of one log."""
+    (folder := folder / str(seed)).mkdir()
+    robot, path = log.write(folder, seed)
+    return [own.mean() for own in inside(identify_robot_dynamics(robot, [path], estimator=estimator))]
+
+
 def coverage(folder: Path, log: Log, estimator: EstimatorName, seeds: range) -> tuple[float, float]:
     """Of base parameters and of torques."""
-    shares = []
-    for seed in seeds:
-        robot, path = log.write(folder, seed)
-        (folder / "estimates.yaml").unlink(missing_ok=True)
-        held = inside(identify_robot_dynamics(robot, [path], estimator=estimator))
-        shares.append([own.mean() for own in held])
-    parameters, torques = np.mean(shares, axis=0)
+    parameters, torques = np.mean(over_seeds(held, seeds, folder, log, estimator), axis=0)
     print(f"{estimator} {log}: {parameters:.3f} of the parameters, {torques:.3f} of the torques")
     return float(parameters), float(torques)
 

@@ -10,6 +10,7 @@ import dh_arm as warm_arm
 import numpy as np
 import pytest
 from measured_dh_arm import FAULTS, DHArm, series
+from over_seeds import over_seeds
 from refusals import refused
 from thermal_arm import ThermalArm, warming
 
@@ -46,7 +47,7 @@ def judged(
     return session, judgements
 
 
-def found_after(ur5: RobotModel, fault: str, seed: int) -> tuple[int | None, Counter[str]]:
+def found_after(seed: int, ur5: RobotModel, fault: str) -> tuple[int | None, Counter[str]]:
     """Rows from the fault to the one that names it, itself included (None: never), and codes of other rows that are called wrong."""
     q, points, row = series(fault, seed)
     _, judgements = judged(ur5, rows(q, points))
@@ -58,14 +59,14 @@ def found_after(ur5: RobotModel, fault: str, seed: int) -> tuple[int | None, Cou
 
 @pytest.mark.parametrize("fault", [fault for fault in FAULTS if fault not in ("clean", "drift")])
 def test_a_fault_is_named(ur5: RobotModel, fault: str):
-    after, others = found_after(ur5, fault, 3)
+    after, others = found_after(3, ur5, fault)
     assert after is not None and after <= (4 if fault in ("moved", "turned") else 1)
     # before it is certain that the tracker moved, its first row is called an outlier, with both explanations
     assert not others or (fault in ("moved", "turned") and others == {"outlier": 1})
 
 
 def test_a_drift_is_named(ur5: RobotModel):
-    after, others = found_after(ur5, "drift", 3)
+    after, others = found_after(3, ur5, "drift")
     assert after is not None and after <= 40 and not others
 
 
@@ -167,16 +168,20 @@ def test_one_row_at_a_time(ur5: RobotModel):
         GuidedSession(ur5).judge(rows(q[:2], points[:2]))
 
 
+def called_wrong(seed: int, ur5: RobotModel) -> int:
+    """Number of clean rows that are not called good."""
+    return sum(not one.is_good for one in judged(ur5, rows(*series("clean", seed)[:2]))[1])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
 def test_power(ur5: RobotModel, fault: str):
     """Over 30 arms: every fault is found, and of clean rows fewer than 1 in 200 are called wrong."""
     seeds = range(100, 130)
     if fault == "clean":
-        called = [judged(ur5, rows(*series("clean", seed)[:2]))[1] for seed in seeds]
-        assert sum(not one.is_good for judgements in called for one in judgements) < 0.005 * 30 * 40
+        assert sum(over_seeds(called_wrong, seeds, ur5)) < 0.005 * 30 * 40
         return
-    results = [found_after(ur5, fault, seed) for seed in seeds]
+    results = over_seeds(found_after, seeds, ur5, fault)
     after = [one for one, _ in results if one is not None]
     assert len(after) >= 29
     assert np.median(after) <= {"moved": 3, "turned": 4, "drift": 30}.get(fault, 1)
