@@ -57,7 +57,7 @@ def demo(examples: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[P
 
 def test_drives_agree_with_those_from_the_arm_side(demo: Path, arm_side_logs, tmp_path: Path) -> None:
     """Frequency response and flexible model (Eq. 2.22) of one robot: their 95 % intervals meet at every drive."""
-    robot, logs = arm_side_logs(tmp_path, read_truth(demo / "truth.yaml"), 77, 4)
+    robot, logs = arm_side_logs(tmp_path, read_truth(demo / "truth.yaml"), 77, 2)
     flexible = identify_robot_dynamics(robot, logs, flexible=True).estimate
     stage1 = read_estimates(demo / "estimates.yaml")["stiffness"]
     for name in (f"joint_{i}.drive.stiffness" for i in (1, 2, 3)):
