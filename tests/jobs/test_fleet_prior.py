@@ -192,7 +192,11 @@ def test_the_file_has_the_prior_and_refuses_other_robots(six: Pooled, tmp_path: 
     told = calibrate_robot(new, [unlike], prior=out, out=tmp_path / "unlike")
     assert told.trust.document() == {"trusted": False, "reasons": ["fleet"]}
     assert "the prior of other robots does not fit this one" in told.trust.sentence
-    assert any("the prior does not fit this robot" in remark for remark in told.document()["remarks"])
+    said = " ".join(told.document()["remarks"])
+    assert "the prior does not fit this robot" in said
+    assert "because the prior of other robots holds it where this robot is not" in said
+    assert "scatter of instrument and robot together" not in said
+    assert "in addition to the stated sigma" not in said
 
     odd = write_robot(tmp_path / "odd")
     urdf = odd.parent / "arm.urdf"
@@ -260,9 +264,26 @@ def test_the_fleet_writes_the_prior_of_its_model(
     assert "from 3 robots (cell_0, cell_1, cell_2)" in said
     assert "without cell_0_backup, whose calibration is the same as that of cell_0" in said
     assert "without cell_3, calibrated with a prior of other robots" in said
+    assert "the results of 4 robots in the folders of 5: those of cell_0_backup (cell_0) are copies" in said
+    assert "no results in its folder" not in said
     told = read_model_prior(out, six.model).geometry
     assert told is not None
     assert told.robots == ("cell_0", "cell_1", "cell_2")
+
+
+def test_other_temperatures_are_said(six: Pooled, tmp_path: Path) -> None:
+    at = [(19.0, 21.0), (30.0, 32.0), None, (20.0, 20.0)]
+    members = [
+        replace(m, estimate=replace(m.estimate, ranges={} if t is None else {"temperature": t}))
+        for m, t in zip(six.members, at, strict=False)
+    ]
+    _, remarks = pool_fleet({"calibration": members}, tmp_path / "prior.yaml")
+    said = " ".join(remarks)
+    assert "calibrated at 20 (robot_0) to 31 °C (robot_1)" in said
+    # 11 K of steel and of aluminium
+    assert "up to 0.13 to 0.25 mm/m" in said
+    assert "the temperature of robot_2 is not known" in said
+    assert not pool_fleet({"calibration": six.members}, tmp_path / "prior.yaml")[1]
 
 
 def test_robots_with_other_terms_are_refused(six: Pooled) -> None:

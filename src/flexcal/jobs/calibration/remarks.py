@@ -133,8 +133,12 @@ def outliers_of(fit: GeometricFit) -> tuple[Outlier, ...]:
     )
 
 
-def calibration_remarks(fit: GeometricFit, cause: Sequence[str] = ()) -> tuple[str, ...]:
-    """Remarks on a calibration, the most important last; a known `cause` of a bad fit precedes its consequences."""
+def calibration_remarks(
+    fit: GeometricFit, cause: Sequence[str] = (), *, prior_misfits: bool = False
+) -> tuple[str, ...]:
+    """Remarks on a calibration, the most important last; a known `cause` of a bad fit precedes its consequences, and
+    `prior_misfits` says that a prior of other robots is one.
+    """
     remarks = [
         *fit.poses.notes,
         *ignored_columns_remarks(fit.poses, () if fit.temperature is None else ("temperature", "time")),
@@ -150,7 +154,13 @@ def calibration_remarks(fit: GeometricFit, cause: Sequence[str] = ()) -> tuple[s
         more = f" and {len(outliers) - _LISTED} more" if len(outliers) > _LISTED else ""
         remarks.append(f"{len(outliers)} outlier{'s' * (len(outliers) > 1)}: {listed}{more}")
         remarks += [*_mislabelled(outliers), *_turned(fit, outliers)]
-    remarks += [*_undetermined(fit), *_views(fit), *_size(fit), *_noise(fit), *_jumps(fit)]
+    remarks += [
+        *_undetermined(fit),
+        *_views(fit),
+        *_size(fit),
+        *_noise(fit, prior_misfits=prior_misfits),
+        *_jumps(fit),
+    ]
     remarks += inclination_remarks(fit)
     drift = Drift.of(fit) if fit.poses.located.any() else None
     if drift is not None and drift.certain:
@@ -384,7 +394,7 @@ def floor_remark(fit: GeometricFit, before: np.ndarray | None) -> tuple[str, ...
     )
 
 
-def _noise(fit: GeometricFit) -> Sequence[str]:
+def _noise(fit: GeometricFit, *, prior_misfits: bool) -> Sequence[str]:
     budget = fit.variances
     instrument, stated, robot, model = (
         budget[key] for key in ("instrument_mm", "stated_mm", "robot_mm", "model_mm")
@@ -393,6 +403,11 @@ def _noise(fit: GeometricFit) -> Sequence[str]:
         return ()
     remarks = []
     scatter = f"{robot:.{decimals(robot)}f} mm per coordinate"
+    if prior_misfits:
+        return [
+            f"the points scatter by {scatter} about the fit (1σ), because the prior of other robots holds it where this robot is not: that "
+            "is no repeatability of the robot and no noise of the instrument"
+        ]
     if instrument is None or stated is None:
         text = (
             f"the ball in its socket and the robot together scatter by {scatter} about the fit (1σ)"

@@ -268,7 +268,8 @@ class Calibration(Identification):
         coupling = self.coupling
         fleet = fleet_document(selected)
         pooled = self.pooled_stiffness
-        misfits = coupling is not None or contradicts(fleet) or (pooled is not None and pooled.contradicted)
+        contradicted = contradicts(fleet) or (pooled is not None and pooled.contradicted)
+        misfits = coupling is not None or contradicted
         floor = None if misfits else RepeatabilityFloor.of(selected)
         learning = LearningCurve.of(selected)
         bearings = bearing_remarks(self.bearings, selected)
@@ -339,7 +340,7 @@ class Calibration(Identification):
                 *fleet_remarks(fleet),
                 *([] if pooled is None else pooled.remarks),
                 *([] if self.levels is None or coupling is not None else [self.levels.sentence]),
-                *calibration_remarks(selected, self._cause),
+                *calibration_remarks(selected, self._cause, prior_misfits=contradicted),
                 *(() if blamed else bearings),
                 *place_remarks(agreement),
                 *(() if self._cause or misfits else floor_remark(selected, self.before.robots_own)),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from datetime import datetime
+from pathlib import Path
 from typing import Any
 
 from flexcal.jobs.fleet.accuracy import RobotAccuracy
@@ -14,6 +15,7 @@ from flexcal.jobs.fleet.gathering import GatheredFleet
 from flexcal.jobs.fleet.geometry_document import geometry_entry
 from flexcal.jobs.fleet.geometry_drifts import GeometryDrift
 from flexcal.jobs.fleet.parameters import ParameterSpread
+from flexcal.jobs.fleet.projects import date_of
 from flexcal.jobs.fleet.rechecks import LatestRecheck
 from flexcal.jobs.fleet_prior import comparable_terms
 from flexcal.report.layout import counted
@@ -74,7 +76,7 @@ def fleet_document(
     tested = [item for item in accuracies if item.drift is not None]
     return {
         "place": place,
-        "headline": _headline(robots, states),
+        "headline": _headline(robots, states, _folders(gathered)),
         "counts": {
             "robots": len(robots),
             "models": len({robot["model"] for robot in robots}),
@@ -103,8 +105,19 @@ def fleet_document(
     }
 
 
-def _headline(robots: Sequence[Mapping[str, Any]], states: Mapping[str, int]) -> str:
+def _folders(gathered: GatheredFleet) -> int:
+    """Number of project folders, those of one robot's visits as one: as many as robots, unless several have one serial."""
+    return len({_place(project.folder) for project in gathered.projects})
+
+
+def _place(folder: Path) -> tuple[str, ...]:
+    return tuple(part for part in folder.parts if date_of((part,)) is None)
+
+
+def _headline(robots: Sequence[Mapping[str, Any]], states: Mapping[str, int], folders: int) -> str:
     many = counted(len(robots), "robot")
+    if folders > len(robots):
+        many += f" in {folders} folders, by their serials"
     if all(robot["tolerance_mm"] is None for robot in robots):
         return f"{many}; no tolerance is stated, so none is judged"
     words = [f"{states.get(state, 0)} {label}" for state, label in TOLERANCE_STATES.items()]
@@ -209,7 +222,16 @@ def _remarks(
 ) -> list[str]:
     remarks = []
     frame = gathered.table.frame
-    bare = len({item.robot for item in accuracies} - set(frame["robot"]))
+    without = {item.robot for item in accuracies} - set(frame["robot"])
+    copies = sorted(without & set(gathered.copied))
+    if copies:
+        listed = ", ".join(f"{name} ({gathered.copied[name]})" for name in copies)
+        number = len(accuracies) - len(copies)
+        remarks.append(
+            f"the results of {counted(number, 'robot')} in the folders of {len(accuracies)}: those of {listed} are copies of another's, in "
+            "brackets; measure these robots, or give both one `serial:` in robot.yaml"
+        )
+    bare = len(without) - len(copies)
     if bare:
         subject = (
             "1 robot has no results in its folder"

@@ -32,7 +32,7 @@ _DIGITS = 12
 @dataclass(frozen=True, eq=False)
 class GatheredFleet:
     """The table of a fleet, its `projects`, its `problems`, and `repeated`: how many results stand in several folders; `courses` of the
-    geometry of robots that were calibrated several times.
+    geometry of robots that were calibrated several times; `copied`: robots whose folders have results of another, by that one.
     """
 
     table: FleetTable
@@ -40,6 +40,7 @@ class GatheredFleet:
     problems: Sequence[Problem]
     repeated: int
     courses: Sequence[GeometryCourse]
+    copied: Mapping[str, str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,10 +102,10 @@ def gather_fleet(place: str | Path, progress: Progress = silent) -> GatheredFlee
             progress("reading", number / len(folders))
             results += _results(root, folder, problems)
         progress("reading", 1.0)
-        kept, repeated = _distinct(results, problems)
+        kept, repeated, copied = _distinct(results, problems)
         courses, refused = geometry_courses(root, [result.first for result in kept], projects, progress)
     table = FleetTable.of(row for result in kept for row in result.rows)
-    return GatheredFleet(table, projects, [*problems, *refused], repeated, courses)
+    return GatheredFleet(table, projects, [*problems, *refused], repeated, courses, copied)
 
 
 def _results(root: Path, folder: ResultFolder, problems: list[Problem]) -> Iterator[_Result]:
@@ -244,18 +245,21 @@ def _data(origin: Mapping[str, Any]) -> str:
     )
 
 
-def _distinct(results: Sequence[_Result], problems: list[Problem]) -> tuple[list[_Result], int]:
+def _distinct(
+    results: Sequence[_Result], problems: list[Problem]
+) -> tuple[list[_Result], int, dict[str, str]]:
     """Every result once, of those that stand in several folders of a robot the one with the earliest date; one that stands in folders of
     several robots is a problem, and counts for the first of them.
     """
     kept: dict[str, _Result] = {}
-    repeated = 0
+    repeated, copied = 0, {}
     for result in results:
         identity = result.identity
         other = kept.get(identity)
         if other is None:
             kept[identity] = result
         elif other.first.robot != result.first.robot:
+            copied[result.first.robot] = other.first.robot
             problems.append(
                 Problem(
                     result.first.file,
@@ -267,4 +271,4 @@ def _distinct(results: Sequence[_Result], problems: list[Problem]) -> tuple[list
             repeated += 1
             if (result.first.date or datetime.max) < (other.first.date or datetime.max):
                 kept[identity] = result
-    return list(kept.values()), repeated
+    return list(kept.values()), repeated, copied

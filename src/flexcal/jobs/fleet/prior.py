@@ -30,19 +30,24 @@ _EQUAL = 1000.0
 
 @dataclass(frozen=True)
 class WrittenPrior:
-    """The `prior` in a `file`, with `remarks` on robots that it is not from."""
+    """The `prior` in a `file`, with `remarks` on robots that it is not from; `twins` of its robots are probably another of them."""
 
     file: Path
     prior: ModelPrior
     remarks: tuple[str, ...]
+    twins: int = 0
 
     @property
     def sentence(self) -> str:
         """What the prior is from."""
         parts, geometry = [], self.prior.geometry
         if geometry is not None:
+            many = len(geometry.robots)
+            robots = (
+                f"{many} folders, probably of {many - self.twins} robots" if self.twins else f"{many} robots"
+            )
             parts.append(
-                f"prior of {counted(len(geometry.names), 'geometric parameter')} from {len(geometry.robots)} robots "
+                f"prior of {counted(len(geometry.names), 'geometric parameter')} from {robots} "
                 f"({', '.join(geometry.robots)}), calibrated with the terms {', '.join(geometry.terms)}"
             )
         for what, pooled in (
@@ -141,12 +146,14 @@ def write_prior(place: str | Path, out: Path) -> WrittenPrior:
         prior, more = pool_fleet(own, out)
         remarks += more
     calibrated = own["calibration"]
-    for one, other, times in alike(calibrated) if len(calibrated) >= FEWEST else ():
+    pairs = alike(calibrated) if len(calibrated) >= FEWEST else []
+    for one, other, times in pairs:
         remarks.append(
             f"{one} and {other} differ by no more than the errors of their measurements, and other robots {_times(times)}: if "
             "they are one robot, the prior is too narrow; give both one `serial:` in robot.yaml"
         )
-    return WrittenPrior(out, prior, tuple(remarks))
+    twins = len({other for _, other, _ in pairs})
+    return WrittenPrior(out, prior, tuple(remarks), twins)
 
 
 def _times(times: float) -> str:

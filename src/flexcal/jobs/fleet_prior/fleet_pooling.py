@@ -12,6 +12,7 @@ from flexcal.jobs.fleet_prior.member import FEWEST, Member
 from flexcal.jobs.fleet_prior.model_prior import ModelPrior
 from flexcal.jobs.fleet_prior.pooled_values import PooledValues
 from flexcal.jobs.fleet_prior.prior_file import write_model_prior
+from flexcal.jobs.fleet_prior.temperatures import temperature_remark
 from flexcal.jobs.fleet_prior.value_pooling import pool_friction, pool_springs
 
 
@@ -27,6 +28,7 @@ def pool_fleet(members: Mapping[Block, Sequence[Member]], out: Path) -> tuple[Mo
     geometry = None
     if len(calibrated) >= FEWEST or (springs is None and friction is None):
         geometry = pooled_prior(calibrated)
+        remarks += temperature_remark(calibrated)
     else:
         remarks.append(
             f"without geometry, because {len(calibrated)} robots are calibrated and {FEWEST} are needed"
