@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
+
+from flexcal.fleet.excess_tail import excess_tail
+
+_CLEARLY = 2.0
+"""Standard deviations by which a unit scatters clearly more than its family."""
 
 
 @dataclass(frozen=True)
@@ -36,12 +42,9 @@ def joint_tests(lines: Sequence[JointLine]) -> list[JointTest]:
     """Tests of lines, of three visits or more, in their order.
 
     Values scatter from visit to visit by more than their covariances tell where something else changes, such as the temperature. How
-    much more is taken from the unit's own residuals or from those of its family, whichever is more, and is supposed to be all along one
-    combination of the quantities, the worst case: the ratio of mean squares then has an F distribution with fewer degrees of freedom (Box
-    1954, Ann. Math. Stat. 25, theorem 3.1). Where there is no more, it has those of all quantities.
+    much more is taken from the residuals of its family, or from the unit's own where these are clearly more, and is supposed to be all
+    along one combination of the quantities, the worst case (`excess_tail`).
     """
-    from scipy.stats import f
-
     totals: dict[Hashable, tuple[float, float, int]] = {}
     for line in lines:
         squares, count, times = totals.get(line.family, (0.0, 0.0, 0))
@@ -53,16 +56,21 @@ def joint_tests(lines: Sequence[JointLine]) -> list[JointTest]:
     tests = []
     for line in lines:
         squares, count, times = totals[line.family]
-        own = line.residual / (line.quantities * (line.visits - 2))
-        scale, of = max((own, line.visits - 2), (squares / count, times))
-        effective = _effective(line.quantities, scale)
-        freedom = of * effective
-        if scale <= 1:
-            scale, freedom = 1.0, line.freedom
-        freedom = min(freedom, line.freedom)
-        ratio = line.statistic / line.quantities / scale
-        tests.append(JointTest(float(f.sf(ratio, effective, freedom)), scale, freedom))
+        scale, of = squares / count, times
+        if line.residual > _largest_expected(line, scale):
+            scale, of = line.residual / (line.quantities * (line.visits - 2)), line.visits - 2
+        probability = excess_tail(line.statistic, scale * line.quantities * of, of, line.quantities)
+        freedom = of * _effective(line.quantities, scale) if scale > 1 else line.freedom
+        tests.append(JointTest(probability, max(scale, 1.0), min(freedom, line.freedom)))
     return tests
+
+
+def _largest_expected(line: JointLine, scale: float) -> float:
+    """Sum of squares about its line that a unit does not exceed by more than two standard deviations where it scatters as its family."""
+    excess = line.quantities * max(scale - 1.0, 0.0)
+    visits = line.visits - 2
+    deviation = math.sqrt(2 * visits * (line.quantities - 1 + (1 + excess) ** 2))
+    return visits * (line.quantities + excess) + _CLEARLY * deviation
 
 
 def _effective(count: int, scale: float) -> float:

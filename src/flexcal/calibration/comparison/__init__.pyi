@@ -1,6 +1,6 @@
 from .explanations import Explanation
 from .geometry_change import GeometryChange, ParameterShift, compare_geometry
-from .geometry_over_time import GeometryTrend, geometry_trend
+from .geometry_over_time import GeometryTrend, geometry_courses
 
 __all__ = [
     "Explanation",
@@ -8,5 +8,5 @@ __all__ = [
     "GeometryTrend",
     "ParameterShift",
     "compare_geometry",
-    "geometry_trend",
+    "geometry_courses",
 ]

@@ -1,4 +1,4 @@
-"""Linear change of a robot's geometry over three calibrations or more.
+"""Change of a robot's geometry over three calibrations or more: along a line, or in a step between two of them.
 
 Single parameters are known far worse than the combinations that the measurements determine, and a shift of one is taken up by several. So
 the calibrations are compared as `geometry_change` does, in positions of the tool at common poses, without what another place of the robot,
@@ -45,15 +45,15 @@ _OF_THE_TOOL = ("tool.", "point.", "payload.")
 
 @dataclass(frozen=True, eq=False)
 class GeometryTrend:
-    """Straight line through a robot's geometry over K calibrations.
+    """Course of a robot's geometry over K calibrations, a straight line or a step.
 
     Attributes
     ----------
     change : ndarray
-        Change (m,) from the first to the last by the line, in the combinations of parameters that all determine, over their standard
+        Change (m,) from the first to the last by the course, in the combinations of parameters that all determine, over their standard
         deviations by the estimates' covariances (whitened).
     residual : float
-        Sum of squares of the calibrations about the line, whitened, of (K − 2) m degrees of freedom where the covariances are right.
+        Sum of squares of the calibrations about the course, whitened, of (K − 2) m degrees of freedom where the covariances are right.
     visits : int
         K.
     freedom : float
@@ -109,10 +109,11 @@ class GeometryTrend:
         return float(distance.mean()), std, float(distance.max())
 
 
-def geometry_trend(
+def geometry_courses(
     model: RobotModel, estimates: Sequence[Estimate], times: np.ndarray, *, same_springs: bool
-) -> GeometryTrend:
-    """Linear trend of a robot's geometry over three blocks `calibration` or more, of different measurements at times (K,).
+) -> tuple[GeometryTrend, ...]:
+    """Linear trend of a robot's geometry over three blocks `calibration` or more, of different measurements at times (K,), and its K − 1
+    steps between one calibration and the next.
 
     `model` is the robot without a calibration, with stiffness and inertia as identified; `same_springs` says whether all had these as
     their prior. Raises `FlexcalError` where they measured no point in common, or no common joint range.
@@ -149,35 +150,51 @@ def geometry_trend(
     apart = {name for e in estimates for name in waves_of(e)}
     sources = _stacked([by_parameter @ s.known for s in splits], [s.sources for s in splits], apart)
 
-    span = (times - times.mean()) / np.ptp(times)
+    causes = [
+        k for k, name in enumerate(names) if is_geometric(nominal, name) and "transmission_" not in name
+    ]
+    free = whole - rigid @ (rigid.T @ whole)
+    freedom = float(sum(e.degrees_of_freedom for e in estimates))
+
+    def along(shape: np.ndarray) -> GeometryTrend:
+        """Change by a course of `shape` (K,), which rises by one."""
+        change, residual, matrix = _change(np.array(moved), noises, sources, shape - shape.mean())
+        matrix = matrix @ by_parameter[:, causes]
+        told = np.linalg.norm(matrix, axis=0) * 1e-3 > 1.0
+        own = [k for k, there in zip(causes, told, strict=True) if there]
+        return GeometryTrend(
+            change,
+            residual,
+            len(times),
+            freedom,
+            tuple(names[k] for k in own),
+            tuple(unit_in(nominal, names[k]) for k in own),
+            matrix[:, told],
+            free[:, own],
+        )
+
+    visit = np.arange(len(times))
+    return along(times / np.ptp(times)), *(along(1.0 * (visit > k)) for k in visit[:-1])
+
+
+def _change(
+    values: np.ndarray, noises: Sequence[np.ndarray], sources: np.ndarray, span: np.ndarray
+) -> tuple[np.ndarray, float, np.ndarray]:
+    """Whitened change (m,) of values (K, r) along `span` (K,), the sum of squares about it, and the matrix (m, r) that whitens a change."""
+    rank = values.shape[1]
     weights = span / (span @ span)
     by_noise = np.einsum("k,kij->ij", weights**2, np.array(noises))
-    by_known = np.tensordot(weights, sources.reshape(len(times), rank, sources.shape[1]), axes=1)
+    by_known = np.tensordot(weights, sources.reshape(len(span), rank, sources.shape[1]), axes=1)
     whiten = _well_known(by_noise, by_known @ by_known.T)
     if not len(whiten):
         raise FlexcalError(
             "E-CAL-035",
             "no combination of the robot's parameters was determined by all its calibrations; measure more poses.",
         )
-    change, factor, residual = _line(
-        np.array(moved) @ whiten.T, [whiten @ n @ whiten.T for n in noises], _each(whiten, sources), span
+    slope, factor, residual = _line(
+        values @ whiten.T, [whiten @ n @ whiten.T for n in noises], _each(whiten, sources), span
     )
-    causes = [
-        k for k, name in enumerate(names) if is_geometric(nominal, name) and "transmission_" not in name
-    ]
-    matrix = factor @ whiten @ by_parameter[:, causes]
-    told = np.linalg.norm(matrix, axis=0) * 1e-3 > 1.0
-    causes = [k for k, there in zip(causes, told, strict=True) if there]
-    return GeometryTrend(
-        factor @ change,
-        residual,
-        len(times),
-        float(sum(e.degrees_of_freedom for e in estimates)),
-        tuple(names[k] for k in causes),
-        tuple(unit_in(nominal, names[k]) for k in causes),
-        matrix[:, told],
-        (whole - rigid @ (rigid.T @ whole))[:, causes],
-    )
+    return factor @ slope, residual, factor @ whiten
 
 
 def _line(

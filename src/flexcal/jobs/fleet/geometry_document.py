@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import Any
 
 from flexcal.jobs.fleet.courses import years
@@ -16,15 +17,18 @@ _SMALL = 0.2
 def geometry_entry(drift: GeometryDrift, tolerance: float | None) -> dict[str, Any]:
     """A robot's drift: changes from the first to the last calibration in SI units, movements of the tool in mm."""
     course, test = drift.course, drift.test
-    units = dict(zip(course.trend.names, course.trend.units, strict=True))
-    span = years(course.dates[-1]) - years(course.dates[0])
+    before, after = _dates(drift)
+    span = years(after) - years(before)
+    along = course.trend if drift.step is None else course.steps[drift.step]
+    units = dict(zip(along.names, along.units, strict=True))
     return {
         "robot": course.robot,
         "model": course.model,
         "visits": len(course.dates),
-        "first": course.dates[0].date().isoformat(),
-        "last": course.dates[-1].date().isoformat(),
-        "combinations": len(course.trend.change),
+        "change": "trend" if drift.step is None else "step",
+        "first": before.date().isoformat(),
+        "last": after.date().isoformat(),
+        "combinations": len(along.change),
         "scatter": test.scale**0.5,
         "freedom": test.freedom,
         "probability": test.probability,
@@ -35,8 +39,8 @@ def geometry_entry(drift: GeometryDrift, tolerance: float | None) -> dict[str, A
                 "unit": units[item.subject],
                 "change": sum(item.change),
                 "std": sum(item.std),
-                "per_year": sum(item.change) / span,
-                "per_year_std": sum(item.std) / span,
+                "per_year": sum(item.change) / span if drift.step is None else None,
+                "per_year_std": sum(item.std) / span if drift.step is None else None,
                 "alternatives": list(item.alternatives),
             }
             for item in drift.explanations
@@ -48,17 +52,27 @@ def geometry_entry(drift: GeometryDrift, tolerance: float | None) -> dict[str, A
     }
 
 
+def _dates(drift: GeometryDrift) -> tuple[datetime, datetime]:
+    """Of the first and the last calibration, or of those before and after a step."""
+    dates = drift.course.dates
+    return (dates[0], dates[-1]) if drift.step is None else (dates[drift.step], dates[drift.step + 1])
+
+
 def _sentence(drift: GeometryDrift, tolerance: float | None) -> str:
-    """What drifted by how much, and how far that moves the tool, with the tolerance (m) where there is one."""
+    """What drifted or jumped by how much, and how far that moves the tool, with the tolerance (m) where there is one."""
+    before, after = (date.date().isoformat() for date in _dates(drift))
+    over = f"trend over {len(drift.course.dates)} calibrations"
+    if drift.step is not None:
+        over = f"jump between the calibrations of {before} and {after}"
     if drift.moved is None:
         return (
-            f"trend over {len(drift.course.dates)} calibrations, of no single parameter of a joint; "
+            f"{over}, of no single parameter of a joint; "
             "flexcal report --compare shows where the tool moved between two of them"
         )
     changes = "; ".join(explanation_in_words(item) for item in drift.explanations)
     mean, std, largest = (m / MILLIMETRE for m in drift.moved)
     said = (
-        f"trend over {len(drift.course.dates)} calibrations, from the first to the last {changes}: "
+        f"{over}{', from the first to the last' if drift.step is None else ':'} {changes}: "
         f"this moves the tool by {mean:.3f} ± {std:.3f} mm on average, {largest:.3f} mm at most"
     )
     if tolerance is None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
 import numpy as np
 
-from flexcal.calibration.comparison import Explanation, GeometryTrend, geometry_trend
+from flexcal.calibration.comparison import Explanation, GeometryTrend
+from flexcal.calibration.comparison import geometry_courses as courses_of
 from flexcal.errors import FlexcalError
 from flexcal.files.formats import read_estimates, sha256_of
 from flexcal.fleet import FEWEST_VISITS, JointLine, JointTest, holm, joint_tests
@@ -25,22 +26,27 @@ from flexcal.progress import Progress
 
 @dataclass(frozen=True, eq=False)
 class GeometryCourse:
-    """A robot's geometry over calibrations on `dates`."""
+    """A robot's geometry over calibrations on `dates`: its `trend`, and its `steps` between each and the next."""
 
     robot: str
     model: str
     urdf: str
     dates: tuple[datetime, ...]
     trend: GeometryTrend
+    steps: tuple[GeometryTrend, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class GeometryDrift:
-    """Test of a course, its p-value corrected for the number of robots, and what explains the change where that is significant:
-    `explanations` from the first to the last visit, and by how far they move the tool, m: mean, its standard deviation, largest.
+    """Test of a course, its p-value corrected for the number of robots and of tests of each, and what explains the change where that is
+    significant: `explanations` from the first to the last visit, and by how far they move the tool, m: mean, its standard deviation,
+    largest.
+
+    `step` is the number of the calibration, from 0, after which the robot jumped, where that explains its course better than the trend.
     """
 
     course: GeometryCourse
+    step: int | None
     test: JointTest
     probability: float
     explanations: tuple[Explanation, ...]
@@ -66,38 +72,39 @@ def geometry_courses(
         dates = tuple(row.date for row in visits if row.date is not None)
         folder = next(p.folder for p in reversed(projects) if p.robot == robot)
         try:
-            trend = _trend(root, folder, urdf, visits, dates)
+            trend, *steps = _courses(root, folder, urdf, visits, dates) or (None,)
         except FlexcalError as problem:
             problems.append(problem_of(root, folder, problem))
             continue
         if trend is not None:
-            courses.append(GeometryCourse(robot, model, urdf, dates, trend))
+            courses.append(GeometryCourse(robot, model, urdf, dates, trend, tuple(steps)))
     return courses, problems
 
 
 def geometry_drifts(courses: Sequence[GeometryCourse], families: int, level: float) -> list[GeometryDrift]:
-    """Tests of courses, which share the error rate with those of all `families` of tests; the change is explained of those that are
-    significant at the `level`.
+    """Of every course the test of its trend, or of the step between two calibrations that explains it better. All these share the error
+    rate with those of all `families` of tests; the change is explained of those that are significant at the `level`.
     """
+    tried = [(c, k, t) for c in courses for k, t in ((None, c.trend), *enumerate(c.steps))]
     lines = [
-        JointLine(
-            len(c.trend.change),
-            c.trend.visits,
-            c.trend.statistic,
-            c.trend.residual,
-            c.trend.freedom,
-            (c.model, c.urdf),
-        )
-        for c in courses
+        JointLine(len(t.change), t.visits, t.statistic, t.residual, t.freedom, (c.model, c.urdf, k))
+        for c, k, t in tried
     ]
     tests = joint_tests(lines)
     adjusted = holm([test.probability for test in tests])
-    found = []
-    for course, test, corrected in zip(courses, tests, adjusted, strict=True):
+    best: dict[tuple[str, str], tuple[GeometryTrend, GeometryDrift]] = {}
+    for (course, step, along), test, corrected in zip(tried, tests, adjusted, strict=True):
         p = min(1.0, families * float(corrected))
-        explanations = course.trend.explained(test.scale, test.freedom) if p <= level else ()
-        moved = course.trend.displacement(explanations, test.scale)
-        found.append(GeometryDrift(course, test, p, explanations, moved))
+        key = course.robot, course.urdf
+        if key in best and best[key][1].test.probability <= test.probability:
+            continue
+        best[key] = along, GeometryDrift(course, step, test, p, (), None)
+    found = []
+    for along, drift in best.values():
+        test = drift.test
+        explanations = along.explained(test.scale, test.freedom) if drift.probability <= level else ()
+        moved = along.displacement(explanations, test.scale)
+        found.append(replace(drift, explanations=explanations, moved=moved))
     return found
 
 
@@ -110,11 +117,11 @@ def _when(row: Row) -> datetime:
     return row.date or row.modified
 
 
-def _trend(
+def _courses(
     root: Path, folder: Path, urdf: str, visits: Sequence[Row], dates: Sequence[datetime]
-) -> GeometryTrend | None:
+) -> tuple[GeometryTrend, ...]:
     estimates = [read_estimates(root / row.file)["calibration"] for row in visits]
     model, same = model_before(folder / ROBOT, estimates)
     if sha256_of(model.urdf) != urdf:
-        return None
-    return geometry_trend(model, estimates, np.array([years(date) for date in dates]), same_springs=same)
+        return ()
+    return courses_of(model, estimates, np.array([years(date) for date in dates]), same_springs=same)

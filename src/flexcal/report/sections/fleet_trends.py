@@ -35,7 +35,8 @@ def trends_section(document: Mapping[str, Any]) -> Section:
         f"{counted(counts['geometry_trends_tested'], 'robot')}. "
         f"P-values are corrected for the number of tests (Holm): if nothing drifts, any robot is named for its errors in "
         f"{100 * level:.0f} % of fleets at most, and in as many for its parameters, single or together. "
-        "A jump between two visits is no trend and may not be found so: flexcal report --compare compares two calibrations."
+        "The geometry is tested for a jump between any two calibrations that follow each other too, from three on; what explains a robot "
+        "better, trend or jump, is named. flexcal report --compare compares two calibrations."
     )
     blocks: list[Block] = []
     if drifting:
@@ -98,7 +99,7 @@ def trends_section(document: Mapping[str, Any]) -> Section:
 def _geometry_table(drifts: Sequence[Mapping[str, Any]]) -> Table:
     return Table(
         "table-geometry",
-        "Robots whose geometry as a whole changed over time",
+        "Robots whose geometry as a whole drifted or jumped",
         ("robot", "visits", "from", "to", "what changed", "per year", "p, corrected"),
         tuple(
             (
@@ -120,6 +121,8 @@ def _geometry_table(drifts: Sequence[Mapping[str, Any]]) -> Table:
 
 def _yearly(cause: Mapping[str, Any]) -> str:
     factor, unit = scaled(cause["unit"])
+    if cause["per_year"] is None:
+        return NOTHING
     rate, std = (significant(factor * cause[key], 3) for key in ("per_year", "per_year_std"))
     return f"{cause['name']} {rate} ± {std} {unit}"
 
