@@ -153,7 +153,7 @@ def test_a_typed_point(page: Any, running: Any, cell: Any) -> None:
     robot_file.write_text(robot_file.read_text().replace(there, f"{there}, moved: {{xyz: [2.4, 0.3, 1]}}"))
     begin(page, process.url)
     press(page, "Take this point")
-    page.get_by_text("type x, y and z of pose 1 first").wait_for(timeout=WAIT)
+    page.get_by_text("x / mm is empty: type x / mm, y / mm, z / mm of pose 1 first").wait_for(timeout=WAIT)
     type_point(page, "534.8619", "-572.7086", "901.3214")
     press(page, "Take this point")
     page.get_by_text("Next: pose 2").wait_for(timeout=WAIT)
@@ -191,7 +191,7 @@ def test_no_number_that_was_not_typed_is_in_a_row(page: Any, running: Any) -> No
     page.wait_for_function("document.querySelector('form fieldset:enabled')")
     assert [field.input_value() for field in fields] == [""] * 3
     for typed, told in (
-        (("1", "", "3"), "y / mm is empty: type x, y and z of pose 2 first"),
+        (("1", "", "3"), "y / mm is empty"),
         (("1", "2", " "), "z / mm is empty"),
         (("1", "2,5", "3"), "'2,5' is not a number"),
         (("nan", "2", "3"), "'nan' is not a number"),

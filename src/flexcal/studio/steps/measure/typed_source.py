@@ -22,6 +22,10 @@ _TEMPERATURE = "arm / °C"
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,2})?", re.ASCII)
 
 
+def _form(labels: tuple[str, ...]) -> str:
+    return entry_form(labels, "Take this point (Enter)")
+
+
 class TypedSource(RowSource):
     """The point of the next pose, typed in mm."""
 
@@ -29,7 +33,14 @@ class TypedSource(RowSource):
 
     def add(self) -> None:
         """Add a field a coordinate, and the button that takes them."""
-        self.window.gui.add_html(entry_form(self._labels, "Take this point (Enter)"))
+        self._shown = self._labels
+        self._form = self.window.gui.add_html(_form(self._shown))
+
+    def tick(self) -> None:
+        """Have other fields where the rows have got other columns."""
+        if self._labels != self._shown:
+            self._shown = self._labels
+            self._form.content = _form(self._shown)
 
     @property
     def _labels(self) -> tuple[str, ...]:
@@ -39,7 +50,7 @@ class TypedSource(RowSource):
 
     def measure_next(self) -> None:
         """Say what is to be done; raises `InputError` where no pose is next."""
-        self.window.say(f"type x, y and z of pose {self._pose().number}, then Enter.")
+        self.window.say(f"type {', '.join(self._shown)} of pose {self._pose().number}, then Enter.")
 
     def enter(self, texts: Mapping[str, str]) -> None:
         """Take the point; raises `InputError` where it was not typed whole, and where it is not of the next pose."""
