@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from over_seeds import over_seeds
 from refusals import assert_refusal
 from servo_axis import RATE, THREE, TWO, ServoAxis, controlled, excitation, write_log
 
@@ -112,6 +113,23 @@ def test_sines_are_named(
     assert not (tmp_path / "out").exists()
 
 
+def quantities_inside(
+    seed: int,
+    folder: Path,
+    axis: ServoAxis,
+    gains: tuple[float, float, float],
+    kind: str,
+    encoder: float,
+    load: float,
+) -> list[bool]:
+    """Whether what one log tells lies in its intervals."""
+    rng = np.random.default_rng(seed)
+    added = excitation(kind, 8000, rng)
+    torque, angle = controlled(axis, gains, added, rng, encoder=encoder, load=load)
+    found = respond(write_log(folder / f"{seed}.csv", torque, angle, added), folder / str(seed))
+    return [item["low"] <= truth <= item["high"] for _, item, truth in quantities(found, axis)]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("axis", "gains", "kind", "encoder", "load"),
@@ -129,12 +147,7 @@ def test_intervals_cover_in_closed_loop(
     encoder: float,
     load: float,
 ) -> None:
-    inside = []
-    for seed in range(500, 520):
-        rng = np.random.default_rng(seed)
-        added = excitation(kind, 8000, rng)
-        torque, angle = controlled(axis, gains, added, rng, encoder=encoder, load=load)
-        found = respond(write_log(tmp_path / "log.csv", torque, angle, added), tmp_path / str(seed))
-        inside += [item["low"] <= truth <= item["high"] for _, item, truth in quantities(found, axis)]
+    found = over_seeds(quantities_inside, range(500, 520), tmp_path, axis, gains, kind, encoder, load)
+    inside = np.concatenate(found)
     assert np.mean(inside) >= 0.9
     assert len(inside) > 0.9 * 20 * (2 * len(axis.inertia) - 2 + len(axis.truth))

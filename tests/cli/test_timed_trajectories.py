@@ -52,7 +52,8 @@ def motion(file: Path) -> tuple[list[str], np.ndarray]:
 
 def test_written_samples_keep_the_limits_from_rest_to_rest(run, gantry: Path) -> None:
     folder = gantry.parent
-    outcome = run("design", "trajectory", gantry, "--count", 2, "--out", folder / "plan.yaml", "--json")
+    asked = ("--count", 2, "--searches", 1, "--out", folder / "plan.yaml", "--json")
+    outcome = run("design", "trajectory", gantry, *asked)
     assert outcome.status == 0 and "no friction of rail, shoulder, elbow" in outcome.err
     # a URDF without collision shapes: that they are kept apart is not claimed
     assert "no collision shapes, so collisions are not excluded" in outcome.err
