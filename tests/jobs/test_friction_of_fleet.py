@@ -7,6 +7,7 @@ import pytest
 from planar_arm import TRUTH, URDF, swings, torque
 
 from flexcal.jobs.dynamics import DynamicsIdentification, identify_robot_dynamics
+from flexcal.jobs.fleet import review_fleet
 from flexcal.jobs.fleet_prior import Member, pool_fleet
 
 NAMES = ("j1.viscous", "j2.viscous", "j1.coulomb", "j2.coulomb")
@@ -98,6 +99,20 @@ def test_other_friction_terms_are_said(fleet: Path, tmp_path: Path) -> None:
         "is not used: it has the terms viscous, coulomb, torque_offset" in n
         for n in found.document()["notes"]
     )
+
+
+def test_the_table_of_a_fleet_has_the_torque_errors_of_its_logs(tmp_path: Path) -> None:
+    robot = logged(tmp_path / "cell", np.ones(4), np.random.default_rng(5), 10.0, 0.5)
+    found = identify_robot_dynamics(
+        robot, [robot.parent / "log.csv"], hold_out=0.3, out=robot.parent / "2026-03-01"
+    )
+    frame = review_fleet(tmp_path).gathered.table.frame
+    rows = {row["name"]: row for row in frame.filter(kind="dynamics").to_dicts()}
+    percent = found.document()["error_percent"]
+    assert rows["torque_error.held_out"]["value"] == pytest.approx(percent["held_out"] / 100)
+    assert rows["torque_error.fit"]["value"] == pytest.approx(percent["train"] / 100)
+    assert rows["torque_error.fit"]["date"].isoformat() == "2026-03-01T00:00:00"
+    assert rows["trusted"]["text"] is None
 
 
 @pytest.mark.slow

@@ -86,8 +86,16 @@ def _repeatability(document: Mapping[str, Any]) -> list[ResultValue]:
     return values
 
 
+def _dynamics(document: Mapping[str, Any]) -> list[ResultValue]:
+    """Torque errors of identified logs, relative: in the fit, and outside it where there is something."""
+    percent = document["error_percent"]
+    values = [("torque_error.fit", percent["train"]), ("torque_error.held_out", percent["held_out"])]
+    return [_number(name, value / 100) for name, value in values if value is not None]
+
+
 _READERS: dict[str, Callable[[Mapping[str, Any]], list[ResultValue]]] = {
     "calibration": _calibration,
+    "dynamics": _dynamics,
     "repeatability": _repeatability,
     "verification": _verification,
 }
