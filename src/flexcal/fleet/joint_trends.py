@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
 from flexcal.fleet.excess_tail import excess_tail
-
-_CLEARLY = 2.0
-"""Standard deviations by which a unit scatters clearly more than its family."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +38,7 @@ def joint_tests(lines: Sequence[JointLine]) -> list[JointTest]:
     """Tests of lines, of three visits or more, in their order.
 
     Values scatter from visit to visit by more than their covariances tell where something else changes, such as the temperature. How
-    much more is taken from the residuals of its family, or from the unit's own where these are clearly more, and is supposed to be all
+    much more is taken from the residuals of its family, or from the unit's own where these are more, and is supposed to be all
     along one combination of the quantities, the worst case (`excess_tail`).
     """
     totals: dict[Hashable, tuple[float, float, int]] = {}
@@ -56,21 +52,14 @@ def joint_tests(lines: Sequence[JointLine]) -> list[JointTest]:
     tests = []
     for line in lines:
         squares, count, times = totals[line.family]
+        own = line.residual / (line.quantities * (line.visits - 2))
         scale, of = squares / count, times
-        if line.residual > _largest_expected(line, scale):
-            scale, of = line.residual / (line.quantities * (line.visits - 2)), line.visits - 2
+        if own > max(scale, 1.0):
+            scale, of = own, line.visits - 2
         probability = excess_tail(line.statistic, scale * line.quantities * of, of, line.quantities)
         freedom = of * _effective(line.quantities, scale) if scale > 1 else line.freedom
         tests.append(JointTest(probability, max(scale, 1.0), min(freedom, line.freedom)))
     return tests
-
-
-def _largest_expected(line: JointLine, scale: float) -> float:
-    """Sum of squares about its line that a unit does not exceed by more than two standard deviations where it scatters as its family."""
-    excess = line.quantities * max(scale - 1.0, 0.0)
-    visits = line.visits - 2
-    deviation = math.sqrt(2 * visits * (line.quantities - 1 + (1 + excess) ** 2))
-    return visits * (line.quantities + excess) + _CLEARLY * deviation
 
 
 def _effective(count: int, scale: float) -> float:
