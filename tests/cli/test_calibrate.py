@@ -171,6 +171,19 @@ def test_intervals_follow_the_scatter_where_no_sigma_is_given(run, ur5_folder: P
     assert stated["parameters"][name]["std"] == pytest.approx(scatter["parameters"][name]["std"], rel=0.2)
 
 
+def test_few_readings_tell_the_scatter_badly(run, ur5_folder: Path, some: Path) -> None:
+    """13 poses have 39 coordinates, of which 25 parameters leave 14: √(1/28) = 19 %."""
+    header, rows = read_csv(some)
+    few = write_csv(ur5_folder / "few.csv", header, rows[::11])
+    robot = ur5_folder / "robot.yaml"
+    remarks = run("calibrate", robot, few, "--terms", "kinematic", "--json").document["remarks"]
+    assert any(
+        "14 degrees of freedom more than the 25 parameters" in text and "±19 %" in text for text in remarks
+    )
+    many = run("calibrate", robot, some, "--terms", "kinematic", "--json").document["remarks"]
+    assert not any("degrees of freedom" in text for text in many)
+
+
 def test_terms_of_robot_yaml_are_kept(run, ur5_folder: Path, some: Path) -> None:
     robot = ur5_folder / "robot.yaml"
     robot.write_text(

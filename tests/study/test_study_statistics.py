@@ -185,10 +185,31 @@ def test_a_share_that_surely_but_hardly_differs_from_the_stated_one_is_no_fault(
     }
     results |= {"tasks": {"total": 3000, "done": 3000, "failed": 0}, **study_statistics(studied)}
     check = study_page(StudyReport(results, studied)).verdict.checks[-1]
-    assert check.status == status and said in check.answer
+    assert check.status == status and said in check.answer and "are few" not in check.answer
     if std != 1.0:
         times = float(check.answer.split(" times the stated")[0].split()[-1])
         assert times == pytest.approx(1 / std, rel=0.03)
+
+
+def test_eight_seeds_do_not_show_that_uncertainties_are_too_large() -> None:
+    errors = np.zeros((8, 50))
+    errors[:4, 0] = 3.0  # half of the tasks have one interval of fifty that does not hold the truth
+    studied = table(intervals(errors, 1.0) | {"seed": np.arange(8)})
+    results = {
+        "study": "virtual_calibration",
+        "name": "s",
+        "error": "verification",
+        "has_truth": True,
+        "command": "",
+        "provenance": {},
+    }
+    results |= {"tasks": {"total": 8, "done": 8, "failed": 0}, **study_statistics(studied)}
+    covered = results["coverage"]
+    check = study_page(StudyReport(results, studied)).verdict.checks[-1]
+    assert covered["low"] > 0.95 and covered["seeds"] == 8  # the interval itself would exclude 95 %
+    assert (
+        check.status == "unknown" and "may be too large" in check.answer and "8 seeds are few" in check.answer
+    )
 
 
 def test_names_and_messages_are_text_in_the_page(tmp_path) -> None:

@@ -30,12 +30,13 @@ class FleetConflict:
     """Test of a prior from other robots: this one deviates from them `size` times as much as they do from each other.
 
     `probability` is that of a likelihood ratio as large where it is one of them, `shifts` (name, deviations in standard deviations of the
-    prior) say where it deviates, the farthest first.
+    prior) say where it deviates, the farthest first, and `deviating` in how many parameters by more than three.
     """
 
     size: float
     probability: float
     shifts: tuple[tuple[str, float], ...]
+    deviating: int
 
     @property
     def contradicted(self) -> bool:
@@ -49,6 +50,7 @@ class FleetConflict:
             "probability": self.probability,
             "contradicted": self.contradicted,
             "shifts": dict(self.shifts),
+            "deviating": self.deviating,
         }
 
     @classmethod
@@ -81,9 +83,8 @@ class FleetConflict:
         shift = root @ right.T @ (size**2 * sizes / (noise + size**2 * sizes**2) * seen)
         relative = shift / np.sqrt(np.diag(fleet.covariance))
         order = [k for k in np.argsort(-np.abs(relative)) if abs(relative[k]) > _NAMED]
-        return cls(
-            float(size), probability, tuple((fleet.names[k], float(relative[k])) for k in order[:_LISTED])
-        )
+        shifts = tuple((fleet.names[k], float(relative[k])) for k in order[:_LISTED])
+        return cls(float(size), probability, shifts, len(order))
 
 
 @dataclass(frozen=True, eq=False)

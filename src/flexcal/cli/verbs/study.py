@@ -89,6 +89,11 @@ def _lines(document: dict[str, Any]) -> list[str]:
             f"95 % intervals that hold the true value: {100 * covered['share']:.1f} % "
             f"({100 * covered['low']:.1f} to {100 * covered['high']:.1f} %)"
         )
+    spread = document["resampling"] and document["resampling"]["ratio"]
+    if spread:
+        lines.append(
+            f"the estimates spread over the resampled data {spread:.2g} times as much as the fit states (median over the parameters)"
+        )
     for item in document["effects"]:
         if item["share"] is not None:
             lines.append(

@@ -63,7 +63,9 @@ def conflict_sentence(block: dict[str, Any]) -> str:
     """What is said of a robot that the prior does not fit."""
     conflict = block["conflict"]
     most = [f"{name} ({shift:+.1f} σ)" for name, shift in conflict["shifts"].items()]
-    where = f", most in {', '.join(most)}" if most else ""
+    others = conflict["deviating"] - len(most)
+    more = f" and {others} more by over 3 σ" if others > 0 else ""
+    where = f", most in {', '.join(most)}{more}" if most else ""
     return (
         f"the prior does not fit this robot (p {_probability(conflict['probability'])}): it deviates from the other robots "
         f"{conflict['size']:.2g} times as much as they differ among each other{where}; is it of another model or batch, or was it "

@@ -22,6 +22,7 @@ from flexcal.calibration.diagnostics import (
     stated_noise,
 )
 from flexcal.calibration.fit import GeometricFit
+from flexcal.jobs.calibration.few_readings import few_readings_remarks
 from flexcal.jobs.calibration.ignored_columns import ignored_columns_remarks
 from flexcal.jobs.calibration.inclinations import inclination_remarks
 from flexcal.jobs.calibration.thermal import thermal_remarks
@@ -159,6 +160,7 @@ def calibration_remarks(
         *_views(fit),
         *_size(fit),
         *_noise(fit, prior_misfits=prior_misfits),
+        *few_readings_remarks(fit),
         *_jumps(fit),
     ]
     remarks += inclination_remarks(fit)

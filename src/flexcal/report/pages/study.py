@@ -49,6 +49,8 @@ _FEWEST_RESAMPLES, _RATIO = 8, 1.25
 _COVERAGE_QUESTION = "Do the 95 % intervals hold the true values in 95 % of cases?"
 _NEAR = 0.02
 """Distance of a share of intervals from 95 % that changes no decision: 93 to 97 %."""
+_FEW_SEEDS = 20
+"""Number of seeds from which a share of intervals that is too large says that they are."""
 _LISTED = 100
 """Largest number of messages in a table."""
 
@@ -172,19 +174,24 @@ def _coverage_check(covered: Mapping[str, Any]) -> Check:
         return Check(_COVERAGE_QUESTION, f"{answer}.", "good")
     small = high < NOMINAL_COVERAGE
     near = low >= NOMINAL_COVERAGE - _NEAR and high <= NOMINAL_COVERAGE + _NEAR
-    answer += f": the stated uncertainties are {'a little ' if near else ''}too {'small' if small else 'large'} under these options"
+    few = covered["seeds"] < _FEW_SEEDS
+    size = f"{'a little ' if near else ''}too {'small' if small else 'large'}"
+    answer += f": the stated uncertainties {'may be' if few else 'are'} {size} under these options"
     if covered["ratio"] is not None:
         times = f"{significant(covered['ratio'], 2)} times the stated standard deviations"
         answer += f"; errors are {times} (root mean square, median over the parameters)"
-    return Check(_COVERAGE_QUESTION, f"{answer}.", "good" if near else "bad" if small else "care")
+    if few:
+        answer += f"; {covered['seeds']} seeds are few, run {_FEW_SEEDS} or more"
+    return Check(
+        _COVERAGE_QUESTION, f"{answer}.", "good" if near else "bad" if small else "unknown" if few else "care"
+    )
 
 
 def _resampling_check(block: Mapping[str, Any]) -> list[Check]:
     """Whether the spread over resamples is that which the fit states, as far as so many resamples tell."""
-    ratios = [item["ratio"] for item in block["parameters"].values() if item["ratio"] is not None]
-    if not ratios or block["resamples"] < _FEWEST_RESAMPLES:
+    middle = block["ratio"]
+    if middle is None or block["resamples"] < _FEWEST_RESAMPLES:
         return []
-    middle = float(np.median(ratios))
     tolerated = _RATIO + 2 / np.sqrt(2 * (block["resamples"] - 1))
     answer = f"The spread over {block['resamples']} data sets is {significant(middle, 3)} times the stated one (median over the parameters)"
     question = "Do resampled data spread the estimates as their standard deviations say?"

@@ -65,8 +65,8 @@ def binomial_interval(inside: float, count: float) -> tuple[float, float]:
 def coverage(table: StudyTable, rows: np.ndarray | None = None) -> dict[str, Any]:
     """How often 95 % intervals hold the true value: of every parameter, and of all, with the 95 % intervals of these shares.
 
-    Tasks of one seed share the drawn robot and its noise, as the intervals of one task do: only seeds are independent. `ratio` is the root
-    mean square of the errors over their stated standard deviations, and of all parameters the median. `rows` (N,) is a mask.
+    Tasks of one seed share the drawn robot and its noise, as the intervals of one task do: only `seeds` are independent. `ratio` is the
+    root mean square of the errors over their stated standard deviations, and of all parameters the median. `rows` (N,) is a mask.
     """
     chosen = np.ones(len(table), bool) if rows is None else rows
     drawn = _drawn_robots(table)
@@ -97,10 +97,11 @@ def coverage(table: StudyTable, rows: np.ndarray | None = None) -> dict[str, Any
     ratios = [item["ratio"] for item in parameters.values() if item["ratio"] is not None]
     return {
         "tasks": int(some.sum()),
+        "seeds": len(np.unique(drawn[some])),
         "share": float(held.sum() / known.sum()) if some.any() else None,
         "low": None if bounds is None else bounds[0],
         "high": None if bounds is None else bounds[1],
-        "ratio": float(np.median(ratios)) if ratios else None,
+        "ratio": _median(ratios),
         "parameters": parameters,
     }
 
@@ -189,7 +190,8 @@ def resampling(table: StudyTable) -> dict[str, Any] | None:
     """Spread of every parameter over resampled data sets beside its standard deviation; None where data were not resampled.
 
     Bootstrap: standard deviation of the estimates; groups left out: the jackknife's √((G − 1)/G Σ (θ − mean)²) (Efron and Tibshirani 1993,
-    chapter 11). `ratio` is the spread over the stated standard deviation. Nothing where options differ, as the spread is theirs too.
+    chapter 11). `ratio` is the spread over the stated standard deviation, and of all parameters the median. Nothing where options differ,
+    as the spread is theirs too.
     """
     names = np.array(table.values("resample"), dtype=object)
     drawn = np.array([isinstance(n, str) and n not in ("", "all") for n in names], dtype=bool)
@@ -209,7 +211,12 @@ def resampling(table: StudyTable) -> dict[str, Any] | None:
             "ratio": float(spread / stated) if stated > 0 else None,
             "resamples": len(own),
         }
-    return {"kind": kind, "resamples": int(drawn.sum()), "parameters": parameters}
+    ratios = [item["ratio"] for item in parameters.values() if item["ratio"] is not None]
+    return {"kind": kind, "resamples": int(drawn.sum()), "ratio": _median(ratios), "parameters": parameters}
+
+
+def _median(values: list[float]) -> float | None:
+    return float(np.median(values)) if values else None
 
 
 def study_level_rows(table: StudyTable, name: str) -> list[tuple[Any, np.ndarray]]:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from flexcal.report.layout import Section, Table, Text, significant
 
 
@@ -23,8 +21,7 @@ def resampling_section(block: Mapping[str, Any]) -> Section:
         )
         for name, i in items
     )
-    ratios = [item["ratio"] for _, item in items if item["ratio"] is not None]
-    middle = f"The median ratio is {significant(float(np.median(ratios)), 3)}. " if ratios else ""
+    middle = "" if block["ratio"] is None else f"The median ratio is {significant(block['ratio'], 3)}. "
     how = (
         "Residuals are drawn anew among those of the same station: errors that are correlated between poses count as independent."
         if block["kind"] == "bootstrap"
