@@ -107,6 +107,26 @@ def test_date_of_a_growing_error(tmp_path: Path) -> None:
     assert any("no date" in remark for remark in fleet.document()["remarks"])
 
 
+def test_a_crash_between_two_verifications_is_said(tmp_path: Path) -> None:
+    """Of four robots that scatter by a tenth, one has 0.88 mm after 0.07 mm; a bad verification that the next does not confirm is none."""
+    write_robot(tmp_path / "crashed", tolerance=2e-4)
+    write_visits(tmp_path / "crashed", (0.070, 0.073, 0.068, 0.88), name="c")
+    write_robot(tmp_path / "once", tolerance=2e-4)
+    write_visits(tmp_path / "once", (0.070, 0.6, 0.068, 0.071), name="o")
+    for name, scale in (("a", 1.0), ("b", 1.3)):
+        write_robot(tmp_path / name, tolerance=2e-4)
+        write_visits(tmp_path / name, tuple(scale * e for e in (0.07, 0.077, 0.068, 0.075)), name=name)
+    write_robot(tmp_path / "bare")
+    document = review_fleet(tmp_path).document()
+    crashed = robot_named(document, "crashed")
+    assert not crashed["drifts"]
+    assert crashed["outlook"] == f"P90 rose from 0.068 mm ({DAYS[2]}) to 0.880 mm ({DAYS[3]})"
+    for name in ("a", "b", "once"):
+        assert robot_named(document, name)["outlook"] == "no significant trend of the errors"
+    assert robot_named(document, "bare")["outlook"] == "not judged"
+    assert document["headline"].endswith("; drifting or changed: crashed")
+
+
 def test_no_date_far_beyond_the_observed_time(tmp_path: Path) -> None:
     write_robot(tmp_path / "slow", tolerance=1e-3)
     write_visits(tmp_path / "slow", (0.100, 0.1196, 0.1405, 0.1597, 0.1802), name="g")
@@ -203,6 +223,10 @@ def test_rechecks_are_corrected_for_their_number(tmp_path: Path) -> None:
         robot_named(fleet, "r7")["recheck"] | {"changed": True, "date": "2026-02-02"}
         == robot_named(fleet, "r7")["recheck"]
     )
+    changed = robot_named(fleet, "r7")["outlook"]
+    assert changed == "not as calibrated by the recheck of 2026-02-02: joint shifted"
+    assert robot_named(fleet, "r0")["outlook"] == "not judged; as calibrated by the recheck of 2026-02-02"
+    assert document["headline"].endswith("; drifting or changed: r7") and document["counts"]["drifting"] == 1
     found = robot_named(fleet, "r3")["recheck"]
     assert found["verdict"] == "joint_shifted" and not found["changed"]
     frame = fleet.gathered.table.frame

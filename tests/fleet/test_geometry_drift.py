@@ -71,6 +71,9 @@ def test_a_slow_drift_is_found_and_named(tmp_path: Path) -> None:
     # a turn by 0.3 mrad moves a point 0.1 m from the axis of joint 4 by 0.03 mm
     assert 0.01 < moved["mean"] < moved["largest"] < 0.15
     assert "significant, but small beside the tolerance of 1 mm" in drift["sentence"]
+    assert document["headline"].endswith("; drifting or changed: r1")
+    (robot,) = [item for item in document["robots"] if item["robot"] == "r1"]
+    assert robot["outlook"].startswith("the geometry drifts over 4 calibrations, the tool by 0.")
     fleet.write(tmp_path / "fleet.parquet")
     page = (tmp_path / "fleet.html").read_text("utf-8")
     assert "joint_4.offset" in page and "small beside the tolerance" in page
@@ -86,6 +89,7 @@ def test_a_jump_is_found_named_and_dated(tmp_path: Path) -> None:
     assert jump["robot"] == "r1"
     assert jump["change"] == "step"
     assert (jump["first"], jump["last"]) == (DAYS[1], DAYS[2])
+    assert f"the geometry jumped between {DAYS[1]} and {DAYS[2]}" in document["robots"][1]["outlook"]
     (cause,) = jump["explanations"]
     assert cause["name"] == "joint_3.offset"
     assert abs(cause["change"] - 3e-4) < 3 * cause["std"] < 1.5e-4
@@ -109,8 +113,13 @@ def test_calibrations_in_other_ranges_are_a_problem(tmp_path: Path) -> None:
     text = file.read_text("utf-8")
     (line,) = [row for row in text.splitlines() if row.strip().startswith("joint_2: [")]
     file.write_text(text.replace(line, line.partition(":")[0] + ": [2.5, 3.0]"), "utf-8")
-    (problem,) = review_fleet(tmp_path).document()["problems"]
+    document = review_fleet(tmp_path).document()
+    (problem,) = document["problems"]
     assert problem["place"].startswith("r0") and "joint_2" in problem["sentence"]
+    (robot,) = document["robots"]
+    assert "not judged; geometry not tested: " in robot["outlook"] and "joint_2" in robot["not_tested"]
+    assert document["headline"].endswith("; geometry not tested: r0")
+    assert document["counts"]["geometry_not_tested"] == 1
 
 
 @pytest.mark.parametrize(("largest", "robots"), [(1.0, 1), (100.0, 12)])

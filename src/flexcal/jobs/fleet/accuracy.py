@@ -11,6 +11,7 @@ from typing import Literal
 from flexcal.fleet import FEWEST_VISITS, Crossing, crossing
 from flexcal.jobs.fleet.courses import Record, date_at, latest, visits_of, years
 from flexcal.jobs.fleet.drifts import Drift, error_drifts
+from flexcal.jobs.fleet.rises import Rise, error_rises
 
 _ONE_SIDED = 1.645
 """Quantile of the normal distribution: a robot that keeps its tolerance is called out of it in 5 % of verifications at most."""
@@ -26,7 +27,7 @@ class RobotAccuracy:
 
     `verification` is the record of the P90 of its latest usable verification, None without one; `state` says whether that keeps the
     `tolerance`, m, and `reason` why. `drift` is the trend of the P90, `reaches` when that reaches the tolerance, years since 2000;
-    `outlook` says both in a clause.
+    `outlook` says both in a clause. `rise` is a significant one between two verifications, `rises_tested` whether there are two.
     """
 
     robot: str
@@ -38,6 +39,8 @@ class RobotAccuracy:
     drift: Drift | None
     reaches: Crossing | None
     outlook: str
+    rise: Rise | None
+    rises_tested: bool
 
     @property
     def reached(self) -> tuple[datetime | None, datetime | None, datetime | None]:
@@ -63,7 +66,7 @@ def robot_accuracies(
         robot: [r for r in group if r["calibration"] == last[robot]["calibration"]]
         for robot, group in verified.items()
     }
-    drifts = error_drifts(same)
+    drifts, rises = error_drifts(same), error_rises(same, level)
     found = []
     for robot, (model, tolerance) in robots.items():
         verification, drift = last.get(robot), drifts.get(robot)
@@ -77,7 +80,19 @@ def robot_accuracies(
             state, reason = _state(verification, tolerance, len(left_out[robot]))
         reaches, outlook = _outlook(same.get(robot, []), drift, tolerance, state, level)
         found.append(
-            RobotAccuracy(robot, model, tolerance, verification, state, reason, drift, reaches, outlook)
+            RobotAccuracy(
+                robot,
+                model,
+                tolerance,
+                verification,
+                state,
+                reason,
+                drift,
+                reaches,
+                outlook,
+                rises.get(robot),
+                len(visits_of(same.get(robot, [])).dates) > 1,
+            )
         )
     return found
 
@@ -104,14 +119,14 @@ def _outlook(
     """When the tolerance is reached, where the data say it, and a sentence on the trend."""
     if drift is None:
         if not verifications:
-            return None, "no trend"
+            return None, "not judged"
         dated = len(visits_of(verifications).dates)
         return (
             None,
             f"no trend yet: {dated} of {FEWEST_VISITS} dated verifications of the present calibration",
         )
     if drift.probability > level:
-        return None, "no significant trend"
+        return None, "no significant trend of the errors"
     if drift.trend.slope < 0:
         return None, "errors decrease"
     if tolerance is None or state == "out":
@@ -124,4 +139,10 @@ def _outlook(
         return None, (
             f"errors increase; the tolerance is farther ahead than {_LARGEST_EXTRAPOLATION:g} times the time observed, so no date is given"
         )
-    return reaches, "errors increase and reach the tolerance if they go on so"
+    date, low, high = (_day(time) for time in (reaches.time, reaches.low, reaches.high))
+    return reaches, f"errors increase and reach the tolerance by {date} ({low} to {high}) if they go on so"
+
+
+def _day(time: float) -> str:
+    date = date_at(time)
+    return "open" if date is None else date.date().isoformat()

@@ -14,6 +14,7 @@ from flexcal.jobs.fleet.drifts import Drift
 from flexcal.jobs.fleet.gathering import GatheredFleet
 from flexcal.jobs.fleet.geometry_document import geometry_entry
 from flexcal.jobs.fleet.geometry_drifts import GeometryDrift
+from flexcal.jobs.fleet.outlooks import outlook_of
 from flexcal.jobs.fleet.parameters import ParameterSpread
 from flexcal.jobs.fleet.projects import date_of
 from flexcal.jobs.fleet.rechecks import LatestRecheck
@@ -21,6 +22,9 @@ from flexcal.jobs.fleet_prior import comparable_terms
 from flexcal.report.layout import counted
 from flexcal.report.results import TOLERANCE_STATES, is_drifting
 from flexcal.units import MILLIMETRE
+
+_NAMED = 5
+"""Largest number of robots that the headline names."""
 
 
 def fleet_document(
@@ -49,7 +53,7 @@ def fleet_document(
     )
     entries = [geometry_entry(item, tolerances.get(item.course.robot)) for item in moving]
     of_geometry = {item.course.robot for item in geometry}
-    sentences = {entry["robot"]: entry["sentence"] for entry in entries}
+    changes = {entry["robot"]: entry for entry in reversed(entries)}
     tested_parameters = Counter(drift.robot for drift in drifts)
     robots = [
         {
@@ -62,7 +66,8 @@ def fleet_document(
             "parameter_trends": tested_parameters[item.robot],
             "drifting_parameters": [drift.name for drift in by_robot[item.robot]],
             "geometry_tested": item.robot in of_geometry,
-            "geometry_drift": sentences.get(item.robot),
+            "geometry_drift": changes[item.robot]["sentence"] if item.robot in changes else None,
+            "not_tested": gathered.untested.get(item.robot),
             "outlying_parameters": [
                 spread.name
                 for spread in spreads
@@ -71,6 +76,10 @@ def fleet_document(
             ],
         }
         for item in accuracies
+    ]
+    robots = [
+        {**robot, "outlook": outlook_of(robot, item.outlook, changes.get(item.robot))}
+        for robot, item in zip(robots, accuracies, strict=True)
     ]
     states = Counter(str(robot["state"]) for robot in robots)
     tested = [item for item in accuracies if item.drift is not None]
@@ -88,7 +97,8 @@ def fleet_document(
             "parameter_trends_tested": len(drifts),
             "robots_with_parameter_trends": len({drift.robot for drift in drifts}),
             "geometry_trends_tested": len(of_geometry),
-            "geometry_drifting": len(sentences),
+            "geometry_drifting": len(changes),
+            "geometry_not_tested": len(gathered.untested),
             "rechecked": len(rechecks),
             "changed": sum(r["recheck"] is not None and r["recheck"]["changed"] for r in robots),
             "reaching_tolerance": sum(robot["reaches"] is not None for robot in robots),
@@ -119,9 +129,18 @@ def _headline(robots: Sequence[Mapping[str, Any]], states: Mapping[str, int], fo
     if folders > len(robots):
         many += f" in {folders} folders, by their serials"
     if all(robot["tolerance_mm"] is None for robot in robots):
-        return f"{many}; no tolerance is stated, so none is judged"
-    words = [f"{states.get(state, 0)} {label}" for state, label in TOLERANCE_STATES.items()]
-    return f"{many}: {', '.join(words)}"
+        many += "; no tolerance is stated, so none is judged"
+    else:
+        words = [f"{states.get(state, 0)} {label}" for state, label in TOLERANCE_STATES.items()]
+        many += f": {', '.join(words)}"
+    for what, named in (
+        ("drifting or changed", [robot["robot"] for robot in robots if is_drifting(robot)]),
+        ("geometry not tested", [robot["robot"] for robot in robots if robot["not_tested"] is not None]),
+    ):
+        if named:
+            more = f" and {len(named) - _NAMED} more" if len(named) > _NAMED else ""
+            many += f"; {what}: {', '.join(named[:_NAMED])}{more}"
+    return many
 
 
 def _accuracy(item: RobotAccuracy, declared: float | None, level: float) -> dict[str, Any]:
@@ -138,7 +157,16 @@ def _accuracy(item: RobotAccuracy, declared: float | None, level: float) -> dict
         "verified": None if verification is None else _day(verification["date"]),
         "drifts": drift is not None and drift.probability <= level,
         "trend": None if drift is None else _trend(drift, MILLIMETRE, "mm"),
-        "outlook": item.outlook,
+        "rise": None
+        if item.rise is None
+        else {
+            "first": _day(item.rise.dates[0]),
+            "last": _day(item.rise.dates[1]),
+            "from_mm": _millimetres(item.rise.errors[0]),
+            "to_mm": _millimetres(item.rise.errors[1]),
+            "adjusted_probability": item.rise.probability,
+        },
+        "rises_tested": item.rises_tested,
         "reaches": None
         if item.reaches is None
         else {"date": _day(date), "low": _day(low), "high": _day(high)},

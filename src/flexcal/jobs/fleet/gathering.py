@@ -32,7 +32,8 @@ _DIGITS = 12
 @dataclass(frozen=True, eq=False)
 class GatheredFleet:
     """The table of a fleet, its `projects`, its `problems`, and `repeated`: how many results stand in several folders; `courses` of the
-    geometry of robots that were calibrated several times; `copied`: robots whose folders have results of another, by that one.
+    geometry of robots that were calibrated several times, `untested`: why others have none; `copied`: robots whose folders have results
+    of another, by that one.
     """
 
     table: FleetTable
@@ -40,6 +41,7 @@ class GatheredFleet:
     problems: Sequence[Problem]
     repeated: int
     courses: Sequence[GeometryCourse]
+    untested: Mapping[str, str]
     copied: Mapping[str, str]
 
 
@@ -103,9 +105,11 @@ def gather_fleet(place: str | Path, progress: Progress = silent) -> GatheredFlee
             results += _results(root, folder, problems)
         progress("reading", 1.0)
         kept, repeated, copied = _distinct(results, problems)
-        courses, refused = geometry_courses(root, [result.first for result in kept], projects, progress)
+        courses, refused, untested = geometry_courses(
+            root, [result.first for result in kept], projects, progress
+        )
     table = FleetTable.of(row for result in kept for row in result.rows)
-    return GatheredFleet(table, projects, [*problems, *refused], repeated, courses, copied)
+    return GatheredFleet(table, projects, [*problems, *refused], repeated, courses, untested, copied)
 
 
 def _results(root: Path, folder: ResultFolder, problems: list[Problem]) -> Iterator[_Result]:

@@ -23,6 +23,8 @@ from flexcal.jobs.pages import model_before
 from flexcal.jobs.result_files import RESULTS
 from flexcal.progress import Progress
 
+_OTHER_URDF = "the URDF is another than that of its calibrations, so they cannot be compared"
+
 
 @dataclass(frozen=True, eq=False)
 class GeometryCourse:
@@ -55,8 +57,8 @@ class GeometryDrift:
 
 def geometry_courses(
     root: Path, results: Sequence[Row], projects: Sequence[Project], progress: Progress
-) -> tuple[list[GeometryCourse], list[Problem]]:
-    """Courses of robots with three calibrations or more on different days, and problems of those that cannot be compared.
+) -> tuple[list[GeometryCourse], list[Problem], dict[str, str]]:
+    """Courses of robots with three calibrations or more on different days; problems of those that cannot be compared, and why, by robot.
 
     `results` are the first rows of all results, each once. Of calibrations of one day, or from the same measurements, the last counts.
     """
@@ -67,6 +69,7 @@ def geometry_courses(
     many = {key: visits for key, rows in robots.items() if len(visits := _visits(rows)) >= FEWEST_VISITS}
     courses: list[GeometryCourse] = []
     problems: list[Problem] = []
+    untested: dict[str, str] = {}
     for number, ((robot, model, urdf), visits) in enumerate(many.items()):
         progress("comparing", number / len(many))
         dates = tuple(row.date for row in visits if row.date is not None)
@@ -75,10 +78,13 @@ def geometry_courses(
             trend, *steps = _courses(root, folder, urdf, visits, dates) or (None,)
         except FlexcalError as problem:
             problems.append(problem_of(root, folder, problem))
+            untested[robot] = problems[-1].sentence.rstrip(".")
             continue
-        if trend is not None:
+        if trend is None:
+            untested[robot] = _OTHER_URDF
+        else:
             courses.append(GeometryCourse(robot, model, urdf, dates, trend, tuple(steps)))
-    return courses, problems
+    return courses, problems, untested
 
 
 def geometry_drifts(courses: Sequence[GeometryCourse], families: int, level: float) -> list[GeometryDrift]:

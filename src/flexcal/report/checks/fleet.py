@@ -66,10 +66,10 @@ def _check_drift(document: Mapping[str, Any]) -> Check:
     """Whether errors, single parameters or the geometry as a whole of a robot have a significant trend."""
     question, counts, tested = "Does any robot drift?", document["counts"], len(with_trends(document))
     if counts["drifting"]:
-        return Check(question, f"{counts['drifting']} of {tested} with trends do.", "care")
-    if not tested:
-        return Check(question, "No robot has three dated visits.", "unknown")
+        return Check(question, f"{counts['drifting']} of {tested} that were tested do, or changed.", "care")
     trends = [robot["trend"] for robot in document["robots"] if robot["trend"] is not None]
+    if not trends and not counts["parameter_trends_tested"] and not counts["geometry_trends_tested"]:
+        return Check(question, "No robot has three dated visits.", "unknown")
     if not trends:
         answer = (
             "Neither single parameters nor the geometry as a whole, of "

@@ -67,9 +67,9 @@ def _verdict(document: Mapping[str, Any]) -> Verdict:
             None if counts["robots"] == counts["not_judged"] else "bad" if out else "good",
         ),
         Fact(
-            "How many drift?",
+            "How many drift or changed?",
             str(counts["drifting"]),
-            f"of {len(with_trends(document))} with trends",
+            f"of {len(with_trends(document))} tested",
             _named(sorted(robot["robot"] for robot in document["robots"] if is_drifting(robot)))
             or "None significantly, after correction for the number of tests.",
         ),
@@ -128,7 +128,7 @@ def _needs_attention(robot: Mapping[str, Any]) -> bool:
         robot["state"] in ("out", "undecided")
         or is_drifting(robot)
         or robot["outlying_parameters"]
-        or (robot["recheck"] is not None and (robot["recheck"]["changed"] or robot["recheck"]["alarms"]))
+        or robot["not_tested"] is not None
     )
 
 
@@ -143,20 +143,13 @@ def _robot_table(
 
 
 def _robot_row(robot: Mapping[str, Any]) -> tuple[str, ...]:
-    reaches = robot["reaches"]
     outlook = robot["outlook"]
     if robot["drifts"]:
-        outlook += f": {_rate(robot['trend'])}"
-    if reaches is not None:
-        outlook += f"; {reaches['date']} ({reaches['low']} to {reaches['high'] or 'open'})"
-    if robot["geometry_drift"] is not None:
-        outlook += f"; {robot['geometry_drift']}"
-    for key, words in (("drifting_parameters", "drifts"), ("outlying_parameters", "differs from the others")):
-        if robot[key]:
-            outlook += f"; {', '.join(robot[key][:3])}{' and others' if len(robot[key]) > 3 else ''}: {words}"
-    if (visit := robot["recheck"]) is not None and (visit["changed"] or visit["alarms"]):
-        said = visit["sentence"] if visit["changed"] else f"slow drift of {', '.join(visit['alarms'])}"
-        outlook += f"; recheck of {visit['date']}: {said}"
+        outlook += f"; errors by {_rate(robot['trend'])}"
+    if names := robot["outlying_parameters"]:
+        outlook += (
+            f"; {', '.join(names[:3])}{' and others' if len(names) > 3 else ''}: differs from the others"
+        )
     verified = robot["p90_mm"] is not None
     return (
         robot["robot"],

@@ -21,14 +21,25 @@ def tolerance_kept(robot: Mapping[str, Any]) -> str:
 
 
 def with_trends(document: Mapping[str, Any]) -> Sequence[str]:
-    """Robots of the document whose errors, a parameter or the geometry as a whole were tested for a trend."""
+    """Robots of the document that were tested for a change: of their errors, a parameter or the geometry as a whole, or by a recheck."""
     return [
         robot["robot"]
         for robot in document["robots"]
-        if robot["trend"] is not None or robot["parameter_trends"] or robot["geometry_tested"]
+        if robot["trend"] is not None
+        or robot["rises_tested"]
+        or robot["parameter_trends"]
+        or robot["geometry_tested"]
+        or robot["recheck"] is not None
     ]
 
 
 def is_drifting(robot: Mapping[str, Any]) -> bool:
-    """Whether a robot of the document has a significant trend of its errors, of a parameter or of the geometry as a whole."""
-    return bool(robot["drifts"] or robot["drifting_parameters"] or robot["geometry_drift"])
+    """Whether a robot of the document changed significantly: its errors, a parameter or the geometry as a whole, or by its rechecks."""
+    visit = robot["recheck"]
+    return bool(
+        robot["drifts"]
+        or robot["rise"]
+        or robot["drifting_parameters"]
+        or robot["geometry_drift"]
+        or (visit is not None and (visit["changed"] or visit["alarms"]))
+    )
