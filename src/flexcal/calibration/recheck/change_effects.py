@@ -11,7 +11,13 @@ from flexcal.calibration.measurement import PredictedMeasurements, predict_measu
 from flexcal.model.robot import GEOMETRY, STATION, RobotModel
 
 ChangeKind = Literal[
-    "joint_shifted", "tool_bumped", "thermal_growth", "payload_changed", "instrument_moved", "wrong_reading"
+    "joint_shifted",
+    "tool_bumped",
+    "thermal_growth",
+    "payload_changed",
+    "instrument_moved",
+    "wrong_reading",
+    "readings_drift",
 ]
 _STEP = 0.1
 """Payload, kg, of the finite difference."""
@@ -80,6 +86,14 @@ def wrong_readings(poses: int, numbers: np.ndarray) -> list[PossibleChange]:
     ]
 
 
+def drift_of_readings(poses: int) -> PossibleChange:
+    """A drift of instrument or robot while the visit was measured, at constant rate over its K poses in measuring order, from none at the
+    first; its parameters are what it comes to at the last.
+    """
+    columns = np.kron(np.linspace(0.0, 1.0, poses)[:, None], np.eye(3))
+    return PossibleChange("readings_drift", "the readings", ("dx", "dy", "dz"), ("m",) * 3, columns)
+
+
 def _flat(columns: np.ndarray) -> np.ndarray:
     return columns.reshape(-1, columns.shape[2])
 
@@ -101,6 +115,8 @@ def _tool(model: RobotModel, at: PredictedMeasurements, target: str) -> Possible
 
 WHOLE_TOOL = "the tool"
 """Subject of a motion of all points on the tool together."""
+OF_THE_MEASUREMENT = ("instrument_moved", "wrong_reading", "readings_drift")
+"""Kinds of changes that leave the tool where it was."""
 
 
 def _whole_tool(model: RobotModel, at: PredictedMeasurements) -> list[PossibleChange]:

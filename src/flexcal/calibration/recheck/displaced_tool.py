@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.calibration.measurement import PredictedMeasurements, random_poses, seen_from_base
-from flexcal.calibration.recheck.change_effects import WHOLE_TOOL, possible_changes
+from flexcal.calibration.recheck.change_effects import OF_THE_MEASUREMENT, WHOLE_TOOL, possible_changes
 from flexcal.calibration.recheck.judged_visit import Suspect
 from flexcal.model.kinematics import joint_limits
 from flexcal.model.robot import RobotModel
@@ -100,7 +100,7 @@ def _random_points(
 
 
 def _columns(model: RobotModel, at: PredictedMeasurements, suspect: Suspect) -> np.ndarray | None:
-    if suspect.change.kind in ("instrument_moved", "wrong_reading"):
+    if suspect.change.kind in OF_THE_MEASUREMENT:
         return None
     return next(
         change.columns

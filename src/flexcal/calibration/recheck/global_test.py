@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -54,10 +54,17 @@ class GlobalTest:
     unseen: tuple[PossibleChange, ...]
     freedom: float
     least: np.ndarray
+    directed: bool = False
 
     @classmethod
-    def of(cls, errors: VisitErrors, changes: Sequence[PossibleChange]) -> GlobalTest:
-        """Test of `errors` for `changes`; those of the instrument's place are no changes where it is fitted to the visit."""
+    def of(
+        cls, errors: VisitErrors, changes: Sequence[PossibleChange], *, directed: bool = False
+    ) -> GlobalTest:
+        """Test of `errors` for `changes`; those of the instrument's place are no changes where it is fitted to the visit.
+
+        A `directed` test has the parts of the changes alone, without that of the whole, for a scatter that is estimated from what the
+        changes leave of these errors.
+        """
         root = np.linalg.cholesky(errors.covariance)
         whitening = np.linalg.inv(root)
         if errors.placed:
@@ -72,8 +79,8 @@ class GlobalTest:
         ]
         seen = tuple(item for item in items if item.seen)
         unseen = tuple(item.change for item in items if not item.seen)
-        test = cls(errors, whitening, seen, unseen, errors.freedom, np.zeros(0))
-        return cls(errors, whitening, seen, unseen, errors.freedom, np.sort(test.least_of(_DRAWS)))
+        test = cls(errors, whitening, seen, unseen, errors.freedom, np.zeros(0), directed)
+        return replace(test, least=np.sort(test.least_of(_DRAWS)))
 
     @property
     def size(self) -> int:
@@ -88,13 +95,11 @@ class GlobalTest:
     def probability(self, values: np.ndarray) -> float:
         """Probability that chance makes the errors (3 K,), m, as conspicuous."""
         whitened = self.whitening @ values
-        parts = [float(whitened @ whitened)] + [float(np.sum((s.basis.T @ whitened) ** 2)) for s in self.seen]
-        least = min(self.chance(part, count) for part, count in zip(parts, self._counts, strict=True))
+        parts = [(float(np.sum((s.basis.T @ whitened) ** 2)), s.basis.shape[1]) for s in self.seen]
+        if not self.directed:
+            parts.append((float(whitened @ whitened), self.size))
+        least = min((self.chance(part, count) for part, count in parts), default=1.0)
         return (1 + int(np.searchsorted(self.least, least, side="right"))) / (1 + len(self.least))
-
-    @property
-    def _counts(self) -> list[int]:
-        return [self.size, *(item.basis.shape[1] for item in self.seen)]
 
     def chance(self, statistic: float | np.ndarray, count: int) -> float | np.ndarray:
         """Probability that chance makes a sum of squares of `count` whitened values as large."""
@@ -112,7 +117,7 @@ class GlobalTest:
         if effect is not None:
             drawn = drawn + span.T @ effect
         # of changes with as many parameters, the largest part has the smallest p-value
-        largest = {self.size: np.sum(drawn**2, axis=1) + other}
+        largest = {} if self.directed else {self.size: np.sum(drawn**2, axis=1) + other}
         for item in self.seen:
             count = item.basis.shape[1]
             part = np.sum((drawn @ (span.T @ item.basis)) ** 2, axis=1)

@@ -7,7 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexcal.calibration.recheck.change_effects import PossibleChange, possible_changes, wrong_readings
+from flexcal.calibration.recheck.change_effects import (
+    PossibleChange,
+    drift_of_readings,
+    possible_changes,
+    wrong_readings,
+)
 from flexcal.calibration.recheck.cumulative_sums import ShiftAtVisit
 from flexcal.calibration.recheck.global_test import (
     ALIKE,
@@ -17,6 +22,7 @@ from flexcal.calibration.recheck.global_test import (
     SeenChange,
     seen_change,
 )
+from flexcal.calibration.recheck.scatter_of_visit import LargerScatter, scatter_about, unexplained
 from flexcal.calibration.recheck.visit_errors import VisitErrors
 from flexcal.estimation import student_quantile
 
@@ -47,6 +53,8 @@ class Suspect:
         Probability that chance leaves what the change does not explain.
     score : float
         Twice the negative log-likelihood, with what Schwarz's criterion adds for the parameters and for the number of changes of the kind.
+    cost : float
+        Twice the negative log-likelihood alone.
     misfit : float
         Sum of squares that the change leaves, whitened.
     same : bool
@@ -60,6 +68,7 @@ class Suspect:
     quantile: float
     remainder: float
     score: float
+    cost: float
     misfit: float
     same: bool = False
 
@@ -84,6 +93,8 @@ class JudgedVisit:
         Why the place of the instrument was fitted to the visit, if it was.
     place : Suspect or None
         Where the instrument stands then, where that alone explains the errors.
+    scatter : LargerScatter or None
+        By how much the readings scatter more than was assumed, where the test rejects and they do; the test and suspects are then by it.
     """
 
     test: GlobalTest
@@ -93,6 +104,7 @@ class JudgedVisit:
     shifts: tuple[Suspect, ...]
     instrument: str = "known"
     place: Suspect | None = None
+    scatter: LargerScatter | None = None
 
     @property
     def as_calibrated(self) -> bool:
@@ -101,11 +113,11 @@ class JudgedVisit:
 
     @property
     def verdict(self) -> str:
-        """One of as_calibrated, the kinds of changes, ambiguous (of several kinds or joints), and recalibrate."""
+        """One of as_calibrated, the kinds of changes, ambiguous (of several kinds or joints), noisier_readings and recalibrate."""
         if self.as_calibrated:
             return "instrument_moved" if self.instrument == "evident" else "as_calibrated"
         if not self.suspects:
-            return "recalibrate"
+            return "recalibrate" if self.scatter is None else "noisier_readings"
         return self.suspects[0].change.kind if len(self.suspects) == 1 else "ambiguous"
 
     def at_visit(self, series: str) -> tuple[ShiftAtVisit, ...]:
@@ -137,7 +149,7 @@ def judge_visit(errors_of: Callable[[bool], VisitErrors | None], *, placed: bool
     if placed:
         return replace(judged, instrument="declared")
     alone = [suspect.change.kind for suspect in judged.suspects] == ["instrument_moved"]
-    if judged.as_calibrated or (judged.suspects and not alone):
+    if judged.as_calibrated or (judged.suspects and not alone) or judged.verdict == "noisier_readings":
         return judged
     again = errors_of(True)
     if again is None or again.errors.size < _LEAST:
@@ -157,43 +169,77 @@ def _judge(errors: VisitErrors) -> JudgedVisit:
     probability = test.probability(errors.errors)
     shifts = tuple(_suspect(test, item, 1) for item in test.seen if len(item.change.names) == 1)
     together = _together(test)
-    suspects = _suspects(test) if probability <= VISIT_ALARM else ()
-    return JudgedVisit(test, probability, suspects, together, shifts)
+    if probability > VISIT_ALARM:
+        return JudgedVisit(test, probability, (), together, shifts)
+    found = _explanations(test)
+    scatter = scatter_about(test, [suspect.remainder for _, suspect in found], together)
+    if scatter is None:
+        return JudgedVisit(test, probability, _suspects(found), together, shifts)
+    # causes by the scatter that the visit has; what that explains is none
+    test = GlobalTest.of(scatter.applied(errors), changes, directed=True)
+    caused = test.probability(errors.errors) <= VISIT_ALARM
+    suspects = _suspects(_explanations(test)) if caused else ()
+    shifts = tuple(_suspect(test, item, 1) for item in test.seen if len(item.change.names) == 1)
+    return JudgedVisit(test, probability, suspects, together, shifts, scatter=scatter)
 
 
 def _together(test: GlobalTest) -> float:
-    whitened = test.whitening @ test.errors.errors
-    every = np.hstack([item.basis for item in test.seen] or [np.zeros((test.size, 0))])
-    basis, sizes, _ = np.linalg.svd(every, full_matrices=False)
-    basis = basis[:, sizes > 1e-6]
-    left = whitened - basis @ (basis.T @ whitened)
-    count = test.size - basis.shape[1]
-    return float(test.chance(float(left @ left), count)) if count > 0 else 1.0
+    left, count = unexplained(test)
+    return float(test.chance(left, count)) if count > 0 else 1.0
 
 
-def _suspects(test: GlobalTest) -> tuple[Suspect, ...]:
+def _explanations(test: GlobalTest) -> list[tuple[SeenChange, Suspect]]:
+    """Every change, a drift of the readings, and a wrong reading of each pose, as if it alone were the cause."""
     errors = test.errors
     root = np.linalg.cholesky(errors.covariance)
-    readings = [
+    others = [
         seen_change(change, test.whitening, root)
-        for change in wrong_readings(len(errors.poses), errors.poses.pose)
+        for change in (
+            drift_of_readings(len(errors.poses)),
+            *wrong_readings(len(errors.poses), errors.poses.pose),
+        )
     ]
-    every = [*test.seen, *(item for item in readings if item.seen and item.basis.shape[1] < test.size)]
+    every = [*test.seen, *(item for item in others if item.seen and item.basis.shape[1] < test.size)]
     kinds = [item.change.kind for item in every]
-    found = [(item, _suspect(test, item, kinds.count(item.change.kind))) for item in every]
+    return [(item, _suspect(test, item, kinds.count(item.change.kind))) for item in every]
+
+
+def _suspects(found: list[tuple[SeenChange, Suspect]]) -> tuple[Suspect, ...]:
+    """Those that explain the errors, and are not excluded by the best of them, the best first."""
     fitting = [pair for pair in found if pair[1].remainder > FALSE_ALARM]
     if not fitting:
         return ()
     best_item, best = min(fitting, key=lambda pair: pair[1].score)
-    # alike: as likely with all that the criterion adds, or a change of more parameters of which the best one is a part
+    # alike: as likely with all that the criterion adds; not told from the best by the errors themselves; or a change of more parameters
+    # of which the best one is a part
     alike = [best]
     for item, suspect in fitting:
         if suspect is best:
             continue
         same = _contains(item, best_item)
-        if same or suspect.score < best.score + ALIKE:
+        if (
+            same
+            or suspect.score < best.score + ALIKE
+            or _not_excluded(suspect, item, best, best_item, len(found))
+        ):
             alike.append(replace(suspect, same=same or _contains(best_item, item)))
     return tuple(sorted(alike, key=lambda s: s.score))
+
+
+def _not_excluded(
+    suspect: Suspect, item: SeenChange, best: Suspect, best_item: SeenChange, alternatives: int
+) -> bool:
+    """Whether the errors may be those of a change of the robot although another explains them best.
+
+    Were it the true one, the best of all alternatives would gain more over it than this limit in at most 1 % of visits: what a change
+    adds to the true one is χ² of its parameters, and Bonferroni's inequality counts the alternatives.
+    """
+    from scipy.special import chdtri
+
+    if suspect.change.kind == "wrong_reading" or item.basis.shape[1] > best_item.basis.shape[1]:
+        return False
+    gain = suspect.cost - best.cost
+    return gain < float(chdtri(best_item.basis.shape[1], FALSE_ALARM / alternatives))
 
 
 def _contains(larger: SeenChange, smaller: SeenChange) -> bool:
@@ -232,5 +278,6 @@ def _suspect(test: GlobalTest, item: SeenChange, alternatives: int) -> Suspect:
         student_quantile(0.975, freedom) if np.isfinite(freedom) else 1.96,
         remainder,
         cost + rank * float(np.log(test.size)) + 2 * float(np.log(alternatives)),
+        cost,
         misfit,
     )

@@ -108,6 +108,8 @@ class Recheck:
         again = f"flexcal recheck {self.robot} NEXT_VISIT.csv{kept}"
         after = {
             "as_calibrated": f"{again}, at the same poses",
+            "noisier_readings": f"check the instrument, measure the visit again, and {again}",
+            "readings_drift": f"let instrument and robot settle, measure the visit again, and {again}",
             "wrong_reading": f"mend what is named, or measure it again, and {again}",
             "instrument_moved": f"while the instrument stands there, {again} --refit station, at the same poses",
             "recalibrate": f"flexcal calibrate {self.robot} POSES… anew, unless the visit was measured or written wrongly",

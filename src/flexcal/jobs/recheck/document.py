@@ -54,6 +54,9 @@ def recheck_block(
         "poses": len(errors.poses),
         "suspects": [_suspect_block(s, tool, errors.model) for s, tool in zip(suspects, tools, strict=True)],
         "together": judged.together,
+        "scatter": None
+        if judged.scatter is None
+        else {"factor": judged.scatter.factor, "p": judged.scatter.chance},
         "telling_pose": None if telling is None else {"q": telling.q, "apart_mm": telling.apart / MILLIMETRE},
         "against_calibration": _judgement_block(absolute),
         "reference_against_calibration": _judgement_block(at_reference),

@@ -44,6 +44,15 @@ def judgement_sentence(judged: JudgedVisit, course: CourseOverVisits | None = No
             return f"{told}; beside that the robot is as calibrated{_as_far_as_seen(judged)} ({chance}; false alarms {VISIT_ALARM:.1%})"
         return f"as calibrated ({chance}; false alarms {VISIT_ALARM:.1%})"
     lead = "the instrument, or the base of the robot, stands elsewhere; beside that: " if moved else ""
+    if judged.scatter is not None:
+        usual = "repeated readings of these poses" if errors.noise == "repeats" else "at the calibration"
+        scatters = (
+            f"the readings scatter {judged.scatter.factor:.1f} times as much as {usual} (p = {judged.scatter.chance:.2g}): check the "
+            "instrument and its targets, and measure again"
+        )
+        if not judged.suspects:
+            return f"{lead}{scatters}; whether the robot changed too cannot be told by them ({chance} that nothing did)"
+        lead = f"{lead}{scatters}; what is more than such scatter: "
     if not judged.suspects:
         if judged.together > FALSE_ALARM:
             return (
@@ -57,7 +66,10 @@ def judgement_sentence(judged: JudgedVisit, course: CourseOverVisits | None = No
     if course is not None and course.drifting:
         return f"{lead}{course.drift_words} ({chance})"
     told = ", or ".join(suspect_in_words(s, judged.test.errors.model) for s in judged.suspects)
-    return f"{lead}{told} ({chance}){'' if course is None else course.since_words}"
+    since = "" if course is None else course.since_words
+    if len(judged.suspects) == 1:
+        return f"{lead}{told} ({chance} that nothing changed; no other single change explains the readings){since}"
+    return f"{lead}something changed ({chance} that nothing did), and these readings do not tell which: {told}{since}"
 
 
 def effect_sentence(judged: JudgedVisit, tools: Sequence[MovedTool], expected: float) -> str:
@@ -72,7 +84,7 @@ def effect_sentence(judged: JudgedVisit, tools: Sequence[MovedTool], expected: f
         f"if it was {suspect_name(suspect)}, "
         + (
             "the tool is where it was"
-            if suspect.change.kind in ("instrument_moved", "wrong_reading")
+            if suspect.change.kind in ("instrument_moved", "wrong_reading", "readings_drift")
             else f"the tool is off by {tool.p95 / MILLIMETRE:.3f} mm at 95 % of the poses"
         )
         for suspect, tool in zip(judged.suspects, tools, strict=True)
@@ -99,6 +111,8 @@ def telling_sentence(judged: JudgedVisit, telling: TellingPose | None, noise: fl
             f"what tells {first} from {second}: a point that is fixed to the robot's base, measured with the others; it moves with the "
             "instrument alone"
         )
+    if "readings_drift" in kinds:
+        return f"what tells {first} from {second}: the poses measured again in another order, once the instrument has settled"
     if "wrong_reading" in kinds:
         pose = next(s.change.subject for s in judged.suspects[:2] if s.change.kind == "wrong_reading")
         return f"what tells {first} from {second}: pose {pose} measured again"
@@ -131,6 +145,7 @@ def suspect_name(suspect: Suspect) -> str:
         "payload_changed": "another payload",
         "instrument_moved": "another place of the instrument",
         "wrong_reading": f"a wrong reading of pose {subject}",
+        "readings_drift": "a drift of the readings",
     }[suspect.change.kind]
 
 
@@ -157,6 +172,8 @@ def suspect_in_words(suspect: Suspect, model: RobotModel) -> str:
         return f"tool bumped: {change.subject} moved by {told}{turned}"
     if change.kind == "wrong_reading":
         return f"pose {change.subject} disagrees on its own, by {told}: measure it again"
+    if change.kind == "readings_drift":
+        return f"instrument or robot drifted by {told} from the first pose of the visit to the last: let both settle, and measure it again"
     turned = float(np.linalg.norm(values[3:]))
     return f"the instrument, or the base of the robot, stands elsewhere by {told} and {turned * 1e3:.3f} mrad"
 
@@ -174,7 +191,7 @@ def _as_warmth(growth: float, model: RobotModel) -> str:
 def _effect(suspect: Suspect, tool: MovedTool, expected: float) -> str:
     if suspect.change.kind == "instrument_moved":
         return ""
-    if suspect.change.kind == "wrong_reading":
+    if suspect.change.kind in ("wrong_reading", "readings_drift"):
         return "; beside that the robot is as calibrated"
     low, high = (value / MILLIMETRE for value in tool.p95_interval)
     told = (

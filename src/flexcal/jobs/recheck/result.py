@@ -263,6 +263,11 @@ class Recheck(PlottedFolder):
                 f"fewer than {LEAST_MATCHED} poses are those of the reference visit (joint positions within 0.0001 rad, as commanded, not "
                 "as read), so the visit is compared with the calibrated model"
             )
+        elif errors.compared == "calibration" and self.becomes_reference:
+            remarks.append(
+                "compared with the calibrated model, whose own errors count; in later visits, which are compared with this one, they "
+                "cancel, and smaller shifts are found"
+            )
         elif errors.compared == "calibration":
             remarks.append(
                 "compared with the calibrated model, whose own errors count; a reference visit to the same poses after the calibration "
@@ -280,8 +285,8 @@ class Recheck(PlottedFolder):
             and not self._differed
         ):
             remarks.append(
-                f"against the calibration itself the robot is {judgement_sentence(self.absolute)}: what changed since the reference visit "
-                "is less than that comparison shows"
+                f"against the calibration, whose own errors count there: {judgement_sentence(self.absolute)}; a change as small as that "
+                "since the reference visit does not show in it"
             )
         if self.becomes_reference:
             remarks.append(self._as_reference)
@@ -409,7 +414,7 @@ def recheck(
     mistake = None
     if not judged.as_calibrated or judged.instrument == "evident":
         mistake = None if refit or unknown else misread_visit(model, poses, expected, compared)
-    if mistake is None and judged.verdict == "recalibrate":
+    if mistake is None and judged.verdict in ("recalibrate", "noisier_readings"):
         mistake = disagreeing_poses(judged, poses, compared)
     at_reference = None
     if reference is not None and not (absolute.as_calibrated and judged.as_calibrated):

@@ -33,9 +33,13 @@ _HEADLINES = {
     "payload_changed": "Another payload",
     "instrument_moved": "The instrument moved, the robot is as calibrated",
     "wrong_reading": "Readings disagree: mend or repeat them",
-    "ambiguous": "Changed, in one of several ways",
+    "noisier_readings": "The readings scatter more than they did: check the instrument",
+    "readings_drift": "Instrument or robot drifted during the visit: measure again",
+    "ambiguous": "Something changed, in one of several ways",
     "recalibrate": "Recalibrate",
 }
+_MEASURE_AGAIN = ("wrong_reading", "noisier_readings", "readings_drift")
+"""Verdicts on the measurement rather than the robot."""
 _COMPARED = {
     "calibration": "the calibrated model, whose own errors are part of what is expected",
     "reference": "a reference visit to the same poses, so that errors of the model cancel",
@@ -63,11 +67,12 @@ def recheck_page(study: RecheckStudy) -> Page:
     facts = (
         Fact(
             "Is it as calibrated?",
-            _as_calibrated(block),
+            _as_calibrated(results),
             "",
-            f"Chance makes errors as conspicuous with p = {significant(block['probability'], 2)}; "
-            f"below {block['false_alarm']:g} something changed.",
-            _status(block),
+            f"Chance makes errors as conspicuous with p = {significant(block['probability'], 2)}; below {block['false_alarm']:g} "
+            f"something changed. That is so by chance in {block['false_alarm']:.1%} of visits, and sums over the visits add 0.2 %: false "
+            "alarms are 1 % in all.",
+            _status(results),
         ),
         Fact(
             "How far is the tool off now?",
@@ -84,7 +89,7 @@ def recheck_page(study: RecheckStudy) -> Page:
         ),
     )
     verdict = Verdict(
-        _status(block),
+        _status(results),
         _headline(results),
         _sentence(results["sentence"]),
         facts,
@@ -108,6 +113,14 @@ def recheck_page(study: RecheckStudy) -> Page:
 
 
 def _headline(results: Mapping[str, Any]) -> str:
+    told = _change_headline(results)
+    # what stands elsewhere is not hidden behind what changed beside it
+    if results["recheck"]["instrument"] == "evident" and results["recheck"]["verdict"] != "instrument_moved":
+        return f"The instrument moved, and beside that: {told[:1].lower()}{told[1:]}"
+    return told
+
+
+def _change_headline(results: Mapping[str, Any]) -> str:
     block, drift = results["recheck"], results["drift"]
     courses = {item["course"] for item in drift["courses"]}
     if block["verdict"] in ("joint_shifted", "tool_bumped", "thermal_growth", "payload_changed", "ambiguous"):
@@ -118,12 +131,13 @@ def _headline(results: Mapping[str, Any]) -> str:
     return _HEADLINES[block["verdict"]]
 
 
-def _as_calibrated(block: Mapping[str, Any]) -> str:
-    if block["verdict"] == "wrong_reading":
+def _as_calibrated(results: Mapping[str, Any]) -> str:
+    block = results["recheck"]
+    if block["verdict"] in _MEASURE_AGAIN:
         return "Measure again"
     if block["verdict"] == "as_at_reference":
         return "As at the reference"
-    return {"good": "Yes", "care": "As far as seen"}.get(_status(block), "No")
+    return {"good": "Yes", "care": "As far as seen"}.get(_status(results), "No")
 
 
 def _since(block: Mapping[str, Any]) -> str:
@@ -146,10 +160,12 @@ def _tool_off(block: Mapping[str, Any]) -> str:
     return f"{told[0]} to {told[-1]}" if len(told) > 1 else told[0] if told else document_millimetres(None)
 
 
-def _status(block: Mapping[str, Any]) -> Status:
+def _status(results: Mapping[str, Any]) -> Status:
+    block = results["recheck"]
     if block["verdict"] == "as_calibrated":
-        return "care" if block.get("fitted") and block["compared"] == "calibration" else "good"
-    return "care" if block["verdict"] in ("instrument_moved", "wrong_reading", "as_at_reference") else "bad"
+        fitted = block.get("fitted") and block["compared"] == "calibration"
+        return "care" if fitted or results["drift"]["alarms"] else "good"
+    return "care" if block["verdict"] in ("instrument_moved", "as_at_reference", *_MEASURE_AGAIN) else "bad"
 
 
 def _sentence(text: str) -> str:
@@ -159,9 +175,21 @@ def _sentence(text: str) -> str:
 def _checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
     block, drift = results["recheck"], results["drift"]
     lost = [name for name, joint in block["power"]["joints"].items() if joint["found_95_percent"] is None]
-    alarms = drift["alarms"]
-    checks = [
-        Check("Is the robot as calibrated?", _sentence(results["sentence"]), _status(block)),
+    measured = "care" if block["verdict"] in _MEASURE_AGAIN or block["scatter"] is not None else "good"
+    several = len(block["suspects"])
+    return (
+        Check(
+            "Are the readings as good as they were?",
+            "No: see the sentence above." if measured == "care" else "Yes: nothing speaks for worse ones.",
+            measured,
+        ),
+        Check(
+            "Is it told what changed?",
+            f"Not alone: {several} changes explain the readings about as well."
+            if several > 1
+            else _cause(block),
+            "care" if several > 1 or block["verdict"] in ("recalibrate", "noisier_readings") else "good",
+        ),
         Check(
             "Does the visit see every joint?",
             f"Not {', '.join(lost)}: these points do not show their shift"
@@ -175,14 +203,24 @@ def _checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
             "care" if lost else "good",
         ),
         Check(
-            "Does anything drift over the visits?",
-            f"{' or '.join(alarms)}."
-            if alarms
-            else f"Not beyond chance in {counted(len(drift['visits']), 'visit')}.",
-            "care" if alarms else "good" if len(drift["visits"]) > 1 else "unknown",
+            "Do visits before tell slow drifts?",
+            f"{counted(len(drift['visits']), 'visit')} so far"
+            + (
+                f": {' or '.join(drift['alarms'])} changed over them."
+                if drift["alarms"]
+                else ", nothing beyond chance."
+            ),
+            "good" if len(drift["visits"]) > 1 else "unknown",
         ),
-    ]
-    return tuple(checks)
+    )
+
+
+def _cause(block: Mapping[str, Any]) -> str:
+    if block["suspects"]:
+        return "Yes: every other single change is excluded."
+    if block["verdict"] in ("recalibrate", "noisier_readings"):
+        return "No: no single change explains the readings."
+    return "Nothing beyond chance changed."
 
 
 def _visit_section(results: Mapping[str, Any]) -> Section:
@@ -247,7 +285,7 @@ def _power_section(block: Mapping[str, Any]) -> Section:
             f"{block['power']['shift'] * 1e3:g}: found with",
         ),
         rows,
-        note=f"At {100 * block['false_alarm']:.1g} % false alarms of the visit. The last but one column is that of the best test for this "
+        note=f"At {block['false_alarm']:.1%} false alarms of the visit. The last but one column is that of the best test for this "
         "joint alone (Neyman and "
         "Pearson), by the Cramér-Rao bound of these poses and this noise: no evaluation of the same measurements finds less.",
     )
