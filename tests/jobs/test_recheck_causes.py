@@ -73,7 +73,7 @@ def test_a_noisier_instrument_is_no_change_of_the_robot(visited: Visited, tmp_pa
         factors += [judged.scatter.factor] if judged.scatter is not None else []
     assert alarms > 10 and mechanical < 0.15 * alarms, (mechanical, alarms)
     assert 1.5 < np.median(factors) < 2.6
-    noise = 1.8 * 3e-5 * np.random.default_rng(1).normal(size=(10, 3))
+    noise = 2.5 * 3e-5 * np.random.default_rng(1).normal(size=(10, 3))
     visit = visited.visit()
     found = recheck(
         visited.robot, replace(visit, position=visit.position + noise), reference=visited.reference
