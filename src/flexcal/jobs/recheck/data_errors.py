@@ -19,6 +19,8 @@ _MOST = 0.75
 """Share of the poses that one explanation must fit to be that of the file."""
 _LEAST = 6
 """Least number of poses that judge the others."""
+_REST = 0.1
+"""Probability of what is left below which not single poses, but all of them scatter more than they should."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +75,8 @@ def disagreeing_poses(
         numbers = test.errors.poses.pose[list(wrong)]
         rest = judge(poses.subset(~np.isin(poses.pose, numbers)))
         if rest is None or not (rest.as_calibrated or rest.suspects):
+            continue
+        if judged.scatter is not None and rest.together < _REST:
             continue
         off = np.linalg.norm(test.errors.errors.reshape(-1, 3)[list(wrong)], axis=1) / MILLIMETRE
         told = " and ".join(f"pose {n} ({d:.3f} mm off)" for n, d in zip(numbers, off, strict=True))
