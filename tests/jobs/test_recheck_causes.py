@@ -76,7 +76,7 @@ def test_a_noisier_instrument_is_no_change_of_the_robot(visited: Visited, tmp_pa
     verdicts = []
     for _ in range(6):
         visit = visited.visit()
-        noise = 1e-4 * shop.rng.normal(size=(10, 3))
+        noise = 8e-5 * shop.rng.normal(size=(10, 3))
         found = recheck(
             visited.robot, replace(visit, position=visit.position + noise), reference=visited.reference
         )

@@ -12,7 +12,7 @@ from flexcal.calibration.recheck.visit_errors import VisitErrors
 
 _CHANCE = 0.05
 """Probability below which what is left about the best explanation, and about all together, is more scatter than assumed."""
-_LARGEST = 3.0
+_LARGEST = 4.0
 """Factor above which errors that no change explains are hardly noise: of a model or poses that are others."""
 _LEAST = 6
 """Least number of coordinates beside all changes that tell the scatter."""
