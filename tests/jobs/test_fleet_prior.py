@@ -24,6 +24,7 @@ from flexcal.cli.main import main
 from flexcal.data.poses import PoseSet
 from flexcal.files.formats import write_estimates
 from flexcal.jobs.calibration import calibrate_robot
+from flexcal.jobs.fleet import review_fleet
 from flexcal.jobs.fleet_prior import (
     FLEET,
     Member,
@@ -269,6 +270,55 @@ def test_the_fleet_writes_the_prior_of_its_model(
     told = read_model_prior(out, six.model).geometry
     assert told is not None
     assert told.robots == ("cell_0", "cell_1", "cell_2")
+
+
+def test_the_largest_group_of_one_geometry_is_pooled(
+    six: Pooled, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A robot of another geometry under the same URDF name is left out by its name; the table is there whatever becomes of the prior."""
+    fleet = tmp_path / "fleet"
+    for k, member in enumerate(six.members[:4]):
+        file = write_robot(fleet / f"cell_{k}")
+        write_estimates(file.parent / "estimates.yaml", "calibration", member.estimate)
+        if k == 0:
+            urdf = file.parent / "arm.urdf"
+            urdf.write_text(urdf.read_text().replace('xyz="0.42', 'xyz="0.43'))
+    table, out = tmp_path / "t.parquet", tmp_path / "prior.yaml"
+    assert main(["fleet", str(fleet), "--out", str(table), "--prior", str(out)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "from 3 robots (cell_1, cell_2, cell_3)" in said
+    assert "without cell_0, of another model than the 3 robots that were pooled: joint_3 is 10 mm" in said
+    told = read_model_prior(out, six.model).geometry
+    assert told is not None and told.robots == ("cell_1", "cell_2", "cell_3")
+    with refused("E-PRIOR-007", str(fleet / "cell_0" / "robot.yaml"), str(out)):
+        read_model_prior(out, RobotModel.from_yaml(fleet / "cell_0" / "robot.yaml", estimates=False))
+
+    shutil.rmtree(fleet / "cell_3")
+    table.unlink()
+    out.unlink()
+    assert main(["fleet", str(fleet), "--out", str(tmp_path / "u.parquet"), "--prior", str(out)]) == 2
+    told = capsys.readouterr().err
+    assert "E-PRIOR-001" in told and "cell_1, cell_2; cell_0" in told
+    assert (tmp_path / "u.parquet").exists() and (tmp_path / "u.html").exists() and not out.exists()
+    assert main(["fleet", str(fleet), "--out", str(tmp_path / "u.parquet")]) == 0
+
+
+def test_a_robot_in_two_folders_is_said_and_counts_once(six: Pooled, tmp_path: Path) -> None:
+    rng = np.random.default_rng(80)
+    robot = six.fleet.robot(rng)
+    twice = [fitted(six.model, robot, 30, rng, None).estimate for _ in range(2)]
+    for k, estimate in enumerate([*(m.estimate for m in six.members), *twice]):
+        file = write_robot(tmp_path / f"cell_{k}")
+        data = {"input.poses.csv": f"{k:064d}", "option.terms": "kinematic"}
+        own = replace(estimate, provenance={**estimate.provenance, **data})
+        write_estimates(file.parent / "estimates.yaml", "calibration", own)
+    fleet = review_fleet(tmp_path)
+    remarks = fleet.document()["remarks"]
+    assert any(
+        r.startswith("cell_6 and cell_7 differ by no more") and "probably one robot" in r for r in remarks
+    )
+    assert fleet.spreads and all("cell_7" not in spread.robots for spread in fleet.spreads)
+    assert max(len(spread.robots) for spread in fleet.spreads) == 7
 
 
 def test_other_temperatures_are_said(six: Pooled, tmp_path: Path) -> None:

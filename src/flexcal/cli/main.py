@@ -140,7 +140,9 @@ def _carry_out(verb: Verb, arguments: list[str]) -> int:
     complete_interrupted_runs(parsed)
     leaves = getattr(parsed, "leaves", verb.leaves)
     with outputs(verb.name, parsed.out, leaves, page=verb.page, beside=verb.beside):
-        parsed.run()
+        refusal = parsed.run()
+    if refusal is not None:  # of a part of what was asked: the rest is written
+        raise refusal
     return 0
 
 

@@ -11,6 +11,7 @@ from tyro.conf import Positional, arg
 from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import Json, MaybeNumber, MaybePath, file_argument
 from flexcal.cli.terminal.console import Console
+from flexcal.errors import FlexcalError
 
 _LISTED = 10
 """Largest number of problems that are printed."""
@@ -41,8 +42,8 @@ class Fleet:
     'identify stiffness' and 'identify dynamics' of the next."""
     json: Json = False
 
-    def run(self) -> None:
-        """Gather, judge, and print every robot that needs attention."""
+    def run(self) -> FlexcalError | None:
+        """Gather, judge, and print every robot that needs attention; returns why no prior could be written, where one was asked for."""
         from flexcal.cli.tables.fleet import fleet_table
         from flexcal.data.plans import page_beside
         from flexcal.jobs.fleet import review_fleet, write_prior
@@ -58,7 +59,12 @@ class Fleet:
             )
             fleet.write(self.out)
         document = fleet.document()
-        written = None if self.prior is None else write_prior(self.fleet, self.prior)
+        written, refusal = None, None
+        if self.prior is not None:
+            try:
+                written = write_prior(self.fleet, self.prior)
+            except FlexcalError as problem:
+                refusal = problem
         console.show(fleet_table(document))
         console.say(document["headline"])
         for remark in document["remarks"]:
@@ -80,3 +86,4 @@ class Fleet:
                 f"flexcal calibrate ROBOT POSES… --prior {self.prior}, for the next robot of the model"
             )
         console.finish(document, following)
+        return refusal

@@ -88,7 +88,7 @@ def fleet_document(
         "headline": _headline(robots, states, _folders(gathered)),
         "counts": {
             "robots": len(robots),
-            "models": len({robot["model"] for robot in robots}),
+            "models": len({(project.model, project.urdf) for project in gathered.projects}),
             "results": sum(counts.values()),
             "rows": gathered.table.frame.height,
             **{state: states[state] for state in ("out", "within", "undecided", "not_judged")},
@@ -138,9 +138,13 @@ def _headline(robots: Sequence[Mapping[str, Any]], states: Mapping[str, int], fo
         ("geometry not tested", [robot["robot"] for robot in robots if robot["not_tested"] is not None]),
     ):
         if named:
-            more = f" and {len(named) - _NAMED} more" if len(named) > _NAMED else ""
-            many += f"; {what}: {', '.join(named[:_NAMED])}{more}"
+            many += f"; {what}: {_listed(named)}"
     return many
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return f"{', '.join(names[:_NAMED])}{more}"
 
 
 def _accuracy(item: RobotAccuracy, declared: float | None, level: float) -> dict[str, Any]:
@@ -259,19 +263,23 @@ def _remarks(
             f"the results of {counted(number, 'robot')} in the folders of {len(accuracies)}: those of {listed} are copies of another's, in "
             "brackets; measure these robots, or give both one `serial:` in robot.yaml"
         )
-    bare = len(without) - len(copies)
-    if bare:
-        subject = (
-            "1 robot has no results in its folder"
-            if bare == 1
-            else f"{bare} robots have no results in their folders"
-        )
-        remarks.append(f"{subject}: give calibrate and verify an --out there")
+    remarks += [
+        f"{twin.sentence}: they are probably one robot, which counts once in the spreads over robots; give both one `serial:` in "
+        "robot.yaml"
+        for twin in gathered.twins
+    ]
+    if bare := sorted(without - set(copies)):
+        subject = "has no results in its folder" if len(bare) == 1 else "have no results in their folders"
+        remarks.append(f"{_listed(bare)} {subject}: give calibrate and verify an --out there")
     undated = frame.filter(frame["date"].is_null())["folder"].n_unique()
     if undated:
-        subject = "1 folder of results has" if undated == 1 else f"{undated} folders of results have"
+        subject = (
+            "1 folder of results has no date and counts"
+            if undated == 1
+            else f"{undated} folders of results have no date and count"
+        )
         remarks.append(
-            f"{subject} no date and counts in no trend: give folders of --out a name with the day of the measurement, as 2026-03-01"
+            f"{subject} in no trend: give folders of --out a name with the day of the measurement, as 2026-03-01"
         )
     if gathered.repeated:
         remarks.append(

@@ -16,6 +16,7 @@ from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, read_estimates, sha256_of
 from flexcal.jobs.fleet.geometry_drifts import GeometryCourse, geometry_courses
+from flexcal.jobs.fleet.members import Twin, latest_members, twins_of
 from flexcal.jobs.fleet.parameter_owners import is_of_robot
 from flexcal.jobs.fleet.places import local_fleet
 from flexcal.jobs.fleet.projects import Problem, Project, ResultFolder, find_results, problem_of
@@ -33,7 +34,7 @@ _DIGITS = 12
 class GatheredFleet:
     """The table of a fleet, its `projects`, its `problems`, and `repeated`: how many results stand in several folders; `courses` of the
     geometry of robots that were calibrated several times, `untested`: why others have none; `copied`: robots whose folders have results
-    of another, by that one.
+    of another, by that one; `twins` probably are another robot of the fleet, measured anew.
     """
 
     table: FleetTable
@@ -43,6 +44,7 @@ class GatheredFleet:
     courses: Sequence[GeometryCourse]
     untested: Mapping[str, str]
     copied: Mapping[str, str]
+    twins: Sequence[Twin]
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,8 +110,9 @@ def gather_fleet(place: str | Path, progress: Progress = silent) -> GatheredFlee
         courses, refused, untested = geometry_courses(
             root, [result.first for result in kept], projects, progress
         )
+        twins = twins_of(latest_members(folders)[0]["calibration"])
     table = FleetTable.of(row for result in kept for row in result.rows)
-    return GatheredFleet(table, projects, [*problems, *refused], repeated, courses, untested, copied)
+    return GatheredFleet(table, projects, [*problems, *refused], repeated, courses, untested, copied, twins)
 
 
 def _results(root: Path, folder: ResultFolder, problems: list[Problem]) -> Iterator[_Result]:
@@ -256,23 +259,28 @@ def _distinct(
     several robots is a problem, and counts for the first of them.
     """
     kept: dict[str, _Result] = {}
-    repeated, copied = 0, {}
+    repeated = 0
+    copies: dict[tuple[str, str], list[tuple[Row, Row]]] = {}
     for result in results:
         identity = result.identity
         other = kept.get(identity)
         if other is None:
             kept[identity] = result
         elif other.first.robot != result.first.robot:
-            copied[result.first.robot] = other.first.robot
-            problems.append(
-                Problem(
-                    result.first.file,
-                    f"the {result.first.kind} is the same as in {other.first.file} of the robot {other.first.robot}, so it is no result of "
-                    f"the robot {result.first.robot} and is not counted; measure this robot, or give both one `serial:`.",
-                )
-            )
+            pair = result.first.robot, other.first.robot
+            copies.setdefault(pair, []).append((result.first, other.first))
         else:
             repeated += 1
             if (result.first.date or datetime.max) < (other.first.date or datetime.max):
                 kept[identity] = result
-    return list(kept.values()), repeated, copied
+    for (robot, owner), pairs in copies.items():
+        (copy, original), more = pairs[0], len(pairs) - 1
+        also = f", and so {'is 1 more result' if more == 1 else f'are {more} more results'}" if more else ""
+        problems.append(
+            Problem(
+                copy.file,
+                f"the {copy.kind} is the same as in {original.file} of the robot {owner}{also}, so it is no result of {robot} and "
+                "is not counted; measure this robot, or give both one `serial:`.",
+            )
+        )
+    return list(kept.values()), repeated, {robot: owner for robot, owner in copies}

@@ -155,13 +155,14 @@ def review_fleet(
     known = {name: (model, own or tolerance) for name, (model, own) in robots.items()}
     parameters = comparable(records)
     drifts = parameter_drifts(parameters, 2 if gathered.courses else 1)
+    again = {twin.robot for twin in gathered.twins}
     fleet = Fleet(
         str(place),
         gathered,
         robot_accuracies(known, records, LEVEL),
         drifts,
         geometry_drifts(gathered.courses, 2 if drifts else 1, LEVEL),
-        parameter_spreads(parameters, LEVEL),
+        parameter_spreads([r for r in parameters if r["robot"] not in again], LEVEL),
         latest_rechecks(records),
         {name: own for name, (_, own) in robots.items()},
         command,

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import json
-from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from flexcal.errors import FlexcalError, InputError
+from flexcal.errors import InputError
 from flexcal.files.formats import Block
-from flexcal.jobs.fleet.places import ROBOT, local_fleet
+from flexcal.jobs.fleet.members import by_geometry, distinct, latest_members, twins_of, unlike
+from flexcal.jobs.fleet.places import local_fleet
 from flexcal.jobs.fleet.projects import find_results
-from flexcal.jobs.fleet_prior import FEWEST, POOLED, Member, ModelPrior, PooledValues, alike, pool_fleet
+from flexcal.jobs.fleet_prior import FEWEST, Member, ModelPrior, PooledValues, pool_fleet
 from flexcal.report.layout import counted
 
 _IDENTIFIED = {
@@ -24,8 +22,6 @@ _IDENTIFIED = {
     "stiffness": "whose stiffness was identified",
     "dynamics": "whose dynamics were identified",
 }
-_EQUAL = 1000.0
-"""Number of times as far apart as two measurements of one robot from which these are equal but for rounding."""
 
 
 @dataclass(frozen=True)
@@ -117,85 +113,51 @@ def _document(pooled: PooledValues | None) -> dict[str, Any] | None:
 
 
 def write_prior(place: str | Path, out: Path) -> WrittenPrior:
-    """Pool what was identified last of every robot of a fleet's one model, and write the prior of the next.
+    """Pool what was identified last of the robots of a fleet, those of the geometry that most have, and write the prior of the next.
 
-    Raises `InputError` where the fleet has robots of several models, and as `pool_fleet` does.
+    Raises `InputError` where no three robots have one geometry, and as `pool_fleet` does.
     """
     with local_fleet(str(place)) as root:
-        blocks, remarks = _members(root)
-        by_model: dict[str, set[str]] = defaultdict(set)
-        for members in blocks.values():
-            for member in members:
-                by_model[member.model.name].add(member.name)
-        if len(by_model) > 1:
-            listed = ", ".join(f"{name} ({len(own)})" for name, own in by_model.items())
-            raise InputError(
-                "E-PRIOR-001",
-                f"{place} has identified robots of several models: {listed}; a prior is of one, so give a folder with its robots alone.",
-            )
-        own = {}
+        blocks, remarks = latest_members(find_results(root)[0])
+        own: dict[Block, list[Member]] = {}
         for block, members in blocks.items():
-            members, copies = _without_copies(members)
+            members, copies = distinct(members)
+            for name, other in copies.items():
+                remark = f"without {name}, whose {block} is the same as that of {other}; measure this robot, or give both one `serial:`"
+                remarks.append(remark)
             with_prior = [member.name for member in members if member.has_prior]
             own[block] = [member for member in members if not member.has_prior]
             if with_prior:
-                copies.append(
+                remarks.append(
                     f"without {', '.join(with_prior)}, {_IDENTIFIED[block]} with a prior of other robots, which would count twice"
                 )
-            remarks += [remark for remark in copies if remark not in remarks]
+        groups = by_geometry(own)
+        if groups:
+            remarks += _left_out(str(place), groups)
+            own = groups[0]
         prior, more = pool_fleet(own, out)
         remarks += more
-    calibrated = own["calibration"]
-    pairs = alike(calibrated) if len(calibrated) >= FEWEST else []
-    for one, other, times in pairs:
-        remarks.append(
-            f"{one} and {other} differ by no more than the errors of their measurements, and other robots {_times(times)}: if "
-            "they are one robot, the prior is too narrow; give both one `serial:` in robot.yaml"
+    twins = twins_of(own["calibration"])
+    remarks += [
+        f"{twin.sentence}: if they are one robot, the prior is too narrow; give both one `serial:` in robot.yaml"
+        for twin in twins
+    ]
+    return WrittenPrior(out, prior, tuple(remarks), len({twin.robot for twin in twins}))
+
+
+def _left_out(place: str, groups: Sequence[Mapping[Block, Sequence[Member]]]) -> list[str]:
+    """Remarks on groups of robots that are not of the geometry of the first, the largest."""
+    firsts = [next(member for own in group.values() for member in own) for group in groups]
+    names = [sorted({member.name for own in group.values() for member in own}) for group in groups]
+    if len(groups) > 1 and max(len(own) for own in groups[0].values()) < FEWEST:
+        listed = "; ".join(", ".join(group) for group in names)
+        raise InputError(
+            "E-PRIOR-001",
+            f"no {FEWEST} identified robots of {place} have one geometry in their URDFs, which a prior needs: {listed}; give a folder with "
+            "more robots of one.",
         )
-    twins = len({other for _, other, _ in pairs})
-    return WrittenPrior(out, prior, tuple(remarks), twins)
-
-
-def _times(times: float) -> str:
-    """How many times as far apart others are, in words; of measurements that are equal no number is meant."""
-    return f"{times:.0f} times as much" if times < _EQUAL else "far more"
-
-
-def _without_copies(members: Sequence[Member]) -> tuple[list[Member], list[str]]:
-    """Robots of which different things were identified, the first of equal ones, as the fleet counts them; and remarks on the others."""
-    first: dict[str, Member] = {}
-    remarks = []
-    for member in members:
-        estimate = member.estimate
-        measured = {k: v for k, v in estimate.provenance.items() if k.startswith(("input.", "option."))}
-        content = json.dumps([measured, [(item.name, float(item.value)) for item in estimate.parameters]])
-        other = first.setdefault(content, member)
-        if other is not member:
-            remarks.append(
-                f"without {member.name}, whose {member.block} is the same as that of {other.name}; measure this robot, or give both one "
-                "`serial:`"
-            )
-    return list(first.values()), remarks
-
-
-def _members(root: Path) -> tuple[dict[Block, list[Member]], list[str]]:
-    """Every robot with what was identified last of it, by block, and remarks on those that cannot be read."""
-    folders, _, _ = find_results(root)
-    latest: dict[Block, dict[str, tuple[tuple[bool, datetime], Member]]] = {block: {} for block in POOLED}
-    remarks: list[str] = []
-    for folder in folders:
-        project, source = folder.project, folder.estimates
-        if not source.is_file():
-            continue
-        try:
-            blocks = Member.read(project.robot, project.folder / ROBOT, source)
-        except FlexcalError as problem:
-            remarks.append(str(problem).rstrip("."))
-            continue
-        changed = datetime.fromtimestamp(source.stat().st_mtime)
-        when = folder.date is not None, folder.date or changed
-        for block, member in blocks.items():
-            robots = latest[block]
-            if project.robot not in robots or when > robots[project.robot][0]:
-                robots[project.robot] = when, member
-    return {block: [robots[name][1] for name in sorted(robots)] for block, robots in latest.items()}, remarks
+    return [
+        f"without {', '.join(others)}, of another model than the {len(names[0])} robots that were pooled: "
+        f"{unlike(firsts[0], first)}; for its prior, run flexcal fleet on a folder with these robots alone"
+        for first, others in zip(firsts[1:], names[1:], strict=True)
+    ]

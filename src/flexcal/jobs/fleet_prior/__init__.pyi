@@ -2,6 +2,7 @@ from .fleet_pooling import pool_fleet
 from .friction_prior import with_friction
 from .geometry_information import OF_THE_CELL
 from .geometry_pooling import alike, pooled_prior
+from .kinematics import difference
 from .member import FEWEST, FLEET, POOLED, Member, comparable_terms
 from .model_prior import ModelPrior
 from .pooled_use import PooledUse
@@ -24,6 +25,7 @@ __all__ = [
     "comparable_terms",
     "conflict",
     "conflict_after",
+    "difference",
     "pool_fleet",
     "pool_friction",
     "pool_springs",

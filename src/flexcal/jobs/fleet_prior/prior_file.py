@@ -169,7 +169,8 @@ def read_model_prior(path: Path, model: RobotModel) -> ModelPrior:
         raise file.error(
             "E-PRIOR-007",
             ("joints",),
-            f"{model.name} is not of this model ({stored.model}): {unlike}; give the prior of robots with the same URDF geometry.",
+            f"the robot of {model.path} is not of the model of {path} ({stored.model}): {unlike}; give the prior of robots with the same "
+            "URDF geometry.",
         )
     items, size = list(stored.parameters.values()), len(stored.parameters)
     if [len(row) for row in stored.correlation] != list(range(1, size)):
