@@ -92,12 +92,12 @@ def distinct(members: Sequence[Member]) -> tuple[list[Member], dict[str, str]]:
 
 
 def twins_of(calibrated: Sequence[Member]) -> list[Twin]:
-    """Robots that probably are another of them, of three or more of one geometry that were calibrated with the same terms."""
+    """Robots that probably are another of them, of three or more of one geometry with points that were calibrated with the same terms."""
     found: list[Twin] = []
     for group in by_geometry({"calibration": distinct(calibrated)[0]}):
         by_terms: dict[tuple[str, ...], list[Member]] = defaultdict(list)
         for member in group["calibration"]:
-            if not member.has_prior:
+            if member.model.points and not member.has_prior:
                 by_terms[member.terms].append(member)
         for own in by_terms.values():
             if len(own) >= FEWEST:
