@@ -16,6 +16,8 @@ from flexcal.jobs.fleet_prior import FEWEST, POOLED, Member, alike, difference
 
 _EQUAL = 1000.0
 """Number of times as far apart as two measurements of one robot from which these are equal but for rounding."""
+_MOST = 300
+"""Largest number of robots of which all pairs are compared, which takes 10 s."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +94,9 @@ def distinct(members: Sequence[Member]) -> tuple[list[Member], dict[str, str]]:
 
 
 def twins_of(calibrated: Sequence[Member]) -> list[Twin]:
-    """Robots that probably are another of them, of three or more of one geometry with points that were calibrated with the same terms."""
+    """Robots that probably are another of them, of three or more of one geometry with points that were calibrated with the same terms;
+    none in groups of more than 300.
+    """
     found: list[Twin] = []
     for group in by_geometry({"calibration": distinct(calibrated)[0]}):
         by_terms: dict[tuple[str, ...], list[Member]] = defaultdict(list)
@@ -100,6 +104,6 @@ def twins_of(calibrated: Sequence[Member]) -> list[Twin]:
             if member.model.points and not member.has_prior:
                 by_terms[member.terms].append(member)
         for own in by_terms.values():
-            if len(own) >= FEWEST:
+            if FEWEST <= len(own) <= _MOST:
                 found += [Twin(other, one, times) for one, other, times in alike(own)]
     return found

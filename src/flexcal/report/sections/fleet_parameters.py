@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from flexcal.report.layout import Block, Section, Table, Text, p_value, scaled, significant
+
+_DYNAMICS = "dynamics"
+_LISTED = 3
+"""Largest number of parameters in a base parameter that are named."""
+_OF_BASE = (
+    "Torques depend on links and rotors only through combinations of their masses, first moments and inertias: the base parameters. A "
+    "value is that of the whole combination, and none of the named parameter alone."
+)
 
 
 def parameter_spreads_section(document: Mapping[str, Any]) -> Section:
@@ -46,25 +54,41 @@ def parameter_spreads_section(document: Mapping[str, Any]) -> Section:
         )
     else:
         blocks.append(Text(("No robot differs significantly from the others of its model.",)))
-    blocks.append(
-        Table(
-            "table-spread",
-            "Spread over the robots of a model",
-            (
-                "parameter",
-                "model",
-                "robots",
-                "mean ± std",
-                "spread",
-                "95 % interval",
-                "measurement's std",
-                "unit",
-            ),
-            tuple(_spread_row(spread) for spread in spreads),
-            text_columns=(1, 7),
-        )
-    )
+    base = [spread for spread in spreads if spread["kind"] == _DYNAMICS]
+    others = [spread for spread in spreads if spread["kind"] != _DYNAMICS]
+    if others:
+        note = "A parameter that absorbed others, which the measurements do not tell apart, is a combination with these."
+        blocks.append(_spread_table("table-spread", "Spread over the robots of a model", others, note))
+    if base:
+        words = "Spread of base parameters and friction over the robots of a model"
+        blocks.append(_spread_table("table-spread-dynamics", words, base, _OF_BASE, folded=True))
     return Section("parameters", "Robots of one model", lead, tuple(blocks))
+
+
+def _spread_table(
+    id: str, caption: str, spreads: Sequence[Mapping[str, Any]], note: str, *, folded: bool = False
+) -> Table:
+    columns = (
+        "parameter",
+        "model",
+        "robots",
+        "mean ± std",
+        "spread",
+        "95 % interval",
+        "measurement's std",
+        "unit",
+    )
+    rows = tuple(_spread_row(spread) for spread in spreads)
+    return Table(id, caption, columns, rows, note, text_columns=(1, 7), folded=folded)
+
+
+def _named(spread: Mapping[str, Any]) -> str:
+    """Name of a parameter, of a base parameter with those that are in it."""
+    absorbed = spread["absorbs"]
+    if spread["kind"] != _DYNAMICS or not absorbed:
+        return spread["name"]
+    more = f" and {len(absorbed) - _LISTED} more" if len(absorbed) > _LISTED else ""
+    return f"base parameter {spread['name']}, with {', '.join(absorbed[:_LISTED])}{more}"
 
 
 def _outlier_row(spread: Mapping[str, Any], item: Mapping[str, Any]) -> tuple[str, ...]:
@@ -76,7 +100,7 @@ def _outlier_row(spread: Mapping[str, Any], item: Mapping[str, Any]) -> tuple[st
     return (
         item["robot"],
         spread["model"],
-        spread["name"],
+        _named(spread),
         f"{value} ± {std}",
         f"{mean} ± {width}",
         unit,
@@ -91,7 +115,7 @@ def _spread_row(spread: Mapping[str, Any]) -> tuple[str, ...]:
         for key in ("mean", "mean_std", "spread", "spread_low", "spread_high", "measurement_std")
     )
     return (
-        spread["name"],
+        _named(spread),
         spread["model"],
         str(spread["robots"]),
         f"{mean} ± {mean_std}",
