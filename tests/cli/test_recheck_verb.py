@@ -137,3 +137,25 @@ def test_damaged_visits_are_refused(tmp_path: Path, content: str, code: str) -> 
     with pytest.raises(InputError) as caught:
         read_visits(tmp_path, "ur5")
     assert caught.value.code == code and VISITS in str(caught.value)
+
+
+def test_visits_out_of_order_are_said_to_be(folder: Path, tmp_path: Path, capsys) -> None:
+    """A visit before the reference, one between others, and one in the future; the line on visits.json counts all."""
+    robot = folder / "robot.yaml"
+
+    def remarks(name: str, day: str) -> str:
+        return " ".join(said(capsys, robot, folder / name, "--date", day, "--out", tmp_path)["remarks"])
+
+    assert "this visit is now the reference" in (told := remarks("reference.csv", "2026-03-10"))
+    assert "(--reference)" not in told and "visits.json says" not in told
+    early = remarks("first.csv", "2026-02-10")
+    assert "now the reference" not in early and "dated before the reference visit of 2026-03-10" in early
+    assert "judged without" not in early
+    stored = json.loads((tmp_path / "visits.json").read_text("utf-8"))["visits"]
+    assert [visit["reference"] for visit in stored] == [False, True]
+    assert "in the future" in remarks("second.csv", "2931-04-01")
+    between = remarks("shifted.csv", "2026-05-10")
+    assert "of 2931-04-01 was judged without this visit; recheck those files again" in between
+    capsys.readouterr()
+    arguments = ["recheck", str(robot), str(folder / "first.csv"), "--out", str(tmp_path)]
+    assert main(arguments) == 0 and ": 4 visits since this calibration" in capsys.readouterr().out

@@ -99,7 +99,7 @@ class Recheck:
         for remark in checked.remarks:
             console.say(remark)
         console.say(
-            f"wrote {self.out / 'visits.json'}: {counted(len(checked.dates), 'visit')} since this calibration"
+            f"wrote {self.out / 'visits.json'}: {counted(checked.kept, 'visit')} since this calibration"
         )
         console.say(f"wrote {self.out / 'report.html'}")
         document = checked.document()
@@ -138,6 +138,8 @@ class Recheck:
                 command=command_line(),
                 progress=progress,
             )
+        where = estimates_option(self.estimates)
+        kept = where if self.visits is None else f"{where} --out {self.visits}"
         console.say(
             "shifts of single joints that are found in 95 % of visits, at false alarms of 1 % (of a visit alone 0.8 %):"
         )
@@ -146,5 +148,6 @@ class Recheck:
         console.say(f"wrote {planned.file}: {len(planned.plan)} poses")
         console.finish(
             planned.document(),
-            f"{measure_command(planned.file, self.robot, 'visit')}{import_command(self.robot, 'visit.csv')}",
+            f"{measure_command(planned.file, self.robot, 'visit')}{import_command(self.robot, 'visit.csv')}; the first time every "
+            f"pose three times; then flexcal recheck {self.robot} visit.csv{kept}, and again at every visit",
         )

@@ -7,6 +7,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import date
+from itertools import takewhile
 from pathlib import Path
 
 from flexcal.calibration.recheck import ShiftAtVisit, drift_sums
@@ -81,7 +82,8 @@ def recheck_robot(
         temperature=temperature,
     )
     absolute = judged.absolute or judged.judged
-    first = base is None and absolute.verdict == "as_calibrated"
+    later = [v for v in comparable if v is not same and v.date > when]
+    first = base is None and absolute.verdict == "as_calibrated" and not any(v.reference for v in later)
     becomes = reference or first or (same is not None and same.reference)
     origin = provenance([robot_file, robot.nominal.urdf, *files], None, robot.stored, tuple(robot.blocks))
     if base is not None:
@@ -92,6 +94,8 @@ def recheck_robot(
         becomes_reference=becomes,
         again=again,
         repeated=_repeated(readings, before),
+        succeeded=any(v.reference for v in later),
+        order=_order(when, robot.stored, later, becomes),
         record=RunRecord(origin | image_provenance(files), command),
     )
     series = _series(judged, base, calibration)
@@ -100,6 +104,7 @@ def recheck_robot(
     errors = judged.judged.test.errors
     judged = replace(
         judged,
+        kept=len(comparable) + (same is None),
         dates=tuple(v.date for v in history),
         drifts=drift_sums([v.shifts if v.steady else [] for v in history]),
         course=CourseOverVisits.of(robot.model, errors, when, before, base),
@@ -151,6 +156,43 @@ def _repeated(readings: Readings, before: Sequence[Visit]) -> str | None:
         f"{most} of the {len(readings.pose)} readings are those of the visit of {when}, to the last digit: they tell nothing new, and the "
         "test takes them for new ones; give a file with this visit alone"
     )
+
+
+def _order(when: str, stored: Path, later: Sequence[Visit], becomes: bool) -> tuple[str, ...]:
+    """What is to be said of a visit that is dated before others, before the calibration, or in the future."""
+    told = []
+    made = _date_of_folder(stored)
+    if made is not None and when < made:
+        told.append(
+            f"the visit is dated {when}, before the calibration of {made} that judges it; give its day by --date if that is wrong"
+        )
+    if when > date.today().isoformat():
+        told.append(f"the visit is dated {when}, in the future; give its day by --date if that is wrong")
+    references = [v.date for v in later if v.reference]
+    if references:
+        until = f"visits before that of {references[0]}, which stays the reference of those after it"
+        told.append(
+            f"this visit is the reference of {until}"
+            if becomes
+            else f"the visit is dated before the reference visit of {references[0]}, which stays the reference of those after it"
+        )
+    # a later reference, and what is compared with it, do not depend on this visit
+    concerned = list(takewhile(lambda v: not v.reference, later))
+    if concerned:
+        days = " and ".join(dict.fromkeys(v.date for v in concerned))
+        told.append(
+            f"what visits.json says of {days} was judged without this visit; recheck those files again, in the order of their dates (a "
+            "visit keeps its date)"
+        )
+    return tuple(told)
+
+
+def _date_of_folder(stored: Path) -> str | None:
+    """Date of a calibration, from the name of its folder; None where that is none."""
+    try:
+        return date.fromisoformat(stored.resolve().parent.name[:10]).isoformat()
+    except ValueError:
+        return None
 
 
 def _series(judged: Recheck, base: Visit | None, calibration: str) -> str:

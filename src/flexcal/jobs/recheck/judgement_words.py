@@ -51,7 +51,7 @@ def judgement_sentence(judged: JudgedVisit, course: CourseOverVisits | None = No
             "instrument and its targets, and measure again"
         )
         if not judged.suspects:
-            return f"{lead}{scatters}; whether the robot changed too cannot be told by them ({chance} that nothing did)"
+            return f"{lead}{scatters}; whether the robot changed too cannot be told by them ({chance} of the whole)"
         lead = f"{lead}{scatters}; what is more than such scatter: "
     if not judged.suspects:
         if judged.together > FALSE_ALARM:
@@ -68,8 +68,8 @@ def judgement_sentence(judged: JudgedVisit, course: CourseOverVisits | None = No
     told = ", or ".join(suspect_in_words(s, judged.test.errors.model) for s in judged.suspects)
     since = "" if course is None else course.since_words
     if len(judged.suspects) == 1:
-        return f"{lead}{told} ({chance} that nothing changed; no other single change explains the readings){since}"
-    return f"{lead}something changed ({chance} that nothing did), and these readings do not tell which: {told}{since}"
+        return f"{lead}{told} (beyond chance: {chance}; no other single change explains the readings){since}"
+    return f"{lead}something changed ({chance}), and these readings do not tell which: {told}{since}"
 
 
 def effect_sentence(judged: JudgedVisit, tools: Sequence[MovedTool], expected: float) -> str:

@@ -91,6 +91,12 @@ class Recheck(PlottedFolder):
         Date under which the same readings are stored already, where another date or file was given.
     repeated : str or None
         How many of the readings are of a visit before, in words.
+    order : tuple of str
+        What is to be said of the date of the visit among others.
+    kept : int
+        Number of visits since the calibration that are stored, this one included.
+    succeeded : bool
+        Whether another reference visit is of a later date.
     unmatched : bool
         Whether a reference visit was given that has fewer than four poses in common with this one.
     reference_date : str or None
@@ -120,6 +126,9 @@ class Recheck(PlottedFolder):
     becomes_reference: bool = False
     again: str | None = None
     repeated: str | None = None
+    order: tuple[str, ...] = ()
+    kept: int = 1
+    succeeded: bool = False
     unmatched: bool = False
     reference_date: str | None = None
     dates: tuple[str, ...] = ()
@@ -233,6 +242,7 @@ class Recheck(PlottedFolder):
             )
         if self.repeated is not None:
             remarks.append(self.repeated)
+        remarks += self.order
         if self.outside:
             remarks.append(self.outside)
         if judged.instrument == "declared":
@@ -268,12 +278,12 @@ class Recheck(PlottedFolder):
                 "compared with the calibrated model, whose own errors count; in later visits, which are compared with this one, they "
                 "cancel, and smaller shifts are found"
             )
-        elif errors.compared == "calibration":
+        elif errors.compared == "calibration" and not self.succeeded:
             remarks.append(
                 "compared with the calibrated model, whose own errors count; a reference visit to the same poses after the calibration "
                 "(--reference) makes the test sharper, for they cancel"
             )
-        elif errors.noise == "calibration":
+        elif errors.compared == "reference" and errors.noise == "calibration":
             remarks.append(
                 "the scatter is that of the calibration, which may contain errors of its model; a reference visit that measures every pose "
                 "three times tells the robot's own, and makes the test sharper"
@@ -288,7 +298,7 @@ class Recheck(PlottedFolder):
                 f"against the calibration, whose own errors count there: {judgement_sentence(self.absolute)}; a change as small as that "
                 "since the reference visit does not show in it"
             )
-        if self.becomes_reference:
+        if self.becomes_reference and not self.succeeded:
             remarks.append(self._as_reference)
         if self.alarms and self.judged.as_calibrated and self.course is not None:
             remarks.append(self.course.alarm_sentence(self.alarms))
