@@ -70,8 +70,8 @@ def recheck_page(study: RecheckStudy) -> Page:
             _as_calibrated(results),
             "",
             f"Chance makes errors as conspicuous with p = {significant(block['probability'], 2)}; below {block['false_alarm']:g} "
-            f"something changed. That is so by chance in {block['false_alarm']:.1%} of visits, and sums over the visits add 0.2 %: false "
-            "alarms are 1 % in all.",
+            f"something changed. That is so by chance in {100 * block['false_alarm']:.1g} % of visits, and sums over the visits add "
+            "0.2 %: false alarms are 1 % in all.",
             _status(results),
         ),
         Fact(
@@ -285,7 +285,7 @@ def _power_section(block: Mapping[str, Any]) -> Section:
             f"{block['power']['shift'] * 1e3:g}: found with",
         ),
         rows,
-        note=f"At {block['false_alarm']:.1%} false alarms of the visit. The last but one column is that of the best test for this "
+        note=f"At {100 * block['false_alarm']:.1g} % false alarms of the visit. The last but one column is that of the best test for this "
         "joint alone (Neyman and "
         "Pearson), by the Cramér-Rao bound of these poses and this noise: no evaluation of the same measurements finds less.",
     )
