@@ -266,7 +266,7 @@ def test_the_fleet_writes_the_prior_of_its_model(
     assert "without cell_0_backup, whose calibration is the same as that of cell_0" in said
     assert "without cell_3, calibrated with a prior of other robots" in said
     assert "the results of 4 robots in the folders of 5: those of cell_0_backup (cell_0) are copies" in said
-    assert "no results in its folder" not in said
+    assert "no results in" not in said
     told = read_model_prior(out, six.model).geometry
     assert told is not None
     assert told.robots == ("cell_0", "cell_1", "cell_2")
@@ -315,7 +315,7 @@ def test_a_robot_in_two_folders_is_said_and_counts_once(six: Pooled, tmp_path: P
     fleet = review_fleet(tmp_path)
     remarks = fleet.document()["remarks"]
     assert any(
-        r.startswith("cell_6 and cell_7 differ by no more") and "probably one robot" in r for r in remarks
+        r.startswith("probably one robot") and "cell_6 and cell_7 differ by no more" in r for r in remarks
     )
     assert fleet.spreads and all("cell_7" not in spread.robots for spread in fleet.spreads)
     assert max(len(spread.robots) for spread in fleet.spreads) == 7

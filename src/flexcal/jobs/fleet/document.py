@@ -264,13 +264,15 @@ def _remarks(
             "brackets; measure these robots, or give both one `serial:` in robot.yaml"
         )
     remarks += [
-        f"{twin.sentence}: they are probably one robot, which counts once in the spreads over robots; give both one `serial:` in "
+        f"probably one robot in two folders, which counts once in the spreads over robots: {twin.sentence}; give both one `serial:` in "
         "robot.yaml"
         for twin in gathered.twins
     ]
     if bare := sorted(without - set(copies)):
-        subject = "has no results in its folder" if len(bare) == 1 else "have no results in their folders"
-        remarks.append(f"{_listed(bare)} {subject}: give calibrate and verify an --out there")
+        folders = "the folder" if len(bare) == 1 else "the folders"
+        remarks.append(
+            f"no results in {folders} of {_listed(bare)}: give calibrate and verify an --out there"
+        )
     undated = frame.filter(frame["date"].is_null())["folder"].n_unique()
     if undated:
         subject = (

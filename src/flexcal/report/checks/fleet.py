@@ -55,7 +55,7 @@ def fleet_checks(document: Mapping[str, Any]) -> tuple[Check, ...]:
         checks.append(
             Check(
                 "Could everything be read?",
-                f"No: {len(document['problems'])} files or folders could not be used; they are listed below.",
+                f"No: {counted(len(document['problems']), 'problem')} with files or folders, listed below.",
                 "care",
             )
         )
