@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import polars
 import pytest
 from scipy.stats import binomtest
 
-from flexcal.report.layout import write_page
+from flexcal.report.layout import Check, write_page
 from flexcal.report.pages import StudyReport, study_page
 from flexcal.report.results import StudyTable, binomial_interval, study_statistics
 
@@ -160,6 +162,19 @@ def test_a_spread_unlike_the_stated_one_is_said(factor: float, status: str) -> N
     assert ("too large" in checks[-1].answer) is False  # errors that resamples share are in none of them
 
 
+def judged(studied: StudyTable) -> tuple[dict[str, Any], Check]:
+    """Coverage of a study of virtual calibrations, and what the page says of it."""
+    results: dict[str, Any] = {
+        "study": "virtual_calibration",
+        "name": "s",
+        "error": "verification",
+        "has_truth": True,
+    }
+    results |= {"command": "", "provenance": {}, **study_statistics(studied)}
+    results |= {"tasks": {"total": len(studied), "done": len(studied), "failed": 0}}
+    return results["coverage"], study_page(StudyReport(results, studied)).verdict.checks[-1]
+
+
 @pytest.mark.parametrize(
     ("std", "status", "said"),
     [
@@ -175,16 +190,7 @@ def test_a_share_that_surely_but_hardly_differs_from_the_stated_one_is_no_fault(
     """Errors of standard deviation 1: 95 % of intervals for 1.06 hold 96.2 % of the truth."""
     errors = np.random.default_rng(9).standard_normal((3000, 4))
     studied = table(intervals(errors, std))
-    results = {
-        "study": "virtual_calibration",
-        "name": "s",
-        "error": "verification",
-        "has_truth": True,
-        "command": "",
-        "provenance": {},
-    }
-    results |= {"tasks": {"total": 3000, "done": 3000, "failed": 0}, **study_statistics(studied)}
-    check = study_page(StudyReport(results, studied)).verdict.checks[-1]
+    _, check = judged(studied)
     assert check.status == status and said in check.answer and "are few" not in check.answer
     if std != 1.0:
         times = float(check.answer.split(" times the stated")[0].split()[-1])
@@ -195,17 +201,7 @@ def test_eight_seeds_do_not_show_that_uncertainties_are_too_large() -> None:
     errors = np.zeros((8, 50))
     errors[:4, 0] = 3.0  # half of the tasks have one interval of fifty that does not hold the truth
     studied = table(intervals(errors, 1.0) | {"seed": np.arange(8)})
-    results = {
-        "study": "virtual_calibration",
-        "name": "s",
-        "error": "verification",
-        "has_truth": True,
-        "command": "",
-        "provenance": {},
-    }
-    results |= {"tasks": {"total": 8, "done": 8, "failed": 0}, **study_statistics(studied)}
-    covered = results["coverage"]
-    check = study_page(StudyReport(results, studied)).verdict.checks[-1]
+    covered, check = judged(studied)
     assert covered["low"] > 0.95 and covered["seeds"] == 8  # the interval itself would exclude 95 %
     assert (
         check.status == "unknown" and "may be too large" in check.answer and "8 seeds are few" in check.answer

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from flexcal.data.tables import open_table
-from flexcal.errors import FlexcalError, InputError
+from flexcal.errors import InputError
 from flexcal.studio.commands import CommandRun, command_line
-from flexcal.studio.project import CALIBRATION, COMPUTED, Project, is_result
+from flexcal.studio.project import CALIBRATION, Project
 from flexcal.studio.steps.verify.particulars import Particulars
+from flexcal.studio.steps.verify.project_tables import project_tables
 from flexcal.studio.steps.verify.target_files import target_files
 from flexcal.studio.window import Window, command_text, file_link, paragraph
 
@@ -99,14 +99,5 @@ class CertificateForm:
 
 def measured_files(project: Project) -> list[str]:
     """Names of tables with points of numbered poses, those whose names say that they come after compensation last."""
-    names = []
-    for name in project.files(".csv", ".parquet"):
-        if is_result(project, name):
-            continue
-        try:
-            columns = set(open_table(project.folder / name).columns)
-        except FlexcalError:
-            continue
-        if {"pose", "x", "y", "z"} <= columns and not columns & COMPUTED:
-            names.append(name)
+    names = project_tables(project, lambda columns: {"pose", "x", "y", "z"} <= columns)
     return sorted(names, key=lambda name: (any(word in name for word in _AFTER), name))
