@@ -15,7 +15,8 @@ from flexcal.data.poses import DEFAULT_SIGMA, read_poses, tables_of
 from flexcal.errors import InputError
 from flexcal.files.formats import block_sha256, provenance, sha256_of
 from flexcal.jobs.inputs import CalibratedRobot, image_provenance, require_distinct_files
-from flexcal.jobs.recheck.result import Recheck, recheck, with_likely_temperatures
+from flexcal.jobs.recheck.one_visit import recheck, with_likely_temperatures
+from flexcal.jobs.recheck.result import Recheck
 from flexcal.jobs.recheck.visit_course import CourseOverVisits
 from flexcal.jobs.recheck.visit_history import (
     Readings,
