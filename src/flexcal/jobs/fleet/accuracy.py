@@ -123,7 +123,7 @@ def _outlook(
         dated = len(visits_of(verifications).dates)
         return (
             None,
-            f"no trend yet: {dated} of {FEWEST_VISITS} dated verifications of the present calibration",
+            f"too early for a trend: {dated} of {FEWEST_VISITS} dated verifications of the present calibration",
         )
     if drift.probability > level:
         return None, "no significant trend of the errors"
