@@ -157,8 +157,7 @@ def test_robot_of_a_urdf_is_that_of_the_robot_yaml_made_for_it(project: Project)
 
 
 def test_places_are_written_in_metres_and_comments_stay(project: Project) -> None:
-    for path in (EXAMPLES / "tx90l").glob("*"):
-        shutil.copy(path, project.folder)
+    shutil.copytree(EXAMPLES / "tx90l", project.folder, dirs_exist_ok=True)
     before = project.robot_file.read_text()
     places = {p.title: p for p in places_of(RobotModel.from_yaml(project.robot_file))}
     assert places["measured point smr"].xyz == (100.0, 0.0, 150.0)
@@ -246,8 +245,7 @@ class SilentWindow:
 
 
 def test_a_change_is_taken_back_unless_the_file_was_changed_since(project: Project) -> None:
-    for path in (EXAMPLES / "ur5_tracker").glob("*"):
-        shutil.copy(path, project.folder)
+    shutil.copytree(EXAMPLES / "ur5_tracker", project.folder, dirs_exist_ok=True)
     before = project.robot_file.read_bytes()
     window = SilentWindow(project)
     file = RobotFile(cast("Window", window))

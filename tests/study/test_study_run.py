@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -188,9 +189,7 @@ def test_a_study_goes_on_with_further_rows_only(
     with refused("E-STUDY-023", "2"):
         run_study(read_study(study), out, ThisProcess(), resume=True)
     robot = tmp_path / "other" / "robot.yaml"
-    robot.parent.mkdir()
-    for file in UR5.iterdir():
-        (robot.parent / file.name).write_bytes(file.read_bytes())
+    shutil.copytree(UR5, robot.parent)
     robot.write_text(robot.read_text() + "# changed\n")
     write_study(tmp_path, robot=str(robot))
     with refused("E-STUDY-022", "input.robot.yaml"):
