@@ -110,7 +110,7 @@ def gather_fleet(place: str | Path, progress: Progress = silent) -> GatheredFlee
         courses, refused, untested = geometry_courses(
             root, [result.first for result in kept], projects, progress
         )
-        twins = twins_of(latest_members(folders)[0]["calibration"])
+        twins = twins_of(latest_members(folders, ("calibration",))[0]["calibration"])
     table = FleetTable.of(row for result in kept for row in result.rows)
     return GatheredFleet(table, projects, [*problems, *refused], repeated, courses, untested, copied, twins)
 

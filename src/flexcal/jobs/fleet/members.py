@@ -35,26 +35,34 @@ class Twin:
         return f"{self.first} and {self.robot} differ by no more than the errors of their measurements, and other robots {times}"
 
 
-def latest_members(folders: Sequence[ResultFolder]) -> tuple[dict[Block, list[Member]], list[str]]:
-    """Every robot with what was identified last of it, by block, and remarks on those that cannot be read."""
-    latest: dict[Block, dict[str, tuple[tuple[bool, datetime], Member]]] = {block: {} for block in POOLED}
+def latest_members(
+    folders: Sequence[ResultFolder], blocks: Sequence[Block] = POOLED
+) -> tuple[dict[Block, list[Member]], list[str]]:
+    """Every robot with what was identified last of it, by block, and remarks on those that cannot be read; a file is read where no later
+    one has all `blocks` of its robot.
+    """
+    latest: dict[Block, dict[str, Member]] = {block: {} for block in blocks}
     remarks: list[str] = []
-    for folder in folders:
-        project, source = folder.project, folder.estimates
-        if not source.is_file():
+    there = [folder for folder in folders if folder.estimates.is_file()]
+    for folder in sorted(there, key=_time, reverse=True):
+        project = folder.project
+        if all(project.robot in robots for robots in latest.values()):
             continue
         try:
-            blocks = Member.read(project.robot, project.folder / ROBOT, source)
+            read = Member.read(project.robot, project.folder / ROBOT, folder.estimates)
         except FlexcalError as problem:
             remarks.append(str(problem).rstrip("."))
             continue
-        changed = datetime.fromtimestamp(source.stat().st_mtime)
-        when = folder.date is not None, folder.date or changed
-        for block, member in blocks.items():
-            robots = latest[block]
-            if project.robot not in robots or when > robots[project.robot][0]:
-                robots[project.robot] = when, member
-    return {block: [robots[name][1] for name in sorted(robots)] for block, robots in latest.items()}, remarks
+        for block, robots in latest.items():
+            if block in read:
+                robots.setdefault(project.robot, read[block])
+    return {block: [robots[name] for name in sorted(robots)] for block, robots in latest.items()}, remarks
+
+
+def _time(folder: ResultFolder) -> tuple[bool, datetime]:
+    """When its results are of: its date, else, before all that have one, that of its file."""
+    changed = datetime.fromtimestamp(folder.estimates.stat().st_mtime)
+    return folder.date is not None, folder.date or changed
 
 
 def by_geometry(members: Mapping[Block, Sequence[Member]]) -> list[dict[Block, list[Member]]]:

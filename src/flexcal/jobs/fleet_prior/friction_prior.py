@@ -9,10 +9,7 @@ import numpy as np
 from flexcal.estimation import Estimate, Parameters
 from flexcal.jobs.fleet_prior.model_prior import ModelPrior
 from flexcal.jobs.fleet_prior.pooled_use import PooledUse
-from flexcal.jobs.fleet_prior.pooled_values import conflict
-
-_CLEAR = 4.0
-"""Least value, in its standard deviations, whose logarithm has about a normal distribution."""
+from flexcal.jobs.fleet_prior.pooled_values import CLEAR, conflict
 
 
 def with_friction(estimate: Estimate, prior: ModelPrior, terms: str) -> tuple[Estimate, PooledUse]:
@@ -43,7 +40,7 @@ def with_friction(estimate: Estimate, prior: ModelPrior, terms: str) -> tuple[Es
     measured = covariance[np.ix_(rows, rows)]
     # where the torques hardly tell a coefficient, its logarithm has no normal distribution, and the deviation is relative to the mean
     log = np.array(own.scales) == "log"
-    clear = log & (value[rows] > _CLEAR * np.sqrt(np.diag(measured)))
+    clear = log & (value[rows] > CLEAR * np.sqrt(np.diag(measured)))
     size = np.where(log, np.where(clear, value[rows], mean), 1.0)
     off = np.where(
         clear,

@@ -9,6 +9,8 @@ from typing import Literal
 import numpy as np
 
 Scale = Literal["log", "linear"]
+CLEAR = 4.0
+"""Least value, in its standard deviations, whose logarithm has about a normal distribution."""
 _REPRODUCIBLE = 0
 _DRAWS = 4000
 """Robots of the model that are drawn for comparison."""

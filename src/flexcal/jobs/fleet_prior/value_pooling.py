@@ -12,13 +12,11 @@ from flexcal.files.formats import block_sha256
 from flexcal.jobs.fleet_prior.geometry_information import independent_combinations
 from flexcal.jobs.fleet_prior.kinematics import difference
 from flexcal.jobs.fleet_prior.member import FEWEST, Member
-from flexcal.jobs.fleet_prior.pooled_values import PooledValues, Scale
+from flexcal.jobs.fleet_prior.pooled_values import CLEAR, PooledValues, Scale
 from flexcal.model.robot import FRICTION_PARAMETERS, MASS_AND_COM, SPRING_LOG_STD
 
 _USEFUL = 0.7
 """Standard deviation of the logarithm of a quantity of the next robot from which the others tell too little of it: a factor of two."""
-_POSITIVE = 4.0
-"""Least value, in its standard deviations, whose logarithm has about a normal distribution."""
 _FRICTION_SIZE = 1.0
 """Plausible size of the logarithm of friction about the median of the robots."""
 FRICTION = ("viscous", "coulomb", *FRICTION_PARAMETERS)
@@ -169,7 +167,7 @@ def _told(estimate: Estimate, name: str) -> bool:
 def _is_positive(estimate: Estimate, names: Sequence[str], kind: str) -> bool:
     own = [name for name in names if name.rpartition(".")[2] == kind and _told(estimate, name)]
     return all(
-        estimate.values[n] > _POSITIVE * np.sqrt(estimate.covariance[k, k])
+        estimate.values[n] > CLEAR * np.sqrt(estimate.covariance[k, k])
         for n in own
         for k in [estimate.parameters.index(n)]
     )

@@ -110,8 +110,8 @@ def recheck(
     whole = absolute.test.errors.covariance
     expected = float(np.sqrt(3 * np.trace(whole) / len(whole)))
     mistake = None
-    if not judged.as_calibrated or judged.instrument == "evident":
-        mistake = None if refit or unknown else misread_visit(model, poses, expected, compared)
+    if not (refit or unknown) and (not judged.as_calibrated or judged.instrument == "evident"):
+        mistake = misread_visit(model, poses, expected, compared)
     if mistake is None and judged.verdict in ("recalibrate", "noisier_readings"):
         mistake = disagreeing_poses(judged, poses, compared)
     at_reference = None

@@ -130,10 +130,7 @@ class Recheck(PlottedFolder):
     @property
     def probability(self) -> float:
         """That chance makes errors as conspicuous in a robot as calibrated."""
-        judged = (
-            self.absolute if self.absolute is not None and self.verdict == AS_AT_REFERENCE else self.judged
-        )
-        return judged.probability
+        return self.shown.probability
 
     @property
     def _differed(self) -> bool:
