@@ -54,9 +54,13 @@ def free_port() -> int:
     raise OSError("no port is free")
 
 
-def test_a_study_goes_on_when_the_scheduler_is_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("recount", [1e9, 0.0], ids=["missed_results", "asked_for_its_workers"])
+def test_a_study_goes_on_when_the_scheduler_is_back(
+    recount: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("flexcal.jobs.study.store._EVERY", 0.0)
     monkeypatch.setattr("flexcal.jobs.study.store._SHARE", 0.0)
+    monkeypatch.setattr("flexcal.parallel.dask_cluster._RECOUNT", recount)
     port = free_port()
     plan, out = read_study(write_study(tmp_path)), tmp_path / "out"
     cluster = Cluster(port)

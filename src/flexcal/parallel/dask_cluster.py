@@ -7,6 +7,7 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from itertools import islice
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -78,7 +79,8 @@ class DaskCluster(Workers):
     @property
     def count(self) -> int:
         """As `Workers.count`: threads of all workers."""
-        return sum(self.client.nthreads().values())
+        with self._connected():
+            return sum(self.client.nthreads().values())
 
     def results(
         self, function: Callable[..., V], tasks: Iterable[Any], *common: Any
@@ -91,13 +93,13 @@ class DaskCluster(Workers):
 
         name = f"flexcal-{uuid.uuid4().hex}"
         client, numbered = self.client, iter(enumerate(tasks))
-        shared = client.submit(_together, function, *common, key=f"common-{name}")
+        shared = self._submitted(_together, function, *common, key=f"common-{name}")
         waiting = as_completed(loop=client.loop, with_results=True, raise_errors=False)
         running: dict[Future, tuple[int, Any]] = {}
         suspects: list[tuple[int, Any]] = []  # each ran beside a killed worker, or killed it
 
         def send(index: int, task: Any, turn: str) -> None:
-            future = client.submit(_run, shared, index, task, key=f"{name}-{index}-{turn}", pure=False)
+            future = self._submitted(_run, shared, index, task, key=f"{name}-{index}-{turn}")
             running[future] = index, task
             waiting.add(future)
 
@@ -121,8 +123,7 @@ class DaskCluster(Workers):
                 outcome = self._outcome(future.status, result, index)
                 yield outcome or Outcome(index, None, TaskError(None, _GIVEN_UP), 0.0)
         finally:
-            if client.status == "running":
-                client.cancel([*running, shared])
+            self._cancel([*running, shared])
 
     def reduced(
         self,
@@ -135,25 +136,44 @@ class DaskCluster(Workers):
 
         Raises `FlexcalError` as `results` does.
         """
-        client, name = self.client, f"flexcal-{uuid.uuid4().hex}"
-        shared = client.submit(_together, function, combine, *common, key=f"common-{name}")
+        name = f"flexcal-{uuid.uuid4().hex}"
+        shared = self._submitted(_together, function, combine, *common, key=f"common-{name}")
         roots: list[Future] = []
         try:
             for index, group in enumerate(groups):
                 level = [
-                    client.submit(_leaf, shared, task, key=f"{name}-{index}-{leaf}", pure=False)
+                    self._submitted(_leaf, shared, task, key=f"{name}-{index}-{leaf}")
                     for leaf, task in enumerate(group)
                 ]
                 while len(level) > 1:
                     parts = [level[first : first + _TOGETHER] for first in range(0, len(level), _TOGETHER)]
-                    level = [client.submit(_combined, shared, *part, pure=False) for part in parts]
+                    level = [self._submitted(_combined, shared, *part) for part in parts]
                 roots += level
             while roots:
                 yield self._value(roots[0])
                 del roots[0]
         finally:
-            if client.status == "running":
-                client.cancel(roots)  # what only they need goes with them
+            self._cancel(roots)  # what only they need goes with them
+
+    def _submitted(self, function: Callable[..., Any], *arguments: Any, key: str | None = None) -> Future:
+        with self._connected():
+            return self.client.submit(function, *arguments, key=key, pure=False)
+
+    def _cancel(self, futures: list[Future]) -> None:
+        with suppress(FlexcalError), self._connected():
+            self.client.cancel(futures)
+
+    @contextmanager
+    def _connected(self) -> Iterator[None]:
+        """Raises `FlexcalError` where the connection was lost, even if it is there again: results are gone with it."""
+        from distributed.client import ClosedClientError
+
+        if self.client.status != "running":
+            raise self._lost()
+        try:
+            yield
+        except (OSError, ClosedClientError) as problem:
+            raise self._lost() from problem
 
     def _value(self, root: Future) -> Any:
         from concurrent.futures import CancelledError
@@ -186,7 +206,8 @@ class DaskCluster(Workers):
 
     def close(self) -> None:
         """As `Workers.close`; the cluster goes on."""
-        self.client.close()
+        with suppress(TimeoutError):
+            self.client.close()
 
     def _outcome(self, status: str, result: Any, index: int) -> Outcome[Any] | None:
         """What a task gave; None where its workers were killed."""
@@ -204,13 +225,16 @@ class DaskCluster(Workers):
         return Outcome(index, None, TaskError.of(problem), 0.0)  # not readable there, or its value not here
 
     def _require_workers(self) -> None:
-        try:
-            self.client.wait_for_workers(1, timeout=_PATIENCE)
-        except TimeoutError as problem:
-            raise InputError(
-                "E-WORK-004",
-                f"the scheduler at {self.address} has no workers; start some with 'dask worker {self.client.scheduler.address}'.",
-            ) from problem
+        from distributed.exceptions import WorkerStartTimeoutError
+
+        with self._connected():
+            try:
+                self.client.wait_for_workers(1, timeout=_PATIENCE)
+            except WorkerStartTimeoutError as problem:
+                raise InputError(
+                    "E-WORK-004",
+                    f"the scheduler at {self.address} has no workers; start some with 'dask worker {self.client.scheduler.address}'.",
+                ) from problem
         self._require_same_version()
 
     def _require_same_version(self) -> None:
@@ -227,7 +251,9 @@ class DaskCluster(Workers):
                 return None
 
         own = version("flexcal")
-        for worker, other in self.client.run(installed, on_error="ignore").items():
+        with self._connected():
+            others = self.client.run(installed, on_error="ignore")
+        for worker, other in others.items():
             if other != own:
                 has = "no flexcal" if other is None else f"flexcal {other}"
                 raise InputError(
