@@ -52,6 +52,24 @@ def test_table_has_every_value_with_its_source(tmp_path: Path, capsys: pytest.Ca
     assert str(p90["date"]) == "2026-03-01 00:00:00"
 
 
+def test_quality_of_a_stiffness_fit(tmp_path: Path) -> None:
+    write_robot(tmp_path / "arm")
+    for name, chi2 in (("known", 3.5), ("unknown", None)):
+        document = {
+            "kind": "stiffness",
+            "schema": 1,
+            "fit": {"reduced_chi2": chi2, "status": "converged"},
+            "verdict": {"trusted": False, "reasons": ["misfit"]},
+            "provenance": {"program": "test", f"input.{name}.csv": name},
+        }
+        (tmp_path / "arm" / name).mkdir()
+        (tmp_path / "arm" / name / "results.json").write_text(json.dumps(document), "utf-8")
+    frame = gather_fleet(tmp_path).table.frame.filter(kind="stiffness")
+    found = frame.filter(name="reduced_chi2").select("folder", "value", "text").rows()
+    assert found == [("arm/known", 3.5, "converged"), ("arm/unknown", None, "converged")]
+    assert frame.filter(name="trusted")["value"].to_list() == [0.0, 0.0]
+
+
 def test_tolerance_is_judged_with_the_uncertainty_of_the_p90(tmp_path: Path) -> None:
     """Standard deviation of a P90 of 40 poses: 0.95/√120 of it, 8.7 %; a margin of 14 %."""
     for name, error in (("bad", 0.24), ("near", 0.21), ("good", 0.16)):

@@ -93,10 +93,16 @@ def _dynamics(document: Mapping[str, Any]) -> list[ResultValue]:
     return [_number(name, value / 100) for name, value in values if value is not None]
 
 
+def _stiffness(document: Mapping[str, Any]) -> list[ResultValue]:
+    """Reduced chi-square of the responses; null where the measurements do not give their noise."""
+    return [ResultValue("reduced_chi2", document["fit"]["reduced_chi2"], None, "1", document["fit"]["status"])]
+
+
 _READERS: dict[str, Callable[[Mapping[str, Any]], list[ResultValue]]] = {
     "calibration": _calibration,
     "dynamics": _dynamics,
     "repeatability": _repeatability,
+    "stiffness": _stiffness,
     "verification": _verification,
 }
 
