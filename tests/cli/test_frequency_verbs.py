@@ -6,6 +6,7 @@ import json
 import shutil
 import signal
 import subprocess
+import sys
 from collections.abc import Callable
 from contextlib import redirect_stdout
 from dataclasses import replace
@@ -16,10 +17,11 @@ from typing import Any
 import numpy as np
 import polars as pl
 import pytest
-from cli_files import FLEXCAL, copied
+from cli_files import copied
 from refusals import assert_refusal
 from small_plan import small_plan
 from test_bad_input import refused_run
+from waiting import PATIENCE
 
 from flexcal.cli.arguments.verb_table import find_verb
 from flexcal.cli.main import main
@@ -366,14 +368,26 @@ def test_motor_without_rotor_inertia(
     assert_refusal(sentence, "E-CELL-012")
 
 
+WITHOUT_END = """
+import sys, time
+import flexcal.jobs.experiments.measurement as measurement
+from flexcal.cli.main import main
+
+measurement.write_results = lambda *_: time.sleep(1000)
+sys.exit(main(sys.argv[1:]))
+"""
+"""`flexcal` whose measurement is at its last step for long: a signal is never too late."""
+
+
 def test_interrupted_measurement_is_not_complete(recorded: Path, tmp_path: Path) -> None:
-    command = [FLEXCAL, "measure", recorded / "whole.yaml", "--cell", "virtual", "--out", tmp_path]
+    command = [sys.executable, "-c", WITHOUT_END]
+    command += ["measure", recorded / "whole.yaml", "--cell", "virtual", "--out", tmp_path]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None and process.stdout is not None
         assert process.stderr.readline().startswith("recording")
         process.send_signal(signal.SIGINT)
         rest = process.stderr.read()
-        assert process.wait(timeout=60) == 130
+        assert process.wait(PATIENCE) == 130
         assert "Traceback" not in rest and "interrupted" in rest
     assert not (tmp_path / "plan.yaml").exists()
 

@@ -9,7 +9,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -17,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from refusals import refused
+from waiting import PATIENCE
 
 from flexcal import CalibratedRobot, compensate, read_torque_model
 from flexcal.cli.main import main
@@ -62,7 +62,7 @@ def serving(*arguments: str | Path) -> Iterator[tuple[subprocess.Popen[str], str
             yield server, said.removeprefix("listening on ").strip()
         finally:
             server.terminate()
-            server.wait(10)
+            server.wait(PATIENCE)
 
 
 class Client:
@@ -71,11 +71,11 @@ class Client:
     def __init__(self, address: str) -> None:
         host, _, port = address.rpartition(":")
         self.socket = (
-            socket.create_connection((host, int(port)), 10) if host else socket.socket(socket.AF_UNIX)
+            socket.create_connection((host, int(port)), PATIENCE) if host else socket.socket(socket.AF_UNIX)
         )
         if not host:
-            self.socket.settimeout(10)
             self.socket.connect(address)
+            self.socket.settimeout(PATIENCE)
         self.file = self.socket.makefile("rb")
 
     def __enter__(self) -> Client:
@@ -124,7 +124,7 @@ def test_answers_are_those_of_the_library(robot_file: Path, tmp_path: Path) -> N
             past = client.ask(q=[9.0] * 6)
             assert past["status"] == "a joint would be past its limit" and past["joint"] == "elbow_joint"
         server.send_signal(signal.SIGTERM)
-        said, _ = server.communicate(timeout=10)
+        said, _ = server.communicate(timeout=PATIENCE)
         assert server.returncode == 0
         assert json.loads(said)["answers"] == 6
     assert not (tmp_path / "s").exists()
@@ -178,11 +178,11 @@ def test_no_client_disturbs_the_others(robot_file: Path, tmp_path: Path) -> None
                 deaf.send(b'{"do": "describe"}\n' * 1000)
         assert steady.ask(q=Q)["status"] == "done"
         child = (
-            "import socket, sys, time; s = socket.socket(socket.AF_UNIX); s.connect(sys.argv[1]); "
-            "s.sendall(b'{\"q\": [0,'); print('up', flush=True); time.sleep(60)"
+            "import socket, sys; s = socket.socket(socket.AF_UNIX); s.connect(sys.argv[1]); "
+            "s.sendall(b'{\"q\": [0,'); print('up', flush=True); sys.stdin.read()"
         )
         with subprocess.Popen(
-            [sys.executable, "-c", child, address], stdout=subprocess.PIPE, text=True
+            [sys.executable, "-c", child, address], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         ) as other:
             assert other.stdout is not None and other.stdout.readline() == "up\n"
             other.kill()
@@ -192,7 +192,7 @@ def test_no_client_disturbs_the_others(robot_file: Path, tmp_path: Path) -> None
             script = (
                 "import json, resource, socket, sys\n_, most = resource.getrlimit(resource.RLIMIT_NOFILE)\n"
                 "resource.setrlimit(resource.RLIMIT_NOFILE, (900, most))\n"
-                "crowd = []\nfor _ in range(600):\n    s = socket.socket(socket.AF_UNIX); s.settimeout(20)\n"
+                "crowd = []\nfor _ in range(600):\n    s = socket.socket(socket.AF_UNIX)\n"
                 "    s.connect(sys.argv[1]); crowd.append(s)\n"
                 f"line = json.dumps({{'q': {Q}}}).encode() + b'\\n'\nfor s in crowd: s.sendall(line)\n"
                 "print(sum(b'done' in s.makefile('rb').readline() for s in crowd))"
@@ -241,12 +241,10 @@ def test_a_socket_of_a_killed_server_is_taken_over(robot_file: Path, tmp_path: P
         with refused("E-SERVE-005", str(path)):
             serve_unix(answers, path, print)
         os.kill(server.pid, signal.SIGKILL)
-        server.wait(10)
+        server.wait(PATIENCE)
         assert path.exists()
-    begun = time.monotonic()
     with serving(robot_file, "--unix", path) as (_, address), Client(address) as client:
         assert client.ask(q=Q)["status"] == "done"
-    assert time.monotonic() - begun < 30
 
 
 def test_places_that_cannot_be_listened_on_are_refused(

@@ -9,7 +9,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from typing import Any
 import pytest
 from cli_files import FLEXCAL, snapshot
 from refusals import assert_refusal
+from waiting import PATIENCE, until
 
 from flexcal.cli.folders.ledger import LEDGER
 from flexcal.files.transaction.staging_folder import PREFIX
@@ -34,7 +34,7 @@ def run(self):
         write_text(self.out / name, "new")
     print("results", flush=True)
     Path("at_work").touch()
-    time.sleep(60)
+    time.sleep(1000)
 
 Repeatability.run = run
 sys.exit(main(["repeatability", "robot.yaml", "visits.csv", "--out", "out"]))
@@ -79,11 +79,9 @@ def at_work(folder: Path) -> subprocess.Popen[str]:
         cwd=folder,
         preexec_fn=heed_signals,
     )
-    for _ in range(600):
-        if (folder / "at_work").exists():
-            return process
-        time.sleep(0.05)
-    raise AssertionError(process.communicate())
+    until(lambda: (folder / "at_work").exists() or process.poll() is not None)
+    assert process.poll() is None, process.communicate()
+    return process
 
 
 @pytest.mark.parametrize(
@@ -93,7 +91,7 @@ def at_work(folder: Path) -> subprocess.Popen[str]:
 def test_a_signal_changes_nothing(folder: Path, number: int, status: int, said: str) -> None:
     process = at_work(folder)
     process.send_signal(number)
-    out, err = process.communicate(timeout=20)
+    out, err = process.communicate(timeout=PATIENCE)
     assert (process.returncode, out) == (status, "results\n")
     assert err.startswith(f"flexcal: {said}") and err.count("\n") == 1
     assert not (folder / "out").exists() and not list(folder.glob(PREFIX + "*"))
@@ -102,7 +100,12 @@ def test_a_signal_changes_nothing(folder: Path, number: int, status: int, said: 
 def test_killed_and_run_again(folder: Path) -> None:
     process = at_work(folder)
     second = subprocess.run(
-        [sys.executable, "-c", AT_WORK], capture_output=True, text=True, cwd=folder, timeout=30, check=False
+        [sys.executable, "-c", AT_WORK],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        timeout=PATIENCE,
+        check=False,
     )
     assert second.returncode == 2
     assert_refusal(second.stderr, "E-CLI-012", "'flexcal repeatability'", f"process {process.pid}")
@@ -110,7 +113,7 @@ def test_killed_and_run_again(folder: Path) -> None:
     process.communicate()
     assert [path.name.startswith(PREFIX) for path in (folder / "out").iterdir()] == [True]
     again = subprocess.run(
-        [sys.executable, "-c", AT_WORK.replace("sleep(60)", "sleep(0)")],
+        [sys.executable, "-c", AT_WORK.replace("sleep(1000)", "sleep(0)")],
         capture_output=True,
         text=True,
         cwd=folder,
@@ -236,7 +239,7 @@ def test_what_is_no_regular_file(folder: Path, kind: str) -> None:
         *PLAN,
         "--out",
         "/dev/null" if kind == "device" else "plan.yaml",
-        timeout=30,
+        timeout=PATIENCE,
     )
     named = {"dangling": "a link", "folder": "a folder"}.get(kind, f"a {kind}")
     assert done.returncode == 2 and done.stderr.count("\n") == 1
@@ -251,7 +254,7 @@ def test_what_is_no_regular_file_in_a_folder(folder: Path, kind: str) -> None:
     page = folder / "out" / "report.html"
     page.symlink_to("/etc/hostname") if kind == "link" else os.mkfifo(page)
     done = flexcal(
-        "calibrate", "robot.yaml", "random.csv", "--terms", "kinematic", "--out", "out", timeout=60
+        "calibrate", "robot.yaml", "random.csv", "--terms", "kinematic", "--out", "out", timeout=PATIENCE
     )
     assert done.returncode == 2
     assert_refusal(done.stderr, "E-FILE-013", "out/report.html", kind)

@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 import urllib.error
 import urllib.request
 from pathlib import Path
@@ -15,6 +14,7 @@ from pathlib import Path
 import pytest
 from browser import studio
 from refusals import assert_refusal
+from waiting import PATIENCE, until
 
 from flexcal.cli.main import main
 
@@ -51,7 +51,7 @@ def test_without_viser(tmp_path: Path) -> None:
     (tmp_path / "viser.py").write_text("raise ModuleNotFoundError(\"No module named 'viser'\", name='viser')")
     command = [sys.executable, "-m", "flexcal.cli.main", "studio", str(tmp_path)]
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
-    ended = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=60)
+    ended = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=PATIENCE)
     assert ended.returncode == 2
     assert_refusal(ended.stderr, "E-STUDIO-001")
     assert "pip install 'flexcal[studio]'" in ended.stderr
@@ -68,9 +68,7 @@ def test_browser_is_not_given_the_token(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setenv("BROWSER", str(browser))
     monkeypatch.setenv("DISPLAY", ":0")
     with studio(tmp_path, browser=True) as running:
-        deadline = time.monotonic() + 10
-        while not (tmp_path / "seen").exists() and time.monotonic() < deadline:
-            time.sleep(0.02)
+        until((tmp_path / "seen").exists)
         seen = (tmp_path / "seen").read_text().strip()
         assert running.url not in seen
         with urllib.request.urlopen(seen) as response:

@@ -6,10 +6,10 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
+from waiting import PATIENCE, until
 
 PROGRAM = """
 import os, sys, time
@@ -19,7 +19,7 @@ from flexcal.parallel import open_workers
 
 def work(folder):
     Path(folder, f"pid_{os.getpid()}").touch()
-    time.sleep(100)
+    time.sleep(1000)
 
 with scratch_folder() as scratch:
     Path(sys.argv[1], scratch.name).touch()
@@ -39,17 +39,11 @@ def test_workers_end_with_who_asked_them(tmp_path: Path, number: int) -> None:
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         env=os.environ | {"TMPDIR": str(tmp_path)},
     )
-    while len(list(tmp_path.glob("pid_*"))) < 2:
-        assert process.poll() is None
-        time.sleep(0.05)
+    until(lambda: len(list(tmp_path.glob("pid_*"))) == 2 or process.poll() is not None)
+    assert process.poll() is None
     (os.killpg if number == signal.SIGINT else os.kill)(process.pid, number)
-    said = process.communicate(timeout=30)[1]
-    for _ in range(600):
-        if not any(alive(int(path.name[4:])) for path in tmp_path.glob("pid_*")):
-            break
-        time.sleep(0.05)
-    else:
-        raise AssertionError("a worker lives on")
+    said = process.communicate(timeout=PATIENCE)[1]
+    until(lambda: not any(alive(int(path.name[4:])) for path in tmp_path.glob("pid_*")))
     assert said.count("Traceback") == (number == signal.SIGINT)  # that of the program itself
 
 

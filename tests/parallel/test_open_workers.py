@@ -8,7 +8,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -18,6 +17,7 @@ import distributed
 import numpy as np
 import pytest
 from refusals import refused
+from waiting import PATIENCE, until
 from worker_tasks import failing, killing, least_squares
 
 from flexcal.parallel import TaskError, ThisProcess, Workers, open_workers
@@ -85,8 +85,7 @@ def test_workers_that_are_killed_between_two_calls_are_started_again() -> None:
         pool = workers._pool  # type: ignore[attr-defined]
         for process in pool._processes.values():
             os.kill(process.pid, signal.SIGKILL)
-        while pool._flags.broken is None:  # from here on the pool refuses tasks
-            time.sleep(0.01)
+        until(lambda: pool._flags.broken is not None)  # from here on the pool refuses tasks
         assert list(workers.values(failing, [0, 1, 5])) == [0, 1, 5]
 
 
@@ -125,7 +124,10 @@ def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_a_scheduler_without_workers(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("flexcal.parallel.dask_cluster._PATIENCE", 0.3)
+    waits = distributed.Client.wait_for_workers
+    monkeypatch.setattr(
+        distributed.Client, "wait_for_workers", lambda client, count, timeout: waits(client, count, 0.3)
+    )
     with distributed.LocalCluster(n_workers=0, dashboard_address=":0") as empty:
         address = empty.scheduler_address.replace("tcp://", "dask://")
         with refused("E-WORK-004", address, empty.scheduler_address), open_workers(address, 1):
@@ -146,8 +148,11 @@ def test_without_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
     ids=["other", "none"],
 )
-def test_a_worker_of_another_version(change: str, said: str, tmp_path: Path) -> None:
+def test_a_worker_of_another_version(
+    change: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """What another flexcal says of itself is found before this one; or none is found."""
+    monkeypatch.setattr("flexcal.parallel.dask_cluster._PATIENCE", PATIENCE)
     information = tmp_path / "flexcal-0.0.9.dist-info"
     information.mkdir()
     (information / "METADATA").write_text("Metadata-Version: 2.1\nName: flexcal\nVersion: 0.0.9\n")
@@ -183,7 +188,7 @@ def test_encrypted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     }
     with dask.config.set(settings):
         security = distributed.Security(require_encryption=True)
-    monkeypatch.setattr("flexcal.parallel.dask_cluster._PATIENCE", 5.0)
+    monkeypatch.setattr("flexcal.parallel.dask_cluster._PATIENCE", PATIENCE)
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, dashboard_address=":0", security=security, protocol="tls://"
     ) as cluster:

@@ -12,6 +12,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from waiting import PATIENCE
+
 ARGUMENTS = [
     "--no-sandbox",
     "--disable-gpu-compositing",
@@ -39,7 +41,7 @@ class Running:
     def stop(self, number: int) -> str:
         """Standard output after a signal that ends it."""
         self.process.send_signal(number)
-        said, _ = self.process.communicate(timeout=20)
+        said, _ = self.process.communicate(timeout=PATIENCE)
         return said
 
 
@@ -56,7 +58,7 @@ def studio(folder: Path, *arguments: str, browser: bool = False) -> Iterator[Run
         subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True) as process,
     ):
         try:
-            deadline = time.monotonic() + 60
+            deadline = time.monotonic() + PATIENCE
             while True:
                 errors.seek(0)
                 said = errors.read().splitlines()
@@ -67,4 +69,4 @@ def studio(folder: Path, *arguments: str, browser: bool = False) -> Iterator[Run
             yield Running(process, said[-2].split()[-1], said)
         finally:
             process.kill()
-            process.wait(10)
+            process.wait(PATIENCE)

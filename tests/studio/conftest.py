@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from browser import ARGUMENTS, chromium, studio
+from page_elements import WAIT
 
 
 @pytest.fixture(scope="session")
@@ -27,6 +28,7 @@ def browser() -> Iterator[Any]:
 def page(browser: Any) -> Iterator[Any]:
     """A page of 1280 × 720 in a fresh profile."""
     context = browser.new_context(viewport={"width": 1280, "height": 720})
+    context.set_default_timeout(WAIT)
     yield context.new_page()
     context.close()
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-WAIT = 30_000
+from waiting import PATIENCE
+
+WAIT = 1000 * PATIENCE
 """Milliseconds until an element is there, at most."""
 
 

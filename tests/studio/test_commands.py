@@ -6,18 +6,17 @@ import json
 import shutil
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 from refusals import refused
+from waiting import PATIENCE, until
 
 from flexcal import RobotModel, calibrate, read_poses
 from flexcal.studio.commands import CommandRun, CommandRunner
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "ur5_tracker"
-PATIENCE = 60.0
 
 
 @pytest.fixture(scope="module")
@@ -62,9 +61,7 @@ def test_a_failure_is_its_sentence_and_writes_nothing(folder: Path) -> None:
 
 def test_cancelling_leaves_no_file(folder: Path) -> None:
     run = CommandRun(["demo", "--seed", "1", "--out", "long"], folder)
-    deadline = time.monotonic() + PATIENCE
-    while run.stage is None and time.monotonic() < deadline:
-        time.sleep(0.05)
+    until(lambda: run.stage is not None)
     run.cancel()
     assert ended(run).status == "cancelled"
     assert not list((folder / "long").glob("*.html"))

@@ -82,7 +82,7 @@ def test_from_plan_to_verification(page: Any, tmp_path: Path) -> None:
         go_to(page, "Calibrate")
         choose(page, "Measured poses", "poses.csv")
         press(page, "Calibrate: geometry")
-        page.get_by_role("button", name="Calibrate again: geometry").wait_for(timeout=2 * WAIT)
+        page.get_by_role("button", name="Calibrate again: geometry").wait_for(timeout=WAIT)
 
         go_to(page, "Verify")
         choose(page, "Fresh poses", "others.csv")

@@ -5,8 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import shutil
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +12,7 @@ import calibrated_ur5
 import pytest
 from browser import Running, studio
 from page_elements import choose, count_rows, field, fill, go_to, open_step, press, see
+from waiting import PATIENCE, until
 
 from flexcal.data.plans import read_plan
 from flexcal.files.formats import read_yaml_file
@@ -25,15 +24,7 @@ TX90L = Path(__file__).parents[2] / "examples" / "tx90l"
 
 def kill(running: Running) -> None:
     running.process.kill()
-    running.process.wait(10)
-
-
-def until(condition: Callable[[], Any]) -> None:
-    """Wait for something that is not on the page."""
-    deadline = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.005)
+    running.process.wait(PATIENCE)
 
 
 def unfold(page: Any, title: str, button: str) -> None:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import shutil
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+from waiting import until
 
 from flexcal import PosePlan, RobotModel, VirtualCell
 from flexcal.data.plans import write_plan
@@ -56,12 +56,12 @@ def judged(folder: Path, model: RobotModel, q: np.ndarray, rows: list[dict[str, 
 
 
 def settle(measuring: Measuring, answers: list[Answer]) -> None:
-    deadline = time.monotonic() + 60
-    while measuring.outlook is None or len(measuring.judgements) < measuring.series.used.sum():
-        assert time.monotonic() < deadline
+    def settled() -> bool:
         for answer in list(answers):
             measuring.answered(answer)
-        time.sleep(0.02)
+        return measuring.outlook is not None and len(measuring.judgements) >= measuring.series.used.sum()
+
+    until(settled)
 
 
 def test_poses_with_good_rows_are_complete(

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import studio
+from waiting import until
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "ur5_tracker"
 COUNT = 90
@@ -58,7 +59,7 @@ def test_killed_again_and_again_while_a_file_grows(tmp_path: Path) -> None:
             before = _modified(table)
             rounds.release()
             if k % 2:
-                _wait(lambda before=before: _modified(table) != before)
+                until(lambda before=before: _modified(table) != before)
             else:
                 time.sleep(float(rng.uniform(0.0, 0.8)))
             running.process.kill()
@@ -66,7 +67,7 @@ def test_killed_again_and_again_while_a_file_grows(tmp_path: Path) -> None:
     rounds.release()
     writer.join()
     with studio(folder):
-        _wait(lambda: _count(table) >= COUNT)
+        until(lambda: _count(table) >= COUNT)
         time.sleep(0.5)
     rows = list(csv.DictReader(table.read_text().splitlines()))
     assert [int(row["pose"]) for row in rows] == list(range(1, COUNT + 1))
@@ -83,10 +84,3 @@ def _modified(path: Path) -> int:
 
 def _count(path: Path) -> int:
     return path.read_text().count("\n") - 1 if path.exists() else 0
-
-
-def _wait(condition) -> None:
-    deadline = time.monotonic() + 20
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.005)

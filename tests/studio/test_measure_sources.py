@@ -6,11 +6,11 @@ import csv
 import json
 import shutil
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from browser import studio
+from waiting import until
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "ur5_tracker"
 HEADER = "q1,q2,q3,q4,q5,q6,x,y,z\n"
@@ -40,13 +40,6 @@ def taken(project: Path) -> list[float]:
     )
 
 
-def wait(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 20
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-
-
 def test_a_folder_with_a_file_a_measurement(project: Path) -> None:
     """In the order in which they came, with or without an end of line, each once, whatever the restarts."""
     follow(project, "a watched folder", "shots")
@@ -54,13 +47,13 @@ def test_a_folder_with_a_file_a_measurement(project: Path) -> None:
     place.mkdir()
     with studio(project):
         (place / "b.csv").write_text(HEADER + line(0.25) + "\n")
-        wait(lambda: taken(project) == [0.25])
+        until(lambda: taken(project) == [0.25])
         (place / "a.csv").write_text(HEADER + line(0.5))
-        wait(lambda: taken(project) == [0.25, 0.5])
+        until(lambda: taken(project) == [0.25, 0.5])
         (place / "note.txt").write_text("no measurement")
     with studio(project):
         (place / "c.csv").write_text(HEADER + line(0.75) + "\n" + line(0.125) + "\n")
-        wait(lambda: len(taken(project)) >= 4)
+        until(lambda: len(taken(project)) >= 4)
         time.sleep(0.5)
     assert taken(project) == [0.25, 0.5, 0.75, 0.125]
 
@@ -71,7 +64,7 @@ def test_lines_that_are_no_measurements_are_left_out(project: Path) -> None:
     text = HEADER + line(0.5) + "\n" + "".join(f"{one}\n" for one in wrong) + line(0.75) + "\n"
     (project / "tracker.csv").write_text(text)
     with studio(project):
-        wait(lambda: len(taken(project)) >= 2)
+        until(lambda: len(taken(project)) >= 2)
         time.sleep(0.3)
     assert taken(project) == [0.5, 0.75]
 

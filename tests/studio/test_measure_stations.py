@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import shutil
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from waiting import until
 
 from flexcal import RobotModel, read_poses
 from flexcal.studio.project import Choices, Project
@@ -67,12 +67,13 @@ def measuring(tmp_path: Path) -> Measuring:
 
 def wait(measuring: Measuring, condition: Callable[[], bool]) -> None:
     """Hand over the answers until a condition holds."""
-    deadline = time.monotonic() + 60
-    while not condition():
-        assert time.monotonic() < deadline
+
+    def holds() -> bool:
         for answer in list(measuring.answers):  # pyright: ignore[reportAttributeAccessIssue]
             measuring.answered(answer)
-        time.sleep(0.02)
+        return condition()
+
+    until(holds)
 
 
 def test_a_new_station_from_the_row_on_before_which_the_tracker_moved(

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from browser import Running, studio
+from page_elements import WAIT
 
 from flexcal import PosePlan, RobotModel, VirtualCell
 from flexcal.data.plans import write_plan
@@ -21,7 +22,6 @@ from flexcal.jobs.guidance import GuidedSession
 from flexcal.virtual_cell import CellConfig
 
 TX90L = Path(__file__).parents[2] / "examples" / "tx90l"
-WAIT = 15_000
 COUNT = 16
 
 

@@ -49,5 +49,5 @@ def test_motions_are_planned_and_shown_against_their_limits(page: Any, tmp_path:
         choose(page, "Plan", "default: poses of frequency_poses.csv")
         see(page, "$ flexcal design frequency robot.yaml --out frequency.yaml")
         press(page, "Plan frequency experiment")
-        page.get_by_role("button", name="Play").wait_for(timeout=2 * WAIT)
+        page.get_by_role("button", name="Play").wait_for(timeout=WAIT)
         assert isinstance(read_plan(folder / "frequency.yaml"), MultisinePlan)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from browser import studio
+from page_elements import WAIT
 
 from flexcal.data.plans import FourierPaths, PosePlan, TrajectoryPlan, write_plan
 from flexcal.model.robot import RobotModel
@@ -125,15 +126,15 @@ def test_page_shows_collisions_and_runs_the_verb(page: Any, tmp_path: Path) -> N
     write_plan(folder / "poses.yaml", PosePlan(q=np.array([STRETCHED, FOLDED])))
     with studio(folder) as running:
         page.goto(running.url)
-        page.get_by_text("2 Plan").click(timeout=20_000)
-        page.get_by_text("Pose 2: bodies are in contact").wait_for(timeout=20_000)
+        page.get_by_text("2 Plan").click(timeout=WAIT)
+        page.get_by_text("Pose 2: bodies are in contact").wait_for(timeout=WAIT)
         page.get_by_text("pose 2", exact=True).click()
-        page.get_by_text(re.compile("Pose 2: .* touch")).wait_for(timeout=10_000)
+        page.get_by_text(re.compile("Pose 2: .* touch")).wait_for(timeout=WAIT)
         page.get_by_label("What to plan").last.click()
         page.get_by_role("option", name="Poses to verify on").click()
-        page.get_by_text("--random --count 20 --seed 7 --out others.yaml").first.wait_for(timeout=10_000)
+        page.get_by_text("--random --count 20 --seed 7 --out others.yaml").first.wait_for(timeout=WAIT)
         page.get_by_role("button", name="Draw random poses").click()
-        page.get_by_text("20 random poses, for a verification").wait_for(timeout=60_000)
+        page.get_by_text("20 random poses, for a verification").wait_for(timeout=WAIT)
     assert (folder / "others.yaml").is_file()
 
 
@@ -144,13 +145,13 @@ def test_empty_number_is_told_and_a_plan_has_no_tally(page: Any, tmp_path: Path)
     folder = tmp_path / "bare"
     with studio(folder) as running:
         page.goto(running.url)
-        page.get_by_text("2 Plan").click(timeout=20_000)
+        page.get_by_text("2 Plan").click(timeout=WAIT)
         number = page.get_by_label("Number of poses").last
-        number.fill("12", timeout=20_000)
-        page.get_by_text("Plans 12 poses, also where the field is left empty.").wait_for(timeout=10_000)
+        number.fill("12", timeout=WAIT)
+        page.get_by_text("Plans 12 poses, also where the field is left empty.").wait_for(timeout=WAIT)
         number.fill("")
         page.get_by_role("button", name="Plan poses").click()
-        page.get_by_text("12 poses to measure").wait_for(timeout=90_000)
+        page.get_by_text("12 poses to measure").wait_for(timeout=WAIT)
         shown = page.locator("body").inner_text()
         assert "checks are good" not in shown and "There are" not in shown
         assert "Collisions are not checked: the URDF has no collision shapes." in shown

@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from page_elements import WAIT
+
 from flexcal.model.robot import RobotModel
 from flexcal.studio.steps.robot.uploads import LARGEST
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-WAIT = 15_000
 
 
 def upload(page: Any, name: str, content: bytes) -> None:

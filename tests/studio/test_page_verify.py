@@ -12,6 +12,7 @@ import numpy as np
 import polars as pl
 import pytest
 from browser import studio
+from page_elements import WAIT
 
 from flexcal import ToolTargets, read_poses
 from flexcal.calibration.measurement import predict_measurements
@@ -19,8 +20,6 @@ from flexcal.jobs.deployment import compensate
 from flexcal.jobs.inputs import CalibratedRobot
 from flexcal.model.statics import tool_at_rest
 from flexcal.studio.steps.results import ResultSource
-
-WAIT = 30_000
 
 
 def numbers(pattern: str, text: str) -> list[float]:
