@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import http.client
 import os
 import re
 import socket
@@ -485,6 +486,20 @@ def test_a_viser_that_goes_around_the_gate_is_not_started(tmp_path: Path, monkey
         patch.setattr(infra, "websockets", own)
         assert_not_started()
     assert websockets.asyncio.server.serve is before
+
+
+def test_a_machine_that_was_asleep_is_no_open_door(tmp_path: Path, monkeypatch: Any) -> None:
+    """The studio asks itself whether it keeps others out; an answer that is late is waited for again."""
+    response, calls = http.client.HTTPConnection.getresponse, iter(range(100))
+
+    def late(connection: http.client.HTTPConnection) -> http.client.HTTPResponse:
+        if next(calls) in (0, 2):
+            raise TimeoutError
+        return response(connection)
+
+    monkeypatch.setattr(http.client.HTTPConnection, "getresponse", late)
+    StudioServer.start("127.0.0.1", 0, {}, ProjectFiles(tmp_path)).stop()
+    assert next(calls) == 5
 
 
 def test_a_port_that_is_taken(tmp_path: Path, monkeypatch: Any) -> None:

@@ -22,6 +22,8 @@ LOOPBACK = "127.0.0.1"
 _FIRST_PORT = 8080
 _PORTS = 20
 """Ports that are tried before any free one is taken."""
+_PATIENCE, _TRIES = 10.0, 6
+"""Seconds that the own server may take to answer, and how often it is asked."""
 
 
 class StudioServer:
@@ -147,13 +149,18 @@ def _refuses(address: str, port: int, token: str) -> bool:
 
 
 def _status(address: str, port: int, path: str, host: str) -> int | None:
-    connection = http.client.HTTPConnection(address, port, timeout=5)
-    try:
-        connection.request("GET", path, headers={"Host": host})
-        response = connection.getresponse()
-        response.read()
-        return response.status
-    except (OSError, http.client.HTTPException):
-        return None
-    finally:
-        connection.close()
+    """Status of the answer; None where there is none, however often it is asked for: a machine may be busy, or asleep for a while."""
+    for _ in range(_TRIES):
+        connection = http.client.HTTPConnection(address, port, timeout=_PATIENCE)
+        try:
+            connection.request("GET", path, headers={"Host": host})
+            response = connection.getresponse()
+            response.read()
+            return response.status
+        except TimeoutError:
+            continue
+        except (OSError, http.client.HTTPException):
+            return None
+        finally:
+            connection.close()
+    return None
