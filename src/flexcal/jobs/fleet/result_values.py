@@ -95,7 +95,9 @@ def _dynamics(document: Mapping[str, Any]) -> list[ResultValue]:
 
 def _stiffness(document: Mapping[str, Any]) -> list[ResultValue]:
     """Reduced chi-square of the responses; null where the measurements do not give their noise."""
-    return [ResultValue("reduced_chi2", document["fit"]["reduced_chi2"], None, "1", document["fit"]["status"])]
+    return [
+        ResultValue("reduced_chi2", document["fit"]["reduced_chi2"], None, "1", document["fit"]["status"])
+    ]
 
 
 _READERS: dict[str, Callable[[Mapping[str, Any]], list[ResultValue]]] = {
