@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -12,6 +14,8 @@ import pytest
 from browser import studio
 from page_elements import WAIT, choose, count_rows, fill, go_to, press, see
 
+TICK = 2 * np.pi / 4096
+"""Of a motor of LeRobot, rad."""
 EXAMPLE = Path(__file__).parents[2] / "examples" / "ur5_tracker"
 
 
@@ -50,3 +54,46 @@ def test_columns_and_units_of_another_program(page: Any, tmp_path: Path) -> None
         press(page, "Import")
         see(page, "tracker export-imported.csv is there already")
     assert count_rows(folder / "poses.csv") == 20
+
+
+def test_motors_of_lerobot(page: Any, tmp_path: Path) -> None:
+    """Ticks become joint positions by LeRobot's file, motors of other names, signs and zeros; what does not fit is refused at first."""
+    pytest.importorskip("viser", reason="viser is absent: pip install 'flexcal[studio]'")
+    folder = tmp_path / "ur5"
+    folder.mkdir()
+    for name in ("robot.yaml", "ur5.urdf"):
+        shutil.copy(EXAMPLE / name, folder / name)
+    rows = pl.read_csv(EXAMPLE / "random.csv", comment_prefix="#")
+    q = rows.select([f"q{k}" for k in range(1, 7)]).to_numpy()
+    joints = re.findall(r'<joint name="([^"]+)" type="revolute"', (folder / "ur5.urdf").read_text())
+    motors, signs = [f"m{k}" for k in range(1, 7)], np.array([1, -1, 1, 1, -1, 1])
+    entry = {"drive_mode": 0, "homing_offset": 7, "range_min": 95, "range_max": 4001}
+    (folder / "my arm.json").write_text(json.dumps({m: {"id": k, **entry} for k, m in enumerate(motors)}))
+    ticks = 2048 + signs * (q - np.deg2rad([0, 90, 0, 0, 0, 0])) / TICK
+    foreign = {f"{motor}.pos": ticks[:, k] for k, motor in enumerate(motors)}
+    foreign |= {f"{axis}_mm": 1000 * rows[axis] for axis in "xyz"}
+    pl.DataFrame(foreign).write_csv(folder / "recorded.csv")
+    (folder / ".studio.json").write_text('{"step": "Measure", "row source": "a file in another format"}')
+    options = [
+        f"{joint}={'-' if s < 0 else ''}{m}" for joint, m, s in zip(joints, motors, signs, strict=True)
+    ]
+    with studio(folder) as running:
+        page.goto(running.url)
+        see(page, "flexcal import robot.yaml recorded.csv --out poses.csv")
+        page.get_by_label("Motors of LeRobot").click(timeout=WAIT)
+        choose(page, "LeRobot's file", "my arm.json")
+        fill(page, "Motors", " ".join(options))
+        press(page, "Import")
+        see(page, "the points do not fit this robot")
+        assert not (folder / "poses.csv").exists()
+        anyway = page.get_by_label("Even if they do not fit the robot")
+        anyway.click(timeout=WAIT)
+        see(page, "--readings ticks --unchecked --out poses.csv")
+        anyway.click(timeout=WAIT)
+        fill(page, "Motors", " ".join([options[0], f"{options[1]}+90", *options[2:]]))
+        press(page, "Import")
+        page.get_by_role("link", name="pose 20", exact=True).wait_for(timeout=WAIT)
+        taken = pl.read_csv(folder / "poses.csv").select([f"q{k}" for k in range(1, 7)]).to_numpy()
+        assert np.allclose(taken, q, rtol=0, atol=1e-9)
+        page.reload()
+        see(page, "--lerobot 'my arm.json' --motors")

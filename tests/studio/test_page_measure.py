@@ -188,7 +188,7 @@ def test_no_number_that_was_not_typed_is_in_a_row(page: Any, running: Any) -> No
     status = "url => fetch(url).then(answer => answer.status)"
     assert [page.evaluate(status, url) for url in again] == [204, 400, 400]
     fields = [page.get_by_label(f"{axis} / mm") for axis in "xyz"]
-    page.wait_for_function("document.querySelector('form fieldset:enabled')")
+    page.wait_for_function("document.querySelector('form:not([data-sent])')")
     assert [field.input_value() for field in fields] == [""] * 3
     for typed, told in (
         (("1", "", "3"), "y / mm is empty"),

@@ -14,7 +14,7 @@ from measured_dh_arm import DHArm
 from refusals import refused
 
 from flexcal import RobotModel, read_poses
-from flexcal.jobs.guidance import FollowedFile, MeasuredRows, RowReader, Source, cells_of
+from flexcal.jobs.guidance import FollowedFile, MeasuredRows, RowReader, Source, cells_of, in_columns
 
 
 @pytest.fixture(scope="module")
@@ -105,6 +105,21 @@ def test_changes_of_another_program_are_not_taken_back(tmp_path: Path, cells: li
         rows.exclude(0, " ")
     with refused("E-STUDIO-010", "temperature"):
         rows.append([cells[0] | {"temperature": "20"}])
+
+
+def test_a_row_takes_the_columns_of_a_table_of_another_program(cells: list[dict[str, str]], ur5: RobotModel):
+    """Remarks of the table are empty, target and number of the pose are left out or added; no measured number is lost or made up."""
+    names = [name for name in cells[0] if name != "pose"]
+    plain = {name: cells[0][name] for name in names}
+    point = ur5.point().name
+    own = cells[0] | {"target": point}
+    assert in_columns([own], [*names, "note"], ur5) == [plain | {"note": ""}]
+    assert in_columns([plain], [*names, "target"], ur5) == [plain | {"target": point}]
+    assert in_columns([own], (), ur5) == [own]
+    other, warm = own | {"target": "another"}, own | {"temperature": "20.0"}
+    assert in_columns([other], names, ur5) == [plain | {"target": "another"}]
+    assert in_columns([warm], names, ur5) == [plain | {"temperature": "20.0"}]
+    assert in_columns([plain], [*names, "t"], ur5) == [plain]
 
 
 def test_texts_and_comments_of_a_file_that_is_there_stay(tmp_path: Path, cells: list[dict[str, str]]):

@@ -3,7 +3,7 @@ from .judgement import Finding, Judgement, JudgementCode
 from .measured_rows import MeasuredRow, MeasuredRows, Source
 from .outlook import Outlook, Prospect
 from .pose_choice import PoseChoice
-from .row_cells import RowReader, cells_of
+from .row_cells import RowReader, cells_of, in_columns
 from .session import DEFAULT_CHOICE, GuidedSession
 
 __all__ = [
@@ -22,4 +22,5 @@ __all__ = [
     "RowReader",
     "Source",
     "cells_of",
+    "in_columns",
 ]

@@ -72,10 +72,14 @@ class MeasuredRows:
         table = self._table()
         columns = table.columns or tuple(dict.fromkeys(name for cells in rows for name in cells))
         for cells in rows:
-            if odd := {*cells} ^ {*columns} - {EXCLUDED}:
+            lacking, further = sorted({*columns} - {*cells} - {EXCLUDED}), sorted({*cells} - {*columns})
+            if lacking or further:
+                odd = [f"has no {', '.join(lacking)}"] * bool(lacking)
+                odd += [f"has {', '.join(further)} beside them"] * bool(further)
                 raise InputError(
                     "E-STUDIO-010",
-                    f"the new row and {self.path} do not have the same columns ({', '.join(sorted(odd))} only in one); name all alike.",
+                    f"all rows of {self.path} must have its columns, but the new row {' and '.join(odd)}; go on as the rows before were "
+                    "measured, or move the table away to begin another.",
                 )
         added = tuple(MeasuredRow(dict(cells)) for cells in rows)
         entry = {"do": "append", "row": len(table.rows), "cells": [dict(cells) for cells in rows]}

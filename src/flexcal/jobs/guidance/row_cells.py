@@ -39,8 +39,7 @@ class RowReader:
     def poses(self, rows: Sequence[Mapping[str, str]]) -> PoseSet:
         """Poses of N rows; raises `InputError` for a cell that is no number, and an unknown target."""
         texts = [name for name in _TEXTS if name in self.columns]
-        known = {c for name in ("pose", "q", "xyz", *_NUMBERS) for c in standard_columns(name, self.model.n)}
-        known |= {column for signal in mapped_signals(self.model).values() for column in signal.columns}
+        known = number_columns(self.model)
         read = [name for name in self.columns if name in known]
         file = TableFile(self.path, (*read, *texts), 1)
         arrays = {
@@ -68,6 +67,31 @@ class RowReader:
             pose=values["pose"][:, 0].astype(int) if "pose" in values else np.arange(1, count + 1),
             sigma_given=sigma is not None,
         )
+
+
+def number_columns(model: RobotModel) -> set[str]:
+    """Names of the columns of a robot's measured poses that hold numbers with a meaning."""
+    known = {c for name in ("pose", "q", "xyz", *_NUMBERS) for c in standard_columns(name, model.n)}
+    return known | {column for signal in mapped_signals(model).values() for column in signal.columns}
+
+
+def in_columns(
+    rows: Sequence[Mapping[str, str]], columns: Sequence[str], model: RobotModel
+) -> list[dict[str, str]]:
+    """Rows, texts by column, with the columns of a table that is there, as far as no measured number is made up or lost for it.
+
+    The target, of a robot's first point, is added or left out, the number of the pose left out, and remarks of the table are empty.
+    """
+    if not columns:
+        return [dict(cells) for cells in rows]
+    first, numbers = model.point().name, number_columns(model)
+    fitted = []
+    for cells in rows:
+        named = {"target": first, **cells}
+        remarks = {name: "" for name in columns if name not in numbers and name not in _TEXTS}
+        left_out = ("pose", "target") if named["target"] == first else ("pose",)
+        fitted.append(remarks | {k: v for k, v in named.items() if k in columns or k not in left_out})
+    return fitted
 
 
 def cells_of(poses: PoseSet) -> list[dict[str, str]]:

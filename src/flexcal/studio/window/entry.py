@@ -28,6 +28,5 @@ def entry_form(labels: Sequence[str], button: str) -> str:
     )
     return (
         '<form data-entry autocomplete="off" style="margin:0 0.7em 0.5em;font-size:0.85em;">'
-        '<fieldset style="border:0;padding:0;margin:0;min-width:0;">'
-        f'{fields}<button type="submit" style="{_BUTTON}">{escape(button)}</button></fieldset></form>'
+        f'{fields}<button type="submit" style="{_BUTTON}">{escape(button)}</button></form>'
     )

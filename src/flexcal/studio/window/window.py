@@ -263,7 +263,7 @@ class Window:
         self.choices.put("dark", self.dark)
         self._theme()
         if self._open is not None:
-            self.go_to(self._open.title)
+            self._open.refresh()  # the figures get other colours; what is typed stays
 
     def _add_hotkeys(self, titles: Sequence[str]) -> None:
         for number, title in enumerate(titles, 1):

@@ -44,7 +44,11 @@ class _Followed(RowSource):
     def add(self) -> None:
         """Add the name, a button that begins or ends following it, and what has come."""
         gui = self.window.gui
-        self._name = gui.add_text(self.label, self.followed or self.example, hint=self.hint)
+        choices, begun = self.window.choices, f"{self.title} typed"
+        self._name = gui.add_text(
+            self.label, self.followed or choices.get(begun, self.example), hint=self.hint
+        )
+        self._name.on_update(lambda _: self.window.post(lambda: choices.put(begun, self._name.value)))
         self._button = self.window.button("", self._toggle)
         self._state = gui.add_html("")
         self._shown = ""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from flexcal.errors import InputError
 from flexcal.studio.commands import CommandRun, command_line
+from flexcal.studio.steps.measure.motor_fields import MotorFields
 from flexcal.studio.steps.measure.row_source import RowSource
 from flexcal.studio.window import command_text, paragraph
 
@@ -56,8 +57,14 @@ class ImportedSource(RowSource):
             step=0.001,
             hint="of the instrument, a coordinate; 0: as the file states it",
         )
+        self._motors = MotorFields(window, self._changed)
+        self._unchecked = gui.add_checkbox(
+            "Even if they do not fit the robot",
+            False,
+            hint="written although the points are far from where the nominal robot has them, as where a joint's zero is off by degrees",
+        )
         self._line = gui.add_html("")
-        for field in (self._file, self._map, self._sigma):
+        for field in (self._file, self._map, self._sigma, self._unchecked):
             field.on_update(lambda _: window.post(self._changed))
         window.button("Show how it is read", lambda: self._run(written=False))
         window.button("Import", lambda: self._run(written=True), main=True)
@@ -92,6 +99,8 @@ class ImportedSource(RowSource):
             *("import", "robot.yaml", self._file.value),
             *(("--map", *columns) if columns else ()),
             *(("--sigma", f"{self._sigma.value:.10g}") if self._sigma.value > 0 else ()),
+            *self._motors.options,
+            *(("--unchecked",) if self._unchecked.value else ()),
             *(("--out", self._out) if written else ()),
         )
 
@@ -104,6 +113,7 @@ class ImportedSource(RowSource):
         choices.put("import", self._file.value)
         choices.put("import map", self._map.value)
         choices.put("import sigma", float(self._sigma.value))
+        self._motors.keep()
         self._line.content = command_text(f"$ {command_line(self._arguments(written=True))}")
 
     def _run(self, *, written: bool) -> None:

@@ -43,6 +43,7 @@ class MeasureStep(Step):
         self._stations: tuple[str, ...] = ()
         self._station: Any = None
         self._hotkeys: list[Any] = []
+        self._begun = ""
 
     def open(self) -> None:
         """Add the next pose, the judgement, the source of rows, and the poses with the accuracy on the left."""
@@ -74,7 +75,9 @@ class MeasureStep(Step):
                 self._move_station,
                 hint="after the instrument or the base was moved: the rows from there on stand for themselves",
             )
-            self._reason = gui.add_text("Reason", "", hint="why a row is excluded; empty: as it is judged")
+            self._reason = gui.add_text(
+                "Reason", self._begun, hint="why a row is excluded; empty: as it is judged"
+            )
             self._exclude_button = window.button("Exclude the last row (X)", self._exclude)
             window.button("Undo (U)", self._undo)
             window.button("Skip the next pose (S)", self._skip)
@@ -88,6 +91,7 @@ class MeasureStep(Step):
                     step=0.001,
                     hint="0: stop where ten more poses bring less than 5 %",
                 )
+        self._reason.on_update(lambda _: window.post(self._reason_typed))
         self._wanted.on_update(lambda _: window.post(self._wanted_changed))
         window.figures.show({"Measured": self._add_figures})
         for key, label, action in (
@@ -234,6 +238,9 @@ class MeasureStep(Step):
         if name != "pose order":
             self._source = None
         self.refresh()
+
+    def _reason_typed(self) -> None:
+        self._begun = self._reason.value
 
     def _wanted_changed(self) -> None:
         self.window.choices.put("wanted p90", float(self._wanted.value))

@@ -191,7 +191,10 @@ class Measuring:
 
         Raises `InputError` for rows that do not fit.
         """
+        from flexcal.jobs.guidance import in_columns
+
         series, first = self.series, self.series.model.stations.names[0]
+        rows = in_columns(rows, series.table.columns, series.model)
         series.check(rows)
         new = self._declare(cells["station"] for cells in rows if cells.get("station"))
         self.series.table.append(with_station(series.table, rows, self.station, first), source)

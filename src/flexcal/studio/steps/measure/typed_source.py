@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 _LABELS = ("x / mm", "y / mm", "z / mm")
 _TEMPERATURE = "arm / °C"
+_WARM = "typed temperature"
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,2})?", re.ASCII)
 
 
@@ -32,21 +33,48 @@ class TypedSource(RowSource):
     title = "typed"
 
     def add(self) -> None:
-        """Add a field a coordinate, and the button that takes them."""
+        """Add a field a coordinate, the button that takes them, and before the first row whether the arm's temperature is typed too."""
         self._shown = self._labels
         self._form = self.window.gui.add_html(_form(self._shown))
+        self._warm = self.window.gui.add_checkbox(
+            "Arm / °C too",
+            self._is_warm,
+            hint="of every row, where the calibration is to tell what heat does to the robot; before the first row",
+            visible=self.measuring.series.poses is None,
+        )
+        self._warm.on_update(
+            lambda event: (
+                event.client
+                and self.window.post(lambda: self.window.choices.put(_WARM, bool(self._warm.value)))
+            )
+        )
 
     def tick(self) -> None:
         """Have other fields where the rows have got other columns."""
+        begun = self.measuring.series.poses is not None
+        if self._warm.visible == begun:
+            self._warm.visible = not begun
         if self._labels != self._shown:
+            if not begun and self._warm.value != self._is_warm:
+                self._warm.value = self._is_warm
             self._shown = self._labels
             self._form.content = _form(self._shown)
 
     @property
     def _labels(self) -> tuple[str, ...]:
-        """The coordinates, and the temperature of the arm where the rows so far have one."""
+        """The coordinates, and the temperature of the arm where the rows so far have one, or the first is to have one."""
         poses = self.measuring.series.poses
-        return _LABELS if poses is None or poses.temperature is None else (*_LABELS, _TEMPERATURE)
+        warm = self._is_warm if poses is None else poses.temperature is not None
+        return (*_LABELS, _TEMPERATURE) if warm else _LABELS
+
+    @property
+    def _is_warm(self) -> bool:
+        """Whether the first row is to have a temperature: by default where robot.yaml has terms that need it."""
+        terms = self.measuring.series.model.config.geometry.terms
+        named = not isinstance(terms, str) and any(
+            term.rpartition(".")[2].startswith("thermal") for term in terms
+        )
+        return self.window.choices.get(_WARM, named)
 
     def measure_next(self) -> None:
         """Say what is to be done; raises `InputError` where no pose is next."""

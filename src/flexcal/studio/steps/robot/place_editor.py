@@ -18,6 +18,7 @@ from flexcal.studio.window import Window, add_fold, paragraph, table
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}")
 _FARTHEST, _HEAVIEST = 99_999.999, 9_999.999
 """Largest numbers of the fields, mm and kg; they have the decimals that can be typed."""
+_BEGUN = "places not written"
 _KINDS = ("measured point", "payload", "instrument")
 
 
@@ -55,7 +56,14 @@ class PlaceEditor:
             window.button("Take the last change back", file.take_back, hint=file.last_change)
         with add_fold(gui, "Add a point, payload or instrument", is_open=not self.places):
             self._kind = gui.add_dropdown("What", self._kinds())
-            self._name = gui.add_text("Name", "", hint="letters, digits and _; the columns of files have it")
+            self._name = gui.add_text(
+                "Name",
+                window.choices.get("new place", ""),
+                hint="letters, digits and _; the columns of files have it",
+            )
+            self._name.on_update(
+                lambda _: window.post(lambda: window.choices.put("new place", self._name.value))
+            )
             window.button("Add to robot.yaml", self._add)
         self._show()
 
@@ -82,7 +90,7 @@ class PlaceEditor:
         with self._fields.anew():
             if self._index is None:
                 return
-            place, gui, window = self._saved, self._window.gui, self._window
+            place, gui, window = self._begun(), self._window.gui, self._window
             frames = (BASE,) if place.frame == BASE else tuple(self._frames)
             self._frame = gui.add_dropdown(
                 "Frame", frames, initial_value=place.frame, disabled=place.frame == BASE
@@ -99,12 +107,44 @@ class PlaceEditor:
             self._frame.on_update(lambda _: window.post(self._reframed))
             for number in self._xyz:
                 number.on_update(lambda _: window.post(self._edited))
-            self._difference = gui.add_html(paragraph("Drag it in the scene, or type the numbers.", "faint"))
+            self._difference = gui.add_html("")
             self._write = window.button("Write to robot.yaml", self._save, main=True)
-            self._back = window.button("Keep what robot.yaml has", self._show)
+            self._back = window.button("Keep what robot.yaml has", self._forget)
             self._write.visible = self._back.visible = False
             window.button(f"Remove {place.title}", self._remove)
         self._mark()
+        self._tell()
+
+    def _begun(self) -> Place:
+        """The place that is edited, with what was typed and not written yet."""
+        saved, frames = self._saved, (BASE, *self._frames)
+        frame, *numbers = self._window.choices.get(_BEGUN, {}).get(saved.title, [saved.frame])
+        count = 3 + (saved.mass is not None)
+        if (
+            frame not in frames
+            or len(numbers) != count
+            or not all(isinstance(n, (int, float)) for n in numbers)
+        ):
+            return saved
+        x, y, z, *mass = (float(number) for number in numbers)
+        return replace(saved, frame=frame, xyz=(x, y, z), mass=mass[0] if mass else None)
+
+    def _forget(self) -> None:
+        """Show the place that is edited as robot.yaml has it."""
+        self._keep(None)
+        self._show()
+
+    def _keep(self, place: Place | None) -> None:
+        """Keep what is not written yet."""
+        begun = dict(self._window.choices.get(_BEGUN, {}))
+        begun.pop(self._saved.title, None)
+        if place is not None:
+            begun[self._saved.title] = [
+                place.frame,
+                *place.xyz,
+                *([] if place.mass is None else [place.mass]),
+            ]
+        self._window.choices.put(_BEGUN, begun)
 
     def _mark(self) -> None:
         """Show all places in the scene, the one that is edited as it is in the fields."""
@@ -152,14 +192,19 @@ class PlaceEditor:
     def _tell(self) -> None:
         """Say what is not written yet."""
         told = self._saved.told_changes(self._edited_place())
+        self._keep(self._edited_place() if told else None)
         self._difference.content = paragraph(
-            f"not written yet: {told}" if told else "as in robot.yaml", "warning" if told else "faint"
+            f"not written yet: {told}"
+            if told
+            else "As in robot.yaml. Drag it in the scene, or type the numbers.",
+            "warning" if told else "faint",
         )
         if self._write.visible != bool(told):
             self._write.visible = self._back.visible = bool(told)
 
     def _save(self) -> None:
         place, saved = self._edited_place(), self._saved
+        self._keep(None)
         self._file.edit(saved.changes(place), f"{saved.title}: {saved.told_changes(place)}")
 
     def _remove(self) -> None:
@@ -168,6 +213,7 @@ class PlaceEditor:
     def _add(self) -> None:
         place = self._new_place()
         self._window.choices.put("place", place.title)
+        self._window.choices.put("new place", "")
         self._file.edit(
             {place.keys: place.entry()}, f"{place.title} added at {place.row()[2]} mm in {place.frame}"
         )

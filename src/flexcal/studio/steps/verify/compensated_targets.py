@@ -103,6 +103,8 @@ class CompensatedTargets(Step):
             )
             self._start = gui.add_dropdown("Start", (_SAFE, _SHOWN), hint="of the inverse kinematics")
             self._oriented.on_update(lambda _: window.post(self._orient))
+            for field in (self._position, self._rpy):
+                field.on_update(lambda _: window.post(self._keep))
             window.button(
                 "Take the tool's present pose",
                 self._take,
@@ -115,6 +117,10 @@ class CompensatedTargets(Step):
         if len(kept) != 3 or not all(isinstance(value, (int, float)) for value in kept):
             return default
         return float(kept[0]), float(kept[1]), float(kept[2])
+
+    def _keep(self) -> None:
+        self.window.choices.put("target position", list(self._position.value))
+        self.window.choices.put("target rpy", list(self._rpy.value))
 
     def _tell_frame(self) -> None:
         self._told_frame.visible = self._frame.value == _BASE
@@ -140,8 +146,7 @@ class CompensatedTargets(Step):
     def _correct(self) -> None:
         window = self.window
         assert self._robot is not None
-        window.choices.put("target position", list(self._position.value))
-        window.choices.put("target rpy", list(self._rpy.value))
+        self._keep()
         target = TypedTarget(
             self._point.value,
             MILLIMETRE * np.array(self._position.value, dtype=float),
