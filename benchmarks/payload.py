@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks._tasks import in_parallel
 from flexcal.compensation import motor_commands
 from flexcal.data.plans import write_plan
 from flexcal.data.poses import ToolTargets
@@ -154,10 +155,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as temporary:
         plans = given.plans or Path(temporary)
         design(plans)
-        runs = []
-        for seed in range(given.first, given.first + given.count):
-            runs.append(one_seed(seed, plans, given.substeps))
-            print(summary(runs), flush=True)
+        seeds = range(given.first, given.first + given.count)
+        print(summary(in_parallel(one_seed, seeds, plans, given.substeps, show=lambda run: run["seed"])))
 
 
 if __name__ == "__main__":
