@@ -27,7 +27,7 @@ from flexcal.frequency.periodic import FrequencyResponse
 from flexcal.frequency.periodic.response import POOLED_LINES, SMALLEST_FREEDOM
 from flexcal.model.parts import LOOP
 from flexcal.model.robot import RATIO, ArmSensor, RobotModel, Stations, unit_of
-from flexcal.model.robot.config import ArmSensorConfig
+from flexcal.model.robot.measuring_config import ArmSensorConfig
 
 NUMBERS = {"nine": 9, "twelve": 12, "thirteen": 13, "fourteen": 14, "fifteen": 15}
 

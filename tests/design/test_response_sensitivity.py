@@ -23,7 +23,7 @@ from flexcal.design.frequency.response_jacobian import (
 )
 from flexcal.design.frequency.response_noise import FrictionDisturbance, equation_error
 from flexcal.model.robot import FRICTION_LOG_STD, ArmSensor
-from flexcal.model.robot.config import ArmSensorConfig
+from flexcal.model.robot.measuring_config import ArmSensorConfig
 from flexcal.model.vibration import linearise, transfer_matrix
 
 POSES = np.radians(

@@ -10,7 +10,7 @@ from flexcal.design.scene.visibility import line_of_sight_blocked
 from flexcal.model.kinematics import link_frames, point_kinematics
 from flexcal.model.parts import rpy_rotation
 from flexcal.model.robot import AcceptanceConfig
-from flexcal.model.robot.config import StationConfig
+from flexcal.model.robot.measuring_config import StationConfig
 from flexcal.units import DEGREE
 
 

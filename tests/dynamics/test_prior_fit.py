@@ -17,7 +17,7 @@ from flexcal.dynamics.inertials import fit_inertials, relative_torque_error, tra
 from flexcal.estimation import Estimate
 from flexcal.jobs.experiments import exciting_plan
 from flexcal.model.robot import RobotModel
-from flexcal.model.robot.config import PriorConfig
+from flexcal.model.robot.drive_config import PriorConfig
 from flexcal.model.torques import inertial_parameters, torque_regressor
 from flexcal.model.vibration import periodic_torque
 from flexcal.virtual_cell import CellConfig, VirtualCell, draw_truth

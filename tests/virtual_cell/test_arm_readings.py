@@ -14,7 +14,7 @@ from flexcal.data.recordings import read_recording, write_recording
 from flexcal.elasticity.time_periodic import ReferenceMotion, reference_shift
 from flexcal.frequency.periodic import samples_per_period
 from flexcal.model.robot import ArmSensor, RobotModel, SignalConfig
-from flexcal.model.robot.config import ArmSensorConfig
+from flexcal.model.robot.measuring_config import ArmSensorConfig
 from flexcal.model.vibration import linearise, transfer_matrix
 from flexcal.units import DEGREE
 from flexcal.virtual_cell import CellConfig, FrictionConfig, LoopConfig, SensorConfig, VirtualCell

@@ -15,7 +15,7 @@ from flexcal.data.plans import PosePlan
 from flexcal.files.formats import read_yaml
 from flexcal.jobs.experiments import frequency_plan
 from flexcal.model.robot import ArmSensor, RobotModel
-from flexcal.model.robot.config import ArmSensorConfig
+from flexcal.model.robot.measuring_config import ArmSensorConfig
 from flexcal.virtual_cell import CellConfig, FrictionConfig, MismatchConfig, VirtualCell, draw_truth
 
 pytest.importorskip("mujoco")

@@ -1,19 +1,18 @@
 from .arm_sensor import ArmSensor, mounting_names, sensitivity_name, sensor_column, sensor_delay_name
 from .attached_payload import carried_inertias, last_frame, with_payload, with_point, with_point_at_frame
-from .config import (
+from .config import RobotConfig, SignalConfig
+from .drive_config import DynamicsConfig
+from .loading import read_robot
+from .measuring_config import (
     FACES,
     AcceptanceConfig,
     BoardConfig,
     CameraConfig,
-    DynamicsConfig,
     FaceConfig,
     InclinometerConfig,
-    RobotConfig,
-    SignalConfig,
     SocketsConfig,
     WireConfig,
 )
-from .loading import read_robot
 from .parameter_groups import Links, Stations, Thermal
 from .parameter_names import (
     BOARD_SCALE,

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexcal.model.robot.config import ArmSensorConfig
+from flexcal.model.robot.measuring_config import ArmSensorConfig
 
 
 @dataclass(frozen=True, eq=False)

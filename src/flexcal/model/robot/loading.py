@@ -22,7 +22,8 @@ from flexcal.model.parts import (
     rpy_rotation,
 )
 from flexcal.model.robot.arm_sensor import ArmSensor
-from flexcal.model.robot.config import ElasticConfig, RobotConfig
+from flexcal.model.robot.config import RobotConfig
+from flexcal.model.robot.drive_config import ElasticConfig
 from flexcal.model.robot.joint_relations import read_relations
 from flexcal.model.robot.parameter_groups import Drives, Geometry, Links, Scatter, Springs, Stations, Thermal
 from flexcal.model.robot.parameter_names import COUPLED, FRICTION_PARAMETERS, PARALLEL, SCATTER

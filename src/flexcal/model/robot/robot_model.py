@@ -34,7 +34,8 @@ from flexcal.model.parts import (
     path_to,
 )
 from flexcal.model.robot.arm_sensor import ArmSensor
-from flexcal.model.robot.config import ControllerConfig, PriorConfig, RobotConfig
+from flexcal.model.robot.config import ControllerConfig, RobotConfig
+from flexcal.model.robot.drive_config import PriorConfig
 from flexcal.model.robot.parameter_groups import (
     Drives,
     Geometry,
