@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from copy import copy
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from dh_arm import postures
+from over_seeds import over_seeds
 from rechecked_arm import Workshop
 from scipy.stats import binom
 
@@ -145,41 +148,49 @@ def test_the_sentence_of_a_drift_and_of_a_step(tmp_path: Path) -> None:
     assert "came at once between the visits of 2026-02-10 and 2026-03-22" in steps[3]
 
 
+def false_alarms(seed: int, root: Path) -> tuple[int, int]:
+    """By the visit's own test and by the sums, of two histories of a hundred visits of an arm."""
+    (folder := root / str(seed)).mkdir()
+    arm, own, sums = Course(folder, seed), 0, 0
+    for _ in range(2):
+        arm.renewed()
+        shifts = []
+        for _ in range(100):
+            judged = arm.judged(arm.visit())
+            own += not judged.as_calibrated or judged.instrument == "evident"
+            shifts.append(judged.at_visit("a") if judged.as_calibrated else [])
+            if any(item.gradual for item in drift_sums(shifts)):
+                sums, shifts = sums + 1, []
+    return own, sums
+
+
 @pytest.mark.slow
 def test_false_alarms_of_all_tests_together_are_one_in_a_hundred(tmp_path: Path) -> None:
     """Ten histories of a hundred visits of arms that did not change: the visit's own test, and sums that begin anew after an alarm."""
-    own, sums, visits = 0, 0, 0
-    for seed in range(40, 45):
-        (folder := tmp_path / str(seed)).mkdir()
-        arm = Course(folder, seed)
-        for _ in range(2):
-            arm.renewed()
-            shifts = []
-            for _ in range(100):
-                poses = arm.visit()
-                judged = arm.judged(poses)
-                own += not judged.as_calibrated or judged.instrument == "evident"
-                shifts.append(judged.at_visit("a") if judged.as_calibrated else [])
-                if any(item.gradual for item in drift_sums(shifts)):
-                    sums, shifts = sums + 1, []
-                visits += 1
-    assert binom.sf(own + sums - 1, visits, 0.01) > 1e-3, (own, sums)
+    own, sums = np.sum(over_seeds(false_alarms, range(40, 45), tmp_path), axis=0)
+    print(f"{own} visits and {sums} sums of 1000 visits")
+    assert binom.sf(own + sums - 1, 1000, 0.01) > 1e-3, (own, sums)
+
+
+def rate_is_held(number: int, arm: Course, root: Path) -> bool | None:
+    """Whether the interval of a drift's rate holds it; None: no drift of the joint was told."""
+    (folder := root / str(number)).mkdir()
+    own = copy(arm)
+    own.shop = replace(arm.shop, folder=folder, rng=np.random.default_rng([46, number]))
+    own.renewed()
+    times = [1.0, 2.0, 3.0, 4.0]
+    courses = visit_courses([own.errors(own.visit(2, 6e-5 * t)) for t in times], times, 0.0)
+    found = [c for c in courses if c.since == 0.0 and c.kind == "drift"]
+    if not found or found[0].change.subject != "joint_2":
+        return None
+    return bool(abs(found[0].estimate[0] - 6e-5) < found[0].quantile * found[0].std[0])
 
 
 @pytest.mark.slow
 def test_intervals_of_the_rate_cover(tmp_path: Path) -> None:
     """Of drifts that were told, with the noise of the reference visit drawn anew."""
     arm = Course(tmp_path, 46)
-    inside, told = 0, 0
-    for _ in range(200):
-        arm.renewed()
-        visits = [arm.errors(arm.visit(2, 6e-5 * t)) for t in (1.0, 2.0, 3.0, 4.0)]
-        found = [
-            c
-            for c in visit_courses(visits, [1.0, 2.0, 3.0, 4.0], 0.0)
-            if c.since == 0.0 and c.kind == "drift"
-        ]
-        if found and found[0].change.subject == "joint_2":
-            told += 1
-            inside += abs(found[0].estimate[0] - 6e-5) < found[0].quantile * found[0].std[0]
+    held = [h for h in over_seeds(rate_is_held, range(200), arm, tmp_path) if h is not None]
+    inside, told = sum(held), len(held)
+    print(f"{inside} of {told} that were told, of 200")
     assert told > 150 and 0.9 < inside / told < 0.99, (told, inside)
