@@ -1,5 +1,7 @@
 """Estimators with a simulated closed loop: the loop itself, the truth without noise, and no bias where least squares has one."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -8,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import recovery
+from over_seeds import over_seeds
 from refusals import refused
 from two_links import CONTROLLER, RATE, driven, errors, recorded, true_values, two_links
 
@@ -138,28 +141,33 @@ def test_without_noise_the_truth_comes_back(
         assert off < 0.01 if observation is declared else 0.01 < off < 0.1
 
 
+def whole(motion: Motion) -> Motion:
+    return motion
+
+
 def scores(
     unknown: Observation,
     clean: Motion,
     runs: int,
     *,
     seed: int = 3,
-    parted: Callable[[Motion], Any] = lambda motion: motion,
+    parted: Callable[[Motion], Any] = whole,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Errors over standard deviations (runs, k) of weighted least squares and of IV; `parted` makes the log of a noisy motion."""
-    truth, rng = true_values(unknown), np.random.default_rng(seed)
-    linear, free = [], []
-    for _ in range(runs):
-        log = parted(noisy(clean, rng))
-        rows = recorded(unknown, log, 2)
-        data = assemble_regression(unknown, rows.base, [log], Decimation(2))
-        for found, kept in (
-            (weighted_least_squares(data), linear),
-            (instrumental_variables(data, rows), free),
-        ):
-            error, std = errors(found, unknown, truth)
-            kept.append(error / std)
+    linear, free = zip(
+        *over_seeds(of_one_log, [(seed, k) for k in range(runs)], unknown, clean, parted), strict=True
+    )
     return np.array(linear), np.array(free)
+
+
+def of_one_log(
+    seed: tuple[int, int], unknown: Observation, clean: Motion, parted: Callable[[Motion], Any]
+) -> list[np.ndarray]:
+    truth, log = true_values(unknown), parted(noisy(clean, np.random.default_rng(seed)))
+    rows = recorded(unknown, log, 2)
+    data = assemble_regression(unknown, rows.base, [log], Decimation(2))
+    both = (weighted_least_squares(data), instrumental_variables(data, rows))
+    return [np.divide(*errors(found, unknown, truth)) for found in both]
 
 
 def test_noisy_velocities_bias_least_squares_and_not_instrumental_variables(

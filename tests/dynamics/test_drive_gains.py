@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from over_seeds import over_seeds
 from refusals import refused
 from two_links import GAINS, HELD, PAYLOAD, swings, two_links
 
@@ -38,9 +39,13 @@ def test_without_noise_the_gains_come_back(arm: Observation) -> None:
 
 def scores(arm: Observation, runs: int) -> np.ndarray:
     """Errors over standard deviations (runs, 2), with torques whose noise is a tenth of their size."""
-    found = [drive_gains(recorded(arm, 3.0, seed), [0.0, HELD[0]]) for seed in range(runs)]
-    std = np.array([[e.std(name) for name in e.parameters.names] for e in found], dtype=float)
-    return (np.array([e.parameters.coordinates() for e in found]) - GAINS) / std
+    return np.array(over_seeds(of_one_pair, range(runs), arm))
+
+
+def of_one_pair(seed: int, arm: Observation) -> np.ndarray:
+    found = drive_gains(recorded(arm, 3.0, seed), [0.0, HELD[0]])
+    std = np.array([found.std(name) for name in found.parameters.names], dtype=float)
+    return (found.parameters.coordinates() - GAINS) / std
 
 
 def test_noise_in_the_torques_leaves_the_gains_unbiased(arm: Observation) -> None:

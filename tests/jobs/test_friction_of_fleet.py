@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from over_seeds import over_seeds
 from planar_arm import TRUTH, URDF, swings, torque
 
 from flexcal.jobs.dynamics import DynamicsIdentification, identify_robot_dynamics
@@ -115,29 +116,35 @@ def test_the_table_of_a_fleet_has_the_torque_errors_of_its_logs(tmp_path: Path) 
     assert rows["trusted"]["text"] is None
 
 
+def next_robots(number: int, root: Path) -> tuple[list[tuple[bool, bool, float]], int]:
+    """Of every parameter of six robots, after a fleet of eight: whether the interval holds the truth with the others and without them, and
+    the standard deviation over that without them; and how many of the six are called another model.
+    """
+    folder, rng, members, rows, strangers = root / str(number), np.random.default_rng([7, number]), [], [], 0
+    for k in range(8):
+        robot = logged(folder / f"cell_{k}", np.exp(SPREAD * rng.standard_normal(4)), rng, 10.0, 1.0)
+        identified(robot)
+        members.append(Member.read(robot.parent.name, robot)["dynamics"])
+    pool_fleet({"dynamics": members}, folder / "prior.yaml")
+    for k in range(6):
+        factors = np.exp(SPREAD * rng.standard_normal(4))
+        robot = logged(folder / f"next_{k}", factors, rng, 12.0, 5.0)
+        alone, found = identified(robot).estimate, identified(robot, folder / "prior.yaml")
+        assert found.pooled is not None
+        strangers += found.pooled.contradicted
+        for name, factor in zip(NAMES, factors, strict=True):
+            ends = [own.interval(name) or (-np.inf, np.inf) for own in (found.estimate, alone)]
+            held, before = (low < factor * TRUTH[name] < high for low, high in ends)
+            rows.append((held, before, (found.estimate.std(name) or np.nan) / (alone.std(name) or np.nan)))
+    return rows, strangers
+
+
 @pytest.mark.slow
 def test_intervals_with_the_others_hold_the_truth(tmp_path: Path) -> None:
     """Four fleets of eight robots, and six further robots of each with noisy logs; one of a hundred is called another by chance."""
-    rng = np.random.default_rng(7)
-    held, before, ratio, strangers = [], [], [], 0
-    for number in range(4):
-        folder, members = tmp_path / str(number), []
-        for k in range(8):
-            robot = logged(folder / f"cell_{k}", np.exp(SPREAD * rng.standard_normal(4)), rng, 10.0, 1.0)
-            identified(robot)
-            members.append(Member.read(robot.parent.name, robot)["dynamics"])
-        pool_fleet({"dynamics": members}, folder / "prior.yaml")
-        for k in range(6):
-            factors = np.exp(SPREAD * rng.standard_normal(4))
-            robot = logged(folder / f"next_{k}", factors, rng, 12.0, 5.0)
-            alone, found = identified(robot).estimate, identified(robot, folder / "prior.yaml")
-            assert found.pooled is not None
-            strangers += found.pooled.contradicted
-            for name, factor in zip(NAMES, factors, strict=True):
-                for estimate, inside in ((alone, before), (found.estimate, held)):
-                    low, high = estimate.interval(name) or (-np.inf, np.inf)
-                    inside.append(low < factor * TRUTH[name] < high)
-                ratio.append((found.estimate.std(name) or np.nan) / (alone.std(name) or np.nan))
+    fleets = over_seeds(next_robots, range(4), tmp_path)
+    held, before, ratio = np.concatenate([rows for rows, _ in fleets]).T
+    strangers = sum(count for _, count in fleets)
     said = f"{100 * np.mean(held):.1f} % of {len(held)} intervals ({100 * np.mean(before):.1f} % without the others)"
     print(f"{said}, {np.nanmedian(ratio):.2f} times as wide, {strangers} strangers of 24")
     assert np.mean(held) > 0.9
