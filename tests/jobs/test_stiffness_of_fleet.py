@@ -109,7 +109,7 @@ def test_robots_that_are_no_population_are_left_out_in_words(
     assert prior.stiffness is not None
     np.testing.assert_array_equal(again.stiffness.mean, prior.stiffness.mean)
     np.testing.assert_array_equal(again.stiffness.std, prior.stiffness.std)
-    with refused("E-PRIOR-015", "cell_0", "odd", "before"):
+    with refused("E-PRIOR-014", "cell_0", "odd", "before"):
         pool_springs([*members, odd])
     with refused("E-PRIOR-013", "stiffness", "2"):
         pool_springs(members[:2])

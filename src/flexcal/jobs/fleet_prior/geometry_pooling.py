@@ -16,7 +16,6 @@ from flexcal.jobs.fleet_prior.geometry_information import (
     geometry_information,
     is_geometric_error,
 )
-from flexcal.jobs.fleet_prior.kinematics import difference
 from flexcal.jobs.fleet_prior.member import FEWEST, Member
 from flexcal.model.robot import RobotModel, unit_in
 
@@ -105,12 +104,7 @@ def _require_alike(members: Sequence[Member]) -> None:
         )
     first = members[0]
     for member in members:
-        unlike = difference(first.model, member.model)
-        if unlike:
-            raise FlexcalError(
-                "E-PRIOR-003",
-                f"{member.name} is not of the model of {first.name}: {unlike}; pool robots with the same URDF geometry only.",
-            )
+        member.require_model_of(first)
         if member.terms != first.terms:
             every = dict.fromkeys([*first.terms, *member.terms])
             raise FlexcalError(

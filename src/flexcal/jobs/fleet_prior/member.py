@@ -6,8 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from flexcal.calibration.error_model import TRANSMISSION
+from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, read_estimates
+from flexcal.jobs.fleet_prior.kinematics import difference
 from flexcal.model.robot import RobotModel
 
 FEWEST = 3
@@ -37,6 +39,15 @@ class Member:
         source = estimates or model.path.parent / model.config.estimates
         blocks = read_estimates(source) if source.exists() else {}
         return {block: cls(name, model, blocks[block], source, block) for block in POOLED if block in blocks}
+
+    def require_model_of(self, first: Member) -> None:
+        """Raises `FlexcalError` where the robot has other kinematics than the `first` of those that are pooled."""
+        unlike = difference(first.model, self.model)
+        if unlike:
+            raise FlexcalError(
+                "E-PRIOR-003",
+                f"{self.name} is not of the model of {first.name}: {unlike}; pool robots with the same URDF geometry only.",
+            )
 
     @property
     def has_prior(self) -> bool:

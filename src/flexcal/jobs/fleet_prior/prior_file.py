@@ -32,8 +32,7 @@ class StoredParameter:
     freedom: float
 
     def __post_init__(self) -> None:
-        if not min(self.std, self.mean_std, self.spread, self.freedom) > 0:
-            raise FlexcalError("E-PRIOR-006", "std, mean_std, spread and freedom must be positive.")
+        _require_positive(self)
 
 
 @dataclass(frozen=True)
@@ -49,10 +48,14 @@ class StoredValue:
     freedom: float
 
     def __post_init__(self) -> None:
-        if not min(self.std, self.mean_std, self.spread, self.freedom) > 0:
-            raise FlexcalError("E-PRIOR-016", "std, mean_std, spread and freedom must be positive.")
+        _require_positive(self)
         if self.scale == "log" and not self.mean > 0:
-            raise FlexcalError("E-PRIOR-017", f"the mean of a log scale must be positive, not {self.mean:g}.")
+            raise FlexcalError("E-PRIOR-015", f"the mean of a log scale must be positive, not {self.mean:g}.")
+
+
+def _require_positive(item: StoredParameter | StoredValue) -> None:
+    if not min(item.std, item.mean_std, item.spread, item.freedom) > 0:
+        raise FlexcalError("E-PRIOR-006", "std, mean_std, spread and freedom must be positive.")
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate, Measured, population
 from flexcal.files.formats import block_sha256
 from flexcal.jobs.fleet_prior.geometry_information import independent_combinations
-from flexcal.jobs.fleet_prior.kinematics import difference
 from flexcal.jobs.fleet_prior.member import FEWEST, Member
 from flexcal.jobs.fleet_prior.pooled_values import CLEAR, PooledValues, Scale
 from flexcal.model.robot import FRICTION_PARAMETERS, MASS_AND_COM, SPRING_LOG_STD
@@ -224,15 +223,10 @@ def _require_alike(members: Sequence[Member], what: str, option: str, said: str)
         )
     first = members[0]
     for member in members:
-        unlike = difference(first.model, member.model)
-        if unlike:
-            raise FlexcalError(
-                "E-PRIOR-014",
-                f"{member.name} is not of the model of {first.name}: {unlike}; pool robots with the same URDF geometry only.",
-            )
+        member.require_model_of(first)
         if _condition(member, option) != _condition(first, option):
             raise FlexcalError(
-                "E-PRIOR-015",
+                "E-PRIOR-014",
                 f"the {what} of {first.name} was identified with the {said} {_condition(first, option)}, and that of {member.name} with "
                 f"{_condition(member, option)}, so they mean different things; name the {said} in every robot.yaml, and identify again.",
             )
