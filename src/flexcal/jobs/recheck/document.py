@@ -17,6 +17,7 @@ from flexcal.calibration.recheck import (
     Suspect,
     TellingPose,
 )
+from flexcal.jobs.recheck.change_intervals import change_intervals
 from flexcal.jobs.recheck.judgement_words import judgement_sentence, suspect_in_words
 from flexcal.jobs.recheck.visit_course import CourseOverVisits
 from flexcal.model.robot import RobotModel
@@ -128,18 +129,7 @@ def _suspect_block(suspect: Suspect, tool: MovedTool, model: RobotModel) -> dict
         "kind": change.kind,
         "subject": change.subject,
         "words": suspect_in_words(suspect, model),
-        "changes": {
-            name: {
-                "estimate": float(value),
-                "std": float(std),
-                "low": float(value - suspect.quantile * std),
-                "high": float(value + suspect.quantile * std),
-                "unit": unit,
-            }
-            for name, unit, value, std in zip(
-                change.names, change.units, suspect.estimate, suspect.std, strict=True
-            )
-        },
+        "changes": change_intervals(suspect),
         "remainder": suspect.remainder,
         "same_at_these_poses": suspect.same,
         "tool_mm": {

@@ -18,6 +18,7 @@ from flexcal.calibration.recheck import (
     visit_courses,
 )
 from flexcal.data.poses import DEFAULT_SIGMA
+from flexcal.jobs.recheck.change_intervals import change_intervals
 from flexcal.jobs.recheck.visit_history import Visit
 from flexcal.model.robot import RobotModel
 from flexcal.report.results import amount
@@ -148,18 +149,7 @@ class CourseOverVisits:
                 "course": item.kind,
                 "since": self._since(item),
                 "per": self.per if item.kind == "drift" else None,
-                "changes": {
-                    name: {
-                        "estimate": float(value),
-                        "std": float(std),
-                        "low": float(value - item.quantile * std),
-                        "high": float(value + item.quantile * std),
-                        "unit": unit,
-                    }
-                    for name, unit, value, std in zip(
-                        item.change.names, item.change.units, item.estimate, item.std, strict=True
-                    )
-                },
+                "changes": change_intervals(item),
                 "remainder": item.remainder,
             }
             for item in self.courses
