@@ -123,6 +123,7 @@ class Recheck:
         )
 
     def _plan(self, console: Console, count: int) -> None:
+        from flexcal.calibration.recheck import FALSE_ALARM, VISIT_ALARM
         from flexcal.jobs.recheck import plan_visit
 
         require_robot(self.robot)
@@ -141,7 +142,8 @@ class Recheck:
         where = estimates_option(self.estimates)
         kept = where if self.visits is None else f"{where} --out {self.visits}"
         console.say(
-            "shifts of single joints that are found in 95 % of visits, at false alarms of 1 % (of a visit alone 0.8 %):"
+            f"shifts of single joints that are found in 95 % of visits, at false alarms of {100 * FALSE_ALARM:g} % (of a visit alone "
+            f"{100 * VISIT_ALARM:g} %):"
         )
         for line in planned.lines:
             console.say(line)

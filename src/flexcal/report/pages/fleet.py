@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from flexcal.calibration.recheck import FALSE_ALARM
 from flexcal.report.checks import fleet_checks
 from flexcal.report.figures import fleet_errors
 from flexcal.report.layout import (
@@ -169,8 +170,9 @@ def _rechecks(document: Mapping[str, Any]) -> Section:
     found = [r for r in visited if r["recheck"]["verdict"] != "as_calibrated" or r["recheck"]["alarms"]]
     found.sort(key=lambda robot: robot["recheck"]["probability"])
     lead = (
-        f"The latest recheck of {counted(len(visited), 'robot')}. Alone, each is called changed in 1 % of visits where it is not; a change "
-        f"is certain here where it is significant after correction for the number of robots (Holm, {100 * document['level']:.0f} %)."
+        f"The latest recheck of {counted(len(visited), 'robot')}. Alone, each is called changed in {100 * FALSE_ALARM:g} % of visits where "
+        "it is not; a change is certain here where it is significant after correction for the number of robots (Holm, "
+        f"{100 * document['level']:.0f} %)."
     )
     if not found:
         return Section("rechecks", "Rechecks", lead, (Text(("All are as calibrated.",)),))

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from flexcal.calibration.recheck import FALSE_ALARM
 from flexcal.report.figures import cumulative_sums, visit_errors
 from flexcal.report.layout import (
     NOTHING,
@@ -71,7 +72,7 @@ def recheck_page(study: RecheckStudy) -> Page:
             "",
             f"Chance makes errors as conspicuous with p = {significant(block['probability'], 2)}; below {block['false_alarm']:g} "
             f"something changed. That is so by chance in {100 * block['false_alarm']:.1g} % of visits, and sums over the visits add "
-            "0.2 %: false alarms are 1 % in all.",
+            f"{100 * (FALSE_ALARM - block['false_alarm']):.1g} %: false alarms are {100 * FALSE_ALARM:g} % in all.",
             _status(results),
         ),
         Fact(
