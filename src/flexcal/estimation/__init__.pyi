@@ -2,7 +2,7 @@ from .conic_constraint import Cone
 from .conic_least_squares import ConicFit
 from .estimate import Dropped, Estimate
 from .gaussian_distance import distance_probability, distance_quantile, mean_distance, principal_variances
-from .hierarchical_model import Measured, Population, population
+from .hierarchical_model import Measured, Population, individuals, population
 from .identifiability import RANK_TOLERANCE, Identifiability, analyse, name_direction
 from .loss import Cauchy, Huber, Loss, Squares, loss_named
 from .misfit import Misfit
@@ -45,6 +45,7 @@ __all__ = [
     "distance_probability",
     "distance_quantile",
     "fit_two_variances",
+    "individuals",
     "is_log_identified",
     "least_squares_of_two_variances",
     "loss_named",

@@ -13,6 +13,9 @@ _FREEDOMS = np.array([2.0, 4.0, 8.0, 16.0, 32.0, 64.0])
 _SMALLEST = 1e-8
 """Least variance of a parameter, relative to its plausible size squared: what rounding leaves."""
 
+_FINITE_VARIANCE = 2.1
+"""Least degrees of freedom of a spread, with which a Student distribution has a variance."""
+
 
 @dataclass(frozen=True, eq=False)
 class Measured:
@@ -98,6 +101,17 @@ def population(measured: Sequence[Measured], sizes: np.ndarray, kinds: Sequence[
         logarithms = np.bincount(kind, np.log(variance))
         freedom = _freedoms(rng, members, common, inverse, logarithms)
     return sums.population(sizes)
+
+
+def individuals(spread: np.ndarray, freedom: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
+    """Deviations (count, p) from the mean of the population of individuals drawn from it.
+
+    Those of each parameter have a Student distribution of the variance `spread` (p,) squared, as that is known with `freedom` (p,) degrees
+    of freedom; at least 2.1, with which it has a variance.
+    """
+    freedom = np.maximum(freedom, _FINITE_VARIANCE)
+    scale = spread * np.sqrt((freedom - 2) / freedom)
+    return scale * rng.standard_t(freedom, (count, len(spread)))
 
 
 def _freedoms(

@@ -10,6 +10,7 @@ import numpy as np
 from flexcal.calibration.error_model import TRANSMISSION
 from flexcal.calibration.fit import FleetPrior, GeometricFit
 from flexcal.calibration.measurement import predict_measurements
+from flexcal.estimation import individuals
 
 _DRAWS = 400
 """Robots of the model that are drawn for comparison."""
@@ -111,12 +112,9 @@ class _Comparison:
 
 
 def _drawn(fleet: FleetPrior, rng: np.random.Generator) -> np.ndarray:
-    """Deviations (draws, p) from the prior's mean of robots of the model, each parameter's spread a Student distribution."""
+    """Deviations (draws, p) from the prior's mean of robots of the model."""
     mean = rng.standard_normal((_DRAWS, len(fleet.names))) @ np.linalg.cholesky(fleet.uncertainty).T
-    freedom = np.maximum(fleet.freedom, 2.1)
-    # variance of the Student distribution is that of the prior
-    scale = fleet.spread * np.sqrt((freedom - 2) / freedom)
-    return mean + scale * rng.standard_t(freedom, (_DRAWS, len(fleet.names)))
+    return mean + individuals(fleet.spread, fleet.freedom, _DRAWS, rng)
 
 
 def _projected(fit: GeometricFit) -> tuple[np.ndarray, np.ndarray, int]:

@@ -8,6 +8,8 @@ from typing import Literal
 
 import numpy as np
 
+from flexcal.estimation import individuals
+
 Scale = Literal["log", "linear"]
 CLEAR = 4.0
 """Least value, in its standard deviations, whose logarithm has about a normal distribution."""
@@ -18,8 +20,6 @@ CONTRADICTED = 0.01
 """Probability below which pooled values do not fit a robot."""
 _NAMED = 3.0
 """Deviation, in standard deviations of the next robot, from which a quantity is named."""
-_FINITE_VARIANCE = 2.1
-"""Least degrees of freedom of a spread, with which a Student distribution has a variance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,12 +107,11 @@ def conflict(pooled: PooledValues, deviation: np.ndarray, covariance: np.ndarray
     rng = np.random.default_rng(_REPRODUCIBLE)
     root = np.linalg.cholesky(np.diag(pooled.std**2) + covariance)
     size = np.sqrt(np.diag(root @ root.T))
-    freedom = np.maximum(pooled.freedom, _FINITE_VARIANCE)
-    scale = pooled.spread * np.sqrt((freedom - 2) / freedom)
     shape = (_DRAWS, len(pooled.names))
     values, vectors = np.linalg.eigh((covariance + covariance.T) / 2)
     errors = rng.standard_normal(shape) @ (vectors * np.sqrt(np.maximum(values, 0.0))).T
-    drawn = pooled.mean_std * rng.standard_normal(shape) + scale * rng.standard_t(freedom, shape) + errors
+    mean = pooled.mean_std * rng.standard_normal(shape)
+    drawn = mean + individuals(pooled.spread, pooled.freedom, _DRAWS, rng) + errors
 
     def statistics(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return np.sum(np.linalg.solve(root, rows.T) ** 2, axis=0), np.abs(rows / size).max(axis=1)
