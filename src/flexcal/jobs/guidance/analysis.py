@@ -38,7 +38,7 @@ class Analysis:
     @classmethod
     def of(cls, model: RobotModel, rows: PoseSet) -> Analysis:
         """Analysis of rows measured with the robot `model` as described, not calibrated."""
-        likely = with_likely_temperatures(rows)
+        likely = with_implausible_temperatures_replaced(rows)
         model = with_reference_temperature(model, likely)
         predicted = predict_measurements(model, likely).located
         consistent = ConsistentRows.of(predicted, rows)
@@ -106,7 +106,7 @@ class Analysis:
         raise ValueError(item)
 
 
-def with_likely_temperatures(rows: PoseSet) -> PoseSet:
+def with_implausible_temperatures_replaced(rows: PoseSet) -> PoseSet:
     """Rows with the median in place of temperatures that cannot be the arm's, as of a sensor that failed for a moment."""
     if rows.temperature is None:
         return rows

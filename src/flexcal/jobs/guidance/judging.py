@@ -9,7 +9,7 @@ import numpy as np
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.plans import PosePlan
 from flexcal.data.poses import PoseSet
-from flexcal.jobs.guidance.analysis import Analysis, with_likely_temperatures
+from flexcal.jobs.guidance.analysis import Analysis, with_implausible_temperatures_replaced
 from flexcal.jobs.guidance.consistency import FEWEST, length_ratio
 from flexcal.jobs.guidance.disturbances import Disturbance
 from flexcal.jobs.guidance.judgement import Finding, Judgement, moved_far_text, p_text, radius
@@ -75,7 +75,7 @@ class RowJudge:
         if rows.temperature is None:
             return None
         value = float(rows.temperature[-1])
-        likely = with_likely_temperatures(rows).temperature
+        likely = with_implausible_temperatures_replaced(rows).temperature
         assert likely is not None
         if likely[-1] == value:
             return None

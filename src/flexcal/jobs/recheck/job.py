@@ -15,7 +15,7 @@ from flexcal.data.poses import DEFAULT_SIGMA, read_poses, tables_of
 from flexcal.errors import InputError
 from flexcal.files.formats import block_sha256, provenance, sha256_of
 from flexcal.jobs.inputs import CalibratedRobot, image_provenance, require_distinct_files
-from flexcal.jobs.recheck.one_visit import recheck, with_likely_temperatures
+from flexcal.jobs.recheck.one_visit import recheck, without_implausible_temperatures
 from flexcal.jobs.recheck.result import Recheck
 from flexcal.jobs.recheck.visit_course import CourseOverVisits
 from flexcal.jobs.recheck.visit_history import (
@@ -58,7 +58,9 @@ def recheck_robot(
     robot = CalibratedRobot.from_yaml(robot_file, estimates)
     assert robot.stored is not None
     progress("reading", 0.0)
-    poses = with_likely_temperatures(robot, read_poses(list(files), robot.model, require_motion=False))
+    poses = without_implausible_temperatures(
+        robot, read_poses(list(files), robot.model, require_motion=False)
+    )
     progress("reading", 1.0)
     calibration = block_sha256(robot.stored, "calibration")
     digests = {f"{k}. {file.name}": sha256_of(file) for k, file in enumerate(files, start=1)}

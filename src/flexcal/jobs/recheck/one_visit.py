@@ -80,11 +80,11 @@ def recheck(
     'as_calibrated'
     """
     model = robot.model
-    poses = with_likely_temperatures(robot, poses)
+    poses = without_implausible_temperatures(robot, poses)
     _require(robot, poses)
     poses, warm = with_temperature(robot, poses, temperature)
     if reference is not None:
-        reference = with_likely_temperatures(robot, reference)
+        reference = without_implausible_temperatures(robot, reference)
         _require(robot, reference)
         warm = (*warm, *_reference_temperature(robot, poses, reference))
     unknown = any(not is_station_identified(model, station) for station in poses.stations)
@@ -144,7 +144,7 @@ def recheck(
     )
 
 
-def with_likely_temperatures(robot: CalibratedRobot, poses: PoseSet) -> PoseSet:
+def without_implausible_temperatures(robot: CalibratedRobot, poses: PoseSet) -> PoseSet:
     """Poses without those whose temperature cannot be the arm's, where the calibrated robot depends on it, and a note on them."""
     if not depends_on_temperature(robot.model):
         return poses
