@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -33,9 +34,8 @@ def pool_springs(members: Sequence[Member]) -> PooledValues:
     Raises `FlexcalError` for fewer than three robots, and for robots that are no one population.
     """
     _require_alike(members, "stiffness", "bearings", "bearing axes")
-    model = members[0].model
     names = _names(members, _is_of_springs)
-    reference, sizes, measured = [], [], []
+    reference, sizes = [], []
     for name in names:
         items = [m.estimate.parameters[name] for m in members if name in m.estimate.parameters]
         first = items[0]
@@ -44,22 +44,12 @@ def pool_springs(members: Sequence[Member]) -> PooledValues:
         spring = name.endswith(SPRING)
         reference.append(middle if spring else nominal)
         sizes.append(SPRING_LOG_STD if spring or not np.isfinite(first.prior_std) else first.prior_std)
-    for member in members:
-        measured.append(_information(member.estimate, names, np.array(reference), np.array(sizes)))
-    common = float(model.prior.torque_constant)
+    scales: list[Scale] = ["log"] * len(names)
+    quantities = _Quantities(names, scales, np.array(reference), np.array(sizes))
+    measured = [_spring_information(member.estimate, quantities) for member in members]
+    common = float(members[0].model.prior.torque_constant)
     springs = [name for name in names if name.endswith(SPRING)]
-    return _pooled(
-        members,
-        "stiffness",
-        names,
-        springs,
-        np.array(reference),
-        np.array(sizes),
-        measured,
-        dict.fromkeys(names, "log"),
-        common,
-        _condition(members[0], "bearings"),
-    )
+    return quantities.pooled(members, measured, common, "bearings").among(springs)
 
 
 def pool_friction(members: Sequence[Member]) -> PooledValues:
@@ -74,67 +64,54 @@ def pool_friction(members: Sequence[Member]) -> PooledValues:
     names = _names(members, _is_friction)
     kinds = {name.rpartition(".")[2] for name in names}
     log = {kind for kind in kinds if all(_is_positive(m.estimate, names, kind) for m in members)}
-    scales: dict[str, Scale] = {name: "log" if name.rpartition(".")[2] in log else "linear" for name in names}
-    values = {n: [m.estimate.values[n] for m in members if _told(m.estimate, n)] for n in names}
-    reference = np.array([np.log(np.median(v)) if scales[n] == "log" else 0.0 for n, v in values.items()])
+    scales: list[Scale] = ["log" if name.rpartition(".")[2] in log else "linear" for name in names]
+    values = [[m.estimate.values[n] for m in members if _told(m.estimate, n)] for n in names]
+    pairs = list(zip(scales, values, strict=True))
+    reference = np.array([np.log(np.median(v)) if scale == "log" else 0.0 for scale, v in pairs])
     sizes = np.array(
-        [_FRICTION_SIZE if scales[n] == "log" else max(np.max(np.abs(v)), 1e-12) for n, v in values.items()]
+        [_FRICTION_SIZE if scale == "log" else max(np.max(np.abs(v)), 1e-12) for scale, v in pairs]
     )
-    measured = [_friction_information(m.estimate, names, scales, reference, sizes) for m in members]
-    return _pooled(
-        members,
-        "dynamics",
-        names,
-        names,
-        reference,
-        sizes,
-        measured,
-        scales,
-        0.0,
-        _condition(members[0], "friction"),
-    )
+    quantities = _Quantities(names, scales, reference, sizes)
+    measured = [_friction_information(member.estimate, quantities) for member in members]
+    return quantities.pooled(members, measured, 0.0, "friction")
 
 
-def _pooled(
-    members: Sequence[Member],
-    block: str,
-    names: Sequence[str],
-    wanted: Sequence[str],
-    reference: np.ndarray,
-    sizes: np.ndarray,
-    measured: Sequence[Measured],
-    scales: dict[str, Scale],
-    common: float,
-    condition: str,
-) -> PooledValues:
-    kinds = [f"{scales[name]}, {name.partition('.')[2]}" for name in names]
-    found = population(measured, sizes, kinds)
-    known = np.sqrt(np.diag(found.uncertainty) + common**2)
-    kept = [
-        k
-        for k, name in enumerate(names)
-        if name in wanted
-        and np.hypot(known[k], found.spread[k]) < _USEFUL * sizes[k] / _unit(scales[name], sizes[k])
-    ]
-    units = {item.name: item.unit for m in members for item in m.estimate.parameters}
-    mean = reference + found.mean
-    return PooledValues(
-        tuple(names[k] for k in kept),
-        tuple(units[names[k]] for k in kept),
-        tuple(scales[names[k]] for k in kept),
-        np.array([np.exp(mean[k]) if scales[names[k]] == "log" else mean[k] for k in kept]),
-        known[kept],
-        found.spread[kept],
-        found.freedom[kept],
-        condition,
-        tuple(member.name for member in members),
-        {m.name: block_sha256(m.source, m.block) for m in members if m.source is not None},
-    )
+@dataclass(frozen=True, eq=False)
+class _Quantities:
+    """p quantities of robots on their scales, as deviations from a `reference` (p,) with the plausible `sizes` (p,)."""
 
+    names: Sequence[str]
+    scales: Sequence[Scale]
+    reference: np.ndarray
+    sizes: np.ndarray
 
-def _unit(scale: Scale, size: float) -> float:
-    """What a standard deviation is compared in: logarithms as they are, others in the size of the quantity."""
-    return size if scale == "log" else 1.0
+    def pooled(
+        self, members: Sequence[Member], measured: Sequence[Measured], common: float, option: str
+    ) -> PooledValues:
+        """Those that are useful over the `members`, of which these deviations were `measured` with an error of the standard deviation
+        `common` to all; the members have the `option` in common.
+        """
+        names, scales, sizes = self.names, self.scales, self.sizes
+        kinds = [f"{scale}, {name.partition('.')[2]}" for name, scale in zip(names, scales, strict=True)]
+        found = population(measured, sizes, kinds)
+        known = np.sqrt(np.diag(found.uncertainty) + common**2)
+        log = np.array(scales) == "log"
+        unit = np.where(log, sizes, 1.0)
+        kept = np.flatnonzero(np.hypot(known, found.spread) < _USEFUL * sizes / unit).tolist()
+        units = {item.name: item.unit for m in members for item in m.estimate.parameters}
+        mean = self.reference + found.mean
+        return PooledValues(
+            tuple(names[k] for k in kept),
+            tuple(units[names[k]] for k in kept),
+            tuple(scales[k] for k in kept),
+            np.array([np.exp(mean[k]) if log[k] else mean[k] for k in kept]),
+            known[kept],
+            found.spread[kept],
+            found.freedom[kept],
+            _condition(members[0], option),
+            tuple(member.name for member in members),
+            {m.name: block_sha256(m.source, m.block) for m in members if m.source is not None},
+        )
 
 
 def _names(members: Sequence[Member], wanted: Callable[[str], bool]) -> list[str]:
@@ -172,10 +149,9 @@ def _is_positive(estimate: Estimate, names: Sequence[str], kind: str) -> bool:
     )
 
 
-def _information(
-    estimate: Estimate, names: Sequence[str], reference: np.ndarray, sizes: np.ndarray
-) -> Measured:
-    """What responses tell of springs and inertials, as deviations from `reference` (p,): the posterior without the declared prior."""
+def _spring_information(estimate: Estimate, quantities: _Quantities) -> Measured:
+    """What responses tell of springs and inertials: the posterior without the declared prior."""
+    names, reference, sizes = quantities.names, quantities.reference, quantities.sizes
     told = [k for k, name in enumerate(names) if _told(estimate, name)]
     rows = [estimate.parameters.index(names[k]) for k in told]
     items = [estimate.parameters[k] for k in rows]
@@ -189,18 +165,13 @@ def _information(
     return independent_combinations(matrix, vector, sizes)
 
 
-def _friction_information(
-    estimate: Estimate,
-    names: Sequence[str],
-    scales: dict[str, Scale],
-    reference: np.ndarray,
-    sizes: np.ndarray,
-) -> Measured:
+def _friction_information(estimate: Estimate, quantities: _Quantities) -> Measured:
     """What torques tell of friction, all inertials integrated out without a prior."""
+    names, reference, sizes = quantities.names, quantities.reference, quantities.sizes
     told = [k for k, name in enumerate(names) if _told(estimate, name)]
     rows = [estimate.parameters.index(names[k]) for k in told]
     value = np.array([estimate.values[names[k]] for k in told])
-    log = np.array([scales[names[k]] == "log" for k in told])
+    log = np.array([quantities.scales[k] == "log" for k in told])
     slope = np.where(log, 1 / np.where(log, value, 1.0), 1.0)
     covariance = estimate.covariance[np.ix_(rows, rows)] * np.outer(slope, slope)
     inverse = np.linalg.inv(covariance)
