@@ -42,18 +42,7 @@ def error_sources(reach: Propagation, q: np.ndarray) -> dict[str, np.ndarray]:
     model, size = reach.model, len(q)
     names = [n for n in moving_parameters(model) if model.posterior.determines(n)]
     root = covariance_root(model, names)
-    poses = PoseSet(
-        q=q,
-        position=np.zeros((size, 3)),
-        sigma=np.ones((size, 3)),
-        torque=None,
-        payload=None,
-        target=np.full(size, reach.target),
-        station=np.full(size, reach.station),
-        temperature=None,
-        pose=np.arange(size),
-    )
-    at = predict_measurements(model, poses, jacobians=True)
+    at = predict_measurements(model, PoseSet.unmeasured(q, reach.target, reach.station, 1.0), jacobians=True)
     roots = at.jacobian(names) @ root
     turned = (joint_rotation_jacobian(at) ** 2).sum(axis=(1, 2))
     scatter = {

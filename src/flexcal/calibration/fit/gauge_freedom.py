@@ -196,16 +196,9 @@ def _random_poses(model: RobotModel, targets: Sequence[str], stations: Sequence[
     target = np.repeat([target for target, _ in pairs], _POSES)
     tilted = np.isin(target, inclined)
     read = [[f"point.{t}.{key}" in model.posterior.parameters for key in ZEROS] for t in target.tolist()]
-    return PoseSet(
-        q=random_configurations(model, size, np.random.default_rng(0), lower, upper),
-        position=np.zeros((size, 3)),
-        sigma=np.ones((size, 3)),
-        torque=None,
-        payload=None,
-        target=target,
-        station=np.repeat([station for _, station in pairs], _POSES),
-        temperature=None,
-        pose=np.arange(size),
+    q = random_configurations(model, size, np.random.default_rng(0), lower, upper)
+    return replace(
+        PoseSet.unmeasured(q, target, np.repeat([station for _, station in pairs], _POSES), 1.0),
         kind=np.where(tilted, DIRECTION, "") if inclined else None,
         tilt=np.where(np.array(read) & tilted[:, None], 0.0, np.nan) if inclined else None,
     )

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from flexcal.calibration.measurement.prediction import PredictedMeasurements, predict_measurements
-from flexcal.data.poses import DEFAULT_SIGMA, PoseSet
+from flexcal.data.poses import PoseSet
 from flexcal.model.kinematics import random_configurations
 from flexcal.model.robot import RobotModel
 
@@ -29,15 +29,5 @@ def random_poses(model: RobotModel, limits: np.ndarray, targets: Sequence[str], 
     They are of the first station; readings are zero.
     """
     q = random_configurations(model, count, np.random.default_rng(0), limits[0], limits[1])
-    many = count * len(targets)
-    return PoseSet(
-        q=np.tile(q, (len(targets), 1)),
-        position=np.zeros((many, 3)),
-        sigma=np.full((many, 3), DEFAULT_SIGMA),
-        torque=None,
-        payload=None,
-        target=np.repeat(list(targets), count),
-        station=np.full(many, model.stations.names[0]),
-        temperature=None,
-        pose=np.arange(many),
-    )
+    q = np.tile(q, (len(targets), 1))
+    return PoseSet.unmeasured(q, np.repeat(list(targets), count), model.stations.names[0])

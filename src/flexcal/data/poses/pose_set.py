@@ -115,6 +115,32 @@ class PoseSet:
     sigma_given: bool = True
     unstated: np.ndarray | None = None
 
+    @classmethod
+    def unmeasured(
+        cls,
+        q: np.ndarray,
+        target: str | np.ndarray,
+        station: str | np.ndarray,
+        sigma: float | np.ndarray = DEFAULT_SIGMA,
+    ) -> PoseSet:
+        """Poses at `q` (N, n) where nothing was measured: positions are zero, poses numbered from 1.
+
+        `target` and `station` are names, or those (N,) of every row, and `sigma` the standard deviation of a coordinate, m, or those (N,)
+        of the rows.
+        """
+        rows = len(q)
+        return cls(
+            q=q,
+            position=np.zeros((rows, 3)),
+            sigma=np.repeat(np.broadcast_to(sigma, rows)[:, None], 3, axis=1),
+            torque=None,
+            payload=None,
+            target=np.array(np.broadcast_to(target, rows)),
+            station=np.array(np.broadcast_to(station, rows)),
+            temperature=None,
+            pose=np.arange(1, rows + 1),
+        )
+
     def __post_init__(self) -> None:
         if self.q.ndim != 2:
             raise FlexcalError(

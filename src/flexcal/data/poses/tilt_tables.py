@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexcal.data.poses.checks import check_same_pose
 from flexcal.data.poses.columns import payload_column, whole_numbers
-from flexcal.data.poses.pose_set import DEFAULT_SIGMA, DIRECTION, PoseSet
+from flexcal.data.poses.pose_set import DIRECTION, PoseSet
 from flexcal.data.tables import Table, TableFile, assign, check_joint_units, timestamp_columns, with_seconds
 from flexcal.files.structuring import suggestion
 from flexcal.model.robot import VERTICAL
@@ -73,14 +74,10 @@ def read_tilts(file: TableFile, model: RobotModel, further: Sequence[str] = ()) 
         else np.arange(1, rows + 1)
     )
     check_same_pose(pose, values["q"], table)
-    return PoseSet(
-        q=values["q"],
-        position=np.zeros((rows, 3)),
-        sigma=np.full((rows, 3), DEFAULT_SIGMA),
+    return replace(
+        PoseSet.unmeasured(values["q"], names, VERTICAL),
         torque=values.get("tau"),
         payload=payload_column(table, signals, model),
-        target=names,
-        station=np.full(rows, VERTICAL),
         temperature=values["temperature"][:, 0] if "temperature" in values else None,
         time=values["t"][:, 0] if "t" in values else None,
         pose=pose,

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexcal.data.poses.pose_set import DEFAULT_SIGMA, PoseSet
+from flexcal.data.poses.pose_set import PoseSet
 from flexcal.errors import FlexcalError
 
 
@@ -62,15 +62,4 @@ class Touches:
 
     def as_poses(self, target: str) -> PoseSet:
         """Poses of the point `target`, without measured positions."""
-        rows = len(self)
-        return PoseSet(
-            q=self.q,
-            position=np.zeros((rows, 3)),
-            sigma=np.full((rows, 3), DEFAULT_SIGMA),
-            torque=None,
-            payload=self.payload,
-            target=np.full(rows, target),
-            station=np.full(rows, ""),
-            temperature=None,
-            pose=self.pose,
-        )
+        return replace(PoseSet.unmeasured(self.q, target, ""), payload=self.payload, pose=self.pose)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -59,16 +59,8 @@ class TiltSetup:
         rows = len(q)
         tilt = np.full((rows, 3), np.nan)
         tilt[:, : self._axes] = 0.0
-        return PoseSet(
-            q=q,
-            position=np.zeros((rows, 3)),
-            sigma=np.ones((rows, 3)),
-            torque=None,
-            payload=None,
-            target=np.full(rows, self.name),
-            station=np.full(rows, VERTICAL),
-            temperature=None,
-            pose=np.arange(rows),
+        return replace(
+            PoseSet.unmeasured(q, self.name, VERTICAL, 1.0),
             orientation_sigma=np.full(rows, _STD if self.config.std is None else self.config.std),
             kind=np.full(rows, DIRECTION),
             tilt=tilt,

@@ -84,14 +84,6 @@ class PoseChoice:
             sigma = np.repeat(sigma[:, None], 3, axis=1)
             return replace(many, q=q, torque=None, sigma=sigma, pose=np.arange(1, count + 1))
         payload = self.setup.payload
-        return PoseSet(
-            q=q,
-            position=np.zeros((count, 3)),
-            sigma=np.full((count, 3), DEFAULT_SIGMA),
-            torque=None,
-            payload=None if payload is None else np.full(count, payload),
-            target=np.full(count, model.point(self.setup.point).name),
-            station=np.full(count, self.setup.station or model.stations.names[0]),
-            temperature=None,
-            pose=np.arange(1, count + 1),
-        )
+        station = self.setup.station or model.stations.names[0]
+        poses = PoseSet.unmeasured(q, model.point(self.setup.point).name, station)
+        return poses if payload is None else replace(poses, payload=np.full(count, payload))

@@ -159,17 +159,8 @@ def _candidates(
     q = q[:count]
     stated = model.value("scatter.instrument_share") > 0 or not model.scatter.std.any()
     sigma = measuring_noise(model, q, setup) if stated else np.full(len(q), 1e-4)
-    return PoseSet(
-        q=q,
-        position=np.zeros((len(q), 3)),
-        sigma=np.repeat(sigma[:, None], 3, axis=1),
-        torque=None,
-        payload=None,
-        target=np.full(len(q), robot.measured[0]),
-        station=np.full(len(q), model.stations.names[0]),
-        temperature=None,
-        pose=np.arange(1, len(q) + 1),
-        sigma_given=stated,
+    return replace(
+        PoseSet.unmeasured(q, robot.measured[0], model.stations.names[0], sigma), sigma_given=stated
     )
 
 
