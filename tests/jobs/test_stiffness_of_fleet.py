@@ -85,7 +85,7 @@ def test_a_robot_of_another_batch_is_told_and_not_narrowed(model: RobotModel, po
     assert not found.pooled.used
     assert found.estimate.values == alone.estimate.values
     said = next(remark for remark in found.remarks if "does not fit this robot" in remark)
-    assert "p < 0.0005" in said
+    assert "p < 5e-4" in said
     assert "j1.drive.stiffness" in said
     assert "from these measurements alone" in said
 

@@ -123,10 +123,16 @@ class PoseSet:
         station: str | np.ndarray,
         sigma: float | np.ndarray = DEFAULT_SIGMA,
     ) -> PoseSet:
-        """Poses at `q` (N, n) where nothing was measured: positions are zero, poses numbered from 1.
+        """Poses where nothing was measured: positions are zero, and poses numbered from 1.
 
-        `target` and `station` are names, or those (N,) of every row, and `sigma` the standard deviation of a coordinate, m, or those (N,)
-        of the rows.
+        Parameters
+        ----------
+        q : ndarray
+            Motor positions (N, n) referred to the joint, rad (m where prismatic).
+        target, station : str or ndarray
+            Name of the point and of the instrument's place, or those (N,) of the rows.
+        sigma : float or ndarray
+            Standard deviation of a coordinate, m, or those (N,) of the rows.
         """
         rows = len(q)
         return cls(

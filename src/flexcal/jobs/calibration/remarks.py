@@ -27,6 +27,7 @@ from flexcal.jobs.calibration.ignored_columns import ignored_columns_remarks
 from flexcal.jobs.calibration.inclinations import inclination_remarks
 from flexcal.jobs.calibration.thermal import thermal_remarks
 from flexcal.model.robot import BOARD_SCALE, socket_scale
+from flexcal.report.results import chance_in_words
 from flexcal.units import MILLIMETRE, decimals
 
 _LOOK = (
@@ -167,9 +168,9 @@ def calibration_remarks(
     drift = Drift.of(fit) if fit.poses.located.any() else None
     if drift is not None and drift.certain:
         remarks.append(
-            f"residuals drift with time (p = {drift.probability:.1g}), by {drift.residual / MILLIMETRE:.3f} mm from first to last pose, "
-            f"and the fit may have taken up more: a drift of {drift.distance / MILLIMETRE:.3f} mm beside it explains the readings best; "
-            "robot or instrument warmed up, or position and measuring order are correlated"
+            f"residuals drift with time ({chance_in_words(drift.probability)}), by {drift.residual / MILLIMETRE:.3f} mm from first to last "
+            f"pose, and the fit may have taken up more: a drift of {drift.distance / MILLIMETRE:.3f} mm beside it explains the readings "
+            "best; robot or instrument warmed up, or position and measuring order are correlated"
         )
     remarks += cause
     if not cause and not residuals_implausible(fit):
@@ -362,7 +363,7 @@ def _contradicted(test: StatedNoise) -> str:
     )
     return (
         f"the readings{of} scatter {test.factor:.2g} times as much as the stated sigma says (χ² is {test.chi2:.2f} per degree of freedom, "
-        f"p = {test.probability:.1g}): {cause}"
+        f"{chance_in_words(test.probability)}): {cause}"
     )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 from flexcal.calibration.diagnostics import FEWEST_PLACES, PlaceAgreement, PlaceErrors
 from flexcal.calibration.fit import GeometricFit
 from flexcal.model.robot import GEOMETRY, SocketsConfig, socket_scale
+from flexcal.report.results import chance_in_words
 from flexcal.units import MILLIMETRE
 
 _PER_MILLE = 1e-3
@@ -86,8 +87,9 @@ def place_remarks(agreement: PlaceAgreement | None) -> tuple[str, ...]:
         if worst is not None:
             return (
                 f"the {len(agreement.places)} places of the fixture are not consistent with one robot: predicted from the others, "
-                f"{worst.name} has {worst.ratio:.1f} times the squared errors that their scatter lets expect (p = {worst.p:.1g}). Which "
-                f"place is wrong, or whether the arm errs beyond its model, cannot be told; measure at {FEWEST_PLACES} places or more",
+                f"{worst.name} has {worst.ratio:.1f} times the squared errors that their scatter lets expect ({chance_in_words(worst.p)}). "
+                "Which place is wrong, or whether the arm errs beyond its model, cannot be told; measure "
+                f"at {FEWEST_PLACES} places or more",
             )
         return (
             f"with {len(agreement.places)} places of the fixture, one that disagrees with the others could not be told from them; measure "
@@ -126,4 +128,4 @@ def _disagrees(agreement: PlaceAgreement, place: PlaceErrors, others: Sequence[P
             f"{place.outliers} of its {place.poses} poses are outliers, {elsewhere} of {rows} at the others"
         )
     p = min(item.p for item in own)
-    return f"the place {place.name} disagrees with the other {len(others)}: {'; '.join(parts)} (p = {p:.1g})"
+    return f"the place {place.name} disagrees with the other {len(others)}: {'; '.join(parts)} ({chance_in_words(p)})"

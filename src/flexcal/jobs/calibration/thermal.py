@@ -6,6 +6,7 @@ from typing import Any
 
 from flexcal.calibration.fit import GeometricFit, TemperatureEvidence
 from flexcal.model.robot import EXPANSION, STATION_DRIFT
+from flexcal.report.results import chance_in_words
 from flexcal.units import MILLIMETRE
 
 _MICRO = 1e-6
@@ -27,8 +28,8 @@ def thermal_remarks(fit: GeometricFit) -> tuple[str, ...]:
         remarks.append(_confounded(told))
     if told.drifts:
         remarks.append(
-            f"beside temperature, residuals change with {_clock(told)} (p = {told.probability:.1g}): something drifts that the temperature "
-            "column does not say, as the instrument, or a link that warms up later than the sensor"
+            f"beside temperature, residuals change with {_clock(told)} ({chance_in_words(told.probability)}): something drifts that the "
+            "temperature column does not say, as the instrument, or a link that warms up later than the sensor"
         )
     if told.scatter is None:
         remarks.append(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from flexcal.jobs.fleet_prior.pooled_values import PoolConflict, PooledValues
+from flexcal.report.results import chance_in_words
 
 _LISTED = 8
 
@@ -66,7 +67,7 @@ class PooledUse:
         fits = (
             "these measurements do not tell whether it fits this robot"
             if self.conflict is None
-            else f"nothing in these measurements contradicts it (p = {self.conflict.probability:.2g})"
+            else f"nothing in these measurements contradicts it ({chance_in_words(self.conflict.probability)})"
         )
         return [f"the {self.what} of {others} is its prior{known}; {fits}: {named}"]
 

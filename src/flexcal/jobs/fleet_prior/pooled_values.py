@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from flexcal.estimation import individuals
+from flexcal.report.results import chance_in_words
 
 Scale = Literal["log", "linear"]
 CLEAR = 4.0
@@ -91,10 +92,8 @@ class PoolConflict:
     @property
     def clause(self) -> str:
         """What contradicts, as the end of a sentence."""
-        least = 2 / (_DRAWS + 1)
-        p = f"= {self.probability:.2g}" if self.probability > least else f"< {2 / _DRAWS:g}"
         named = ", ".join(f"{name} ({shift:+.1f} σ)" for name, shift in self.shifts)
-        return f"p {p}" + (f", most in {named}" if named else "")
+        return chance_in_words(self.probability, 2 / _DRAWS) + (f", most in {named}" if named else "")
 
 
 def conflict(pooled: PooledValues, deviation: np.ndarray, covariance: np.ndarray) -> PoolConflict:

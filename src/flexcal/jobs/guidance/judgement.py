@@ -9,6 +9,7 @@ import numpy as np
 
 from flexcal.jobs.guidance.analysis import Analysis
 from flexcal.jobs.guidance.disturbances import Disturbance, DisturbanceKind
+from flexcal.report.results import chance_in_words
 from flexcal.units import MILLIMETRE
 
 JudgementCode = Literal[
@@ -36,7 +37,7 @@ class Finding:
             return moved_far_text(self.pose)
         if self.p is None:
             return f"pose {self.pose} is {self.size / MILLIMETRE:.0f} mm from where the robot was; exclude it, or measure it again."
-        size, p = f"{self.size / MILLIMETRE:.2g} mm", p_text(self.p)
+        size, p = f"{self.size / MILLIMETRE:.2g} mm", chance_in_words(self.p)
         if self.kind == "outlier":
             return f"pose {self.pose} is {size} off ({p}); exclude it, or measure it again."
         if self.kind == "moved":
@@ -107,11 +108,6 @@ def moved_far_text(pose: int) -> str:
         f"the points from pose {pose} on agree with each other, but not with those before: the tracker or the robot's base was moved by "
         f"centimetres before pose {pose}; give the rows from there on another station of robot.yaml."
     )
-
-
-def p_text(p: float) -> str:
-    """A p-value as text."""
-    return "p < 1e-12" if p < 1e-12 else f"p = {p:.1g}"
 
 
 def radius(covariance: np.ndarray, beyond: float = BEYOND) -> float:

@@ -12,9 +12,10 @@ from flexcal.data.poses import PoseSet
 from flexcal.jobs.guidance.analysis import Analysis, with_implausible_temperatures_replaced
 from flexcal.jobs.guidance.consistency import FEWEST, length_ratio
 from flexcal.jobs.guidance.disturbances import Disturbance
-from flexcal.jobs.guidance.judgement import Finding, Judgement, moved_far_text, p_text, radius
+from flexcal.jobs.guidance.judgement import Finding, Judgement, moved_far_text, radius
 from flexcal.jobs.inputs import Misreading, misread_point, other_pose, planned_pose
 from flexcal.model.robot import RobotModel
+from flexcal.report.results import chance_in_words
 from flexcal.units import MILLIMETRE, temperature_fault
 
 _CERTAIN = 5.5
@@ -178,8 +179,8 @@ class RowJudge:
         return Judgement(
             "outlier",
             f"pose {pose} is {error / MILLIMETRE:.2f} mm off, where 95 % of good rows are within {expected / MILLIMETRE:.2f} mm "
-            f"({p_text(item.p)}): either this row alone is wrong, or the tracker or the base has moved; the next row will tell, best a "
-            "pose measured before.",
+            f"({chance_in_words(item.p)}): either this row alone is wrong, or the tracker or the base has moved; the next row will tell, "
+            "best a pose measured before.",
             error=error,
             expected=expected,
             p=item.p,

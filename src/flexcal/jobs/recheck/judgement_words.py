@@ -16,9 +16,11 @@ from flexcal.calibration.recheck import (
 )
 from flexcal.jobs.recheck.visit_course import CourseOverVisits
 from flexcal.model.robot import EXPANSION, RobotModel
-from flexcal.report.results import amount
+from flexcal.report.results import amount, chance_in_words
 from flexcal.units import MILLIMETRE
 
+_LEAST_CHANCE = 1e-4
+"""Least probability that the draws of the test tell."""
 _KELVIN = 12e-6
 """Growth of steel, m/m/K."""
 _CLEAR = 4.0
@@ -29,7 +31,7 @@ _SMALL = 0.5
 
 def judgement_sentence(judged: JudgedVisit, course: CourseOverVisits | None = None) -> str:
     """What the visit says of the robot; with the `course` over all visits, since when, and at which rate."""
-    chance = _chance(judged.probability)
+    chance = chance_in_words(judged.probability, _LEAST_CHANCE)
     errors = judged.test.errors
     count = len(errors.errors) / 3
     size = (
@@ -47,8 +49,8 @@ def judgement_sentence(judged: JudgedVisit, course: CourseOverVisits | None = No
     if judged.scatter is not None:
         usual = "repeated readings of these poses" if errors.noise == "repeats" else "at the calibration"
         scatters = (
-            f"the readings scatter {judged.scatter.factor:.1f} times as much as {usual} (p = {judged.scatter.chance:.2g}): check the "
-            "instrument and its targets, and measure again"
+            f"the readings scatter {judged.scatter.factor:.1f} times as much as {usual} ({chance_in_words(judged.scatter.chance)}): check "
+            "the instrument and its targets, and measure again"
         )
         if not judged.suspects:
             return f"{lead}{scatters}; whether the robot changed too cannot be told by them ({chance} of the whole)"
@@ -201,7 +203,3 @@ def _effect(suspect: Suspect, tool: MovedTool, expected: float) -> str:
     if tool.p95_interval[1] < _SMALL * expected:
         told += f": significant, but small beside the {expected / MILLIMETRE:.3f} mm that are expected of the calibrated robot"
     return told
-
-
-def _chance(probability: float) -> str:
-    return f"p = {probability:.2g}" if probability > 1e-4 else "p < 1e-4"

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from flexcal.report.layout import Check
+from flexcal.report.results import chance_in_words
 
 _QUESTION = "Is the robot like those that its prior is from?"
 
@@ -28,7 +29,7 @@ def check_fleet(block: Mapping[str, Any] | None) -> tuple[Check, ...]:
     return (
         Check(
             _QUESTION,
-            f"Yes: nothing in these measurements contradicts the {robots} others (p = {conflict['probability']:.2g}); "
+            f"Yes: nothing in these measurements contradicts the {robots} others ({chance_in_words(conflict['probability'])}); "
             f"{len(block['from_fleet'])} of {block['parameters']} parameters are known from them, not from these measurements.",
             "good",
             "fleet",
@@ -43,8 +44,8 @@ def check_pooled_stiffness(block: Mapping[str, Any] | None) -> tuple[Check, ...]
     return (
         Check(
             "Has the robot springs like those that its stiffness is from?",
-            f"No (p = {block['conflict']['probability']:.2g}): the stiffness of the {len(block['robots'])} others does not fit this robot. "
-            "Identify its stiffness, or calibrate it without --prior.",
+            f"No ({chance_in_words(block['conflict']['probability'])}): the stiffness of the {len(block['robots'])} others does not fit "
+            "this robot. Identify its stiffness, or calibrate it without --prior.",
             "bad",
             "fleet",
         ),

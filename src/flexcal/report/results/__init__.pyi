@@ -1,4 +1,5 @@
-from .change_wording import amount, chance_in_words, change_sentence, explanation_in_words
+from .chance_wording import chance_in_words
+from .change_wording import amount, change_sentence, explanation_in_words
 from .fitted_response import FittedResponse, fitted_responses
 from .fleet_robots import TOLERANCE_STATES, is_drifting, tolerance_kept, with_trends
 from .identifiability import IdentifiableParameters

@@ -6,6 +6,7 @@ import math
 
 from flexcal.calibration.comparison import Explanation, GeometryChange
 from flexcal.model.robot import unit_of
+from flexcal.report.results.chance_wording import chance_in_words
 from flexcal.units import MILLIMETRE
 
 _ALTERNATIVES = 4
@@ -20,15 +21,6 @@ def change_sentence(change: GeometryChange) -> str:
     if not change.explanations:
         return f"changed ({chance}), by no single parameter"
     return f"changed ({chance}): " + "; ".join(explanation_in_words(item) for item in change.explanations)
-
-
-def chance_in_words(probability: float) -> str:
-    """p = 0.4, or p < 1e-6."""
-    if math.isnan(probability):
-        return "p not known"
-    if probability < 1e-6:
-        return "p < 1e-6"
-    return f"p = {probability:.1g}" if probability < 0.1 else f"p = {probability:.2f}"
 
 
 def explanation_in_words(item: Explanation) -> str:
