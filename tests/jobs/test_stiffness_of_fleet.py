@@ -175,9 +175,9 @@ def test_intervals_hold_the_next_robot_though_all_have_the_same_wrong_mass(
     model: RobotModel, robots: int
 ) -> None:
     """The error of the CAD is common to all robots and does not average out: its half-width bounds what the prior may claim."""
-    held, widths = zip(*over_seeds(of_one_fleet, range(40), model, robots), strict=True)
+    held, widths = zip(*over_seeds(of_one_fleet, range(200), model, robots), strict=True)
     share = float(np.mean(held))
-    print(f"{robots} robots: {100 * share:.1f} % of 80 intervals, 1 sigma {100 * np.mean(widths):.1f} %")
+    print(f"{robots} robots: {100 * share:.1f} % of 400 intervals, 1 sigma {100 * np.mean(widths):.1f} %")
     assert 0.9 < share <= 1.0
     # no sharper than spread and common error of the masses
     assert np.mean(widths) > np.hypot(TYPE_SPREAD, 0.04)

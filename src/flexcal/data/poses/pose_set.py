@@ -133,6 +133,11 @@ class PoseSet:
             Name of the point and of the instrument's place, or those (N,) of the rows.
         sigma : float or ndarray
             Standard deviation of a coordinate, m, or those (N,) of the rows.
+
+        Returns
+        -------
+        PoseSet
+            N poses without torques, payload and temperature.
         """
         rows = len(q)
         return cls(
