@@ -231,3 +231,7 @@ def test_a_data_set_that_is_resampled(tmp_path: Path) -> None:
     rows = stored(tmp_path / "out")
     assert rows["left_out.p90_mm"].is_null().to_list() == [True, False, False]
     assert document["resampling"]["kind"] == "jackknife" and document["resampling"]["resamples"] == 2
+    units = {name: item["unit"] for name, item in document["resampling"]["parameters"].items()}
+    assert units["elbow_joint.offset"] == "rad" and units["station.tracker.x"] == "m"
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "<td>mrad</td>" in page and "<td>mm</td>" in page

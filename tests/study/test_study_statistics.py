@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -139,14 +140,10 @@ def test_a_jackknife_of_means_gives_their_standard_error() -> None:
     assert block["parameters"]["a"]["spread"] == pytest.approx(np.std(means[1:], ddof=1))
 
 
-@pytest.mark.parametrize(("factor", "status"), [(1.0, "good"), (3.0, "bad"), (0.25, "good")])
-def test_a_spread_unlike_the_stated_one_is_said(factor: float, status: str) -> None:
-    rng = np.random.default_rng(8)
-    names = ["all", *(f"bootstrap {k}" for k in range(60))]
-    columns: dict[str, object] = {"resample": names}
-    for k in range(9):
-        columns |= {f"p{k}.estimate": factor * rng.standard_normal(61), f"p{k}.std": np.ones(61)}
-    studied = table(columns, truth=False)
+def checks_of_resamples(columns: dict[str, object], count: int) -> tuple[Check, ...]:
+    """Checks of the page of a study of resampled data."""
+    names = ["all", *(f"bootstrap {k}" for k in range(count))]
+    studied = table({"resample": names, **columns}, truth=False)
     results = {
         "study": "calibrate",
         "name": "s",
@@ -155,8 +152,38 @@ def test_a_spread_unlike_the_stated_one_is_said(factor: float, status: str) -> N
         "command": "",
         "provenance": {},
     }
-    results |= {"tasks": {"total": 61, "done": 61, "failed": 0}, **study_statistics(studied)}
-    checks = study_page(StudyReport(results, studied)).verdict.checks
+    results |= {"tasks": {"total": count + 1, "done": count + 1, "failed": 0}, **study_statistics(studied)}
+    return study_page(StudyReport(results, studied)).verdict.checks
+
+
+def spreads(factors: Sequence[float], count: int, rng: np.random.Generator) -> dict[str, object]:
+    """Estimates of parameters that spread by so many times what is stated."""
+    columns: dict[str, object] = {}
+    for k, factor in enumerate(factors):
+        columns |= {
+            f"p{k}.estimate": factor * rng.standard_normal(count + 1),
+            f"p{k}.std": np.ones(count + 1),
+        }
+    return columns
+
+
+def test_one_parameter_that_surely_spreads_more_is_said_beside_a_good_median() -> None:
+    rng = np.random.default_rng(9)
+    *_, check = checks_of_resamples(spreads([1.0] * 30 + [20.0], 12, rng), 12)
+    assert check.status == "care" and "but that of p30" in check.answer and "p1 " not in check.answer
+    told = [checks_of_resamples(spreads([1.0] * 31, 12, rng), 12)[-1].status for _ in range(60)]
+    assert told.count("good") >= 58
+    *_, check = checks_of_resamples(
+        {f"scatter.{n}": v for n, v in [("a.estimate", 20 * rng.standard_normal(13)), ("a.std", np.ones(13))]}
+        | spreads([1.0] * 9, 12, rng),
+        12,
+    )
+    assert check.status == "good"  # how the scatter is shared among its components is chance
+
+
+@pytest.mark.parametrize(("factor", "status"), [(1.0, "good"), (3.0, "bad"), (0.25, "good")])
+def test_a_spread_unlike_the_stated_one_is_said(factor: float, status: str) -> None:
+    checks = checks_of_resamples(spreads([factor] * 9, 60, np.random.default_rng(8)), 60)
     assert [check.status for check in checks] == ["good", "good", status]
     assert ("too small for these data" in checks[-1].answer) == (factor > 1)
     assert ("too large" in checks[-1].answer) is False  # errors that resamples share are in none of them

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -118,10 +118,15 @@ class PointFit:
         *,
         marginalised: bool,
         near: Mapping[str, float],
+        placed: RobotModel | None = None,
+        kept: Sequence[str] = (),
         progress: Progress,
         fleet: FleetPrior | None = None,
     ) -> PointFit:
         """Input without the term `transmission` for fewer than 20 different poses, which do not determine its variance.
+
+        Instruments stand and targets are mounted as on the robot that is `placed` already, if any, and else as registration finds them;
+        of parameters that cannot be told apart those `kept` in another fit come first.
 
         Raises `FlexcalError` for a backlash seen from one flank and for too few poses.
         """
@@ -135,9 +140,11 @@ class PointFit:
         start = register(model, poses, predict_measurements(bare, poses, elastic=elastic).located)
         zeroed = register_with_zeros(start, poses)
         far_zeros = zeroed is not None
-        placed = with_target_axes(with_camera_places(zeroed or start, poses), poses)
-        require_orientations(placed, poses)
-        start = with_places_of(start, placed, poses) if far_zeros else placed
+        mounted = with_target_axes(with_camera_places(zeroed or start, poses), poses)
+        require_orientations(mounted, poses)
+        start = with_places_of(start, mounted, poses) if far_zeros else mounted
+        if placed is not None:
+            start = with_places_of(start, placed, poses)
         prior = with_instruments(prior, start, poses)
         if "backlash" in terms:
             require_both_flanks(model, predict_measurements(start, poses, elastic=elastic).rest.flank)
@@ -152,9 +159,10 @@ class PointFit:
         last = {start.point(target).joint for target in poses.targets}
         inner = [f"{joint.name}.offset" for i, joint in enumerate(start.joints) if i not in last]
         zeros = [name for name in inner if name in geometric] if far_zeros else []
+        zeros += [name for name in kept if name in geometric and name not in zeros]
         known = () if fleet is None else fleet.names
         told = Parameters(item for item in geometric if item.name not in known)
-        seen = kinematic_identifiability(start, poses, told, prefer=zeros)
+        seen = kinematic_identifiability(start, poses, told, prefer=[name for name in zeros if name in told])
         require_enough(start, poses, told, seen)
         if fleet is not None:
             # of the others those that pivoting keeps come first, so that the poses determine them beside what the prior tells

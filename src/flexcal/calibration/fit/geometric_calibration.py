@@ -153,6 +153,7 @@ def fit_geometry(
     loss: Loss | LossName = "auto",
     fleet: FleetPrior | None = None,
     near: Mapping[str, float] | None = None,
+    frame: GeometricFit | None = None,
     tolerance: float = CONVERGED,
     progress: Progress = silent,
 ) -> GeometricFit:
@@ -189,6 +190,10 @@ def fit_geometry(
         Prior of the geometry from other robots of the model.
     near : mapping of float, optional
         Values of parameters from which to start, as of a fit to nearly the same points; by default those of the `model`.
+    frame : GeometricFit, optional
+        Fit to nearly the same points whose choices are to hold: where the instruments stand, of which the points may determine the place
+        only together with the first joint's errors, and which of the parameters that are not separately identifiable are kept. Estimates
+        of both fits are then in one frame; by default the instruments are registered anew.
     tolerance : float
         Relative offset at which the fit has converged (Bates and Watts 1981, who suggest 1e-3).
     progress : Progress
@@ -231,6 +236,8 @@ def fit_geometry(
         elastic,
         marginalised=elasticity == "marginalised",
         near=near or {},
+        placed=None if frame is None else frame.model,
+        kept=() if frame is None else frame.identifiability.kept_names,
         progress=progress,
         fleet=fleet,
     )

@@ -94,6 +94,10 @@ def _lines(document: dict[str, Any]) -> list[str]:
         lines.append(
             f"the estimates spread over the resampled data {spread:.2g} times as much as the fit states (median over the parameters)"
         )
+    larger = document["resampling"]["surely_larger"] if spread else []
+    if larger:
+        named = ", ".join(larger[:3]) + (f" and {len(larger) - 3} more" if len(larger) > 3 else "")
+        lines.append(f"{named}: more spread than the fit states, by more than chance explains")
     for item in document["effects"]:
         if item["share"] is not None:
             lines.append(

@@ -71,12 +71,18 @@ class Fits:
         near: Fits | None = None,
         progress: Progress = silent,
     ) -> Fits:
-        """Fit the nominal robot `model`, starting from the fits `near` of most of these poses, where there are some."""
+        """Fit the nominal robot `model`, starting from the fits `near` of most of these poses, where there are some, and in their frame."""
         model = model.with_stations(poses.places)
         loss, terms = settings.loss, settings.terms
 
         def fit(
-            robot: RobotModel, chosen: Sequence[str], stage: str, start: GeometricFit | None, *, elastic: bool
+            robot: RobotModel,
+            chosen: Sequence[str],
+            stage: str,
+            start: GeometricFit | None,
+            *,
+            elastic: bool,
+            frame: GeometricFit | None,
         ) -> GeometricFit:
             progress(stage, 0.0)
             calibration = fit_geometry(
@@ -89,15 +95,18 @@ class Fits:
                 loss=loss,
                 fleet=settings.fleet,
                 near=None if start is None else start.estimate.values,
+                frame=frame,
                 tolerance=CONVERGED if near is None else _COMPARED,
             )
             progress(stage, 1.0)
             return calibration
 
         base = ("kinematic", "backlash") if model.backlash_joints else ("kinematic",)
-        rigid = fit(model, base, "rigid fit", None if near is None else near.rigid, elastic=False)
+        of_rigid, of_selected = (None, None) if near is None else (near.rigid, near.selected)
+        rigid = fit(model, base, "rigid fit", of_rigid, elastic=False, frame=of_rigid)
         bearings = compare_bearings(
-            model, lambda robot: fit(robot, (*base, TRANSMISSION), "bearing axes", None, elastic=True)
+            model,
+            lambda robot: fit(robot, (*base, TRANSMISSION), "bearing axes", None, elastic=True, frame=None),
         )
         if bearings is not None and bearings.declared is None and bearings.preferred is not None:
             model = model.with_bearings(bearings.preferred)
@@ -105,17 +114,21 @@ class Fits:
             # errors in mm, by which terms are selected, are not to be had
             terms = base
         elastic = bool(model.elastic)
-        start = rigid if near is None else near.selected
+        start = of_selected or rigid
         if terms is not None:
             same = not elastic and terms == base
-            selected = rigid if same else fit(model, terms, "selected fit", start, elastic=elastic)
+            selected = (
+                rigid
+                if same
+                else fit(model, terms, "selected fit", start, elastic=elastic, frame=of_selected)
+            )
             return cls(model, terms, rigid, bearings, None, None, selected)
         good = poses.subset(np.setdiff1d(np.flatnonzero(~poses.tilted), rigid.estimate.outliers))
         alone = loss == "auto" and not poses.tilted.any()
 
         def fit_of(chosen: TermSelection) -> GeometricFit:
             found = _with_random_waves(chosen.terms)
-            return fit(chosen.model, found, "selected fit", start, elastic=elastic)
+            return fit(chosen.model, found, "selected fit", start, elastic=elastic, frame=of_selected)
 
         def choose(robot: RobotModel, begin: GeometricFit) -> tuple[TermSelection, GeometricFit]:
             """Terms beyond the geometry, and the fit with them."""
@@ -135,7 +148,7 @@ class Fits:
         levels = zeros_or_geometry(model, good) if not elastic and asks_for_levels(selected) else None
         if levels is not None and levels.answer.level != "kinematic":
             model = levels.with_tolerances(model, poses)
-            rigid = fit(model, base, "rigid fit", levels.answer.fit, elastic=False)
+            rigid = fit(model, base, "rigid fit", levels.answer.fit, elastic=False, frame=of_rigid)
             selection, selected = choose(model, rigid)
         return cls(
             selection.model,

@@ -61,6 +61,11 @@ class StudyRun:
             "has_truth": tasks.has_truth,
             "error": tasks.error,
             "remarks": list(self.remarks),
+            "units": {
+                name: tasks.unit(name)
+                for name in dict.fromkeys(column.rpartition(".")[0] for column in frame.columns)
+                if f"{name}.estimate" in frame.columns
+            },
         }
         statistics = study_statistics(StudyTable.of(frame, document))
         return document | statistics | {"provenance": dict(self._origin), "command": self.command}

@@ -19,7 +19,7 @@ from flexcal.jobs.study.measured_values import error_columns, fit_columns, param
 from flexcal.jobs.study.options import CalibrateOptions, structured
 from flexcal.jobs.study.rows import StudyRow
 from flexcal.jobs.study.tasks import StudyTasks
-from flexcal.model.robot import RobotModel, with_blocks
+from flexcal.model.robot import RobotModel, unit_in, with_blocks
 
 ALL = "all"
 """The data set as it was measured."""
@@ -95,6 +95,10 @@ class ResampledCalibrations(StudyTasks):
             return [ALL, *(f"{WITHOUT}{name}" for name in dict.fromkeys(self.labels.tolist()))]
         count = 0 if self.resampling is None else self.resampling.bootstrap
         return [ALL, *(f"{BOOTSTRAP}{number}" for number in range(1, count + 1))]
+
+    def unit(self, parameter: str) -> str:
+        """As `StudyTasks.unit`, of joints that slide too."""
+        return unit_in(self.model, parameter)
 
     def require(self, options: Mapping[str, Any]) -> None:
         """As `StudyTasks.require`: there are such terms."""

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 from flexcal.jobs.study.rows import StudyRow
+from flexcal.model.robot import unit_of
 
 
 class StudyTasks(ABC):
@@ -34,6 +35,10 @@ class StudyTasks(ABC):
     def resamples(self) -> Sequence[str]:
         """Data sets of every combination of options."""
         return ("",)
+
+    def unit(self, parameter: str) -> str:
+        """SI unit of a parameter."""
+        return unit_of(parameter)
 
     def require(self, options: Mapping[str, Any]) -> None:
         """Raise `FlexcalError` where no task could run with these `options` by name; by default all can that have the right types."""

@@ -22,7 +22,7 @@ from flexcal.report.layout import (
     significant,
     worst,
 )
-from flexcal.report.results import NOMINAL_COVERAGE, StudyTable
+from flexcal.report.results import ABOUT_ALIKE, NOMINAL_COVERAGE, StudyTable
 from flexcal.report.sections import (
     coverage_range,
     coverage_section,
@@ -44,8 +44,10 @@ _KINDS = {
     "two_stage": "two-stage calibrations of virtual robots",
     "calibrate": "calibrations on measured poses",
 }
-_FEWEST_RESAMPLES, _RATIO = 8, 1.25
-"""Least number of resamples that tell a spread, and ratio of two spreads that are about alike."""
+_FEWEST_RESAMPLES = 8
+"""Least number of resamples that tell a spread."""
+_NAMED = 3
+"""Largest number of parameters that a sentence names."""
 _COVERAGE_QUESTION = "Do the 95 % intervals hold the true values in 95 % of cases?"
 _NEAR = 0.02
 """Distance of a share of intervals from 95 % that changes no decision: 93 to 97 %."""
@@ -192,11 +194,26 @@ def _resampling_check(block: Mapping[str, Any]) -> list[Check]:
     middle = block["ratio"]
     if middle is None or block["resamples"] < _FEWEST_RESAMPLES:
         return []
-    tolerated = _RATIO + 2 / np.sqrt(2 * (block["resamples"] - 1))
+    tolerated = ABOUT_ALIKE + 2 / np.sqrt(2 * (block["resamples"] - 1))
     answer = f"The spread over {block['resamples']} data sets is {significant(middle, 3)} times the stated one (median over the parameters)"
     question = "Do resampled data spread the estimates as their standard deviations say?"
     if middle > tolerated:
         return [Check(question, f"{answer}: the stated uncertainties are too small for these data.", "bad")]
+    single = block["surely_larger"]
+    if single:
+        told = ", ".join(
+            f"{name} {significant(block['parameters'][name]['ratio'], 3)} times" for name in single[:_NAMED]
+        )
+        more = f" and {len(single) - _NAMED} more" if len(single) > _NAMED else ""
+        few = "that" if len(single) == 1 else "those"
+        return [
+            Check(
+                question,
+                f"{answer}, but that of {told}{more}: more than chance explains, so the stated uncertainty of {few} is too small for these "
+                "data.",
+                "care",
+            )
+        ]
     if middle < 1 / tolerated:
         shared = "they also hold errors that all resamples share, as those of the model at neighbouring poses"
         return [Check(question, f"{answer}: no sign that the stated ones are too small; {shared}.", "good")]

@@ -8,11 +8,18 @@ from .particulars import NOT_GIVEN, MeasurementDetails
 from .published_values import TX90L_PAPER, PublishedValues
 from .run_significance import LEVEL, ParameterChanges, parameter_changes
 from .runs import Comparison, Run
-from .study_summary import NOMINAL_COVERAGE, binomial_interval, study_level_rows, study_statistics
+from .study_summary import (
+    ABOUT_ALIKE,
+    NOMINAL_COVERAGE,
+    binomial_interval,
+    study_level_rows,
+    study_statistics,
+)
 from .study_table import StudyTable
 from .two_stage_study import TwoStageStudy
 
 __all__ = [
+    "ABOUT_ALIKE",
     "LEVEL",
     "NOMINAL_COVERAGE",
     "NOT_GIVEN",

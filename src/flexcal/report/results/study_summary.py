@@ -13,11 +13,15 @@ from flexcal.estimation import student_quantile
 from flexcal.report.results.study_table import StudyTable
 
 NOMINAL_COVERAGE = 0.95
+ABOUT_ALIKE = 1.25
+"""Ratio of two spreads that are about alike."""
 _NORMAL_QUANTILE = 1.959963984540054
 _BINS, _FEW = 6, 8
 """Bins of an option with more numbers than a few."""
 _STATISTICS = ("mean_mm", "p90_mm", "max_mm")
 _SMALLEST = 1e-9
+_DOUBT = 0.01
+"""Probability that any of the lower limits of all ratios is above the true one."""
 
 
 def study_statistics(table: StudyTable) -> dict[str, Any]:
@@ -190,15 +194,17 @@ def resampling(table: StudyTable) -> dict[str, Any] | None:
     """Spread of every parameter over resampled data sets beside its standard deviation; None where data were not resampled.
 
     Bootstrap: standard deviation of the estimates; groups left out: the jackknife's √((G − 1)/G Σ (θ − mean)²) (Efron and Tibshirani 1993,
-    chapter 11). `ratio` is the spread over the stated standard deviation, and of all parameters the median. Nothing where options differ,
-    as the spread is theirs too.
+    chapter 11). `ratio` is the spread over the stated standard deviation, and of all parameters the median. `ratio_low` is the lower limit
+    of the true ratio, where the spread over so few data sets is known from chi-square only: all limits together hold with 99 %
+    (Bonferroni); `surely_larger` names those where it is above 1.25, the largest ratio first. Components of the scatter have none: how
+    they share it among them is chance, and some end at zero. Nothing where options differ, as the spread is theirs too.
     """
     names = np.array(table.values("resample"), dtype=object)
     drawn = np.array([isinstance(n, str) and n not in ("", "all") for n in names], dtype=bool)
     if not drawn.any() or table.options:
         return None
     kind = "bootstrap" if str(names[drawn][0]).startswith("bootstrap ") else "jackknife"
-    parameters = {}
+    parameters: dict[str, dict[str, Any]] = {}
     for name in table.parameters:
         estimate, std = table.numbers(f"{name}.estimate"), table.numbers(f"{name}.std")
         own, whole = estimate[drawn], estimate[names == "all"]
@@ -207,12 +213,35 @@ def resampling(table: StudyTable) -> dict[str, Any] | None:
             continue
         spread = own.std(ddof=1) if kind == "bootstrap" else np.sqrt((len(own) - 1) * own.var())
         stated = float(std[names == "all"][0])
-        parameters[name] = {"estimate": float(whole[0]), "std": stated, "spread": float(spread)} | {
+        parameters[name] = {
+            "unit": table.units.get(name),
+            "estimate": float(whole[0]),
+            "std": stated,
+            "spread": float(spread),
             "ratio": float(spread / stated) if stated > 0 else None,
             "resamples": len(own),
         }
+    judged = [name for name in parameters if not name.startswith("scatter.")]
+    for name, item in parameters.items():
+        told = item["ratio"] is not None and name in judged
+        item["ratio_low"] = _surely(item["ratio"], item["resamples"], len(judged)) if told else None
     ratios = [item["ratio"] for item in parameters.values() if item["ratio"] is not None]
-    return {"kind": kind, "resamples": int(drawn.sum()), "ratio": _median(ratios), "parameters": parameters}
+    larger = [name for name, item in parameters.items() if (item["ratio_low"] or 0.0) > ABOUT_ALIKE]
+    return {
+        "kind": kind,
+        "resamples": int(drawn.sum()),
+        "ratio": _median(ratios),
+        "surely_larger": sorted(larger, key=lambda name: -parameters[name]["ratio"]),
+        "parameters": parameters,
+    }
+
+
+def _surely(ratio: float, resamples: int, parameters: int) -> float:
+    """Lower limit of the true ratio of one of many parameters, from the scatter of a spread over so many data sets."""
+    from scipy.special import chdtri
+
+    freedom = resamples - 1
+    return ratio * float(np.sqrt(freedom / chdtri(freedom, _DOUBT / parameters)))
 
 
 def _median(values: list[float]) -> float | None:

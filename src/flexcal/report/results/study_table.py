@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,18 +18,21 @@ _ESTIMATE = ".estimate"
 class StudyTable:
     """Tasks of a study that have ended: their columns as stored, and what the study declares of them.
 
-    `options` are the columns of the options that differ between tasks; `error` names the errors that are the result of a task.
+    `options` are the columns of the options that differ between tasks; `error` names the errors that are the result of a task; `units` are
+    SI units of parameters, by name.
     """
 
     frame: polars.DataFrame
     options: Sequence[str]
     error: str
     has_truth: bool
+    units: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, frame: polars.DataFrame, document: Mapping[str, Any]) -> StudyTable:
         """The rows of the study that a results.json tells of."""
-        return cls(frame, document["options"], document["error"], document["has_truth"])
+        units = document.get("units", {})
+        return cls(frame, document["options"], document["error"], document["has_truth"], units)
 
     def __len__(self) -> int:
         return len(self.frame)

@@ -26,6 +26,14 @@ def effects_section(results: Mapping[str, Any], table: StudyTable) -> Section:
             )
         )
     )
+    if any(item["option"].startswith("cell.") for item in results["effects"]):
+        blocks.append(
+            Text(
+                (
+                    "Values of the cell's settings are in SI units, as in cell.yaml: lengths in m, angles in rad.",
+                )
+            )
+        )
     values = table.numbers(f"{table.error}.p90_mm")
     known = results["has_truth"]
     columns = ("value", "tasks", "median / mm", *(("coverage",) if known else ()))
