@@ -223,8 +223,8 @@ def resampling(table: StudyTable) -> dict[str, Any] | None:
         }
     judged = [name for name in parameters if not name.startswith("scatter.")]
     for name, item in parameters.items():
-        told = item["ratio"] is not None and name in judged
-        item["ratio_low"] = _surely(item["ratio"], item["resamples"], len(judged)) if told else None
+        ratio = item["ratio"] if name in judged else None
+        item["ratio_low"] = None if ratio is None else _surely(ratio, item["resamples"], len(judged))
     ratios = [item["ratio"] for item in parameters.values() if item["ratio"] is not None]
     larger = [name for name, item in parameters.items() if (item["ratio_low"] or 0.0) > ABOUT_ALIKE]
     return {
