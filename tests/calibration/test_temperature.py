@@ -87,8 +87,12 @@ def warmed(
     lag: float = 0.0,
     gradient: np.ndarray | None = None,
     sigma: float = 2.5e-5,
+    eccentric: float = 0.0,
 ) -> tuple[RobotModel, PoseSet, PoseSet]:
-    """A file of poses of an arm that warms up, and the exact points of others, before the same tracker; both are below `folder`."""
+    """A file of poses of an arm that warms up, and the exact points of others, before the same tracker; both are below `folder`.
+
+    Gears are `eccentric` by so many rad.
+    """
     rng = np.random.default_rng(seed)
     arm = ThermalArm(
         DHArm.made(seed), np.full(6, growth), gradient=np.ones(6) if gradient is None else gradient
@@ -98,7 +102,9 @@ def warmed(
     model = RobotModel.from_yaml(robot, estimates=False)
     time, q, others = np.linspace(0, 10800, count), postures(rng, count), postures(rng, 100)
     temperature, other = profile(time, rise), COLD + rise * rng.uniform(size=100)
-    every = tracked(arm.points(np.concatenate([q, others]), np.concatenate([temperature, other])), rng, 0.0)
+    turned = np.concatenate([q, others])
+    turned = turned + eccentric * np.sin(turned + np.arange(6))
+    every = tracked(arm.points(turned, np.concatenate([temperature, other])), rng, 0.0)
     seen = every[:count] + sigma * rng.normal(size=(count, 3))
     read = sensed(time, temperature, rng, noise=noise, lag=lag)
     files = (
@@ -179,6 +185,15 @@ def test_a_column_that_hardly_varies_is_not_used(measured: Callable) -> None:
     still = replace(poses, temperature=np.full(len(poses), 23.0))
     with refused("E-CAL-034", "thermal"):
         geometric_parameters(model, still, ["thermal"])
+
+
+def test_errors_that_other_terms_explain_do_not_hide_an_expansion(measured: Callable) -> None:
+    """Eccentric gears scatter the points of the plain geometry by ten times the noise, as gravity does."""
+    model, poses, _ = measured(24, rise=8.0, eccentric=2e-3)
+    calibration = calibrate(model, poses)
+    assert "thermal" in calibration.selected.terms, str(calibration.selection)
+    low, high = expansion(calibration)
+    assert low < GROWTH < high and high - low < GROWTH
 
 
 def test_the_scatter_of_a_sensor_is_told_where_temperature_is_smooth(measured: Callable) -> None:

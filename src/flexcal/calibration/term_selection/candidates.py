@@ -9,7 +9,6 @@ import numpy as np
 
 from flexcal.calibration.fit import (
     PER_JOINT,
-    GeometricFit,
     free_joints,
     geometric_parameters,
     loaded_compliances,
@@ -41,9 +40,19 @@ class CandidateTerms:
     single: dict[str, tuple[str, ...]]
     excluded: tuple[tuple[str, str], ...]
 
+    def with_thermal(self, poses: PoseSet, scatter: float) -> CandidateTerms:
+        """These and the terms of temperature that `poses` can tell beside a `scatter`, m, of a coordinate."""
+        thermal = thermal_candidates(self.model, poses, scatter)
+        return replace(
+            self,
+            kinds=(*self.kinds, *thermal.kinds),
+            single=self.single | ({ZERO_DRIFT: thermal.single} if thermal.kinds else {}),
+            excluded=(*self.excluded, *thermal.excluded),
+        )
 
-def candidates(model: RobotModel, poses: PoseSet, rigid: GeometricFit) -> CandidateTerms:
-    """Terms to be considered on some poses, by gravity, the declared springs, the moving joints and the scatter of a `rigid` fit."""
+
+def candidates(model: RobotModel, poses: PoseSet) -> CandidateTerms:
+    """Terms to be considered on some poses, by gravity, the declared springs and the moving joints; those of temperature are not here."""
     joints = moving_joints(model, poses)
     masses = carried_mass(model, poses.payload, len(poses))
     torque = gravity_torque(model, poses.q, masses)
@@ -86,10 +95,6 @@ def candidates(model: RobotModel, poses: PoseSet, rigid: GeometricFit) -> Candid
         else:
             model = wider
             kinds.append("backlash")
-    thermal = thermal_candidates(model, poses, rigid)
-    kinds += thermal.kinds
-    single |= {ZERO_DRIFT: thermal.single} if thermal.kinds else {}
-    excluded += thermal.excluded
     kinds += ["ratio"] if geometric_parameters(model, poses, ["ratio"]).names else []
     kinds += [f"transmission_{order}" for order in model.drives.harmonics]
     return CandidateTerms(model, tuple(kinds), single, tuple(excluded))

@@ -134,9 +134,12 @@ def select_terms(
     else:
         near = None if fitted is None else fitted.estimate.values
         rigid = fit_geometry(model, poses, terms=base, elastic=bool(model.elastic), loss="squares", near=near)
-    open_terms = candidates(model, poses, rigid)
+    open_terms = candidates(model, poses)
     by = left_out_by(poses, distinct)
     trials = TermTrials(rigid, open_terms.model, base, folds, by=by)
+    if poses.temperature is not None:
+        # what the base terms alone leave may be ten times as much, as under gravity
+        open_terms = open_terms.with_thermal(poses, trials.scatter((*base, *open_terms.kinds)))
     chosen, rows = base, [trials.start()]
     left: dict[str, TermComparison] = {}
 

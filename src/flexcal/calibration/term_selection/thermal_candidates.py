@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.fit import THERMAL, GeometricFit, moving_joints, sensor_scatter, thermal_parameters
+from flexcal.calibration.fit import THERMAL, moving_joints, sensor_scatter, thermal_parameters
 from flexcal.data.poses import PoseSet
 from flexcal.model.robot import ZERO_DRIFT, RobotModel
 from flexcal.model.statics import points_kinematics
+from flexcal.units import MILLIMETRE
 
 PRECISION = 5e-6
 """Standard deviation of the expansion coefficient, 1/K, beyond which it tells nothing: half of that of steel."""
@@ -27,11 +28,11 @@ class ThermalCandidates:
     excluded: tuple[tuple[str, str], ...] = ()
 
 
-def thermal_candidates(model: RobotModel, poses: PoseSet, rigid: GeometricFit) -> ThermalCandidates:
-    """Terms of temperature to be considered on some poses, by what their temperatures can tell beside the scatter of a `rigid` fit."""
+def thermal_candidates(model: RobotModel, poses: PoseSet, scatter: float) -> ThermalCandidates:
+    """Terms of temperature to be considered on some poses, by what their temperatures can tell beside a `scatter`, m, of a coordinate."""
     if poses.temperature is None:
         return ThermalCandidates()
-    reason = thermal_weakness(poses, rigid)
+    reason = _weakness(model, poses, scatter)
     if reason:
         return ThermalCandidates(excluded=(("thermal", reason),))
     kinds = [kind for kind in THERMAL if kind != "thermal_links" or model.relations is None]
@@ -39,8 +40,8 @@ def thermal_candidates(model: RobotModel, poses: PoseSet, rigid: GeometricFit) -
     return ThermalCandidates(tuple(kinds), tuple(names))
 
 
-def thermal_weakness(poses: PoseSet, rigid: GeometricFit) -> str:
-    """Clause on why temperatures of the poses tell no expansion beside the scatter of a fit; empty where they may."""
+def _weakness(model: RobotModel, poses: PoseSet, scatter: float) -> str:
+    """Clause on why temperatures of the poses tell no expansion beside the scatter; empty where they may."""
     temperature = poses.temperature
     assert temperature is not None
     extent, spread = float(np.ptp(temperature)), float(temperature.std())
@@ -52,17 +53,17 @@ def thermal_weakness(poses: PoseSet, rigid: GeometricFit) -> str:
             f"the temperature varies by {spread:.2g} K (1σ), which is less than {_ABOVE_SENSOR:.0f} times the {sensor:.2g} K by which its "
             "sensor scatters"
         )
-    std = float(np.sqrt(np.mean(rigid.residuals**2))) / (spread * _extent_of(rigid) * np.sqrt(len(poses)))
+    std = scatter / (spread * _extent_of(model, poses) * np.sqrt(len(poses)))
     if std > PRECISION:
         return (
             f"the temperature varies by {extent:.2g} K only, from which an expansion coefficient would be known to "
-            f"{std / _MICRO:.0f} µm/m/K (1σ), and not to {PRECISION / _MICRO:.0f}"
+            f"{std / _MICRO:.0f} µm/m/K (1σ) at the {scatter / MILLIMETRE:.2g} mm that points scatter with all other terms, and not to "
+            f"{PRECISION / _MICRO:.0f}"
         )
     return ""
 
 
-def _extent_of(rigid: GeometricFit) -> float:
+def _extent_of(model: RobotModel, poses: PoseSet) -> float:
     """Root mean square distance, m, of the points from their mean."""
-    poses = rigid.poses
-    at = points_kinematics(rigid.model, poses.q, None, poses.target, jacobians=False).position
+    at = points_kinematics(model, poses.q, None, poses.target, jacobians=False).position
     return float(np.sqrt(((at - at.mean(axis=0)) ** 2).sum(axis=1).mean()))

@@ -165,6 +165,11 @@ class TermTrials:
         """Mean error at left-out poses, m, over the decisive kinds of folds."""
         return self.fit(terms).mean(self.deciding)
 
+    def scatter(self, terms: tuple[str, ...]) -> float:
+        """Standard deviation, m, of a coordinate that a fit of some terms leaves, by its degrees of freedom."""
+        fit = self.fit(terms)
+        return float(np.sqrt(fit.squares / max(self._coordinates - fit.freedom, 1.0)))
+
     def _row(
         self, term: str | None, terms: tuple[str, ...], bic: float, *, taken: bool, reason: str
     ) -> TermComparison:
