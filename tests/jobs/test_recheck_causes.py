@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from dh_arm import DHArm
 from test_recheck import Visited
 
 from flexcal import recheck
@@ -86,6 +87,16 @@ def test_a_noisier_instrument_is_no_change_of_the_robot(visited: Visited, tmp_pa
             )
             assert "cannot be told" in found.headline
     assert verdicts.count("noisier_readings") >= 3 and not _MECHANICAL & set(verdicts), verdicts
+
+
+def test_another_robot_is_no_noisier_instrument(visited: Visited) -> None:
+    """Six other arms of the type, before the same instrument: too much for single changes, and for scatter."""
+    for seed in range(200, 206):
+        visit = visited.shop.measured(visited.robot.model, visited.q, arm=DHArm.made(seed))
+        for reference in (None, visited.reference):
+            found = recheck(visited.robot, visit, reference=reference)
+            assert found.verdict == "recalibrate", (seed, found.headline)
+            assert "this may be another robot" in found.headline or "several together" in found.headline
 
 
 def test_a_shift_beyond_a_larger_scatter_is_still_named(visited: Visited) -> None:

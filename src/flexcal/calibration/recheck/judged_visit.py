@@ -158,7 +158,8 @@ def judge_visit(errors_of: Callable[[bool], VisitErrors | None], *, placed: bool
     # an instrument that moved leaves nothing else; errors that remain have another cause, unless they are a small part of the whole
     before = float(np.sum((judged.test.whitening @ errors.errors) ** 2))
     after = float(np.sum((moved.test.whitening @ again.errors) ** 2))
-    if moved.as_calibrated or (moved.suspects and after < _EVIDENT * before):
+    explained = moved.suspects and moved.scatter is None and after < _EVIDENT * before
+    if moved.as_calibrated or explained:
         return replace(moved, instrument="evident", place=judged.suspects[0] if alone else None)
     return judged
 
@@ -176,11 +177,13 @@ def _judge(errors: VisitErrors) -> JudgedVisit:
     if scatter is None:
         return JudgedVisit(test, probability, _suspects(found), together, shifts)
     # causes by the scatter that the visit has; what that explains is none
-    test = GlobalTest.of(scatter.applied(errors), changes, directed=True)
-    caused = test.probability(errors.errors) <= VISIT_ALARM
-    suspects = _suspects(_explanations(test)) if caused else ()
-    shifts = tuple(_suspect(test, item, 1) for item in test.seen if len(item.change.names) == 1)
-    return JudgedVisit(test, probability, suspects, together, shifts, scatter=scatter)
+    wider = GlobalTest.of(scatter.applied(errors), changes, directed=True)
+    caused = wider.probability(errors.errors) <= VISIT_ALARM
+    suspects = _suspects(_explanations(wider)) if caused else ()
+    if caused and not suspects:  # scatter is not it: more changed, or this is another robot
+        return JudgedVisit(test, probability, (), together, shifts)
+    shifts = tuple(_suspect(wider, item, 1) for item in wider.seen if len(item.change.names) == 1)
+    return JudgedVisit(wider, probability, suspects, together, shifts, scatter=scatter)
 
 
 def _together(test: GlobalTest) -> float:

@@ -63,7 +63,8 @@ def judgement_sentence(judged: JudgedVisit, course: CourseOverVisits | None = No
             )
         return (
             f"{lead}recalibrate ({size}): the errors are not those of shifted joints, a bumped tool, growth or a moved instrument, all "
-            "together; if the instrument is noisier than at the calibration, or poses were not those commanded, measure again first"
+            "together; if this may be another robot, poses were not those commanded, or the instrument is noisier than at the calibration, "
+            "mend that and measure again first"
         )
     if course is not None and course.drifting:
         return f"{lead}{course.drift_words} ({chance})"
