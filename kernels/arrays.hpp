@@ -30,8 +30,8 @@ std::string shape_text(std::size_t axes, Extent&& extent) {
 
 // `object` as an array of this shape. One that is read (const T) is converted where its kind or order differs, from real numbers only;
 // one that is written has to be what it should be.
-template <class T, std::size_t axes>
-Contiguous<T, axes> array(nb::handle object, const std::size_t (&shape)[axes], const char* name) {
+template <class T, std::size_t axes, class Array = Contiguous<T, axes>>
+Array array(nb::handle object, const std::size_t (&shape)[axes], const char* name) {
     constexpr bool read = std::is_const_v<T>, whole = std::is_integral_v<T>;
     const std::string what(name);
     nb::ndarray<nb::ro> raw;
@@ -46,7 +46,7 @@ Contiguous<T, axes> array(nb::handle object, const std::size_t (&shape)[axes], c
         const std::string present = shape_text(raw.ndim(), [&](std::size_t k) { return raw.shape(k); });
         throw nb::value_error((what + " must have the shape " + expected + ", not " + present).c_str());
     }
-    Contiguous<T, axes> taken;
+    Array taken;
     if (!nb::try_cast(object, taken, read)) throw nb::type_error((what + " must be a writable C-contiguous array of float64").c_str());
     return taken;
 }
@@ -63,6 +63,21 @@ template <std::size_t axes>
 Contiguous<double, axes> written_reals(nb::handle object, const std::size_t (&shape)[axes], const char* name) {
     return array<double>(object, shape, name);
 }
+
+// A matrix to be read whose rows are contiguous, and need not follow each other.
+struct Rows {
+    using Strided = nb::ndarray<const double, nb::ndim<2>, nb::device::cpu>;
+
+    Rows(nb::handle object, const std::size_t (&shape)[2], const char* name) : matrix_(array<const double, 2, Strided>(object, shape, name)) {
+        if (matrix_.shape(1) > 1 && matrix_.stride(1) != 1) matrix_ = Strided(reals(object, shape, name));
+    }
+    std::size_t shape(std::size_t axis) const { return matrix_.shape(axis); }
+    std::ptrdiff_t stride() const { return matrix_.stride(0); }
+    const double* data() const { return matrix_.data(); }
+
+  private:
+    Strided matrix_;
+};
 
 using Result = nb::ndarray<nb::numpy, double>;
 

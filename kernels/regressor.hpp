@@ -2,9 +2,9 @@
 //
 // In the frame of link i, with ω, α its angular velocity and acceleration and a the acceleration of its origin less gravity, the link
 // needs force f = m a + A m c, A = [α]× + [ω]×[ω]×, and moment I α + ω × I ω + m c × a. Joint j, whose unit rate moves that frame with
-// velocity v and angular velocity u, feels v·f + u·moment: m gets v·a, m c gets Aᵀ v + a × u, and I gets u·I α + (u × ω)·I ω.
+// velocity v and angular velocity u, feels v·f + u·moment: m gets v·a, m c gets Aᵀ v + a × u, and the six of I are products of u with
+// α and those of ω, which are entries of A and their differences.
 #pragma once
-#include <array>
 #include <cstdint>
 #include <cstring>
 
@@ -14,35 +14,39 @@ namespace flexcal {
 
 constexpr int inertial_size = 10;  // m, m c_x, m c_y, m c_z, Ixx, Ixy, Ixz, Iyy, Iyz, Izz
 
-// What torques per unit parameter a joint feels from a link.
+// What the motion of a link makes of its inertials; x, y and z are the columns of A.
 template <class S>
-inline std::array<S, inertial_size> inertial_torques(const Motion<S>& joint, const Link<S>& link) {
-    const auto& [v, u] = joint;
-    const auto& [w, dw, a] = link;
-    const Vector<S> moment = cross(v, dw) + cross(w, cross(w, v)) + cross(a, u), t = cross(u, w);
-    return {dot(v, a),
-            moment.x,
-            moment.y,
-            moment.z,
-            u.x * dw.x + t.x * w.x,
-            u.x * dw.y + u.y * dw.x + t.x * w.y + t.y * w.x,
-            u.x * dw.z + u.z * dw.x + t.x * w.z + t.z * w.x,
-            u.y * dw.y + t.y * w.y,
-            u.y * dw.z + u.z * dw.y + t.y * w.z + t.z * w.y,
-            u.z * dw.z + t.z * w.z};
-}
-
-// Calls store(joint, column, torque) for every entry of the regressor that is not zero by structure. q, dq, ddq: one S a joint.
-template <class S, class Store>
-void regressor(TreeMotion<S>& tree, const S* q, const S* dq, const S* ddq, Store&& store) {
-    for (int i = 0; i < tree.size(); ++i) {
-        const Link<S>& link = tree.advance(i, q[i], dq[i], ddq[i]);
-        for (int j : tree.path(i)) {
-            const std::array<S, inertial_size> torques = inertial_torques(tree.reach(i, j), link);
-            for (int k = 0; k < inertial_size; ++k) store(j, inertial_size * i + k, torques[k]);
-        }
+class LinkTorques {
+  public:
+    explicit LinkTorques(const Link<S>& link) : a(link.a), dw(link.dw) {
+        const Vector<S>& w = link.w;
+        const S xx = w.x * w.x, yy = w.y * w.y, zz = w.z * w.z;
+        xy = w.x * w.y, xz = w.x * w.z, yz = w.y * w.z;
+        x = {-(yy + zz), xy + dw.z, xz - dw.y};
+        y = {xy - dw.z, -(xx + zz), yz + dw.x};
+        z = {xz + dw.y, yz - dw.x, -(xx + yy)};
     }
-}
+
+    // Calls store(k, torque) with a function for each torque per unit parameter that a joint feels from the link.
+    template <class Store>
+    [[gnu::always_inline]] void felt(const Motion<S>& joint, Store store) const {  // called once a pair of joint and link
+        const auto [v, u] = joint;
+        store(0, [&] { return dot(v, a); });
+        store(1, [&] { return dot(x, v) + (a.y * u.z - a.z * u.y); });
+        store(2, [&] { return dot(y, v) + (a.z * u.x - a.x * u.z); });
+        store(3, [&] { return dot(z, v) + (a.x * u.y - a.y * u.x); });
+        store(4, [&] { return u.x * dw.x + (u.y * xz - u.z * xy); });
+        store(5, [&] { return u.y * y.z - u.x * x.z + u.z * (x.x - y.y); });
+        store(6, [&] { return u.x * x.y - u.z * z.y + u.y * (z.z - x.x); });
+        store(7, [&] { return u.y * dw.y + (u.z * xy - u.x * yz); });
+        store(8, [&] { return u.z * z.x - u.y * y.x + u.x * (y.y - z.z); });
+        store(9, [&] { return u.z * dw.z + (u.x * yz - u.y * xz); });
+    }
+
+  private:
+    Vector<S> a, dw, x, y, z;
+    S xy, xz, yz;
+};
 
 // q, dq, ddq: (samples, n). places: (n, 10 n), for every entry of the regressor the row of out that takes it over the samples, or -1.
 // out: (·, samples); entries that are zero by structure are not written.
@@ -53,15 +57,22 @@ inline void torque_regressor(const Tree& tree, const double* geometry, Vector3 g
     JointStates states(n);
     for (std::ptrdiff_t s = 0; s < samples; s += lane_count) {
         const int present = states.read(q, dq, ddq, s, samples);
-        regressor(motion, states.q(), states.dq(), states.ddq(), [&](int joint, int column, const Lanes& torque) {
-            const std::ptrdiff_t place = places[joint * inertial_size * n + column];
-            if (place < 0) return;
-            double* p = out + place * samples + s;
-            if (present == lane_count)
-                std::memcpy(p, &torque, sizeof torque);
-            else
-                for (int lane = 0; lane < present; ++lane) p[lane] = torque[lane];
-        });
+        for (int i = 0; i < n; ++i) {
+            const LinkTorques<Lanes> link(motion.advance(i, states.q()[i], states.dq()[i], states.ddq()[i]));
+            for (int j : motion.path(i)) {
+                const std::int64_t* rows = places + inertial_size * (j * n + i);
+                double* first = out + s;
+                link.felt(motion.reach(i, j), [rows, first, samples, present](int k, auto torque) {
+                    if (rows[k] < 0) return;
+                    const Lanes value = torque();
+                    double* p = first + rows[k] * samples;
+                    if (present == lane_count)
+                        std::memcpy(p, &value, sizeof value);
+                    else
+                        for (int lane = 0; lane < present; ++lane) p[lane] = value[lane];
+                });
+            }
+        }
     }
 }
 

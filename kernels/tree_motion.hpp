@@ -28,7 +28,7 @@ struct Step {
     RotationOf<S> turn;
 };
 
-// S samples at a time; S needs + - * with itself, cosine, sine and broadcast.
+// S samples at a time; S needs + - * with itself, cosine_and_sine and broadcast.
 template <class S>
 class TreeMotion {
   public:
@@ -63,10 +63,13 @@ class TreeMotion {
         const S moved = q + f.offset;
         RotationOf<S> r = f.aligned;
         step.arm = f.translation;
-        if (slides(i))
+        if (slides(i)) {
             step.arm = step.arm + moved * f.aligned.z;
-        else
-            turn_z(r, cosine(moved), sine(moved));
+        } else {
+            S c, s;
+            cosine_and_sine(moved, c, s);
+            turn_z(r, c, s);
+        }
         step.turn = r * f.bearing_inverse;
         const RotationOf<S> back = transpose(step.turn);
         Link<S>& link = links_[i];

@@ -1,78 +1,143 @@
 // Rows brought into a triangle by Householder reflections: R of the QR of a tall matrix that comes in parts.
+//
+// A reflection H = 1 - scale w wᵀ brings a column below the triangle into one of its rows: w is head in this row and v, the column, below.
+// Four columns are reflected one after the other, and the four reflections then applied to all columns behind them together, two at a
+// time, as in the WY form (Bischof & Van Loan 1987): each value is read once for four reflections. As their heads stand in different rows
+// of the triangle, products of two w are those of their v.
 #pragma once
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstring>
+#include <vector>
 
 #include "lanes.hpp"
 
 namespace flexcal {
 
-constexpr std::ptrdiff_t rows_together = 128;  // of 40 columns they fit a processor's first cache
-constexpr double negligible = 1e-280;           // a column below the triangle whose square is smaller counts as zero: it would underflow
+constexpr double negligible = 1e-280;  // a column below the triangle whose square is smaller counts as zero: it would underflow
 
-inline Lanes load(const double* p) {
-    Lanes a;
-    std::memcpy(&a, p, sizeof a);
-    return a;
-}
-inline void store(double* p, const Lanes& a) { std::memcpy(p, &a, sizeof a); }
-inline double sum(const Lanes& a) { return (a[0] + a[1]) + (a[2] + a[3]); }
+// Up to so many rows are reflected together: 40 columns of them fit a processor's second cache.
+constexpr std::ptrdiff_t lanes_together = 64, rows_together = lanes_together * lane_count;
 
-// Products of v (m) with `count` columns b, `stride` apart; what a reflection takes from them: b_j -= v factor_j.
+// Reflections of `count` columns v; along[i][j] is the product of v_i and v_j, j < i.
 template <int count>
-inline void products(const double* v, const double* b, std::ptrdiff_t stride, std::ptrdiff_t m, double* found) {
-    Lanes total[count] = {};
-    std::ptrdiff_t s = 0;
-    for (; s + lane_count <= m; s += lane_count) {
-        const Lanes a = load(v + s);
-        for (int j = 0; j < count; ++j) total[j] += a * load(b + j * stride + s);
-    }
-    for (int j = 0; j < count; ++j) found[j] = sum(total[j]);
-    for (; s < m; ++s)
-        for (int j = 0; j < count; ++j) found[j] += v[s] * b[j * stride + s];
-}
-template <int count>
-inline void take(const double* v, double* b, std::ptrdiff_t stride, std::ptrdiff_t m, const double* factor) {
-    std::ptrdiff_t s = 0;
-    for (; s + lane_count <= m; s += lane_count) {
-        const Lanes a = load(v + s);
-        for (int j = 0; j < count; ++j) store(b + j * stride + s, load(b + j * stride + s) - factor[j] * a);
-    }
-    for (; s < m; ++s)
-        for (int j = 0; j < count; ++j) b[j * stride + s] -= factor[j] * v[s];
+struct Reflections {
+    double head[count], scale[count], along[count][count];
+};
+
+// Products of `left` columns v with `right` columns b, of m lanes each.
+template <int left, int right>
+inline void products(const Lanes* v, const Lanes* b, std::ptrdiff_t m, double (&found)[left][right]) {
+    Lanes total[left][right] = {};
+    for (std::ptrdiff_t s = 0; s < m; ++s)
+        for (int j = 0; j < right; ++j)
+            for (int i = 0; i < left; ++i) total[i][j] += v[i * lanes_together + s] * b[j * lanes_together + s];
+    for (int i = 0; i < left; ++i)
+        for (int j = 0; j < right; ++j) found[i][j] = sum(total[i][j]);
 }
 
-// One reflection of the row r of the triangle and m rows of b, with w = (head, v) and H = 1 - scale w wᵀ, for `count` columns.
-template <int count>
-inline void reflect(const double* v, double head, double scale, double* r, double* b, std::ptrdiff_t stride, std::ptrdiff_t m) {
-    double along[count];
-    products<count>(v, b, stride, m, along);
-    for (int j = 0; j < count; ++j) {
-        along[j] = scale * (along[j] + head * r[j]);
-        r[j] -= along[j] * head;
-    }
-    take<count>(v, b, stride, m, along);
-}
-
-// triangle: (k, k) by rows, upper. rows: (k, m), every column's m values together; spent.
-inline void update(double* triangle, double* rows, std::ptrdiff_t k, std::ptrdiff_t m) {
-    for (std::ptrdiff_t start = 0; start < m; start += rows_together) {
-        const std::ptrdiff_t count = m - start < rows_together ? m - start : rows_together;
-        for (std::ptrdiff_t c = 0; c < k; ++c) {
-            const double* v = rows + c * m + start;
-            double* r = triangle + c * k;
-            double square;
-            products<1>(v, v, m, count, &square);
-            if (square < negligible) continue;
-            const double size = std::sqrt(r[c] * r[c] + square), corner = r[c] > 0 ? -size : size, head = r[c] - corner;
-            const double scale = -1 / (corner * head);
-            r[c] = corner;
-            std::ptrdiff_t j = c + 1;
-            for (; j + 4 <= k; j += 4) reflect<4>(v, head, scale, r + j, rows + j * m + start, m, count);
-            for (; j < k; ++j) reflect<1>(v, head, scale, r + j, rows + j * m + start, m, count);
+// Reflects column c and those of its panel behind it, then the columns that follow.
+template <int count, int c = 0>
+inline void factor(Lanes* v, double* r, std::ptrdiff_t width, std::ptrdiff_t m, Reflections<count>& panel) {
+    double* row = r + c * width;
+    double factors[count] = {};
+    panel.head[c] = panel.scale[c] = 0;
+    const double* along = panel.along[c];
+    if (along[c] >= negligible) {
+        const double size = std::sqrt(row[c] * row[c] + along[c]), corner = row[c] > 0 ? -size : size, head = row[c] - corner;
+        panel.head[c] = head;
+        panel.scale[c] = -1 / (corner * head);
+        row[c] = corner;
+        for (int j = c + 1; j < count; ++j) {
+            factors[j] = panel.scale[c] * (along[j] + head * row[j]);
+            row[j] -= factors[j] * head;
         }
     }
+    if constexpr (c + 1 < count) {
+        Lanes total[count] = {};
+        for (std::ptrdiff_t s = 0; s < m; ++s) {
+            Lanes x[count];
+            for (int j = 0; j < count; ++j) x[j] = v[j * lanes_together + s];
+            for (int j = c + 1; j < count; ++j) v[j * lanes_together + s] = x[j] -= factors[j] * x[c];
+            for (int j = 0; j < count; ++j) total[j] += x[c + 1] * x[j];
+        }
+        for (int j = 0; j < count; ++j) panel.along[c + 1][j] = sum(total[j]);
+        factor<count, c + 1>(v, r, width, m, panel);
+    }
+}
+
+// Applies reflections to two columns b and what stands above them in the triangle.
+template <int count>
+inline void reflect(const Reflections<count>& panel, const Lanes* v, double* r, std::ptrdiff_t width, Lanes* b, std::ptrdiff_t m) {
+    double factors[count][2];
+    products(v, b, m, factors);
+    for (int i = 0; i < count; ++i)
+        for (int j = 0; j < 2; ++j) {
+            double along = factors[i][j] + panel.head[i] * r[i * width + j];
+            for (int k = 0; k < i; ++k) along -= panel.along[i][k] * factors[k][j];
+            factors[i][j] = panel.scale[i] * along;
+            r[i * width + j] -= factors[i][j] * panel.head[i];
+        }
+    for (std::ptrdiff_t s = 0; s < m; ++s)
+        for (int j = 0; j < 2; ++j) {
+            Lanes x = b[j * lanes_together + s];
+            for (int i = 0; i < count; ++i) x -= factors[i][j] * v[i * lanes_together + s];
+            b[j * lanes_together + s] = x;
+        }
+}
+
+// Rows of several columns, `width` of them with one of zeros where their number is odd, brought into a triangle (width, width) by rows.
+class TriangleUpdate {
+  public:
+    explicit TriangleUpdate(std::ptrdiff_t columns)
+        : columns_(columns), width_(columns + columns % 2), triangle_(width_ * width_), rows_(width_ * lanes_together) {}
+
+    // triangle: (k, k) by rows, upper.
+    void load(const double* triangle) {
+        for (std::ptrdiff_t c = 0; c < columns_; ++c) std::copy_n(triangle + c * columns_, columns_, &triangle_[c * width_]);
+    }
+    void store(double* triangle) const {
+        for (std::ptrdiff_t c = 0; c < columns_; ++c) std::copy_n(&triangle_[c * width_], columns_, triangle + c * columns_);
+    }
+
+    // rows: (k, ·), every column's values together and columns `stride` apart; count of them, up to rows_together.
+    void add(const double* rows, std::ptrdiff_t stride, std::ptrdiff_t count) {
+        const std::ptrdiff_t m = (count + lane_count - 1) / lane_count;
+        for (std::ptrdiff_t c = 0; c < columns_; ++c) {
+            double* column = reinterpret_cast<double*>(&rows_[c * lanes_together]);
+            std::copy_n(rows + c * stride, count, column);
+            std::fill(column + count, column + m * lane_count, 0.0);
+        }
+        std::ptrdiff_t c = 0;
+        for (; c + 4 <= width_; c += 4) step<4>(c, m);
+        if (c < width_) step<2>(c, m);
+    }
+
+  private:
+    template <int count>
+    void step(std::ptrdiff_t c, std::ptrdiff_t m) {
+        Lanes* v = &rows_[c * lanes_together];
+        double* r = &triangle_[c * width_];
+        double along[1][count];
+        products(v, v, m, along);
+        Reflections<count> panel;
+        std::copy_n(along[0], count, panel.along[0]);
+        factor(v, r + c, width_, m, panel);
+        for (std::ptrdiff_t j = c + count; j < width_; j += 2) reflect(panel, v, r + j, width_, &rows_[j * lanes_together], m);
+    }
+
+    std::ptrdiff_t columns_, width_;
+    std::vector<double> triangle_;
+    std::vector<Lanes> rows_;
+};
+
+// triangle: (k, k) by rows, upper. rows: (k, m), every column's m values together and columns `stride` apart.
+inline void update(double* triangle, const double* rows, std::ptrdiff_t k, std::ptrdiff_t m, std::ptrdiff_t stride) {
+    TriangleUpdate whole(k);
+    whole.load(triangle);
+    for (std::ptrdiff_t start = 0; start < m; start += rows_together) whole.add(rows + start, stride, std::min(rows_together, m - start));
+    whole.store(triangle);
 }
 
 }  // namespace flexcal

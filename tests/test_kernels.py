@@ -60,19 +60,65 @@ def test_a_pose_at_rest_does_not_depend_on_those_beside_it(
     assert not len(command.coupling) and not len(command.regressor)
 
 
-@pytest.mark.parametrize("rows", [1, 3, 39, 128, 1001])
-def test_the_triangle_is_that_of_numpy(rows: int, rng: np.random.Generator) -> None:
+@pytest.mark.parametrize("width", [1, 2, 4, 17, 18])
+@pytest.mark.parametrize("rows", [1, 3, 39, 256, 1001])
+def test_the_triangle_is_that_of_numpy(rows: int, width: int, rng: np.random.Generator) -> None:
     """Up to signs, which also R of numpy has no rule for; rows come in two parts, and one column is zero."""
-    columns = rng.normal(size=(17, 2 * rows))
-    columns[5] = 0.0
-    factor = np.zeros((17, 17))
+    columns = rng.normal(size=(width, 2 * rows))
+    columns[5:6] = 0.0
+    factor = np.zeros((width, width))
     for part in (columns[:, :rows], columns[:, rows:]):
-        update(factor, part.copy())
+        update(factor, part)
     assert (np.tril(factor, -1) == 0).all()
     np.testing.assert_allclose(factor.T @ factor, columns @ columns.T, rtol=0, atol=1e-12 * 2 * rows)
-    if 2 * rows >= 17:
-        expected = np.linalg.qr(columns[:5].T, mode="r")
-        np.testing.assert_allclose(np.abs(factor[:5, :5]), np.abs(expected), rtol=0, atol=1e-12 * rows)
+    whole = min(5, width)
+    if 2 * rows >= width:
+        expected = np.linalg.qr(columns[:whole].T, mode="r")
+        np.testing.assert_allclose(
+            np.abs(factor[:whole, :whole]), np.abs(expected), rtol=0, atol=1e-12 * rows
+        )
+
+
+def test_columns_that_nearly_depend_on_each_other_keep_their_digits(rng: np.random.Generator) -> None:
+    """R has columns apart by 1e-9 of their size to its own rounding, of which products of columns tell nothing."""
+    common = rng.normal(size=(1, 700))
+    columns = common + 1e-9 * rng.normal(size=(9, 700))
+    factor = np.zeros((9, 9))
+    update(factor, columns)
+    expected = np.abs(np.diag(np.linalg.qr(columns.T, mode="r")))
+    np.testing.assert_allclose(np.abs(np.diag(factor)), expected, rtol=1e-5)
+    assert expected[-1] < 1e-7 * expected[0]
+
+
+def test_rows_are_read_as_any_array_has_them(rng: np.random.Generator) -> None:
+    columns = rng.normal(size=(6, 300))
+    expected = np.zeros((6, 6))
+    update(expected, columns)
+    for array in (
+        np.asfortranarray(columns),
+        np.repeat(columns, 2, axis=1)[:, ::2],
+        np.pad(columns, ((0, 0), (3, 4)))[:, 3:-4],
+    ):
+        found = np.zeros((6, 6))
+        update(found, array)
+        np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize("largest", [1e-3, 4.0, 300.0, 9.9e4, 1e9])
+def test_cosine_and_sine_are_exact_to_rounding(largest: float, rng: np.random.Generator) -> None:
+    """A pendulum's torque regressor has gravity times both; angles about multiples of π/2, too, in extended precision."""
+    angles = rng.uniform(-largest, largest, 4001)
+    angles[::2] = np.round(angles[::2] / (np.pi / 2)) * (np.pi / 2)
+    still = np.zeros((len(angles), 1))
+    one = np.eye(3)[None]
+    normals = np.eye(3)[None, :2]
+    tree = _kernels.Tree.build([-1], [False], one, np.zeros((1, 3)), normals, one)
+    out = np.zeros((10, len(angles)))
+    places, gravity = np.arange(10)[None], np.array([0.0, 1.0, 0.0])
+    tree.torque_regressor(np.zeros((1, 6)), gravity, angles[:, None], still, still, places, out)
+    precise = angles.astype(np.longdouble)
+    np.testing.assert_allclose(out[1], -np.cos(precise).astype(float), rtol=0, atol=2.3e-16)
+    np.testing.assert_allclose(out[2], np.sin(precise).astype(float), rtol=0, atol=2.3e-16)
 
 
 _SHAPES = {
@@ -131,7 +177,6 @@ _INDICES = {"places", "motors", "twists"}
 _WRITTEN = {
     "out",
     "triangle",
-    "rows",
     "position",
     "velocity",
     "force",

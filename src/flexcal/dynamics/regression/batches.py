@@ -117,10 +117,10 @@ class _Growing:
         self._factors = [np.zeros((len(own) + 1, len(own) + 1)) for own in projection]
 
     def add(self, part: RegressionBlock) -> None:
-        """Update with rows, whose memory is overwritten."""
+        """Update with rows."""
         self._rows += len(part)
         for factor, system in zip(self._factors, part.reduced, strict=True):
-            update(factor, np.ascontiguousarray(system))
+            update(factor, system)
 
     def batch(self) -> Batch:
         whole = [

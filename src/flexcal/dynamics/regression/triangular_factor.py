@@ -96,7 +96,6 @@ def widened(system: np.ndarray, column_indices: np.ndarray, columns: int) -> np.
 
 def triangular(matrix: np.ndarray) -> np.ndarray:
     """Triangular factor R (k, k) of a matrix (·, k), by Householder reflections; the last rows are zero, to rounding, if it has fewer."""
-    columns = np.array(matrix.T, dtype=float, order="C")
-    factor = np.zeros((len(columns), len(columns)))
-    update(factor, columns)
+    factor = np.zeros((matrix.shape[1], matrix.shape[1]))
+    update(factor, matrix.T)
     return factor
