@@ -5,6 +5,7 @@
 // velocity v and angular velocity u, feels v·f + u·moment: m gets v·a, m c gets Aᵀ v + a × u, and the six of I are products of u with
 // α and those of ω, which are entries of A and their differences.
 #pragma once
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 
@@ -49,30 +50,41 @@ class LinkTorques {
 };
 
 // q, dq, ddq: (samples, n). places: (n, 10 n), for every entry of the regressor the row of out that takes it over the samples, or -1.
-// out: (·, samples); entries that are zero by structure are not written.
+// out: (·, samples); entries that are zero by structure are not written. Rows are written in stretches: one sample after the other would
+// go through as many pages of memory as there are rows.
 inline void torque_regressor(const Tree& tree, const double* geometry, Vector3 gravity, const double* q, const double* dq, const double* ddq,
                              const std::int64_t* places, std::ptrdiff_t samples, double* out) {
+    constexpr std::ptrdiff_t stretch = 128;
     const int n = tree.size();
     TreeMotion<Lanes> motion(tree, geometry, gravity);
     JointStates states(n);
-    for (std::ptrdiff_t s = 0; s < samples; s += lane_count) {
-        const int present = states.read(q, dq, ddq, s, samples);
-        for (int i = 0; i < n; ++i) {
-            const LinkTorques<Lanes> link(motion.advance(i, states.q()[i], states.dq()[i], states.ddq()[i]));
-            for (int j : motion.path(i)) {
-                const std::int64_t* rows = places + inertial_size * (j * n + i);
-                double* first = out + s;
-                link.felt(motion.reach(i, j), [rows, first, samples, present](int k, auto torque) {
-                    if (rows[k] < 0) return;
-                    const Lanes value = torque();
-                    double* p = first + rows[k] * samples;
-                    if (present == lane_count)
-                        std::memcpy(p, &value, sizeof value);
-                    else
-                        for (int lane = 0; lane < present; ++lane) p[lane] = value[lane];
-                });
+    std::vector<std::int64_t> rows, own(inertial_size * n * n, -1);
+    for (int i = 0; i < n; ++i)
+        for (int j : motion.path(i))
+            for (int at = inertial_size * (j * n + i); at < inertial_size * (j * n + i + 1); ++at)
+                if (places[at] >= 0) {
+                    own[at] = static_cast<std::int64_t>(rows.size());
+                    rows.push_back(places[at]);
+                }
+    std::vector<double> written(rows.size() * stretch);
+    for (std::ptrdiff_t start = 0; start < samples; start += stretch) {
+        const std::ptrdiff_t count = std::min(stretch, samples - start);
+        for (std::ptrdiff_t s = 0; s < count; s += lane_count) {
+            states.read(q, dq, ddq, start + s, samples);
+            for (int i = 0; i < n; ++i) {
+                const LinkTorques<Lanes> link(motion.advance(i, states.q()[i], states.dq()[i], states.ddq()[i]));
+                for (int j : motion.path(i)) {
+                    const std::int64_t* row = &own[inertial_size * (j * n + i)];
+                    double* first = written.data() + s;
+                    link.felt(motion.reach(i, j), [row, first](int k, auto torque) {
+                        if (row[k] < 0) return;
+                        const Lanes value = torque();
+                        std::memcpy(first + row[k] * stretch, &value, sizeof value);
+                    });
+                }
             }
         }
+        for (std::size_t r = 0; r < rows.size(); ++r) std::copy_n(&written[r * stretch], count, out + rows[r] * samples + start);
     }
 }
 
