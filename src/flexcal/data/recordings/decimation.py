@@ -81,23 +81,33 @@ class DecimationStream:
         """Output samples (k, M) completed by the next `columns` (k, N); M may be zero."""
         for i, stage in enumerate(self._stages):
             pending = self._pending[i]
-            whole = columns if pending is None else np.concatenate([pending, columns], axis=1)
-            columns = _decimated(whole, stage)
-            self._pending[i] = whole[:, stage * columns.shape[1] :].copy()
+            columns, self._pending[i] = _decimated(
+                columns[:, :0] if pending is None else pending, columns, stage
+            )
         return columns
 
 
-def _decimated(columns: np.ndarray, stage: int) -> np.ndarray:
-    """Every `stage`-th sample of the filtered columns, as products with a matrix whose columns are the shifted filter."""
-    length = 2 * _REACH * stage + 1
-    count = max(0, (columns.shape[1] - length) // stage + 1)
+def _decimated(pending: np.ndarray, columns: np.ndarray, stage: int) -> tuple[np.ndarray, np.ndarray]:
+    """Every `stage`-th sample of the filtered `columns` after `pending` ones, as products with a matrix whose columns are the shifted
+    filter, and the samples that are pending then.
+    """
+    before, length = pending.shape[1], 2 * _REACH * stage + 1
+    count = max(0, (before + columns.shape[1] - length) // stage + 1)
     shifted = _shifted_filter(stage)
     kept = np.empty((len(columns), count))
     for start in range(0, count, _TOGETHER):
         number = min(_TOGETHER, count - start)
         first, reach = start * stage, (number - 1) * stage + length
-        kept[:, start : start + number] = columns[:, first : first + reach] @ shifted[:reach, :number]
-    return kept
+        if first >= before:
+            part = columns[:, first - before : first - before + reach]
+        else:
+            part = np.concatenate([pending[:, first:], columns[:, : max(0, first + reach - before)]], axis=1)[
+                :, :reach
+            ]
+        np.matmul(part, shifted[:reach, :number], out=kept[:, start : start + number])
+    spent = stage * count
+    left = columns[:, max(0, spent - before) :]
+    return kept, left.copy() if spent >= before else np.concatenate([pending[:, spent:], left], axis=1)
 
 
 @cache
