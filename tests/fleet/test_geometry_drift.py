@@ -163,6 +163,12 @@ def courses(rng: np.random.Generator, robots: int, visits: int, spread: np.ndarr
     return found
 
 
+def any_alarm(seed: int, largest: float, robots: int, visits: int) -> bool:
+    rng = np.random.default_rng([visits + robots, seed])
+    drifts = geometry_drifts(courses(rng, robots, visits, np.sqrt(np.r_[largest, np.ones(19)])), 1, 0.05)
+    return any(drift.probability <= 0.05 for drift in drifts)
+
+
 @pytest.mark.parametrize(
     ("largest", "robots", "visits"),
     [
@@ -184,14 +190,9 @@ def courses(rng: np.random.Generator, robots: int, visits: int, spread: np.ndarr
 )
 def test_rate_of_false_alarms_of_trends_and_jumps_together(largest: float, robots: int, visits: int) -> None:
     """Any robot of a fleet is named, for a trend or a jump, in 5 % of 200 fleets at most, though all scatter by more than they should."""
-    rng, fleets = np.random.default_rng(visits + robots), 200
-    spread = np.sqrt(np.r_[largest, np.ones(19)])
-    alarms = 0
-    for _ in range(fleets):
-        drifts = geometry_drifts(courses(rng, robots, visits, spread), 1, 0.05)
-        alarms += any(drift.probability <= 0.05 for drift in drifts)
-    print(f"{largest} {robots} {visits}: {alarms} of {fleets}")
-    assert alarms <= binom.ppf(0.999, fleets, 0.05)
+    alarms = sum(over_seeds(any_alarm, range(200), largest, robots, visits))
+    print(f"{largest} {robots} {visits}: {alarms} of 200")
+    assert alarms <= binom.ppf(0.999, 200, 0.05)
 
 
 def any_is_named(seed: int, folder: Path) -> bool:
