@@ -239,6 +239,12 @@ def test_certificate(run, ur5: Path) -> None:
     )
 
 
+def test_a_certificate_is_for_the_temperature_that_was_given(run, ur5: Path) -> None:
+    done = certify(run, ur5, "--temperature", "40", "--json")
+    assert done.status == 0 and done.document["temperature"] == [40.0, 40.0]
+    assert any("the temperature is not used" in remark for remark in done.document["remarks"])
+
+
 def test_a_certificate_has_the_particulars_that_were_given(run, ur5: Path) -> None:
     """What is not given stays a line to fill in, as on the customer's sheets."""
     given = ("--instrument", "tracker T", "--robot-serial", "R-17", "--operator", "A. Meier")

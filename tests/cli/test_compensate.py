@@ -42,6 +42,10 @@ def test_there_and_back_through_files(run, ur5: Path) -> None:
     robot = ur5 / "robot.yaml"
     done = run("compensate", robot, ur5 / "targets.csv", "-o", ur5 / "commands.csv", "--json")
     assert done.status == 0 and "next: run " in done.err
+    warm = run(
+        "compensate", robot, ur5 / "targets.csv", "-o", ur5 / "warm.csv", "--temperature", "40", "--json"
+    )
+    assert warm.err.count("--temperature 40") == 2  # what verifies and what certifies the commands
     document = done.document
     assert document["targets"] == document["compensated"] == 20 and document["refused"] == []
     assert 1.5 < document["error_before_mm"]["mean_mm"] < 3.5

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import polars
 import pytest
 from cli_files import read_csv, snapshot, write_csv
 from refusals import assert_refusal
@@ -139,6 +140,44 @@ def test_one_wild_value_is_named_with_its_line(run, ur5_folder: Path) -> None:
         outcome = run("import", ur5_folder / "robot.yaml", write_csv(ur5_folder / "wild.csv", header, wild))
         assert outcome.status == 2
         assert_refusal(outcome.err, code, f"line 5, column {column}")
+
+
+def test_a_unit_that_is_not_known_is_refused_and_not_guessed(run, ur5_folder: Path) -> None:
+    header, rows = read_csv(ur5_folder / "grid.csv")
+    point = [header.index(name) for name in "xyz"]
+    rows = rows[::25].copy()
+    rows[:, point] /= 25.4e-3
+
+    def headed(unit: str) -> Path:
+        named = [f"{name.upper()} [{unit}]" if name in ("x", "y", "z") else name for name in header]
+        return write_csv(ur5_folder / "inches.csv", named, rows)
+
+    out = ur5_folder / "read.csv"
+    for unit in ("in", "inch", '"'):
+        assert run("import", ur5_folder / "robot.yaml", headed(unit), "--out", out).status == 0
+        np.testing.assert_allclose(polars.read_csv(out)["x"], rows[:, point[0]] * 25.4e-3, rtol=1e-12)
+    refused = run("import", ur5_folder / "robot.yaml", headed("furlong"))
+    assert refused.status == 2
+    assert_refusal(refused.err, "E-IMPORT-069", "[furlong]", "X [furlong]", "m, mm, um, cm, in, ft")
+    mapped = [f"{name}={name.upper()} [furlong][in]" for name in "xyz"]
+    assert run("import", ur5_folder / "robot.yaml", headed("furlong"), "--map", *mapped).status == 0
+
+
+def test_angles_that_were_converted_are_not_said_to_be_degrees(run, ur5_folder: Path) -> None:
+    """A controller's own zero, 200 degrees off, is far past the limits in radians as well."""
+    header, rows = read_csv(ur5_folder / "grid.csv")
+    rows = rows[::25].copy()
+    joint = header.index("q3")
+    rows[:, [header.index(f"q{i}") for i in range(1, 7)]] *= 180 / np.pi
+    rows[:, joint] = np.abs(rows[:, joint]) + 560
+    named = [f"{name} [deg]" if name.startswith("q") else name for name in header]
+    named = ["a" + name if name in ("x", "y", "z") else name for name in named]
+    file = write_csv(ur5_folder / "zero.csv", named, rows)
+    refused = run("import", ur5_folder / "robot.yaml", file)
+    assert refused.status == 2 and "look like degrees" not in refused.err
+    assert_refusal(refused.err, "E-TABLE-001", "converted to rad already", "another zero", "offset:")
+    refused = run("import", ur5_folder / "robot.yaml", file, "--sigma", "0.03")
+    assert_refusal(refused.err, "E-RUN-087", "ax, ay, az: not recognised", "--map x=COLUMN[mm]")
 
 
 def test_a_folder_is_no_file_to_write(run, ur5_folder: Path) -> None:

@@ -32,6 +32,10 @@ HEADERS = [
     ("theta*|px|py|pz|sigma_x|sigma_y|sigma_z|temp",
      {"q": "theta1", "xyz": "px", "sigma_xyz": "sigma_x", "temperature": "temp"}),
     ("J*|E*|x|y|z", {"q": "J1", "xyz": "x"}),
+    ("Punkt|A* [deg]|Mx [mm]|My [mm]|Mz [mm]", {"pose": "Punkt", "q": "A1 [deg]", "xyz": "Mx [mm]"}),
+    ('A* [deg]|X ["]|Y ["]|Z ["]', {"q": "A1 [deg]", "xyz": 'X ["]'}),
+    ("A* [deg]|dx [mm]|dy [mm]|dz [mm]", {"q": "A1 [deg]"}),
+    ("A* [deg]|mx|my|mz", {"q": "A1 [deg]"}),
     ("shoulder_pan|shoulder_lift|elbow|wrist_1|wrist_2|wrist_3|pose.position.x|pose.position.y|pose.position.z|"
      "pose.orientation.x|pose.orientation.y|pose.orientation.z|pose.orientation.w",
      {"q": "shoulder_pan", "xyz": "pose.position.x", "quaternion": "pose.orientation.w"}),
@@ -63,7 +67,9 @@ def test_headers_that_people_use(ur5, made, rng, header, expected) -> None:
     header = written_out(header)
     columns = {name: rng.uniform(-2, 2, 30) for name in header}
     columns |= {
-        name: np.arange(30.0) for name in ("pose", "Nr", "Punktnr", "Point", "Punto") if name in header
+        name: np.arange(30.0)
+        for name in ("pose", "Nr", "Punkt", "Punktnr", "Point", "Punto")
+        if name in header
     }
     guess = guess_columns(made(columns), ur5)
     assert {quantity: placed.columns[0] for quantity, placed in guess.placed.items()} == expected

@@ -23,9 +23,10 @@ from flexcal.calibration.fit import FleetPrior, GeometricFit, base_errors
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.cli.main import main
 from flexcal.data.poses import PoseSet
+from flexcal.estimation import Parameters
 from flexcal.files.formats import write_estimates
 from flexcal.jobs.calibration import calibrate_robot
-from flexcal.jobs.fleet import review_fleet
+from flexcal.jobs.fleet import review_fleet, write_prior
 from flexcal.jobs.fleet_prior import (
     FLEET,
     Member,
@@ -221,6 +222,37 @@ def test_the_file_has_the_prior_and_refuses_other_robots(six: Pooled, tmp_path: 
         pool_fleet({"calibration": members[:2]}, out)
     with refused("E-PRIOR-003", "odd", "robot_0", "joint_3"):
         pooled_prior([*members, replace(members[1], name="odd", model=RobotModel.from_yaml(odd))])
+
+
+def test_too_few_robots_are_said_with_what_was_left_out(six: Pooled, tmp_path: Path) -> None:
+    """Robots that were all calibrated with a prior count in none: not a bare number of 0."""
+    for k, member in enumerate(six.members[:3]):
+        file = write_robot(tmp_path / "fleet" / f"cell_{k}")
+        origin = {**member.estimate.provenance, "input.fleet": "0" * 64}
+        write_estimates(
+            file.parent / "estimates.yaml", "calibration", replace(member.estimate, provenance=origin)
+        )
+    with refused("E-PRIOR-002", "without cell_0, cell_1, cell_2, calibrated with a prior of other robots"):
+        write_prior(tmp_path / "fleet", tmp_path / "prior.yaml")
+
+
+def test_a_robot_that_differs_from_the_others_is_not_pooled(six: Pooled, tmp_path: Path) -> None:
+    """Another batch, by an error far beyond what robots of the fleet differ by."""
+    fleet = tmp_path / "fleet"
+    files = [write_robot(fleet / f"cell_{k}").parent / "estimates.yaml" for k in range(len(six.members))]
+    for file, member in zip(files, six.members, strict=True):
+        write_estimates(file, "calibration", member.estimate)
+    pooled = write_prior(fleet, tmp_path / "all.yaml").prior.geometry
+    assert pooled is not None and len(pooled.robots) == 6
+    name = next(spread.name for spread in review_fleet(fleet).spreads if spread.name in pooled.names)
+    estimate = six.members[4].estimate
+    moved = [replace(p, value=p.value + 0.03) if p.name == name else p for p in estimate.parameters]
+    write_estimates(files[4], "calibration", replace(estimate, parameters=Parameters(moved)))
+    written = write_prior(tmp_path / "fleet", tmp_path / "prior.yaml")
+    assert written.prior.geometry is not None and "cell_4" not in written.prior.geometry.robots
+    assert len(written.prior.geometry.robots) == 5
+    (said,) = [remark for remark in written.remarks if "cell_4" in remark]
+    assert f"without cell_4, whose geometry differs from that of the others beyond chance in {name}" in said
 
 
 def test_calibrations_that_tell_nothing_of_the_arm_are_refused(six: Pooled) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -58,6 +58,30 @@ def test_the_weight_that_something_else_carries_is_named(tmp_path: Path) -> None
         assert found["shoulder"].share == pytest.approx(1.0 - carried, abs=0.2)
     check = check_weight_shares({"shoulder": {"share": -0.01, "low": -0.02, "high": 0.0}})
     assert check.status == "care" and "on shoulder" in check.answer and "joint_springs" in check.answer
+
+
+def test_torques_in_another_unit_are_the_first_thing_to_check(tmp_path: Path) -> None:
+    """Currents show too little weight on every joint, a balancer on one: only there springs come first, and the torques are right."""
+    arm = Observation(two_links(tmp_path), CLASSIC)
+    motion = moved(arm)
+
+    def answer(torque: np.ndarray) -> str:
+        found = shares(arm, replace(motion, torque=torque))
+        unlike = {name: asdict(share) for name, share in found.items() if share.unlike}
+        return check_weight_shares(unlike, len(found)).answer if unlike else ""
+
+    currents = answer(motion.torque / 12.0)
+    assert "on shoulder 0.08" in currents and "on elbow 0.08" in currents
+    assert "Check first whether the torques are in another unit (currents in A" in currents
+    assert "torques and masses are then wrong by that factor" in currents
+    assert currents.index("unit") < currents.index("something else carries the arm")
+    assert "all the same" not in currents
+    carried = answer(motion.torque - np.column_stack([shoulder_weight(motion.q), 0 * motion.time]))
+    assert (
+        "Either something else carries the arm" in carried and "torques are predicted all the same" in carried
+    )
+    assert "Or the torques of shoulder are in another unit" in carried
+    assert answer(motion.torque) == ""
 
 
 def springs(arm: Observation, motion: Motion) -> Sequence[str]:

@@ -31,8 +31,13 @@ if TYPE_CHECKING:
     from flexcal.progress import Progress
 
 
-def considered_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """One line a term of `term_selection` in results.json; compliances of single joints that were left stand in one line together."""
+def considered_lines(rows: Sequence[Mapping[str, Any]], fitted: Sequence[str]) -> list[str]:
+    """One line a term of `term_selection` in results.json; compliances of single joints that were left stand in one line together.
+
+    Of the `fitted` terms that of the transmission is in place of its waves, and is told as such.
+    """
+    from flexcal.calibration.error_model import TRANSMISSION
+
     lines, joints = [], []
     for row in rows:
         term = row["term"]
@@ -47,6 +52,10 @@ def considered_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     if joints:
         lines.append(
             f"considered for single joints and left, because left-out poses or the BIC do not support them: {', '.join(joints)}"
+        )
+    if TRANSMISSION in fitted and any(str(row["term"]).startswith(f"{TRANSMISSION}_") for row in rows):
+        lines.append(
+            "fitted in place of transmission_1 and so on, taken or left: transmission, random waves of every joint of fitted size"
         )
     return lines
 
@@ -86,6 +95,7 @@ class Calibrate:
 
     def run(self) -> None:
         """Calibrate, and print identifiability, errors and remarks."""
+        from flexcal.calibration.error_model import TRANSMISSION
         from flexcal.calibration.fit import KNOWN_POINT_STD
         from flexcal.cli.tables.results import (
             dropped_table,
@@ -118,12 +128,13 @@ class Calibrate:
             console.say(
                 f"with all terms: {seen['selected']['rank']} of {seen['selected']['parameters']} parameters{lost}"
             )
-        for line in considered_lines(document["term_selection"]):
+        for line in considered_lines(document["term_selection"], calibration.selected.terms):
             console.say(line)
         errors, poses = document["calibration"], calibration.selected.poses
         located, held = poses.located, bool(poses.in_socket.all())
+        named = {TRANSMISSION: "random transmission"}
         terms = ("elastic, " if calibration.selected.model.elastic else "") + " + ".join(
-            calibration.selected.terms
+            named.get(term, term) for term in calibration.selected.terms
         )
         labels = {"rigid": "rigid", "selected": f"selected: {terms}"}
         rows = uncalibrated_rows(document, held=held) | {label: errors[key] for key, label in labels.items()}

@@ -10,7 +10,7 @@ from tyro.conf import arg
 
 from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.particulars import ParticularsOptions
-from flexcal.cli.arguments.shared_options import Estimates, Json, Robot, require_robot
+from flexcal.cli.arguments.shared_options import Estimates, Json, Robot, Temperature, require_robot
 from flexcal.cli.terminal.console import Console
 
 
@@ -31,6 +31,7 @@ class Certificate(ParticularsOptions):
     after: Annotated[Path, arg(metavar="FILE")]
     """Points measured with compensated commands."""
     estimates: Estimates = None
+    temperature: Temperature = None
     out: Annotated[Path, arg(metavar="FILE", aliases=["-o"])] = Path("certificate.html")
     """The page."""
     json: Json = False
@@ -50,6 +51,7 @@ class Certificate(ParticularsOptions):
                 self.after,
                 self.out,
                 estimates=self.estimates,
+                temperature=self.temperature,
                 particulars=self.particulars,
                 command=command_line(),
                 progress=progress,

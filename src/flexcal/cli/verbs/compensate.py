@@ -131,5 +131,5 @@ class Compensate:
         console.finish(
             document,
             f"run {self.out} on the robot, measure it, and flexcal verify {self.robot} {measured}; with the nominal commands "
-            f"measured too, flexcal certificate {self.robot} --targets {self.targets} --before NOMINAL.csv --after MEASURED.csv{where}",
+            f"measured too, flexcal certificate {self.robot} --targets {self.targets} --before NOMINAL.csv --after {measured}",
         )

@@ -62,7 +62,7 @@ class Fleet:
         written, refusal = None, None
         if self.prior is not None:
             try:
-                written = write_prior(self.fleet, self.prior)
+                written = write_prior(self.fleet, self.prior, fleet)
             except FlexcalError as problem:
                 refusal = problem
         console.show(fleet_table(document))

@@ -143,13 +143,13 @@ class IdentifyDynamics:
         )
         if dynamics.bodiless:
             console.say(
-                f"the inertials of {', '.join(dynamics.bodiless)} are not physically consistent: torques are right, but springs and a URDF "
-                "need consistent ones; use --estimator sdp"
+                f"the inertials of {', '.join(dynamics.bodiless)} are not physically consistent: predicted torques do not depend on it, "
+                "but springs and a URDF need consistent ones; use --estimator sdp"
             )
         for remark in (*document["remarks"], *document["notes"]):
             console.say(remark)
         if shares := document["weight_shares"]:
-            weight = check_weight_shares(shares)
+            weight = check_weight_shares(shares, document["weight_compared"])
             console.say(f"{weight.question} {weight.answer}")
         if (share := document["external_share"]) and (sensor := check_external(share)).status != "good":
             console.say(sensor.answer)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexcal.data.poses.length_units import unit_advice
 from flexcal.data.poses.pose_set import PoseSet
 from flexcal.data.tables import Signal, Table
 from flexcal.errors import InputError
@@ -13,6 +14,10 @@ from flexcal.errors import InputError
 if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
 
+_ALIKE = 1.5
+"""Factor by which the extent of measured points differs from that of the nominal robot's at the same poses, at most."""
+_POSSIBLE = (0.02, 1.3)
+"""Extent of the points or distances of all poses about their middle, relative to the robot's reach, where the nominal one tells nothing."""
 STILL = 1e-3
 """Range over all poses (rad or m) below which a joint counts as never moving."""
 SAME_POSE = 0.02
@@ -61,6 +66,25 @@ def check_same_pose(pose: np.ndarray, q: np.ndarray, table: Table) -> None:
         )
 
 
+def _nominal_extent(poses: PoseSet, model: RobotModel) -> float | None:
+    """Median distance, m, of the nominal robot's points from the middle of those of their station and target; None where it has none."""
+    from flexcal.model.kinematics import point_kinematics
+
+    known = set(model.points)
+    if poses.kind is not None or not known.issuperset(poses.targets):
+        return None
+    extent = np.zeros(len(poses))
+    for target in poses.targets:
+        seen = poses.target == target
+        position = point_kinematics(model, poses.q[seen], point=target).position
+        for station in poses.stations:
+            rows = poses.station[seen] == station
+            if rows.any():
+                own = position[rows]
+                extent[np.flatnonzero(seen)[rows]] = np.linalg.norm(own - np.median(own, axis=0), axis=1)
+    return float(np.median(extent))
+
+
 def check_metres(poses: PoseSet, model: RobotModel, table: Table, signal: Signal) -> None:
     """Raise `InputError` where points cannot be in m.
 
@@ -83,8 +107,10 @@ def check_metres(poses: PoseSet, model: RobotModel, table: Table, signal: Signal
     row = int(np.argmax(wrong))
     column = signal.column_of(int(np.argmax(np.abs(values[row]))))
     place = f"the point lies {distance[row]:.4g} m from the instrument and {spread[row]:.4g} m from the middle of all points"
-    if wrong.sum() > 0.2 * wrong.size and distance.max() * 1e-3 < farthest:
-        advice = "these look like millimetres: convert them to m, or declare 'unit: mm' under `signals:`."
-    else:
-        advice = "correct or remove the line."
+    many = wrong.sum() > 0.2 * wrong.size
+    extent, nominal = float(np.median(spread)), _nominal_extent(poses, model)
+    advice = unit_advice(extent, nominal / _ALIKE, nominal * _ALIKE) if many and nominal else ""
+    if many and not advice:
+        advice = unit_advice(extent, *(share * reach for share in _POSSIBLE))
+    advice = advice or "correct or remove the line."
     raise table.error("E-POSES-007", row, column, f"{place}, but the robot reaches {reach:.3g} m; {advice}")

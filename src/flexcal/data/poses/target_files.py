@@ -14,6 +14,7 @@ from flexcal.data.poses.columns import (
     unit_quaternions,
     whole_numbers,
 )
+from flexcal.data.poses.length_units import unit_advice
 from flexcal.data.poses.tool_targets import ToolTargets
 from flexcal.data.tables import (
     Table,
@@ -29,6 +30,9 @@ from flexcal.model.parts import rotation_wxyz, wxyz_rotation
 
 if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
+
+_DISTANCES = (0.12, 1.3)
+"""Usual distance of targets from the base, relative to the robot's reach."""
 
 
 def read_targets(path: str | Path, model: RobotModel) -> ToolTargets:
@@ -192,12 +196,9 @@ def _check_metres(table: Table, columns: tuple[str, ...], position: np.ndarray, 
     distance = np.linalg.norm(position, axis=1)
     if (distance > 10 * reach).any():
         row = int(np.argmax(distance > 10 * reach))
-        likely = np.median(distance) * 1e-3 < 2 * reach and np.median(distance) > 10 * reach
-        advice = (
-            "these look like millimetres: convert them to m, or declare 'unit: mm' under `signals:`."
-            if likely
-            else "correct or remove the line."
-        )
+        middle = float(np.median(distance))
+        near = unit_advice(middle, *(share * reach for share in _DISTANCES)) if middle > 10 * reach else ""
+        advice = near or "correct or remove the line."
         place = (
             f"the point lies {distance[row]:.4g} m from the robot's base, but the robot reaches {reach:.3g} m"
         )

@@ -39,8 +39,12 @@ def check_joint_units(model: RobotModel, table: Table, signal: Signal, q: np.nda
     scaled = q * (MILLIMETRE if prismatic else DEGREE)
     likely = not ((scaled < lower - margin) | (scaled > upper + margin))[:, column].any()
     limits = f"{value:g} {unit} is far past the limits of {joint.name} ({lower[column]:.4g} to {upper[column]:.4g} {unit})"
+    factor = signal.factor[column] if signal.matrix is None else 0.0
     advice = (
-        f"these look like {word}: convert them to {unit}, or declare 'unit: {other}' under `signals:`."
+        f"it is converted to {unit} already: the controller may count the joint from another zero or the other way round, which "
+        "`offset:` and `gain:` under `signals:` say, or --map of import; or the columns are in another order."
+        if abs(factor) != 1.0
+        else f"these look like {word}: convert them to {unit}, or declare 'unit: {other}' under `signals:`."
         if likely
         else "check the unit and the order of the columns."
     )

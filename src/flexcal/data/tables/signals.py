@@ -16,7 +16,7 @@ from flexcal.errors import InputError, unreadable
 from flexcal.files.formats import read_yaml_file
 from flexcal.files.structuring import suggestion
 from flexcal.files.transaction import current_path
-from flexcal.units import COLDEST, DEGREE, HOTTEST, MILLIMETRE, temperature_fault
+from flexcal.units import COLDEST, DEGREE, HOTTEST, INCH, MILLIMETRE, temperature_fault
 
 if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel, SignalConfig
@@ -40,7 +40,7 @@ _RATE = {"rad/s": 1.0, "deg/s": DEGREE, "rpm": 2 * pi / 60, "m/s": 1.0, "mm/s": 
 _ACCELERATION = {"rad/s^2": 1.0, "deg/s^2": DEGREE, "m/s^2": 1.0, "mm/s^2": MILLIMETRE}
 _TORQUE = {"N m": 1.0, "Nm": 1.0, "N": 1.0, "A": 1.0, "mA": 1e-3}
 _TILT = {"rad": 1.0, "mrad": 1e-3, "deg": DEGREE, "1": 1.0, "m/s^2": 1 / 9.80665}
-_LENGTH = {"m": 1.0, "mm": MILLIMETRE, "um": 1e-6}
+_LENGTH = {"m": 1.0, "mm": MILLIMETRE, "um": 1e-6, "cm": 1e-2, "in": INCH, "ft": 12 * INCH}
 TIMESTAMP = "timestamp"
 """Unit of time for texts with date or time of day, which count as seconds from the first."""
 UNITS: dict[str, dict[str, float]] = {

@@ -3,7 +3,7 @@ from .base_and_tilts import TILTS
 from .excitation_records import ExcitationSource, ResponseRecords, read_response_records, record_paths
 from .map_option import apply_map
 from .nominal_consistency import NominalMismatch, check_nominal
-from .recognition import RecognisedColumns, UnusedColumn, guess_columns, reasons_unused
+from .recognition import RecognisedColumns, UnusedColumn, guess_columns, reasons_unused, require_known_units
 from .rtde_names import TOOL
 
 __all__ = [
@@ -22,4 +22,5 @@ __all__ = [
     "read_response_records",
     "reasons_unused",
     "record_paths",
+    "require_known_units",
 ]

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.data.tables import TIMESTAMP, VECTORS
+from flexcal.data.tables import TIMESTAMP, UNITS, VECTORS
+from flexcal.errors import InputError
 from flexcal.importing.columns.assignment import ORIENTATIONS, ColumnAssignment, units_of
 from flexcal.importing.columns.base_and_tilts import TILTS, base_columns, tilt_columns
 from flexcal.importing.columns.joints import joint_quantities
@@ -37,10 +38,15 @@ from flexcal.importing.tables import (
     ForeignTable,
     parse_name,
     rank,
+    unknown_unit,
 )
 
 if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
+
+
+_NO_PREFIX = frozenset(["d", "e", "i", "j", "k", "n", "o", "r", "s", "u", "v"])
+"""Letters before x, y and z of deviations, directions, turns, uncertainties and velocities."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +92,24 @@ def _shortened(columns: Sequence[str]) -> list[str]:
     return listed
 
 
+def require_known_units(
+    guess: RecognisedColumns, recognised: RecognisedColumns, foreign: ForeignTable
+) -> None:
+    """Raise `InputError` for a unit in the name of a column that is not known, where the `guess` is as `recognised`, without --map."""
+    for quantity, item in guess.placed.items():
+        known = [unit for unit in units_of(quantity) if unit != TIMESTAMP]
+        if item is not recognised.placed.get(quantity) or not known:
+            continue
+        for column in item.columns:
+            unit = unknown_unit(column)
+            if unit is not None:
+                raise InputError(
+                    "E-IMPORT-069",
+                    f"{foreign.table.file.path}: the unit [{unit}] of the column '{column}', taken as {quantity}, is none of "
+                    f"{', '.join(known)}; convert it to one of them, or say with --map which of them it is, behind the column's name.",
+                )
+
+
 def guess_columns(foreign: ForeignTable, model: RobotModel) -> RecognisedColumns:
     """Recognise the columns of a foreign table; no column is two things, and what could be two is left out and named."""
     if not foreign.named:
@@ -107,7 +131,10 @@ def guess_columns(foreign: ForeignTable, model: RobotModel) -> RecognisedColumns
     turns = orientation_groups(rest) | ({("components", ()): unnamed} if unnamed else {})
     turning = {column for columns in turns.values() for column in columns}
     rest = [name for name in rest if name.column not in turning]
-    vectors, singles = _vectors(rest, reasons), _singles(rest, foreign, reasons)
+    vectors = _vectors(rest, reasons)
+    if "xyz" not in vectors and not any("could both begin xyz" in why for why in reasons.values()):
+        vectors |= _prefixed_points(rest, reasons)
+    singles = _singles(rest, foreign, reasons)
     turned = orientation_of(turns, rest, vectors.get("xyz", ()), reasons)
     for quantity, columns in (vectors | singles | turned).items():
         other = placed.get(quantity)
@@ -211,6 +238,27 @@ def _vectors(names: Sequence[ColumnName], reasons: dict[str, str]) -> dict[str, 
                     missing = " and ".join(axis for axis in wanted if axis not in axes)
                     reasons |= dict.fromkeys(axes.values(), f"no {missing} was recognised beside them")
     return vectors
+
+
+def _prefixed_points(names: Sequence[ColumnName], reasons: dict[str, str]) -> dict[str, tuple[str, ...]]:
+    """Columns of points whose names are one word that ends in x, y and z, as Mx, My and Mz, where their unit is one of lengths."""
+    groups: dict[tuple[str, ...], dict[str, str]] = {}
+    for name in names:
+        last = name.words[-1] if name.words else ""
+        prefix, axis = last[:-1], last[-1:]
+        others = set(name.words[:-1])
+        apart = not prefix or prefix in _NO_PREFIX or {prefix, *others} & (NO_POINT | TURN | SIGMA)
+        if axis in ("x", "y", "z") and name.unit in UNITS["xyz"] and not apart:
+            groups.setdefault((*name.words[:-1], prefix, str(name.number)), {})[axis] = name.column
+    whole = [axes for axes in groups.values() if len(axes) == len(VECTORS["xyz"])]
+    if len(whole) != 1:
+        firsts = [axes["x"] for axes in whole]
+        why = f"{' and '.join(firsts)} could both begin xyz: say which with --map"
+        reasons |= {column: why for axes in whole for column in axes.values()}
+        return {}
+    for column in whole[0].values():
+        reasons.pop(column, None)
+    return {"xyz": tuple(whole[0][axis] for axis in VECTORS["xyz"])}
 
 
 def _singles(

@@ -1,4 +1,4 @@
-from .column_names import ColumnName, parse_name, unit_of
+from .column_names import ColumnName, parse_name, unit_of, unknown_unit
 from .foreign_table import ForeignTable
 from .header_rows import NUMBER, find_header
 from .vocabulary import (
@@ -45,4 +45,5 @@ __all__ = [
     "parse_name",
     "rank",
     "unit_of",
+    "unknown_unit",
 ]

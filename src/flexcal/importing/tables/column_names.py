@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from unicodedata import normalize
 
-from flexcal.importing.tables.vocabulary import SINGLE
+from flexcal.importing.tables.vocabulary import NEUTRAL, SINGLE
 
 _UNITS = {
     "deg": ("deg", "degree", "degrees", "degs", "°", "º", "grad"),
@@ -16,6 +16,9 @@ _UNITS = {
     "m": ("m", "meter", "meters", "metre", "metres"),
     "mm": ("mm", "millimeter", "millimeters", "millimetre", "millimetres"),
     "um": ("um", "µm", "μm", "micron", "microns"),
+    "cm": ("cm", "centimeter", "centimeters", "centimetre", "centimetres"),
+    "in": ("in", "inch", "inches", "zoll", '"', "″", "''"),
+    "ft": ("ft", "foot", "feet", "'", "′"),
     "s": ("s", "sec", "second", "seconds"),
     "ms": ("ms", "msec", "millisecond", "milliseconds"),
     "us": ("us", "µs", "μs", "usec"),
@@ -49,6 +52,9 @@ _AS_WORD = {
     "radians",
     "mm",
     "um",
+    "cm",
+    "inch",
+    "inches",
     "ms",
     "us",
     "nm",
@@ -92,6 +98,16 @@ def is_unit(text: str) -> bool:
 def unit_of(text: str) -> str | None:
     """Unit denoted by a text, as `signals:` writes it."""
     return _SPELLINGS.get(text.strip().strip("[](){}<>").strip().lower())
+
+
+def unknown_unit(column: str) -> str | None:
+    """What stands in square brackets at the end of a column's name and is no unit that is known; None where nothing of that kind does."""
+    bracket = _BRACKETS.search(column)
+    if bracket is None or not bracket[0].startswith("["):
+        return None
+    text = bracket[1].strip()
+    words = {part.lower() for part in _WORDS.findall(text)}
+    return None if not text or is_unit(text) or text.isdigit() or words <= NEUTRAL else text
 
 
 def parse_name(column: str, unit: str | None = None) -> ColumnName:

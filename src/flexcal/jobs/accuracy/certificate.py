@@ -33,7 +33,7 @@ from flexcal.errors import InputError
 from flexcal.files.formats import sha256_of
 from flexcal.jobs.accuracy.verification import require_stations, verification_poses
 from flexcal.jobs.calibration import fitted_files, fitted_points
-from flexcal.jobs.inputs import CalibratedRobot, unmeasured_targets_remark
+from flexcal.jobs.inputs import CalibratedRobot, unmeasured_targets_remark, with_temperature
 from flexcal.jobs.pages import Result
 from flexcal.model.parts import vector_rotation
 from flexcal.model.robot import RobotModel
@@ -110,6 +110,8 @@ class Certificate(Result):
         Remarks on points that the calibration did not measure.
     fitted : tuple of str
         Files or points among those after that the calibration was made from.
+    temperatures : tuple of str
+        Remarks on the temperatures of the points measured after.
     files : mapping of str
         SHA-256 of the files by what they are, where the result was made from files.
     command : str
@@ -127,6 +129,7 @@ class Certificate(Result):
     sample: StratifiedSample | None
     uncalibrated: tuple[str, ...]
     fitted: tuple[str, ...]
+    temperatures: tuple[str, ...] = ()
     files: Mapping[str, str] = field(default_factory=dict)
     command: str = ""
 
@@ -186,7 +189,11 @@ class Certificate(Result):
     @property
     def remarks(self) -> tuple[str, ...]:
         """One sentence each."""
-        remarks = [*dict.fromkeys([*self.before.poses.notes, *self.after.poses.notes]), *self.uncalibrated]
+        remarks = [
+            *dict.fromkeys([*self.before.poses.notes, *self.after.poses.notes]),
+            *self.uncalibrated,
+            *self.temperatures,
+        ]
         if self.unmatched_targets:
             remarks.append(
                 f"targets that were measured only before or only after are not compared: {self.unmatched_targets}"
@@ -255,6 +262,7 @@ def certify(
     before: PoseSet,
     after: PoseSet,
     *,
+    temperature: float | None = None,
     progress: Progress = silent,
 ) -> Certificate:
     """Compare measurements at nominal and at compensated commands with the targets of both.
@@ -272,6 +280,8 @@ def certify(
         Points measured with the nominal commands.
     after : PoseSet
         Points measured with the compensated commands, outside the fit.
+    temperature : float, optional
+        Temperature of the arm at both, °C, where the points do not say it.
     progress : Progress
         Called with the stage and the share of it that is done.
 
@@ -302,7 +312,8 @@ def certify(
     for poses in (before, after):
         require_points(poses)
         require_stations(robot, poses)
-    return _compared(robot, targets, "the targets", {"before": before, "after": after}, progress)
+    sets = {"before": before, "after": after}
+    return _compared(robot, targets, "the targets", sets, temperature, progress)
 
 
 def certify_robot(
@@ -313,6 +324,7 @@ def certify_robot(
     out: Path,
     *,
     estimates: Path | None = None,
+    temperature: float | None = None,
     particulars: MeasurementDetails = NOT_GIVEN,
     command: str = "",
     progress: Progress = silent,
@@ -334,7 +346,7 @@ def certify_robot(
     desired = read_targets(targets, calibrated.probable)
     sets = {str(file): verification_poses(calibrated, [file]) for file in (before, after)}
     progress("reading", 1.0)
-    compared = _compared(calibrated, desired, str(targets), sets, progress)
+    compared = _compared(calibrated, desired, str(targets), sets, temperature, progress)
     files = _files(
         [robot_file, calibrated.nominal.urdf],
         {"estimates": calibrated.stored, "targets": targets, "before": before, "after": after},
@@ -346,10 +358,18 @@ def certify_robot(
 
 
 def _compared(
-    robot: CalibratedRobot, desired: ToolTargets, origin: str, sets: dict[str, PoseSet], progress: Progress
+    robot: CalibratedRobot,
+    desired: ToolTargets,
+    origin: str,
+    sets: dict[str, PoseSet],
+    temperature: float | None,
+    progress: Progress,
 ) -> Certificate:
     """The targets, called `origin`, with the two `sets` of measured poses by their names: before, then after; `sets` is emptied."""
     model, (first, last) = robot.probable, sets
+    warm: tuple[str, ...] = ()
+    for file, poses in sets.items():
+        sets[file], warm = with_temperature(robot, poses, temperature)
     progress("comparing", 0.0)
     base, as_declared = (
         desired_pose(model, nominal, desired).position for nominal in (robot.with_points, robot.nominal)
@@ -400,6 +420,7 @@ def _compared(
         scale=error_scale(known, _measured_noise(there, covariance)),
         sample=sample,
         uncalibrated=unmeasured_targets_remark(robot, end.targets),
+        temperatures=warm,
         fitted=fitted_points(robot, end),
     )
 

@@ -232,6 +232,7 @@ class DynamicsIdentification(TorqueIdentification):
             "weight_shares": {
                 joint: asdict(share) for joint, share in self.weight_shares.items() if share.unlike
             },
+            "weight_compared": len(self.weight_shares),
             "base_parameters": self._base_parameters(),
             "essential_parameters": self._essential_parameters(),
             "parameters": quantities(self.estimate),

@@ -11,12 +11,16 @@ import numpy as np
 
 from flexcal.errors import InputError
 from flexcal.files.formats import Block
+from flexcal.jobs.fleet.job import Fleet, review_fleet
 from flexcal.jobs.fleet.members import by_geometry, distinct, latest_members, twins_of, unlike
 from flexcal.jobs.fleet.places import local_fleet
 from flexcal.jobs.fleet.projects import find_results
 from flexcal.jobs.fleet_prior import FEWEST, Member, ModelPrior, PooledValues, pool_fleet
 from flexcal.report.layout import counted
 
+_NAMED = 3
+"""Largest number of parameters that a sentence names."""
+_WHAT: dict[Block, str] = {"calibration": "geometry", "stiffness": "stiffness", "dynamics": "dynamics"}
 _IDENTIFIED = {
     "calibration": "calibrated",
     "stiffness": "whose stiffness was identified",
@@ -112,11 +116,13 @@ def _document(pooled: PooledValues | None) -> dict[str, Any] | None:
     }
 
 
-def write_prior(place: str | Path, out: Path) -> WrittenPrior:
+def write_prior(place: str | Path, out: Path, reviewed: Fleet | None = None) -> WrittenPrior:
     """Pool what was identified last of the robots of a fleet, those of the geometry that most have, and write the prior of the next.
 
+    Robots that differ from the others beyond chance in any parameter are left out, as the fleet is `reviewed`; it is by default here.
     Raises `InputError` where no three robots have one geometry, and as `pool_fleet` does.
     """
+    reviewed = review_fleet(place) if reviewed is None else reviewed
     with local_fleet(str(place)) as root:
         blocks, remarks = latest_members(find_results(root)[0])
         own: dict[Block, list[Member]] = {}
@@ -135,7 +141,9 @@ def write_prior(place: str | Path, out: Path) -> WrittenPrior:
         if groups:
             remarks += _left_out(str(place), groups)
             own = groups[0]
-        prior, more = pool_fleet(own, out)
+        own, apart = _without_outlying(own, reviewed)
+        remarks += apart
+        prior, more = pool_fleet(own, out, remarks)
         remarks += more
     twins = twins_of(own["calibration"])
     remarks += [
@@ -143,6 +151,31 @@ def write_prior(place: str | Path, out: Path) -> WrittenPrior:
         for twin in twins
     ]
     return WrittenPrior(out, prior, tuple(remarks), len({twin.robot for twin in twins}))
+
+
+def _without_outlying(
+    own: Mapping[Block, Sequence[Member]], reviewed: Fleet
+) -> tuple[dict[Block, list[Member]], list[str]]:
+    """Members without the robots that differ from the others of their model in what was identified, and remarks on these.
+
+    The tests are corrected for the number of robots and parameters, and name a fifth of the robots at most.
+    """
+    kept, remarks = {}, []
+    for block, members in own.items():
+        unlike_in: dict[str, list[str]] = {}
+        for spread in reviewed.spreads:
+            for item in spread.outliers if spread.kind == block else ():
+                unlike_in.setdefault(spread.robots[item.number], []).append(spread.name)
+        rest = [member for member in members if member.name not in unlike_in]
+        kept[block] = rest if len(rest) >= FEWEST else list(members)
+        for name in (member.name for member in members if member not in kept[block]):
+            found = unlike_in[name]
+            more = f" and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
+            remarks.append(
+                f"without {name}, whose {_WHAT[block]} differs from that of the others beyond chance in {', '.join(found[:_NAMED])}{more}: "
+                "the prior is of robots like the others"
+            )
+    return kept, remarks
 
 
 def _left_out(place: str, groups: Sequence[Mapping[Block, Sequence[Member]]]) -> list[str]:

@@ -16,9 +16,12 @@ from flexcal.jobs.fleet_prior.temperatures import temperature_remark
 from flexcal.jobs.fleet_prior.value_pooling import pool_friction, pool_springs
 
 
-def pool_fleet(members: Mapping[Block, Sequence[Member]], out: Path) -> tuple[ModelPrior, list[str]]:
+def pool_fleet(
+    members: Mapping[Block, Sequence[Member]], out: Path, left_out: Sequence[str] = ()
+) -> tuple[ModelPrior, list[str]]:
     """Pool robots by the block that was identified of them, and write the prior to `out`; returns it with remarks on what is not in it.
 
+    `left_out` are remarks on robots that are not among the members, for the message where too few are.
     Raises `FlexcalError` as `pooled_prior` does where there are as many calibrations as it needs, and where there is nothing to pool.
     """
     remarks: list[str] = []
@@ -27,7 +30,7 @@ def pool_fleet(members: Mapping[Block, Sequence[Member]], out: Path) -> tuple[Mo
     friction = _values(members.get("dynamics", ()), pool_friction, "friction", remarks)
     geometry = None
     if len(calibrated) >= FEWEST or (springs is None and friction is None):
-        geometry = pooled_prior(calibrated)
+        geometry = pooled_prior(calibrated, left_out)
         remarks += temperature_remark(calibrated)
     else:
         remarks.append(

@@ -30,13 +30,13 @@ _TOLD = 0.9
 """Variance of a mean, relative to the plausible one, below which the robots tell something of it."""
 
 
-def pooled_prior(members: Sequence[Member]) -> FleetPrior:
-    """Prior for a further robot of the model of some calibrated ones (`estimation.population`).
+def pooled_prior(members: Sequence[Member], left_out: Sequence[str] = ()) -> FleetPrior:
+    """Prior for a further robot of the model of some calibrated ones (`estimation.population`); `left_out` says why others are none.
 
     Raises `FlexcalError` for fewer than three robots, robots of other kinematics or with other terms, and those that were calibrated with
     such a prior themselves, which would count the others twice.
     """
-    _require_alike(members)
+    _require_alike(members, left_out)
     names, sizes, measured = _measured(members)
     if not names or not any(len(own.observed) for own in measured):
         raise FlexcalError(
@@ -95,12 +95,14 @@ def _measured(members: Sequence[Member]) -> tuple[list[str], np.ndarray, list[Me
     return names, sizes, [geometry_information(member.estimate, names, cell, sizes) for member in members]
 
 
-def _require_alike(members: Sequence[Member]) -> None:
+def _require_alike(members: Sequence[Member], left_out: Sequence[str]) -> None:
     if len(members) < FEWEST:
+        listed = ", ".join(member.name for member in members)
+        reasons = "; ".join(left_out)
         raise FlexcalError(
             "E-PRIOR-002",
             f"a prior needs at least {FEWEST} calibrated robots of a model, and there are {len(members)}"
-            f"{': ' + ', '.join(m.name for m in members) if members else ''}; fewer do not tell how much robots differ.",
+            f"{': ' + listed if listed else ''}{f' ({reasons})' if reasons else ''}; fewer do not tell how much robots differ.",
         )
     first = members[0]
     for member in members:

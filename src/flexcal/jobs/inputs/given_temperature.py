@@ -90,20 +90,25 @@ def temperature_remarks(
 
 
 def _unused(robot: CalibratedRobot, temperature: np.ndarray, what: str) -> str:
-    """That a calibration without a term of temperature takes none, and how far from its own temperatures (N,) °C are."""
+    """That a calibration without a term of temperature takes none, and how far outside its own temperatures those given (N,), °C, are."""
     said = "the temperature is not used, because the calibration has no term that depends on it: "
     measured = robot.blocks["calibration"].ranges.get(TEMPERATURE) if "calibration" in robot.blocks else None
     if measured is None:
         return f"{said}{what} are for the temperature at which it was measured, which is not known"
     low, high = measured
     where = f"at {low:.1f} °C" if high - low < 0.1 else f"from {low:.1f} to {high:.1f} °C"
-    away = float(np.maximum(low - temperature, temperature - high).max())
-    far = (
-        f", and {away:.1f} K from the farthest of these temperatures"
-        if away > 0
-        else ", which includes these"
+    away = np.maximum(low - temperature, temperature - high)
+    beyond, farthest = float(away.max()), float(temperature[np.argmax(away)])
+    if beyond <= 0:
+        return (
+            f"{said}{what} are for the temperatures at which it was measured, {where}, which includes these"
+        )
+    given = (
+        f"the given {farthest:.1f} °C"
+        if np.ptp(temperature) == 0
+        else f"of those given the farthest, {farthest:.1f} °C,"
     )
-    return f"{said}{what} are for the temperatures at which it was measured, {where}{far}"
+    return f"{said}{what} are for the temperatures at which it was measured, {where}; {given} is {beyond:.1f} K outside"
 
 
 def calibrated_temperatures(robot: CalibratedRobot) -> tuple[float, float]:

@@ -72,8 +72,8 @@ def weight_faults(logs: Sequence[JointLog], model: RobotModel) -> Iterator[str]:
         if joint is not None:
             yield (
                 f"{log.path}: the torque of {model.joint_names[joint]} has the sign of its gravity torque instead of the "
-                "opposite; change its sign by "
-                "`tau: {gain: […]}` under `signals:`, or correct `gravity:` in robot.yaml"
+                f"opposite: its sign is reversed; change its sign by `tau: {{gain: […]}}` under `signals:`, or by "
+                f"--map 'tau{joint + 1}=-COLUMN' where the file was imported, or correct `gravity:` in robot.yaml"
             )
         elif log.weight.on_motor_side:
             yield (

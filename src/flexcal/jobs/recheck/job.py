@@ -155,10 +155,11 @@ def _repeated(readings: Readings, before: Sequence[Visit]) -> str | None:
     most, when = max(shared, default=(0, ""))
     if not most:
         return None
-    return (
-        f"{most} of the {len(readings.pose)} readings are those of the visit of {when}, to the last digit: they tell nothing new, and the "
-        "test takes them for new ones; give a file with this visit alone"
-    )
+    of = f"of the {len(readings.pose)} readings"
+    said = f"to the last digit: {'it tells' if most == 1 else 'they tell'} nothing new, and the test takes"
+    if most == 1:
+        return f"one {of} is that of the visit of {when}, {said} it for a new one; give a file with this visit alone"
+    return f"{most} {of} are those of the visit of {when}, {said} them for new ones; give a file with this visit alone"
 
 
 def _order(when: str, stored: Path, later: Sequence[Visit], becomes: bool) -> tuple[str, ...]:

@@ -31,6 +31,7 @@ from flexcal.importing.columns import (
     check_nominal,
     guess_columns,
     reasons_unused,
+    require_known_units,
 )
 from flexcal.importing.orientations import NominalPoses
 from flexcal.importing.readers import read_foreign
@@ -158,17 +159,18 @@ def import_file(
     """
     model = RobotModel.from_yaml(robot_file, estimates=False)
     foreign = read_foreign(file, model.motor_names, sheet=sheet, topic=topic)
-    guess = guess_columns(foreign, model)
+    guess = recognised = guess_columns(foreign, model)
     if motors is not None:
         mapped = (*motors.mapped(file, list(foreign.numbers), model.motor_names), *mapped)
     if mapped:
         guess = apply_map(mapped, guess, foreign, model)
+    require_known_units(guess, recognised, foreign)
     kind, guess = _kind(foreign, guess, model)
     columns, values = _converted(foreign, guess, model)
     remarks = list(foreign.notes)
     stated = {"sigma", "sigma_xyz"} & guess.placed.keys()
     if sigma is not None:
-        _check_sigma(sigma, file, stated, measured=bool({"xyz", "length"} & guess.placed.keys()))
+        _check_sigma(sigma, file, stated, guess)
         columns["sigma"] = np.full(len(foreign), sigma)
     elif {"xyz", "length"} & guess.placed.keys() and not stated:
         remarks.append(
@@ -334,11 +336,16 @@ def _check_poses(
     check_metres(poses, model, table, guess.placed[place].signal())
 
 
-def _check_sigma(sigma: float, file: Path, stated: set[str], *, measured: bool) -> None:
+def _check_sigma(sigma: float, file: Path, stated: set[str], guess: RecognisedColumns) -> None:
     if not 0 < sigma < np.inf:
         raise InputError("E-RUN-086", f"--sigma is {sigma / MILLIMETRE:g}; it must be positive, in mm.")
-    if not measured:
-        raise InputError("E-RUN-087", f"--sigma is of measured points, but {file} has none; leave it out.")
+    if not {"xyz", "length"} & guess.placed.keys():
+        left = "; ".join(reasons_unused(guess.left_out))
+        unused = f" ({left}); say which they are with --map x=COLUMN[mm] and so on, or" if left else ";"
+        raise InputError(
+            "E-RUN-087",
+            f"--sigma is of measured points, but none were recognised in {file}{unused} leave --sigma out.",
+        )
     if stated:
         raise InputError(
             "E-RUN-088",

@@ -15,6 +15,8 @@ LARGE, TOO_LARGE = 10.0, 30.0
 JOINT_LARGE = 25.0
 """Relative torque error of a joint, per cent, above which it is predicted poorly; small torques are mostly friction."""
 _SHOWN = 3
+_OTHER_UNIT = 10 / 3
+"""Factor between identified and declared gravity torque beyond which masses are rarely wrong, but units and gains are."""
 _SENSOR = 0.1
 """Largest distance of 1 from the interval of the external torque ratio: axes rotated by half a radian."""
 
@@ -90,8 +92,8 @@ def check_bodies(bodiless: list[str]) -> Check:
         return Check(question, "Yes: all masses and pseudo-inertias are positive.", "good")
     return Check(
         question,
-        f"Not {', '.join(bodiless)}. Torques are not affected, but springs and a URDF need consistent inertials: identify with "
-        f"--estimator sdp.",
+        f"Not {', '.join(bodiless)}. Predicted torques do not depend on that, but springs and a URDF need consistent inertials: identify "
+        f"with --estimator sdp.",
         "care",
     )
 
@@ -111,19 +113,40 @@ def check_weight(faults: list[str]) -> Check:
     return Check(question, f"No, which was accepted: {faults[0]}.", "care")
 
 
-def check_weight_shares(shares: Mapping[str, Mapping[str, float]]) -> Check:
-    """Reservation about joints, named in `shares`, whose identified gravity torque differs much from that of the URDF."""
+def check_weight_shares(shares: Mapping[str, Mapping[str, float]], compared: int | None = None) -> Check:
+    """Reservation about joints, named in `shares`, whose identified gravity torque differs much from that of the URDF.
+
+    Where the gravity torque is far from that on all joints that were `compared`, the torques are the first to be doubted; something that
+    carries the arm does so on one joint.
+    """
     told = "; ".join(
         f"on {joint} {significant(max(0.0, share['share']), 2)} times that (95 % interval {significant(share['low'], 2)} to "
         f"{significant(share['high'], 2)})"
         for joint, share in list(shares.items())[:_SHOWN]
     )
-    return Check(
-        "Do the links weigh what the URDF says?",
-        f"No: {told}. Torques are not affected. Either something else carries the arm (declare springs under `dynamics: joint_springs:`; a "
-        "counterweight belongs in the URDF) or loads it (a tool), or the URDF's masses are guesses (accept that with --accept weight).",
-        "care",
+    far = [
+        name
+        for name, share in shares.items()
+        if share["high"] < 1 / _OTHER_UNIT or share["low"] > _OTHER_UNIT
+    ]
+    otherwise = (
+        "something else carries the arm (declare springs under `dynamics: joint_springs:`; a counterweight belongs in the URDF) or loads "
+        "it (a tool), or the URDF's masses are guesses (accept that with --accept weight)"
     )
+    unlike = "in another unit (currents in A, or per cent), have a wrong gain, or are those of the motor instead of the joint"
+    wrong = (
+        "torques and masses are then wrong by that factor, which `tau: {gain: […]}` under `signals:` corrects"
+    )
+    if far and len(far) >= max(2, compared or 0):
+        advice = (
+            f"Check first whether the torques are {unlike}: {wrong}. If they are right, either {otherwise}."
+        )
+    elif far:
+        listed = ", ".join(far[:_SHOWN])
+        advice = f"Either {otherwise}; torques are predicted all the same. Or the torques of {listed} are {unlike}: {wrong}."
+    else:
+        advice = f"If the measured torques are right, so are the predicted ones, and either {otherwise}."
+    return Check("Do the links weigh what the URDF says?", f"No: {told}. {advice}", "care")
 
 
 def check_external(share: Mapping[str, float]) -> Check:
@@ -165,7 +188,7 @@ def dynamics_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
         check_shown(results["remarks"]).named("drive_terms"),
         *([check_weight(faults).named("weight")] if (faults := results.get("weight_faults")) else []),
         *(
-            [check_weight_shares(shares).named("weight_shares")]
+            [check_weight_shares(shares, results.get("weight_compared")).named("weight_shares")]
             if (shares := results.get("weight_shares"))
             else []
         ),
