@@ -52,6 +52,20 @@ def test_another_order_and_a_left_handed_frame(tx90l, measured) -> None:
     assert mirrored is not None and "left-handed" in mirrored.proposal and mirrored.options == ()
 
 
+def test_another_unit(tx90l, measured) -> None:
+    """Inches that were read as millimetres, and centimetres that were read as metres."""
+    q, points = measured
+    read = ColumnAssignment.plain("xyz", ("X", "Y", "Z"), ("mm",) * 3, "")
+    found = check_nominal(tx90l, q, points / 25.4, PLACED, points=read)
+    assert found is not None and found.doubtful and "in inches, but were read in mm" in found.proposal
+    assert found.options == ("x=25.4*X[mm]", "y=25.4*Y[mm]", "z=25.4*Z[mm]")
+    read = ColumnAssignment.plain("xyz", ("X", "Y", "Z"), ("m",) * 3, "")
+    found = check_nominal(tx90l, q, 100 * points, PLACED, points=read)
+    assert found is not None and found.options[0] == "x=0.01*X[m]"
+    fits = check_nominal(tx90l, *measured, PLACED, points=read)
+    assert fits is not None and not fits.proposal
+
+
 def test_rows_that_do_not_belong_together_have_no_explanation(tx90l, measured) -> None:
     q, points = measured
     found = check_nominal(tx90l, q[::-1], points, PLACED)

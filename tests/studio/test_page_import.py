@@ -14,8 +14,13 @@ import pytest
 from browser import studio
 from page_elements import WAIT, choose, count_rows, fill, go_to, press, see
 
+from flexcal import RobotModel
+from flexcal.jobs.setup import edit_robot
+from flexcal.model.kinematics import point_kinematics
+
 TICK = 2 * np.pi / 4096
 """Of a motor of LeRobot, rad."""
+TX90L = Path(__file__).parents[2] / "examples" / "tx90l"
 EXAMPLE = Path(__file__).parents[2] / "examples" / "ur5_tracker"
 
 
@@ -38,6 +43,8 @@ def test_columns_and_units_of_another_program(page: Any, tmp_path: Path) -> None
         see(page, "flexcal import robot.yaml 'tracker export.csv' --out poses.csv")
         press(page, "Show how it is read")
         see(page, "done in")
+        row = page.get_by_role("row").filter(has_text="A1 [deg]")
+        assert row.inner_text().split()[:4] == ["q1", "A1", "[deg]", "deg"]
         assert not (folder / "poses.csv").exists()
         fill(page, "Columns", "q1='A1 [deg]")
         see(page, "Columns: No closing quotation")
@@ -54,6 +61,39 @@ def test_columns_and_units_of_another_program(page: Any, tmp_path: Path) -> None
         press(page, "Import")
         see(page, "tracker export-imported.csv is there already")
     assert count_rows(folder / "poses.csv") == 20
+
+
+def test_a_file_in_inches_and_a_point_that_is_elsewhere(page: Any, tmp_path: Path) -> None:
+    """The page says how the columns were read and what would fit; then where the point fits better, and writes it when asked to."""
+    pytest.importorskip("viser", reason="viser is absent: pip install 'flexcal[studio]'")
+    folder = tmp_path / "arm"
+    folder.mkdir()
+    for name in ("robot.yaml", "tx90l.urdf"):
+        shutil.copy(TX90L / name, folder / name)
+    model = RobotModel.from_yaml(folder / "robot.yaml")
+    q = np.random.default_rng(4).uniform(-1.5, 1.5, (25, model.n))
+    points = point_kinematics(model, q, jacobians=False).position
+    edit_robot(folder / "robot.yaml", {("points", "smr", "xyz"): [0.06, 0.03, 0.1]})
+    foreign = {f"J{k + 1}": q[:, k] for k in range(model.n)}
+    foreign |= {axis: points[:, k] / 0.0254 for k, axis in enumerate("xyz")}
+    pl.DataFrame(foreign).write_csv(folder / "inch.csv")
+    (folder / ".studio.json").write_text('{"step": "Measure", "row source": "a file in another format"}')
+    with studio(folder) as running:
+        page.goto(running.url)
+        press(page, "Import")
+        see(page, "if they are in inches")
+        page.get_by_text("what it said").click(timeout=WAIT)
+        options = re.search(r"read as --map (.*)", page.locator("body").inner_text())
+        assert options and "q1=J1[rad]" in options[1]
+        size = 0.0254 if "x=x[m]" in options[1] else 25.4
+        fill(page, "Columns", " ".join(f"{a}={size}*{a}[{'m' if size < 1 else 'mm'}]" for a in "xyz"))
+        press(page, "Import")
+        see(page, "or take this place")
+        press(page, "Write this place to robot.yaml")
+        see(page, "--write-point")
+        see(page, "done in")
+    found = RobotModel.from_yaml(folder / "robot.yaml").point()
+    assert found.xyz == pytest.approx(model.point().xyz, abs=1e-4)
 
 
 def test_motors_of_lerobot(page: Any, tmp_path: Path) -> None:

@@ -111,6 +111,8 @@ class Import:
             console.say(remark)
         self._say_fit(console, imported)
         if not imported.trusted and not self.unchecked:
+            if self.json:
+                console.say(f"read as --map {' '.join(imported.mapped())}")
             raise InputError("E-CLI-035", self._doubt(imported))
         if self.write_point:
             self._write_point(console, imported)

@@ -35,6 +35,8 @@ _ROTATION = 0.1
 _MOST_ROWS = 60
 _MOST_JOINTS = 8
 _TURNS = (0.0, np.pi / 2, -np.pi / 2, np.pi)
+_LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 1e-3, "um": 1e-6, "inches": 0.0254, "feet": 0.3048}
+"""Units of points, m; flexcal reads some of them, of the others a column is multiplied."""
 _ROUNDS = 20
 _SOME_ROUNDS = 2
 _ALIKE = 1.5
@@ -66,12 +68,19 @@ class NominalMismatch:
 
 
 def check_nominal(
-    model: RobotModel, q: np.ndarray, xyz: np.ndarray, placed: ColumnAssignment, *, point: str | None = None
+    model: RobotModel,
+    q: np.ndarray,
+    xyz: np.ndarray,
+    placed: ColumnAssignment,
+    *,
+    point: str | None = None,
+    points: ColumnAssignment | None = None,
 ) -> NominalMismatch | None:
     """Register the nominal robot at `q` (N, n) rad or m with points `xyz` (N, 3), m, of one station and target.
 
     Where that misses by more than a hundredth of the reach, joints counted the other way or from another zero, another order of the
-    columns `placed` as q, and points in a left-handed frame are tried. None with fewer than six rows: anything fits then.
+    columns `placed` as q, points in a left-handed frame, and another unit of their columns `points` are tried. None with
+    fewer than six rows: anything fits then.
     """
     if len(q) < _FEWEST:
         return None
@@ -90,7 +99,7 @@ def check_nominal(
         _MADE_GOOD * moved_rms, _ODD * model.reach
     ):
         return replace(mismatch, proposal=_FROM_HAND, supported=False)
-    return _explained(model, tool, q, xyz, placed, mismatch)
+    return _explained(model, tool, q, xyz, placed, points, mismatch)
 
 
 @dataclass(frozen=True)
@@ -133,15 +142,21 @@ class _Tool:
 
 @dataclass(frozen=True, eq=False)
 class _Change:
-    """Another reading of the columns: their `order`, `signs` and `zeros` (rad) of the joints, points in a `mirrored` frame."""
+    """Another reading of the columns: their `order`, `signs` and `zeros` (rad) of the joints, points in a `mirrored` frame or a `unit`.
+
+    `scale` is that unit in the one that was read.
+    """
 
     order: tuple[int, ...]
     signs: np.ndarray
     zeros: np.ndarray
     mirrored: bool = False
+    unit: str = ""
+    scale: float = 1.0
 
     def read(self, q: np.ndarray, xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return self.signs * q[:, self.order] + self.zeros, xyz * [1.0, 1.0, -1.0] if self.mirrored else xyz
+        turned = self.signs * q[:, self.order] + self.zeros
+        return turned, self.scale * (xyz * [1.0, 1.0, -1.0] if self.mirrored else xyz)
 
 
 def _explained(
@@ -150,19 +165,20 @@ def _explained(
     q: np.ndarray,
     xyz: np.ndarray,
     placed: ColumnAssignment,
+    points: ColumnAssignment | None,
     mismatch: NominalMismatch,
 ) -> NominalMismatch:
     """The misfit with the simplest explanation that makes good most of it, with the point where it was declared if one does so."""
     enough = min(_MADE_GOOD * mismatch.moved_rms, _ODD * model.reach)
-    simple = list(_simple_changes(model))
+    simple = [*_simple_changes(model), *_other_units(model, points)]
     for rounds in (1, _ROUNDS):
         for change in simple:
             if tool.miss(*change.read(q, xyz), rounds)[0] < enough:
-                return replace(mismatch, **_said(model, placed, change))
+                return replace(mismatch, **_said(model, placed, points, change))
     if model.n <= _MOST_JOINTS:
         change = _signs_and_zeros(model, tool, q, xyz)
         if tool.miss(*change.read(q, xyz), _ROUNDS)[0] < enough:
-            return replace(mismatch, **_said(model, placed, change))
+            return replace(mismatch, **_said(model, placed, points, change))
     return mismatch
 
 
@@ -182,6 +198,21 @@ def _simple_changes(model: RobotModel) -> Iterator[_Change]:
         exchanged = list(straight)
         exchanged[i], exchanged[j] = j, i
         yield _Change(tuple(exchanged), ones, zeros)
+
+
+def _other_units(model: RobotModel, points: ColumnAssignment | None) -> Iterator[_Change]:
+    """Points in another unit than that in which they were read."""
+    if points is None or points.unit not in _LENGTHS:
+        return
+    for unit, size in _LENGTHS.items():
+        if unit != points.unit:
+            yield _Change(
+                tuple(range(model.n)),
+                np.ones(model.n),
+                np.zeros(model.n),
+                unit=unit,
+                scale=size / _LENGTHS[points.unit],
+            )
 
 
 def _turning(model: RobotModel) -> list[int]:
@@ -212,13 +243,23 @@ def _signs_and_zeros(model: RobotModel, tool: _Tool, q: np.ndarray, xyz: np.ndar
     return min(alike, key=lambda change: np.sum(change.signs < 0) + 1.5 * np.sum(change.zeros != 0))
 
 
-def _said(model: RobotModel, placed: ColumnAssignment, change: _Change) -> dict[str, Any]:
+def _said(
+    model: RobotModel, placed: ColumnAssignment, points: ColumnAssignment | None, change: _Change
+) -> dict[str, Any]:
     """Values of `proposal` and `options` for a misfit explained by a change."""
     words, options = [], []
     if change.mirrored:
         words.append(
             "the points are in a left-handed frame: one of x, y, z has the opposite sign, or two are exchanged"
         )
+    if change.unit and points is not None:
+        words.append(
+            f"the points fit this robot if they are in {change.unit}, but were read in {points.unit}"
+        )
+        options += [
+            f"{axis}={change.scale * gain:.10g}*{column}[{points.unit}]"
+            for axis, column, gain in zip("xyz", points.columns, points.gains, strict=True)
+        ]
     if change.order != tuple(range(model.n)):
         words.append(
             f"the joints seem to be in another order: {', '.join(placed.columns[i] for i in change.order)}"

@@ -281,7 +281,8 @@ class RowJudge:
         return Judgement(
             "misfit",
             f"the points of {int((~own).sum())} of {len(own)} rows are not where this robot can have been: check the order, "
-            "signs and units of the joint values and of x, y, z; 'flexcal import' tells them of a whole file.",
+            "signs and units of the joint values and of x, y, z, and the place of the point on the tool in robot.yaml; 'flexcal import' "
+            "finds these from a whole file.",
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -99,6 +100,18 @@ class ImportedFile:
     def trusted(self) -> bool:
         """Whether the points are plausible for this robot."""
         return self.misfit is None or not self.misfit.doubtful
+
+    def mapped(self) -> list[str]:
+        """The columns as --map has them, in quotes where there are spaces."""
+        told = []
+        for name, read in self.document()["columns"].items():
+            gain, offset, unit = read["gain"], read["offset"], read["unit"]
+            factor = "" if gain == 1 else "-" if gain == -1 else f"{gain:g}*"
+            column = f"{name}={factor}{read['from']}" + (
+                f"[{unit}]" if unit and unit not in read["from"] else ""
+            )
+            told.append(shlex.quote(column + (f"{offset:+g}" if offset else "")))
+        return told
 
     def document(self) -> dict[str, Any]:
         """The JSON document."""
@@ -417,7 +430,14 @@ def _misfit(
     if "xyz" not in values or not model.points:
         return None
     rows, target = _groups(columns, len(values["q"]))[0]
-    return check_nominal(model, values["q"][rows], _from_base(values)[rows], guess.placed["q"], point=target)
+    return check_nominal(
+        model,
+        values["q"][rows],
+        _from_base(values)[rows],
+        guess.placed["q"],
+        point=target,
+        points=guess.placed["xyz"],
+    )
 
 
 def _from_base(values: dict[str, np.ndarray]) -> np.ndarray:

@@ -65,12 +65,10 @@ class CommandBox:
 def _ending(run: CommandRun, project: Project) -> str:
     if run.status == "running":
         return paragraph(f"{run.stage[0]} …" if run.stage else "starting …")
-    if run.status == "failed":
-        return paragraph(project.told(run.error), "bad")
     if run.status == "cancelled":
         return paragraph("cancelled; nothing was written.", "warning")
-    told = [m for m in run.messages if not m.startswith("next: ")][-_MESSAGES:]
+    told = [m for m in run.messages if not m.startswith(("next: ", "flexcal: "))][-_MESSAGES:]
     messages = "".join(paragraph(project.told(message), "faint") for message in told)
-    return paragraph(f"done in {run.seconds:.1f} s", "good") + (
-        folded("what it said", messages) if told else ""
-    )
+    failed = run.status == "failed"
+    ending = (project.told(run.error), "bad") if failed else (f"done in {run.seconds:.1f} s", "good")
+    return paragraph(*ending) + (folded("what it said", messages) if told else "")

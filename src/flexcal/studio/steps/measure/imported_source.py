@@ -11,7 +11,8 @@ from flexcal.errors import InputError
 from flexcal.studio.commands import CommandRun, command_line
 from flexcal.studio.steps.measure.motor_fields import MotorFields
 from flexcal.studio.steps.measure.row_source import RowSource
-from flexcal.studio.window import command_text, paragraph
+from flexcal.studio.window import Place, command_text, paragraph, table
+from flexcal.units import MILLIMETRE
 
 if TYPE_CHECKING:
     from flexcal.studio.steps.measure.measuring import Measuring
@@ -21,6 +22,8 @@ _ENDINGS = (
     *(".csv", ".tsv", ".txt", ".dat", ".asc", ".xlsx", ".xlsm", ".xls", ".xlsb", ".ods", ".mat", ".parquet"),
     *(".uff", ".unv", ".mcap", ".db3", ".bag"),
 )
+_NOTEWORTHY = 2.0
+"""Misfit, mm, by which another place of the point must be better to be told."""
 _NONE = (
     "There is no table in the folder yet: put the file of the other program there (text, Excel, MAT, Parquet, universal file or ROS "
     "recording), and open this step again."
@@ -68,6 +71,8 @@ class ImportedSource(RowSource):
             field.on_update(lambda _: window.post(self._changed))
         window.button("Show how it is read", lambda: self._run(written=False))
         window.button("Import", lambda: self._run(written=True), main=True)
+        self._read = gui.add_html("")
+        self._point = Place(gui)
         self._keep()
 
     def tick(self) -> None:
@@ -106,6 +111,9 @@ class ImportedSource(RowSource):
 
     def _changed(self) -> None:
         self.window.say("")
+        self._read.content = ""
+        with self._point.anew():
+            pass
         self._keep()
 
     def _keep(self) -> None:
@@ -116,12 +124,36 @@ class ImportedSource(RowSource):
         self._motors.keep()
         self._line.content = command_text(f"$ {command_line(self._arguments(written=True))}")
 
+    def _tell(self, document: dict[str, Any]) -> None:
+        """Show which columns were read as what, and the place of the point on the tool where another one fits far better."""
+        self._read.content = _how_read(document)
+        nominal = document.get("nominal") or {}
+        before, after = nominal.get("rms_mm", 0.0), nominal.get("rms_with_point_moved_mm", 0.0)
+        with self._point.anew():
+            if after > 0.5 * before or before - after < _NOTEWORTHY or nominal["doubtful"]:
+                return
+            place = ", ".join(f"{value / MILLIMETRE:.1f}" for value in nominal["point_moved_to"])
+            self.window.gui.add_html(
+                paragraph(
+                    f"The nominal robot misses the points by {before:.1f} mm (rms). With the measured point at ({place}) mm in its frame, "
+                    f"instead of where robot.yaml has it, by {after:.1f} mm: measure it on the tool, or take this place.",
+                    "warning",
+                )
+            )
+            arguments = (*self._arguments(written=False), "--write-point")
+            self.window.button(
+                "Write this place to robot.yaml",
+                lambda: self.window.command(arguments, lambda run: self._tell(run.document)),
+                hint=f"$ {command_line(arguments)}",
+            )
+
     def _run(self, *, written: bool) -> None:
         out = self._out
         if written and self.window.project.path(out).exists():
             raise InputError("E-STUDIO-048", f"{out} is there already; rename it, and import again.")
 
-        def told(_: CommandRun) -> None:
+        def told(run: CommandRun) -> None:
+            self._tell(run.document)
             if written and out != self.measuring.series.purpose.rows:
                 self.window.say(
                     f"{out} is written beside {self.measuring.series.purpose.rows}; step 4 takes it too.",
@@ -129,3 +161,21 @@ class ImportedSource(RowSource):
                 )
 
         self.window.command(self._arguments(written=written), told)
+
+
+def _how_read(document: dict[str, Any]) -> str:
+    """HTML of which columns were read as what; empty for a document without them."""
+    columns = document.get("columns", {})
+    if not columns:
+        return ""
+    rows = [(name, _column(read), read["unit"] or "", read["why"]) for name, read in columns.items()]
+    left = "".join(
+        paragraph(f"left out: {name}: {why}", "faint") for name, why in document.get("left_out", {}).items()
+    )
+    return table(("", "column", "unit", "recognised by"), rows, height="16em") + left
+
+
+def _column(read: dict[str, Any]) -> str:
+    gain, offset = read["gain"], read["offset"]
+    factor = "" if gain == 1 else "\N{MINUS SIGN}" if gain == -1 else f"{gain:g} · "
+    return f"{factor}{read['from']}" + (f" {offset:+g}" if offset else "")

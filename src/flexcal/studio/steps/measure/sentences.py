@@ -64,6 +64,10 @@ def outlook_text(measuring: Measuring) -> str | None:
 
 def _without_next(measuring: Measuring) -> str:
     series = measuring.series
+    if series.plan is None and series.purpose.is_check and series.rows:
+        return paragraph(
+            f"{len(series.rows)} rows to verify on, and no plan of more: go on with step 5, Verify."
+        )
     if series.plan is None and series.purpose.is_check:
         return paragraph(f"no {series.purpose.plan} yet: plan poses to verify on in step 2.", "warning")
     if measuring.is_complete:
