@@ -150,6 +150,12 @@ def test_keys_and_hot_keys(page: Any, running: Any) -> None:
     page.evaluate(AT_ONCE, ["Reason", [""], "x"])
     see(page, "is used again")
 
+    reached = "window.reached = []; document.addEventListener('keydown', (event) => window.reached.push(event.code))"
+    page.evaluate(reached)  # where the camera listens
+    for key in ("d", "d", "w", "ArrowUp"):
+        page.keyboard.press(key)
+    assert page.evaluate("window.reached") == ["ArrowUp"]
+
     for label in ("Reason", "x / mm"):
         place = page.get_by_label(label) if "mm" in label else field(page, label)
         place.click()

@@ -143,7 +143,7 @@ def _facts(results: Mapping[str, Any]) -> tuple[Fact, ...]:
     error, least = results["tool_error_mm"], results["least_possible_mm"]
     return (
         Fact("What accuracy is possible?", significant(error, 3), "mm", f"Root mean square {where}, from noise alone."),
-        Fact("How close to the optimum is it?", f"{100 * (error / least - 1):.0f}", "%", "Upper bound of the excess over the best choice "
+        Fact("How far from the optimum is it?", f"≤ {100 * (error / least - 1):.0f}", "%", "Upper bound of the excess over the best choice "
         "of as many poses."),
         Fact("How long are the moves?", f"{results['moves_s']:.0f}", "s", "At least: all joints at once, none faster than its limit."),
     )  # fmt: skip

@@ -51,6 +51,13 @@
     return made;
   };
 
+  // viser's camera moves by W, A, S, D, Q, E and the arrows, and listens at the document: letters are hot keys here, and arrows move the
+  // slider or list that has the focus. What has come as far as the root element has been seen by all others.
+  document.documentElement.addEventListener("keydown", (event) => {
+    const isCamera = event.target instanceof HTMLCanvasElement || event.target === document.body;
+    if (/^Key/.test(event.code) || (/^Arrow/.test(event.code) && !isCamera)) event.stopPropagation();
+  });
+
   // A number field of viser that is left without a number keeps its last one without showing it: it is shown again.
   const numbers = new WeakMap();
   const isNumber = ({ value }) => value.trim() !== "" && Number.isFinite(Number(value));

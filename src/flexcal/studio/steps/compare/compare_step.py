@@ -48,6 +48,7 @@ class CompareStep(Step):
         super().__init__(window)
         self._arrows: MagnifiedArrows | None = None
         self._names: tuple[str, ...] = ()
+        self._dark = window.dark
         self._stamp: object = None
         self._kept: tuple[object, Comparison] | None = None
 
@@ -59,10 +60,10 @@ class CompareStep(Step):
 
     def refresh(self) -> None:
         """Offer the calibrations that are in the folder."""
-        names = tuple(calibrations(self.window.project))
-        if names == self._names and self._stamp is not None:
+        names, dark = tuple(calibrations(self.window.project)), self.window.dark
+        if (names, dark) == (self._names, self._dark) and self._stamp is not None:
             return
-        self._names, self._stamp = names, object()
+        self._names, self._dark, self._stamp = names, dark, object()
         with self._place.anew():
             self._add_choice(names)
         self._show_again()

@@ -15,9 +15,10 @@ from flexcal.studio.window import Window, command_text, file_link, paragraph
 _OUT = "certificate.html"
 _FILES = {
     "--targets": "Targets",
-    "--before": "Measured at nominal commands",
-    "--after": "Measured at corrected commands",
+    "--before": "Before",
+    "--after": "After",
 }
+_MEANING = "Before: the targets as measured at the nominal commands; after: at the corrected ones."
 _AFTER = ("after", "compens", "correct")
 _MISSING = (
     "A certificate compares the same targets before and after compensation. It needs a table of targets and two tables of points, x, y, z "
@@ -50,6 +51,7 @@ class CertificateForm:
         if len(measured) < 2 or not names["--targets"]:
             gui.add_html(paragraph(_MISSING, "faint"))
             return
+        gui.add_html(paragraph(_MEANING, "faint"))
         for option, label in _FILES.items():
             choices = window.choices
             initial = choices.among(f"certificate {option}", names[option], names[option][0])
