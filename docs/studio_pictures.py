@@ -19,7 +19,7 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "tests" / "studio"))
+sys.path[:0] = [str(ROOT / "tests" / "studio"), str(ROOT / "tests")]
 
 from browser import ARGUMENTS, chromium, studio  # noqa: E402
 

@@ -13,9 +13,10 @@ if TYPE_CHECKING:
     from flexcal.report.layout import Page, Section, Table
 
 
-def add_verdict(gui: viser.GuiApi, page: Page, *, tally: bool = True) -> None:
-    """Add the verdict of a page at the current place, with `tally` how many checks are good."""
-    gui.add_html(verdict_text(page.verdict, tally=tally))
+def add_verdict(gui: viser.GuiApi, page: Page, *, tally: bool = True, below: str = "") -> None:
+    """Add the verdict of a page at the current place, with `tally` how many checks are good; folded `below` a title where one is given."""
+    text = verdict_text(page.verdict, tally=tally)
+    gui.add_html(folded(below, text) if below else text)
 
 
 def add_sections(gui: viser.GuiApi, page: Page) -> None:

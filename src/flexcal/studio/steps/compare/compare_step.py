@@ -187,8 +187,7 @@ class CompareStep(Step):
                 window.gui.add_html(paragraph(_next(comparison.second.name) if changed else _UNCHANGED))
                 window.gui.add_html(step_link("Verify", "verify with fresh poses"))
                 self._add_displacement(comparison)
-                with window.gui.add_folder("Which calibration is more accurate", expand_by_default=False):
-                    add_verdict(window.gui, page)
+                add_verdict(window.gui, page, below="Which calibration is more accurate")
             add_sections(window.gui, page)
             line = command_line(("report", comparison.first.name, "--compare", comparison.second.name))
             window.gui.add_html(paragraph("the same as a page:", "faint") + command_text(f"$ {line}"))
