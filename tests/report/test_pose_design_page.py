@@ -69,7 +69,7 @@ def test_without_collision_shapes_nothing_is_said_to_be_free_of_collisions(
 def test_first_screen_and_figures(tx90l: RobotModel, rng: np.random.Generator) -> None:
     q = rng.uniform(-1, 1, (20, 6))
     page = pose_page(PoseStudy(tx90l, q, _results(9, [], 1.0)))
-    assert [fact.value for fact in page.verdict.facts] == ["0.0300", "20", "12"]
+    assert [fact.value for fact in page.verdict.facts] == ["0.0300", "≤ 20", "12"]
     assert [figure.id for figure in page.figures] == ["figure-numbers", "figure-space", "figure-joints"]
     drawn = pose_page(PoseStudy(tx90l, q, {"plan": "r.yaml", "seed": 1, "poses": 20, **ORIGIN}))
     assert drawn.verdict.facts == () and len(drawn.figures) == 2
