@@ -25,6 +25,7 @@ class FreshPoses(Step):
         super().__init__(window)
         self._shown: object = None
         self._file = ""
+        self._is_asking = False
 
     def open(self) -> None:
         """Add the choice of the poses, the button, and the place of the result."""
@@ -68,23 +69,27 @@ class FreshPoses(Step):
     def _choose(self, file: str) -> None:
         self._file = file
         self.window.choices.put("fresh", file)
-        self._add_button()
+        if self._is_asking:
+            self._add_button()
+        else:
+            self._tell_button()  # in its place: a press that is on its way must not meet a button that has gone
         self._show_result()
 
     def _show_result(self) -> None:
         self._result.show(VERIFICATION, self._add_note, chosen=self._file)
 
     def _add_button(self) -> None:
-        window = self.window
-        again = " again" if (window.project.folder / VERIFICATION / RESULTS).is_file() else ""
-        source = self._other_source()
+        self._is_asking = False
         with self._buttons.anew():
-            window.button(
-                "Verify on these poses" + ("" if source is not None else again),
-                self._verify if source is None else self._ask,
-                hint=f"$ {command_line(self._arguments())}",
-                main=True,
-            )
+            self._button = self.window.button("Verify on these poses", self._ask, main=True)
+        self._tell_button()
+
+    def _tell_button(self) -> None:
+        """Say on the button what it does now."""
+        done = (self.window.project.folder / VERIFICATION / RESULTS).is_file()
+        again = " again" if done and self._other_source() is None else ""
+        self._button.label = f"Verify on these poses{again}"
+        self._button.hint = f"$ {command_line(self._arguments())}"
 
     def _other_source(self) -> ResultSource | None:
         """What the present verification is of, where that is another table."""
@@ -95,11 +100,12 @@ class FreshPoses(Step):
         return source
 
     def _ask(self) -> None:
-        """Have the replacement of a verification of another table confirmed."""
+        """Verify; where that replaces a verification of another table, have it confirmed first."""
         source = self._other_source()
         if source is None:
             self._verify()
             return
+        self._is_asking = True
         with self._buttons.anew():
             self.window.gui.add_html(
                 paragraph(
