@@ -60,11 +60,10 @@ def name_of(called: ast.expr) -> str:
 def test_the_classes_are_all(trees: dict[str, ast.Module]) -> None:
     """Those that derive from `FlexcalError`; of a `StructureError` the first failure has the code."""
     known = {"FlexcalError"}
+    nodes = (node for tree in trees.values() for node in ast.walk(tree))
+    classes = [node for node in nodes if isinstance(node, ast.ClassDef)]
     for _ in range(3):
-        for tree in trees.values():
-            for node in ast.walk(tree):
-                if isinstance(node, ast.ClassDef) and known & {name_of(base) for base in node.bases}:
-                    known.add(node.name)
+        known |= {node.name for node in classes if known & {name_of(base) for base in node.bases}}
     assert known == CLASSES - {"Fault", "Failure"} | {"StructureError"}
 
 

@@ -41,8 +41,11 @@ def test_make_target_exists(line: str, root: Path) -> None:
 
 
 @pytest.mark.parametrize("verb", VERBS)
-def test_verb_exists(verb: str, tmp_path: Path) -> None:
-    run([str(BIN / "flexcal"), *verb.split(), "--help"], tmp_path, dict(os.environ))
+def test_verb_exists(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    from flexcal.cli.main import main
+
+    assert main([*verb.split(), "--help"]) == 0
+    assert f"flexcal {verb}" in capsys.readouterr().out
 
 
 def test_every_verb_is_listed() -> None:

@@ -144,16 +144,16 @@ def coverage(simulate: Callable, tx90l: RobotModel, seeds: range) -> tuple[float
     )
 
 
-def test_intervals_cover_the_regrouped_truth(simulate: Callable, tx90l: RobotModel) -> None:
-    """Truths drawn from the very priors that the fit is told (stiffness: 30 % told, 15 % drawn, so slightly wide)."""
-    share, squares, chi2 = coverage(simulate, tx90l, range(100, 112))
-    assert 0.9 <= share <= 1.0
-    assert 0.5 <= squares <= 1.5
-    assert 0.8 <= chi2 <= 1.2
+def test_intervals_cover_the_regrouped_truth_of_two_robots(simulate: Callable, tx90l: RobotModel) -> None:
+    share, squares, chi2 = coverage(simulate, tx90l, range(100, 102))
+    assert 0.85 <= share <= 1.0
+    assert 0.4 <= squares <= 1.8
+    assert 0.75 <= chi2 <= 1.25
 
 
 @pytest.mark.slow
 def test_intervals_cover_over_many_seeds(simulate: Callable, tx90l: RobotModel) -> None:
+    """Truths drawn from the very priors that the fit is told (stiffness: 30 % told, 15 % drawn, so slightly wide)."""
     share, squares, chi2 = coverage(simulate, tx90l, range(200, 300))
     assert 0.93 <= share <= 0.99
     assert 0.7 <= squares <= 1.2

@@ -233,7 +233,7 @@ def test_a_column_with_the_wrong_sign_is_remarked(run, ur5_folder: Path, some: P
 
 def test_scatter_that_no_instrument_has_is_remarked(run, ur5_folder: Path, some: Path) -> None:
     header, rows = read_csv(some)
-    at = [header.index(key) for key in ("q2", "q3")]
+    rows, at = rows[::2], [header.index(key) for key in ("q2", "q3")]
     rows[:, at] = rows[:, at[::-1]]
     write_csv(some, header, rows)
     arguments = ("calibrate", ur5_folder / "robot.yaml", some, "--terms", "kinematic")

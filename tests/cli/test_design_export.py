@@ -2,34 +2,46 @@
 
 from __future__ import annotations
 
+import io
 import json
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import numpy as np
 import pytest
+from cli_files import copied
 
 from flexcal.calibration.kinds import rigid_motion
+from flexcal.cli.main import main
 from flexcal.data.plans import PosePlan, read_plan_of
 from flexcal.files.formats import read_estimates
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.robot import RobotModel
 
 
-@pytest.fixture
-def measured(run, tx90l_folder: Path) -> Path:
+@pytest.fixture(scope="module")
+def once_measured(examples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The TX90L's folder with 45 designed poses, measured in the virtual cell, and 30 random ones."""
-    robot = tx90l_folder / "robot.yaml"
+    folder = copied(examples / "tx90l", tmp_path_factory.mktemp("measured") / "tx90l")
+    robot = folder / "robot.yaml"
     for name, options, verb in (
-        ("chosen", ("--count", 45, "--candidates", 600), "calibrate"),
-        ("random", ("--count", 30, "--random"), "verify"),
+        ("chosen", ("--count", "45", "--candidates", "600"), "calibrate"),
+        ("random", ("--count", "30", "--random"), "verify"),
     ):
-        plan = tx90l_folder / f"{name}.yaml"
-        assert run("design", "poses", robot, *options, "--out", plan).status == 0
-        outcome = run("measure", plan, "--cell", "virtual", "--seed", 3, "--out", tx90l_folder / name)
-        poses = tx90l_folder / name / "poses.csv"
-        assert outcome.status == 0
-        assert outcome.out.splitlines()[-1] == f"next: flexcal {verb} {robot} {poses}"
-    return tx90l_folder
+        plan = folder / f"{name}.yaml"
+        assert main(["design", "poses", str(robot), *options, "--out", str(plan)]) == 0
+        measure = ["measure", str(plan), "--cell", "virtual", "--seed", "3", "--out", str(folder / name)]
+        with redirect_stdout(io.StringIO()) as said:
+            assert main(measure) == 0
+        poses = folder / name / "poses.csv"
+        assert said.getvalue().splitlines()[-1] == f"next: flexcal {verb} {robot} {poses}"
+    return folder
+
+
+@pytest.fixture
+def measured(once_measured: Path, tmp_path: Path) -> Path:
+    """A copy of it."""
+    return copied(once_measured, tmp_path / "tx90l")
 
 
 def test_chosen_poses_say_why(run, tx90l_folder: Path) -> None:

@@ -129,14 +129,14 @@ def test_killed_and_run_again(folder: Path) -> None:
 )
 def test_streams_that_nobody_reads(folder: Path, redirection: str) -> None:
     """The files are written whatever becomes of the messages; no traceback is among these."""
-    script = f"set -o pipefail; '{FLEXCAL}' design poses robot.yaml --random --count 3 --out plan.yaml {redirection}"
+    script = f"set -o pipefail; '{FLEXCAL}' init ur5.urdf --out made {redirection}"
     done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, cwd=folder, check=False)
     assert (
         done.returncode == 0
         and "Traceback" not in done.stdout + done.stderr
         and "Exception" not in done.stderr
     )
-    assert (folder / "plan.yaml").read_bytes().startswith(b"kind: pose")
+    assert b"\nrobot: ../ur5.urdf" in (folder / "made" / "robot.yaml").read_bytes()
 
 
 def test_full_standard_output(folder: Path) -> None:

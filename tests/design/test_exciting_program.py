@@ -118,7 +118,7 @@ def test_every_limit_holds_between_the_instants(tx90l: RobotModel) -> None:
     import pinocchio as pin
 
     model = limited(tx90l)
-    design = optimise_trajectories(model, criterion="D", payload=0.0, starts=1, steps=25, seed=11)
+    design = optimise_trajectories(model, criterion="D", payload=0.0, starts=1, steps=15, seed=11)
     time = np.linspace(0, 10, 3001)
     q, dq, ddq = design.plan.motion(0, time)
     robot = pin.buildModelFromUrdf(str(model.urdf))
@@ -153,7 +153,7 @@ def test_better_than_the_best_of_many_random_motions(tx90l: RobotModel) -> None:
 def test_splines_from_rest_at_a_start_and_stages_whose_joints_stand(tx90l: RobotModel) -> None:
     start = np.array([0.1, 0.3, 0.5, 0.0, 0.2, 0.0])
     rested = optimise_trajectories(
-        tx90l, criterion="A", kind="spline", harmonics=4, start=start, payload=0.0, starts=1, steps=8
+        tx90l, criterion="A", kind="spline", harmonics=4, start=start, payload=0.0, starts=1, steps=3
     )
     q, dq, ddq = rested.plan.motion(0, np.array([0.0, 10.0, 3.3]))
     np.testing.assert_allclose(q[:2], [start, start], atol=1e-9)
@@ -161,16 +161,16 @@ def test_splines_from_rest_at_a_start_and_stages_whose_joints_stand(tx90l: Robot
     assert np.abs(dq[2]).min() > 1e-3
     stages = sequence(BaseRegressor.of(tx90l), "axes")
     assert [stage.moving for stage in stages] == [(3, 4, 5), (0, 1, 2, 3, 4, 5)]
-    staged = optimise_trajectories(tx90l, criterion="D", sequence=stages, payload=0.0, starts=1, steps=8)
+    staged = optimise_trajectories(tx90l, criterion="D", sequence=stages, payload=0.0, starts=1, steps=3)
     speed = np.abs(staged.plan.motion(0, np.linspace(0, 10, 50))[1]).max(axis=0)
     assert (speed[:3] < 1e-12).all() and (speed[3:] > 0.1).all()
 
 
 def test_what_is_known_already_is_not_sought_again(tx90l: RobotModel) -> None:
     """After one plan, the same criterion grows by less, and information adds up."""
-    first = optimise_trajectories(tx90l, criterion="posterior", payload=0.0, starts=1, steps=8, seed=1)
+    first = optimise_trajectories(tx90l, criterion="posterior", payload=0.0, starts=1, steps=4, seed=1)
     second = optimise_trajectories(
-        tx90l, criterion="posterior", payload=0.0, starts=1, steps=8, seed=2, after=first.plan
+        tx90l, criterion="posterior", payload=0.0, starts=1, steps=4, seed=2, after=first.plan
     )
     assert second.merits[0] > first.merits[0]
     added = second.information[0] - first.information[0]

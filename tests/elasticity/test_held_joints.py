@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.elasticity.identification import fit_springs
+from flexcal.elasticity.identification import MultiStart, fit_springs
 from flexcal.model.robot import spring_names
 from flexcal.virtual_cell import CellConfig, FrictionConfig, MismatchConfig
 from flexcal.virtual_cell.equilibrium import rest
@@ -55,13 +55,13 @@ def noisy(response, exact, draw):
 
 @pytest.fixture
 def like(stiff, poses, synthesise):
-    return synthesise(stiff, poses["default"][[0, 1, 3, 4]], noise=NOISE, payload=6.0, step=8)
+    return synthesise(stiff, poses["default"][[0, 1, 3]], noise=NOISE, payload=6.0, step=8)
 
 
 def test_an_elastic_wrist_is_found(stiff, like, drawn, rng):
     truth = drawn(stiff, rng, inertias=False).with_values({f"joint_{i}.delay": 0.0 for i in (1, 2, 3)})
     responses = mujoco_responses(like, truth, rng, wrist=50e3)
-    result = fit_springs(stiff, responses, rng=rng, inertias_known=True)
+    result = fit_springs(stiff, responses, rng=rng, inertias_known=True, search=MultiStart(agreement=1))
     estimate = result.estimate
     assert estimate.misfit is None
     assert {name.split(".")[0] for name in result.springs} >= set(WRIST[:2])

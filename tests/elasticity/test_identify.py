@@ -36,7 +36,7 @@ def perturbed(model, rng, factor=3.0):
     )
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [2, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (0, 1))])
 def test_noiseless_recovery_from_far_starts(stiff, poses, synthesise, seed):
     """All 18 parameters to 1e-6 from ×÷3 starts."""
     rng = np.random.default_rng(seed)
@@ -77,7 +77,10 @@ def test_paper_plan_leaves_the_forearm_torsion_unidentified(tx90l, poses, synthe
     assert quantity["std"] is None
     assert paper.quantity("joint_1.drive.stiffness")["identifiable"]
     default = fit_springs(
-        tx90l, synthesise(truth, poses["default"], noise=0.05, rng=rng, step=8), rng=rng, search=ONE_START
+        tx90l,
+        synthesise(truth, poses["default"][[0, 1, 3]], noise=0.05, rng=rng, step=8),
+        rng=rng,
+        search=ONE_START,
     )
     assert all(default.quantity(n)["identifiable"] for n in spring_names(tx90l) if n.endswith(".stiffness"))
 
@@ -112,7 +115,7 @@ def test_inertials_known_from_before_count_as_known(tx90l, poses, synthesise, dr
 
 def test_population_search_reaches_the_same_fit(stiff, poses, synthesise, drawn, rng):
     truth = drawn(stiff, rng, inertias=False)
-    responses = synthesise(truth, poses["default"][:2], noise=1e-2, rng=rng, step=12)
+    responses = synthesise(truth, poses["default"][:1], noise=1e-2, rng=rng, step=12)
     common = {"inertias_known": True, "tolerances": Tolerances.none()}
     one = fit_springs(stiff, responses, rng=rng, search=MultiStart(), **common)
     search = PopulationSearch(factor=1.6, population=54, generations=25)
@@ -229,6 +232,12 @@ def check_intervals(z, ratio):
     assert np.median(ratio) <= 1.5
 
 
+def test_intervals_of_one_robot_are_of_the_size_of_errors(stiff, poses, synthesise, drawn):
+    z, ratio = errors_of_one(0, stiff, poses["default"][[0, 1, 3]], synthesise, drawn, inertias=False)
+    assert 0.4 <= np.nanmean(z**2) <= 2.0 and np.median(ratio) <= 1.5
+
+
+@pytest.mark.slow
 def test_intervals_are_true(stiff, poses, synthesise, drawn):
     check_intervals(
         *squared_errors(stiff, poses["default"][[0, 1, 3]], synthesise, drawn, range(12), inertias=False)

@@ -35,7 +35,7 @@ def truth(tx90l: RobotModel) -> dict[str, float]:
 @pytest.fixture(scope="module")
 def recorded(arm_side_logs, truth, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Path]]:
     """The encoders on the arm side start elsewhere than those of the motors; calm motions, in which gaps weigh."""
-    robot, logs = arm_side_logs(tmp_path_factory.mktemp("logs"), truth, SEED, 4, share=0.5)
+    robot, logs = arm_side_logs(tmp_path_factory.mktemp("logs"), truth, SEED, 3, share=0.5)
     for log in logs:
         shifted = [pl.col(f"qa{i}") + zero for i, zero in enumerate(ZEROS, start=1)]
         pl.read_parquet(log).with_columns(shifted).write_parquet(log)

@@ -74,14 +74,14 @@ def test_an_exact_log_gives_the_truth(tmp_path: Path) -> None:
 
 
 def test_noise_that_remembers_itself_for_a_second_and_a_half(tmp_path: Path) -> None:
-    parameters, torques = coverage(tmp_path, LONG_MEMORY, "wls", range(12))
+    parameters, torques = coverage(tmp_path, LONG_MEMORY, "wls", range(3))
     assert parameters > 0.9 and torques > 0.9
 
 
 def test_positions_alone_are_noisy(tmp_path: Path) -> None:
     """A Kalman filter that took the noise of accelerations into W had .64, with errors of inertias up to ten times as large."""
     log = Log(duration=10.0, rate=250.0, position_noise=3e-4)
-    parameters, torques = coverage(tmp_path, log, "ekf", range(2))
+    parameters, torques = coverage(tmp_path, log, "ekf", range(1))
     assert parameters > 0.88 and torques > 0.88
 
 

@@ -57,11 +57,14 @@ def test_the_p_value_is_that_of_a_change_and_not_of_its_cause(visited: Visited) 
     assert both.startswith("something changed (p < 1e-4), and these readings do not tell which")
 
 
-def test_a_noisier_instrument_is_no_change_of_the_robot(visited: Visited, tmp_path: Path) -> None:
+@pytest.mark.parametrize("visits", [7, pytest.param(25, marks=pytest.mark.slow)])
+def test_a_noisier_instrument_is_no_change_of_the_robot(
+    visited: Visited, tmp_path: Path, visits: int
+) -> None:
     """An instrument of nearly twice the noise, and nothing else: most alarms say so, with the factor."""
     shop = replace(visited.shop, folder=tmp_path, rng=np.random.default_rng(8))
     alarms, mechanical, factors = 0, 0, []
-    for _ in range(25):
+    for _ in range(visits):
         visit = shop.measured(visited.robot.model, visited.q)
         noise = 1.7 * 3e-5 * shop.rng.normal(size=visit.position.shape)
         judged = _judged(visited, replace(visit, position=visit.position + noise), _again(visited))
@@ -70,7 +73,7 @@ def test_a_noisier_instrument_is_no_change_of_the_robot(visited: Visited, tmp_pa
         alarms += 1
         mechanical += judged.verdict in _MECHANICAL and judged.scatter is None
         factors += [judged.scatter.factor] if judged.scatter is not None else []
-    assert alarms > 6 and mechanical <= max(1, 0.15 * alarms), (mechanical, alarms)
+    assert alarms > 0.25 * visits and mechanical <= max(1, 0.15 * alarms), (mechanical, alarms)
     assert 1.5 < np.median(factors) < 2.6
     verdicts = []
     for _ in range(6):

@@ -94,10 +94,13 @@ def test_poses_chosen_anywhere_tell_more_than_the_candidates(tx90l: RobotModel):
     assert (free.q >= lower).all() and (free.q <= upper).all()
 
 
-def test_the_predicted_error_is_that_of_the_cell(tx90l: RobotModel):
-    """The error against noise-free points at 150 poses over the workspace, over 4 robots, 30 rows each."""
+@pytest.mark.parametrize(
+    ("robots", "low", "high"), [(1, 0.5, 2.0), pytest.param(4, 0.7, 1.5, marks=pytest.mark.slow)]
+)
+def test_the_predicted_error_is_that_of_the_cell(tx90l: RobotModel, robots: int, low: float, high: float):
+    """The error against noise-free points at 150 poses over the workspace, 30 rows of every robot."""
     ratios, choice = [], None
-    for seed in range(4):
+    for seed in range(robots):
         cell = VirtualCell.drawn(tx90l, CellConfig(), seed)[0]
         session = GuidedSession(tx90l, choice=choice)
         choice = session.candidates
@@ -106,4 +109,4 @@ def test_the_predicted_error_is_that_of_the_cell(tx90l: RobotModel):
         estimate = session.analysis.estimate
         error = estimate.predicted(choice.rows(tx90l, plan.q, session.rows))[0] - cell.noise_free(plan)
         ratios.append(session.outlook(1).p90[0] / np.quantile(np.linalg.norm(error, axis=1), 0.9))
-    assert 0.7 < np.exp(np.mean(np.log(ratios))) < 1.5
+    assert low < np.exp(np.mean(np.log(ratios))) < high
