@@ -1,10 +1,14 @@
-"""Files of one run take their places together, wherever the run is killed."""
+"""Files of one run take their places together, wherever the run is killed.
+
+Processes that are to be killed are forked, some thousand of them, by one that has little memory to copy.
+"""
 
 from __future__ import annotations
 
 import errno
 import os
 import signal
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -60,6 +64,19 @@ def killed_at(step: int, action: Callable[[], None]) -> bool:
     return os.WIFSIGNALED(in_child(act))
 
 
+def in_small_process(action: Callable[[Path], None], folder: Path) -> None:
+    """Do it in a process that has imported little."""
+    command = [sys.executable, __file__, action.__name__, str(folder)]
+    done = subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
+    )
+    assert done.returncode == 0, done.stderr
+
+
 def whole(folder: Path) -> str:
     """Which run the files of a folder are of; fails where they are of several, or something else is left."""
     names = sorted(os.listdir(folder))
@@ -82,6 +99,10 @@ def write_run(folder: Path, text: str) -> None:
 
 def test_killed_at_any_step(tmp_path: Path) -> None:
     """A reader that opens the folder finds one run; so does the next run, which works."""
+    in_small_process(kill_at_any_step, tmp_path)
+
+
+def kill_at_any_step(tmp_path: Path) -> None:
     ended = {"old": 0, "new": 0}
     for step in range(400):
         folder = tmp_path / str(step)
@@ -101,6 +122,10 @@ def test_killed_at_any_step(tmp_path: Path) -> None:
 
 def test_killed_while_the_rest_is_finished(tmp_path: Path) -> None:
     """What is finished after a kill may be killed too."""
+    in_small_process(kill_while_the_rest_is_finished, tmp_path)
+
+
+def kill_while_the_rest_is_finished(tmp_path: Path) -> None:
     for step in range(20, 200):
         folder = tmp_path / str(step)
         folder.mkdir()
@@ -116,6 +141,10 @@ def test_killed_while_the_rest_is_finished(tmp_path: Path) -> None:
 
 
 def test_two_folders_change_together(tmp_path: Path) -> None:
+    in_small_process(kill_between_two_folders, tmp_path)
+
+
+def kill_between_two_folders(tmp_path: Path) -> None:
     def write(text: str) -> None:
         with FileTransaction():
             for folder in ("one", "two"):
@@ -258,3 +287,8 @@ def test_what_is_read_once_or_has_no_end_is_not_read(tmp_path: Path) -> None:
         with refused("E-FILE-014", str(path), kind):
             current_path(path)
     assert current_path(tmp_path / "none") == tmp_path / "none" and current_path(tmp_path) == tmp_path
+
+
+if __name__ == "__main__":
+    os.fsync = lambda handle: None  # as in all tests
+    globals()[sys.argv[1]](Path(sys.argv[2]))
