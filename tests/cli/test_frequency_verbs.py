@@ -428,7 +428,7 @@ def test_a_pose_without_response_is_named(run, recorded: Path, responses: Path, 
     robot = copied(recorded, tmp_path / "tx90l") / "robot.yaml"
     shutil.copytree(responses, tmp_path / "responses")
     (tmp_path / "responses" / "response_pose_1.npz").unlink()
-    done = run("identify", "stiffness", robot, tmp_path / "responses", "--inertias-known")
+    done = run("identify", "stiffness", robot, tmp_path / "responses")
     assert done.status == 0 and "poses of the plan without a response, not used in the fit: 1" in done.out
 
 
