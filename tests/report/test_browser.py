@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from outline import Outline
 from program_results import program_results
+from waiting import PATIENCE
 
 from flexcal.model.robot import RobotModel
 from flexcal.report.layout.rendering import page_html
@@ -82,7 +83,7 @@ def browse(page: Path, profile: Path, *flags: str) -> str:
         "--disable-background-networking", "--disable-component-update", "--disable-sync", "--allow-file-access-from-files",
         f"--user-data-dir={profile}", "--virtual-time-budget=60000", *flags, "--dump-dom", page.as_uri(),
     ]  # fmt: skip
-    return subprocess.run(command, capture_output=True, text=True, timeout=240, check=True).stdout
+    return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=True).stdout
 
 
 def seen(page: str, folder: Path, width: int, scheme: str, more: str = "") -> dict[str, str]:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from outline import Outline
+from waiting import PATIENCE
 
 from flexcal.cli.main import main
 from flexcal.jobs.pages import customer_report
@@ -55,7 +56,7 @@ def test_sheets_have_what_was_given_and_found(folders: Path, folder: str, tmp_pa
         sheets = tmp_path / "sheets.pdf"
         flags = ["--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}"]
         subprocess.run(
-            [CHROMIUM, *flags, f"--print-to-pdf={sheets}", page.as_uri()], check=True, capture_output=True, timeout=120
+            [CHROMIUM, *flags, f"--print-to-pdf={sheets}", page.as_uri()], check=True, capture_output=True, timeout=PATIENCE
         )  # fmt: skip
         assert len(re.findall(rb"/Type /Page\b", sheets.read_bytes())) == 2
 

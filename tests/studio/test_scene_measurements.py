@@ -5,10 +5,12 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from refusals import refused
+from waiting import until
 
 from flexcal.design.scene import CollisionChecker
 from flexcal.model.kinematics import point_kinematics
@@ -174,31 +176,35 @@ def test_before_and_after_share_their_colours() -> None:
     assert np.abs(ColourScale(1.0).colours(np.array([0, 0.5, 1.0])).astype(int) - expected).max() <= 1
 
 
-def test_a_motion_passes_its_positions_and_ends(scene: viser.SceneApi, robot: RobotModel) -> None:
+def test_a_motion_passes_its_positions_and_ends(
+    scene: viser.SceneApi, robot: RobotModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By a clock that stands still until the test sets it."""
+    clock = SimpleNamespace(now=100.0, monotonic=lambda: clock.now)
+    monkeypatch.setattr("flexcal.studio.scene.motion.time", clock)
     view = RobotView(scene, robot, name="/moving")
     times = np.array([1.0, 1.1, 1.3])
     q = np.array([np.zeros(6), np.full(6, 0.2), np.full(6, -0.2)])
-    ended, seen = threading.Event(), []
-
-    def shown(moment: float) -> None:
-        seen.append((moment, view.q[0]))
-        if moment >= 1.3:
-            ended.set()
-
-    motion = Motion(view, times, q, shown=shown)
+    seen: list[tuple[float, float]] = []
+    motion = Motion(view, times, q, shown=lambda moment: seen.append((moment, view.q[0])))
     np.testing.assert_allclose(motion.at(1.05), np.full(6, 0.1))
     np.testing.assert_allclose(motion.at(1.2), np.zeros(6), atol=1e-12)
     np.testing.assert_allclose(motion.at(9.0), q[2])
     motion.start()
-    assert motion.playing and ended.wait(10)
-    motion.pause()
-    assert not motion.playing and len(seen) >= 2
+    for clock.now in (100.0, 100.05, 100.2):
+        count = len(seen)
+        until(lambda count=count: len(seen) > count + 1)  # the first may have been under way
+        assert motion.playing and motion.time == pytest.approx(clock.now - 99.0)
+    clock.now = 109.0
+    until(lambda: not motion.playing)
+    assert motion.time == 1.3 and {round(moment, 9) for moment, _ in seen} == {1.0, 1.05, 1.2, 1.3}
     for moment, first in seen:
         expected = 2 * (moment - 1.0) if moment <= 1.1 else 0.2 - 2 * (moment - 1.1)
         assert abs(first - expected) < 1e-9
     motion.start()  # begins anew
+    until(lambda: seen[-1][0] == 1.0)
     motion.pause()
-    assert 1.0 <= motion.time < 1.3 and threading.active_count() < 50
+    assert not motion.playing and motion.time == 1.0 and threading.active_count() < 50
 
 
 def test_times_that_do_not_increase_are_refused(scene: viser.SceneApi, robot: RobotModel) -> None:

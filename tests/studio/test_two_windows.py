@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from browser import studio
 from page_elements import WAIT, choose, count_rows, go_to, open_step, press, see
+from waiting import PATIENCE
 
 from flexcal import PosePlan
 from flexcal.data.plans import write_plan
@@ -78,7 +79,7 @@ def test_a_second_studio_on_the_folder_is_refused(folder: Path) -> None:
     arguments = ("studio", str(folder), "--no-browser", "--port", "0")
     command = [sys.executable, "-m", "flexcal.cli.main", *arguments]
     with studio(folder) as first:
-        second = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+        second = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
         assert second.returncode == 2
         assert f"another studio (process {first.process.pid}) has project open" in second.stderr
         first.stop(signal.SIGKILL)
