@@ -190,7 +190,7 @@ def short_of_rows(recorded: Recorded, runs: int, bootstraps: int) -> tuple[np.nd
 
 
 def test_every_standard_deviation_is_true_on_average(recorded: Recorded) -> None:
-    """61 parameters from 6.4 s. Of 30 runs chance alone takes the largest of all above 1.25 in 19 of a hundred draws; 300 have it at 1.14."""
+    """61 parameters from 6.4 s. Of 30 runs chance alone takes the largest above 1.25 in 19 of a hundred draws; 300 have it at 1.14."""
     reported, _, coverage = short_of_rows(recorded, 100, 0)
     size = np.sqrt(np.mean(reported**2, axis=0))
     assert size.min() > 0.8 and size.max() < 1.25
