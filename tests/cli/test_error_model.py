@@ -297,7 +297,9 @@ def test_a_cause_that_is_known_stands_in_place_of_where_to_look(tmp_path: Path) 
     q = case.arm.postures(60, case.rng)
     wrong = case.calibrated(*spoiled("sign", q, case.arm.measured(q, case.rng), case.rng), 2e-5)
     far, look = calibration_remarks(wrong)[-2:]
-    assert far.startswith("implausibly far") and look.startswith("these data do not fit this robot: look")
+    assert far.startswith("implausibly far") and look.startswith(
+        "data and robot.yaml do not go together: look"
+    )
     assert calibration_remarks(wrong, ("the cause",))[-2:] == ("the cause", far)
 
 

@@ -31,9 +31,9 @@ from flexcal.report.results import chance_in_words
 from flexcal.units import MILLIMETRE, decimals
 
 _LOOK = (
-    "these data do not fit this robot: look for a column with wrong sign, unit or order, for points of another "
-    "target or robot, for a wrong xyz under `points:`, and for points seen by an instrument on the hand (eye-in-hand, "
-    "not supported); flexcal import looks for these"
+    "data and robot.yaml do not go together: look for a wrong xyz under `points:`, for a column with wrong sign, unit or order, for "
+    "points of another target or robot, and for points seen by an instrument on the hand (eye-in-hand, not supported); "
+    "flexcal import looks for these"
 )
 
 _OVERSTATED, _UNDERSTATED = 0.5, 2.0
