@@ -15,7 +15,7 @@ from flexcal.calibration.diagnostics import stated_noise
 from flexcal.calibration.error_model import ErrorComponents
 from flexcal.calibration.fit import GeometricFit, fit_geometry
 from flexcal.calibration.fit.elastic_prior import NOTHING_ELASTIC
-from flexcal.calibration.fit.fitted_points import PointFit
+from flexcal.calibration.fit.point_fit import PointFit
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.robot import propagated_covariance_root
 from flexcal.progress import silent

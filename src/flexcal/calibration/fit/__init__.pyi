@@ -1,6 +1,5 @@
 from .base_placement import base_errors
 from .elastic_prior import ElasticPrior
-from .fitted_points import CONVERGED
 from .fleet_prior import FleetPrior
 from .gauge_freedom import (
     KNOWN_POINT_STD,
@@ -11,6 +10,7 @@ from .gauge_freedom import (
 )
 from .geometric_calibration import GeometricFit, fit_geometry
 from .least_squares_problem import LossName
+from .point_fit import CONVERGED
 from .stratified_sample import StratifiedSample, all_errors
 from .temperature_evidence import TemperatureEvidence, sensor_scatter
 from .terms import (

@@ -10,9 +10,10 @@ import numpy as np
 
 from flexcal.calibration.error_model import ErrorComponents, ErrorStatistics, LinearFit
 from flexcal.calibration.fit.elastic_prior import NOTHING_ELASTIC, ElasticPrior
-from flexcal.calibration.fit.fitted_points import CONVERGED, FittedPoints, PointFit
+from flexcal.calibration.fit.fitted_points import FittedPoints
 from flexcal.calibration.fit.fleet_prior import FleetPrior
 from flexcal.calibration.fit.least_squares_problem import LossName, PlainLoss
+from flexcal.calibration.fit.point_fit import CONVERGED, PointFit
 from flexcal.calibration.fit.practical_identifiability import Undetermined
 from flexcal.calibration.fit.temperature_evidence import TemperatureEvidence
 from flexcal.calibration.fit.terms import moving_joints
