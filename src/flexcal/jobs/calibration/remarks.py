@@ -31,7 +31,7 @@ from flexcal.report.results import chance_in_words
 from flexcal.units import MILLIMETRE, decimals
 
 _LOOK = (
-    "data and robot.yaml do not go together: look for a wrong xyz under `points:`, for a column with wrong sign, unit or order, for "
+    "data and robot.yaml do not go together: look for a column with wrong sign, unit or order, for a wrong xyz under `points:`, for "
     "points of another target or robot, and for points seen by an instrument on the hand (eye-in-hand, not supported); "
     "flexcal import looks for these"
 )
