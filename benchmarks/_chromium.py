@@ -13,7 +13,23 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from benchmarks.peers import PeerAbsentError
+
 PROGRAM = next((p for p in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if p), None)
+
+
+def require_chromium() -> None:
+    """Raise `PeerAbsentError` where there is no browser."""
+    if PROGRAM is None:
+        raise PeerAbsentError("there is no Chromium on this machine")
+
+
+def require_viser() -> None:
+    """Raise `PeerAbsentError` where the studio cannot be opened."""
+    try:
+        import viser  # noqa: F401
+    except ImportError as problem:
+        raise PeerAbsentError("viser is not installed") from problem
 
 
 class Tab:

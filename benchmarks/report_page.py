@@ -7,8 +7,7 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from benchmarks._chromium import PROGRAM, Tab, chromium
-from benchmarks.peers import PeerAbsentError
+from benchmarks._chromium import Tab, chromium, require_chromium
 from flexcal.jobs.accuracy import verify_robot
 from flexcal.jobs.calibration import calibrate_robot
 from flexcal.jobs.pages import compare_folders
@@ -23,8 +22,7 @@ _FETCHED = "performance.getEntriesByType('resource').length"
 
 def run() -> list[tuple[str, float, str]]:
     """Limits over size and time; what is loaded from elsewhere is counted."""
-    if PROGRAM is None:
-        raise PeerAbsentError("there is no Chromium on this machine")
+    require_chromium()
     rows = []
     with TemporaryDirectory(prefix="flexcal_pages_") as folder:
         for name, page in _pages(Path(folder)).items():

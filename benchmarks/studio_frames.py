@@ -15,8 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks._chromium import PROGRAM, Tab, chromium
-from benchmarks.peers import PeerAbsentError
+from benchmarks._chromium import Tab, chromium, require_chromium, require_viser
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.robot import RobotModel
 
@@ -50,12 +49,8 @@ Stretch = Callable[[float], None]
 
 def run() -> list[tuple[str, float, str]]:
     """Frames per second over the limit, and the limit of memory over what the server takes."""
-    if PROGRAM is None:
-        raise PeerAbsentError("there is no Chromium on this machine")
-    try:
-        import viser  # noqa: F401
-    except ImportError as problem:
-        raise PeerAbsentError("viser is not installed") from problem
+    require_chromium()
+    require_viser()
     model = RobotModel.from_yaml(
         Path(__file__).parent.parent / "examples" / "ur5_tracker" / "robot.yaml", estimates=False
     )

@@ -24,8 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks._chromium import PROGRAM, Tab, chromium
-from benchmarks.peers import PeerAbsentError
+from benchmarks._chromium import Tab, chromium, require_chromium, require_viser
 from flexcal.data.plans import PosePlan, write_plan
 from flexcal.design.poses import random_candidates
 from flexcal.design.scene import CollisionChecker, MeasuringSetup
@@ -48,12 +47,8 @@ _PAINT = "performance.timeOrigin / 1000 + performance.getEntriesByName('first-co
 
 def run() -> list[tuple[str, float, str]]:
     """Limits over what is reached."""
-    if PROGRAM is None:
-        raise PeerAbsentError("there is no Chromium on this machine")
-    try:
-        import viser  # noqa: F401
-    except ImportError as problem:
-        raise PeerAbsentError("viser is not installed") from problem
+    require_chromium()
+    require_viser()
     with (
         tempfile.TemporaryDirectory() as place,
         chromium("--use-gl=angle", "--use-angle=swiftshader", "--window-size=1280,720") as tab,
