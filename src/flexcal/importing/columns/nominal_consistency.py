@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flexcal.data.tables import UNITS
 from flexcal.importing.columns.assignment import ColumnAssignment
 from flexcal.importing.tables import parse_name
 from flexcal.model.kinematics import point_kinematics
@@ -35,8 +36,8 @@ _ROTATION = 0.1
 _MOST_ROWS = 60
 _MOST_JOINTS = 8
 _TURNS = (0.0, np.pi / 2, -np.pi / 2, np.pi)
-_LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 1e-3, "um": 1e-6, "inches": 0.0254, "feet": 0.3048}
-"""Units of points, m; flexcal reads some of them, of the others a column is multiplied."""
+_WORDS = {"in": "inches", "ft": "feet"}
+"""Units that are written as words."""
 _ROUNDS = 20
 _SOME_ROUNDS = 2
 _ALIKE = 1.5
@@ -202,16 +203,16 @@ def _simple_changes(model: RobotModel) -> Iterator[_Change]:
 
 def _other_units(model: RobotModel, points: ColumnAssignment | None) -> Iterator[_Change]:
     """Points in another unit than that in which they were read."""
-    if points is None or points.unit not in _LENGTHS:
+    if points is None or points.unit not in UNITS["xyz"]:
         return
-    for unit, size in _LENGTHS.items():
+    for unit, size in UNITS["xyz"].items():
         if unit != points.unit:
             yield _Change(
                 tuple(range(model.n)),
                 np.ones(model.n),
                 np.zeros(model.n),
-                unit=unit,
-                scale=size / _LENGTHS[points.unit],
+                unit=_WORDS.get(unit, unit),
+                scale=size / UNITS["xyz"][points.unit],
             )
 
 
@@ -254,7 +255,7 @@ def _said(
         )
     if change.unit and points is not None:
         words.append(
-            f"the points fit this robot if they are in {change.unit}, but were read in {points.unit}"
+            f"the points fit this robot if they are in {change.unit}, but were read in {_WORDS.get(str(points.unit), points.unit)}"
         )
         options += [
             f"{axis}={change.scale * gain:.10g}*{column}[{points.unit}]"
