@@ -140,21 +140,21 @@ class PointFit:
         # be where the target is
         last = {start.point(target).joint for target in poses.targets}
         inner = [f"{joint.name}.offset" for i, joint in enumerate(start.joints) if i not in last]
-        zeros = [name for name in inner if name in geometric] if far_zeros else []
-        zeros += [name for name in kept if name in geometric and name not in zeros]
+        first = [name for name in inner if name in geometric] if far_zeros else []
+        first += [name for name in kept if name in geometric and name not in first]
         known = () if fleet is None else fleet.names
         told = Parameters(item for item in geometric if item.name not in known)
-        seen = kinematic_identifiability(start, poses, told, prefer=[name for name in zeros if name in told])
+        seen = kinematic_identifiability(start, poses, told, prefer=[name for name in first if name in told])
         require_enough(start, poses, told, seen)
         if fleet is not None:
             # of the others those that pivoting keeps come first, so that the poses determine them beside what the prior tells
-            zeros = [*zeros, *seen.kept_names]
-            seen = kinematic_identifiability(start, poses, geometric, prefer=zeros)
+            first = [*first, *seen.kept_names]
+            seen = kinematic_identifiability(start, poses, geometric, prefer=first)
         structural = random_identifiability(start, poses, geometric, seen)
         if structural.rank > seen.rank or poses.kind is not None:
             # these poses hide something: what may be off most, as the place of the instrument, is to take it up
             sizes = np.array([plausible_size(start, name) for name in geometric.names])
-            seen = kinematic_identifiability(start, poses, geometric, scale=sizes, prefer=zeros)
+            seen = kinematic_identifiability(start, poses, geometric, scale=sizes, prefer=first)
             structural = random_identifiability(start, poses, geometric, seen, scale=sizes)
         return cls(
             start,
