@@ -24,13 +24,19 @@ TX90L = Path(__file__).parents[2] / "examples" / "tx90l"
 EXAMPLE = Path(__file__).parents[2] / "examples" / "ur5_tracker"
 
 
-def test_columns_and_units_of_another_program(page: Any, tmp_path: Path) -> None:
-    """Looked at first, then the rows of the session; a second import goes beside them and replaces nothing."""
-    pytest.importorskip("viser", reason="viser is absent: pip install 'flexcal[studio]'")
+def project(tmp_path: Path) -> Path:
+    """A folder with the example's robot and no measurements."""
     folder = tmp_path / "ur5"
     folder.mkdir()
     for name in ("robot.yaml", "ur5.urdf"):
         shutil.copy(EXAMPLE / name, folder / name)
+    return folder
+
+
+def test_columns_and_units_of_another_program(page: Any, tmp_path: Path) -> None:
+    """Looked at first, then the rows of the session; a second import goes beside them and replaces nothing."""
+    pytest.importorskip("viser", reason="viser is absent: pip install 'flexcal[studio]'")
+    folder = project(tmp_path)
     rows = pl.read_csv(EXAMPLE / "random.csv", comment_prefix="#")
     foreign = {f"A{k} [deg]": np.rad2deg(rows[f"q{k}"]) for k in range(1, 7)}
     foreign |= {f"{axis.upper()} [mm]": 1000 * rows[axis] for axis in "xyz"}
@@ -99,10 +105,7 @@ def test_a_file_in_inches_and_a_point_that_is_elsewhere(page: Any, tmp_path: Pat
 def test_motors_of_lerobot(page: Any, tmp_path: Path) -> None:
     """Ticks become joint positions by LeRobot's file, motors of other names, signs and zeros; what does not fit is refused at first."""
     pytest.importorskip("viser", reason="viser is absent: pip install 'flexcal[studio]'")
-    folder = tmp_path / "ur5"
-    folder.mkdir()
-    for name in ("robot.yaml", "ur5.urdf"):
-        shutil.copy(EXAMPLE / name, folder / name)
+    folder = project(tmp_path)
     rows = pl.read_csv(EXAMPLE / "random.csv", comment_prefix="#")
     q = rows.select([f"q{k}" for k in range(1, 7)]).to_numpy()
     joints = re.findall(r'<joint name="([^"]+)" type="revolute"', (folder / "ur5.urdf").read_text())
