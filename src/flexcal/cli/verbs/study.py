@@ -73,6 +73,8 @@ class Study:
 
 
 def _lines(document: dict[str, Any]) -> list[str]:
+    from flexcal.report.layout import listed
+
     count = document["tasks"]
     lines = [
         *document["remarks"],
@@ -96,8 +98,7 @@ def _lines(document: dict[str, Any]) -> list[str]:
         )
     larger = document["resampling"]["surely_larger"] if spread else []
     if larger:
-        named = ", ".join(larger[:3]) + (f" and {len(larger) - 3} more" if len(larger) > 3 else "")
-        lines.append(f"{named}: more spread than the fit states, by more than chance explains")
+        lines.append(f"{listed(larger, 3)}: more spread than the fit states, by more than chance explains")
     for item in document["effects"]:
         if item["share"] is not None:
             lines.append(

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from flexcal.data.poses import PoseSet
+from flexcal.report.layout import listed
 
 _FAR = 10.0
 """Distance, K, from the others that no arm covers between two measurements."""
@@ -52,14 +53,10 @@ def with_plausible_temperatures(poses: PoseSet, kept: np.ndarray) -> PoseSet:
     median = float(np.median(poses.temperature))
     if not kept.all():
         out = np.flatnonzero(~kept)
-        listed = ", ".join(
-            f"row {row + 1}, pose {poses.pose[row]} ({poses.temperature[row]:.1f} °C)"
-            for row in out[:_LISTED]
-        )
-        more = f" and {len(out) - _LISTED} more" if len(out) > _LISTED else ""
+        told = [f"row {row + 1}, pose {poses.pose[row]} ({poses.temperature[row]:.1f} °C)" for row in out]
         notes.append(
-            f"left out, because the temperature is far from those before and after it and from the median of {median:.1f} °C: {listed}"
-            f"{more}; correct the column 'temperature' there to use them"
+            f"left out, because the temperature is far from those before and after it and from the median of {median:.1f} °C: "
+            f"{listed(told, _LISTED)}; correct the column 'temperature' there to use them"
         )
     highest = float(poses.temperature[kept].max())
     if highest > _WARM:

@@ -8,6 +8,7 @@ import numpy as np
 
 from flexcal.calibration.diagnostics import FleetConflict
 from flexcal.calibration.fit import GeometricFit
+from flexcal.report.layout import listed
 
 _LEARNT = 0.8
 """Standard deviation, relative to that of the prior, from which the measurements say little of a parameter."""
@@ -49,7 +50,7 @@ def fleet_remarks(block: dict[str, Any] | None) -> list[str]:
     if block is None:
         return []
     robots, known = block["robots"], block["from_fleet"]
-    named = ", ".join(known[:_LISTED]) + (f" and {len(known) - _LISTED} more" if len(known) > _LISTED else "")
+    named = listed(known, _LISTED)
     sentence = f"calibrated with a prior of {len(robots)} other robots of the model ({block['file']})"
     sentence += (
         f": {len(known)} of its {block['parameters']} parameters are from the fleet, not from these measurements: {named}"

@@ -27,6 +27,7 @@ from flexcal.jobs.calibration.ignored_columns import ignored_columns_remarks
 from flexcal.jobs.calibration.inclinations import inclination_remarks
 from flexcal.jobs.calibration.thermal import thermal_remarks
 from flexcal.model.robot import BOARD_SCALE, socket_scale
+from flexcal.report.layout import counted, listed
 from flexcal.report.results import chance_in_words
 from flexcal.units import MILLIMETRE, decimals
 
@@ -152,9 +153,8 @@ def calibration_remarks(
         remarks.append(f"the flank of a backlash is uncertain at {fit.ambiguous.sum()} poses")
     outliers = outliers_of(fit)
     if outliers:
-        listed = ", ".join(str(outlier) for outlier in outliers[:_LISTED])
-        more = f" and {len(outliers) - _LISTED} more" if len(outliers) > _LISTED else ""
-        remarks.append(f"{len(outliers)} outlier{'s' * (len(outliers) > 1)}: {listed}{more}")
+        told = listed([str(outlier) for outlier in outliers], _LISTED)
+        remarks.append(f"{counted(len(outliers), 'outlier')}: {told}")
         remarks += [*_mislabelled(outliers), *_turned(fit, outliers)]
     remarks += [
         *_undetermined(fit),
@@ -210,9 +210,8 @@ def _mislabelled(outliers: Sequence[Outlier]) -> Sequence[str]:
     ]
     if not confused:
         return ()
-    more = f" and {len(confused) - _LISTED} more" if len(confused) > _LISTED else ""
     return [
-        f"nearer to another socket than to their own, so perhaps mislabelled: {', '.join(confused[:_LISTED])}{more}"
+        f"nearer to another socket than to their own, so perhaps mislabelled: {listed(confused, _LISTED)}"
     ]
 
 

@@ -19,7 +19,7 @@ from flexcal.jobs.fleet.parameters import ParameterSpread
 from flexcal.jobs.fleet.projects import date_of
 from flexcal.jobs.fleet.rechecks import LatestRecheck
 from flexcal.jobs.fleet_prior import comparable_terms
-from flexcal.report.layout import counted
+from flexcal.report.layout import counted, listed
 from flexcal.report.results import TOLERANCE_STATES, is_drifting
 from flexcal.units import MILLIMETRE
 
@@ -138,13 +138,8 @@ def _headline(robots: Sequence[Mapping[str, Any]], states: Mapping[str, int], fo
         ("geometry not tested", [robot["robot"] for robot in robots if robot["not_tested"] is not None]),
     ):
         if named:
-            many += f"; {what}: {_listed(named)}"
+            many += f"; {what}: {listed(named, _NAMED)}"
     return many
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-    return f"{', '.join(names[:_NAMED])}{more}"
 
 
 def _accuracy(item: RobotAccuracy, declared: float | None, level: float) -> dict[str, Any]:
@@ -257,10 +252,10 @@ def _remarks(
     without = {item.robot for item in accuracies} - set(frame["robot"])
     copies = sorted(without & set(gathered.copied))
     if copies:
-        listed = ", ".join(f"{name} ({gathered.copied[name]})" for name in copies)
+        copied = ", ".join(f"{name} ({gathered.copied[name]})" for name in copies)
         number = len(accuracies) - len(copies)
         remarks.append(
-            f"the results of {counted(number, 'robot')} in the folders of {len(accuracies)}: those of {listed} are copies of another's, in "
+            f"the results of {counted(number, 'robot')} in the folders of {len(accuracies)}: those of {copied} are copies of another's, in "
             "brackets; measure these robots, or give both one `serial:` in robot.yaml"
         )
     remarks += [
@@ -271,7 +266,7 @@ def _remarks(
     if bare := sorted(without - set(copies)):
         folders = "the folder" if len(bare) == 1 else "the folders"
         remarks.append(
-            f"no results in {folders} of {_listed(bare)}: give calibrate and verify an --out there"
+            f"no results in {folders} of {listed(bare, _NAMED)}: give calibrate and verify an --out there"
         )
     undated = frame.filter(frame["date"].is_null())["folder"].n_unique()
     if undated:

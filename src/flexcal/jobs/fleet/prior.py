@@ -16,7 +16,7 @@ from flexcal.jobs.fleet.members import by_geometry, distinct, latest_members, tw
 from flexcal.jobs.fleet.places import local_fleet
 from flexcal.jobs.fleet.projects import find_results
 from flexcal.jobs.fleet_prior import FEWEST, Member, ModelPrior, PooledValues, pool_fleet
-from flexcal.report.layout import counted
+from flexcal.report.layout import counted, listed
 
 _NAMED = 3
 """Largest number of parameters that a sentence names."""
@@ -169,11 +169,9 @@ def _without_outlying(
         rest = [member for member in members if member.name not in unlike_in]
         kept[block] = rest if len(rest) >= FEWEST else list(members)
         for name in (member.name for member in members if member not in kept[block]):
-            found = unlike_in[name]
-            more = f" and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
             remarks.append(
-                f"without {name}, whose {_WHAT[block]} differs from that of the others beyond chance in {', '.join(found[:_NAMED])}{more}: "
-                "the prior is of robots like the others"
+                f"without {name}, whose {_WHAT[block]} differs from that of the others beyond chance in "
+                f"{listed(unlike_in[name], _NAMED)}: the prior is of robots like the others"
             )
     return kept, remarks
 

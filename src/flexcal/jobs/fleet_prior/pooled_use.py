@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from flexcal.jobs.fleet_prior.pooled_values import PoolConflict, PooledValues
+from flexcal.report.layout import listed
 from flexcal.report.results import chance_in_words
 
 _LISTED = 8
@@ -53,9 +54,7 @@ class PooledUse:
                 f"repaired? {end[0].upper()}{end[1:]}"
             ]
         names = self.pooled.names
-        named = ", ".join(names[:_LISTED]) + (
-            f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
-        )
+        named = listed(names, _LISTED)
         log = [
             s for s, scale in zip(self.pooled.std.tolist(), self.pooled.scales, strict=True) if scale == "log"
         ]

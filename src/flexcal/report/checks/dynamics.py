@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import PurePath
 from typing import Any
 
-from flexcal.report.layout import Check, significant
+from flexcal.report.layout import Check, listed, significant
 
 MUCH_WORSE = 1.5
 """Held-out error over that in the fit, above which the model overfits or friction has changed."""
@@ -77,10 +77,9 @@ def check_base(results: Mapping[str, Any]) -> Check:
     if rank >= len(base):
         return Check(question, answer, "good")
     lost = [row["kept"] for row in base if row["std"] is None]
-    more = f" and {len(lost) - _SHOWN} more" if len(lost) > _SHOWN else ""
     return Check(
         question,
-        f"{answer} Not {', '.join(lost[:_SHOWN])}{more}: a motion that excites them is missing.",
+        f"{answer} Not {listed(lost, _SHOWN)}: a motion that excites them is missing.",
         "care",
     )
 
@@ -142,8 +141,8 @@ def check_weight_shares(shares: Mapping[str, Mapping[str, float]], compared: int
             f"Check first whether the torques are {unlike}: {wrong}. If they are right, either {otherwise}."
         )
     elif far:
-        listed = ", ".join(far[:_SHOWN])
-        advice = f"Either {otherwise}; torques are predicted all the same. Or the torques of {listed} are {unlike}: {wrong}."
+        named = ", ".join(far[:_SHOWN])
+        advice = f"Either {otherwise}; torques are predicted all the same. Or the torques of {named} are {unlike}: {wrong}."
     else:
         advice = f"If the measured torques are right, so are the predicted ones, and either {otherwise}."
     return Check("Do the links weigh what the URDF says?", f"No: {told}. {advice}", "care")

@@ -9,7 +9,7 @@ import numpy as np
 
 from flexcal.frequency.periodic import FrequencyResponse
 from flexcal.report.checks.pose_errors import CHANCE, MISSING
-from flexcal.report.layout import Check, percent, significant
+from flexcal.report.layout import Check, listed, percent, significant
 from flexcal.report.results import relative_to_diagonal
 
 Limit = Literal["noise", "distortion"]
@@ -103,10 +103,9 @@ def _check_axes(responses: Sequence[FrequencyResponse]) -> Check:
     ]
     if not lost:
         return Check(question, f"Yes, to {100 * _TOO_LARGE:.0f} % or better at half of the lines.", "good")
-    more = f" and {len(lost) - _SHOWN} more" if len(lost) > _SHOWN else ""
     return Check(
         question,
-        f"Not {', '.join(lost[:_SHOWN])}{more}: 1σ is more than {100 * _TOO_LARGE:.0f} % of the response at half of the lines. Increase "
+        f"Not {listed(lost, _SHOWN)}: 1σ is more than {100 * _TOO_LARGE:.0f} % of the response at half of the lines. Increase "
         f"the torques of these "
         "axes.",
         "care",

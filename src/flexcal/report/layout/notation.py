@@ -48,6 +48,12 @@ def counted(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
+def listed(names: Sequence[str], most: int) -> str:
+    """Names with commas between; of more than `most` the first so many, and how many more."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return f"{', '.join(names[:most])}{more}"
+
+
 def scaled(unit: str) -> tuple[float, str]:
     """Factor and unit in which an SI value is printed."""
     return _SCALED.get(unit, (1.0, unit))

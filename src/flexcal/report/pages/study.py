@@ -18,6 +18,7 @@ from flexcal.report.layout import (
     Table,
     Verdict,
     document_millimetres,
+    listed,
     percent,
     significant,
     worst,
@@ -201,16 +202,13 @@ def _resampling_check(block: Mapping[str, Any]) -> list[Check]:
         return [Check(question, f"{answer}: the stated uncertainties are too small for these data.", "bad")]
     single = block["surely_larger"]
     if single:
-        told = ", ".join(
-            f"{name} {significant(block['parameters'][name]['ratio'], 3)} times" for name in single[:_NAMED]
-        )
-        more = f" and {len(single) - _NAMED} more" if len(single) > _NAMED else ""
+        told = [f"{name} {significant(block['parameters'][name]['ratio'], 3)} times" for name in single]
         few = "that" if len(single) == 1 else "those"
         return [
             Check(
                 question,
-                f"{answer}, but that of {told}{more}: more than chance explains, so the stated uncertainty of {few} is too small for these "
-                "data.",
+                f"{answer}, but that of {listed(told, _NAMED)}: more than chance explains, so the stated uncertainty of {few} is too small "
+                "for these data.",
                 "care",
             )
         ]
@@ -250,14 +248,14 @@ def _errors_section(study: StudyReport) -> Section:
 
 
 def _failures_section(results: Mapping[str, Any]) -> Section:
-    listed = results["failures"][:_LISTED]
+    frequent = results["failures"][:_LISTED]
     rows = tuple(
         (item["code"] or "unexpected", item["error"], str(item["tasks"]), str(item["first"]))
-        for item in listed
+        for item in frequent
     )
     caption = (
         "Messages of failed tasks"
-        if len(listed) == len(results["failures"])
+        if len(frequent) == len(results["failures"])
         else f"The {_LISTED} most frequent messages of failed tasks"
     )
     table = Table(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from flexcal.report.layout import Block, Section, Table, Text, p_value, scaled, significant
+from flexcal.report.layout import Block, Section, Table, Text, listed, p_value, scaled, significant
 
 _DYNAMICS = "dynamics"
 _LISTED = 3
@@ -87,8 +87,7 @@ def _named(spread: Mapping[str, Any]) -> str:
     absorbed = spread["absorbs"]
     if spread["kind"] != _DYNAMICS or not absorbed:
         return spread["name"]
-    more = f" and {len(absorbed) - _LISTED} more" if len(absorbed) > _LISTED else ""
-    return f"base parameter {spread['name']}, with {', '.join(absorbed[:_LISTED])}{more}"
+    return f"base parameter {spread['name']}, with {listed(absorbed, _LISTED)}"
 
 
 def _outlier_row(spread: Mapping[str, Any], item: Mapping[str, Any]) -> tuple[str, ...]:
