@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from browser import studio
 from page_elements import WAIT, choose, count_rows, fill, go_to, press, see
+from waiting import PATIENCE
 
 TX90L = Path(__file__).parents[2] / "examples" / "tx90l"
 POSES, FRESH = 20, 20
@@ -26,7 +27,7 @@ def text(page: Any) -> str:
 def measure(page: Any, table: Path, count: int) -> None:
     """Measure all poses that are left, until the page says stop."""
     press(page, "Measure all that are left")
-    deadline = time.monotonic() + 90
+    deadline = time.monotonic() + PATIENCE
     while count_rows(table) < count:
         assert time.monotonic() < deadline
         found = PREDICTED.search(text(page))
@@ -38,7 +39,7 @@ def measure(page: Any, table: Path, count: int) -> None:
 
 def prediction(page: Any) -> float:
     """The predicted P90, mm, once all rows are judged and it no longer changes."""
-    last, since, deadline = "", time.monotonic(), time.monotonic() + 60
+    last, since, deadline = "", time.monotonic(), time.monotonic() + PATIENCE
     while time.monotonic() - since < 1.5 or not PREDICTED.search(last):
         assert time.monotonic() < deadline
         now = text(page)
