@@ -227,6 +227,34 @@ def test_a_followed_file_goes_on_where_its_rows_were_taken(
     assert followed.new_rows() == cells[:1]
 
 
+@pytest.mark.parametrize("again", [False, True])
+def test_a_line_that_goes_on_after_it_was_taken_is_said(
+    tmp_path: Path, cells: list[dict[str, str]], ur5: RobotModel, again: bool
+):
+    """Whether the same program follows on or another begins; an end of line that comes late is none of it."""
+    path = tmp_path / "shot.csv"
+    lines = [",".join(cells[0]), *(",".join(one.values()) for one in cells)]
+    followed = FollowedFile(path, ur5)
+
+    def write(text: str) -> list[dict[str, str]]:
+        nonlocal followed
+        path.write_text(text)
+        if again:
+            followed = FollowedFile(path, ur5, followed.end)
+        return followed.new_rows(is_whole=True)
+
+    text = "\n".join(lines[:2])
+    assert write(text) == cells[:1]
+    text += "\n" + lines[2][:-3]
+    cut = cells[1] | {"z": cells[1]["z"][:-3]}
+    assert write(text) == [cut]
+    text += lines[2][-3:] + "\n"
+    with refused("E-STUDIO-051", f"'{lines[2][-3:]}' behind it"):
+        write(text)
+    text += lines[3] + "\n"
+    assert write(text) == cells[2:3]
+
+
 def test_rows_to_verify_on_have_a_journal_of_their_own(tmp_path: Path, cells: list[dict[str, str]]):
     first, second = MeasuredRows(tmp_path), MeasuredRows(tmp_path, "others.csv")
     first.append(cells[:2])

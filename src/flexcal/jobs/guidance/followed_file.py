@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import BinaryIO
 
 from flexcal.errors import InputError, unreadable
 from flexcal.jobs.guidance.measured_rows import split_line
@@ -47,7 +48,8 @@ class FollowedFile:
 
         Of a file that `is_whole` the last line is complete without an end of line.
 
-        Raises `InputError` for a header that names other columns, a line with more or fewer values, and a file that has become shorter.
+        Raises `InputError` for a header that names other columns, a line with more or fewer values, a file that has become shorter, and
+        a line that went on after it was read.
         """
         try:
             with self.path.open("rb") as stream:
@@ -58,6 +60,8 @@ class FollowedFile:
                         "E-STUDIO-016",
                         f"{self.path} has become shorter: another program wrote it anew; the rows that it has now are read from its start.",
                     )
+                if self.end and size > self.end:
+                    self._require_line_ended(stream)
                 stream.seek(self._start)
                 content = stream.read()
         except FileNotFoundError:
@@ -87,3 +91,21 @@ class FollowedFile:
                     "is left out.",
                 )
         return rows
+
+    def _require_line_ended(self, stream: BinaryIO) -> None:
+        """Raise `ReadingGoesOn` where the last line that was read, without an end of line, has gone on; the rest of it is passed over."""
+        end = self.end
+        stream.seek(end - 1)
+        if any(byte in b"\r\n" for byte in stream.read(2)):
+            return
+        stream.seek(end)
+        rest = stream.readline()
+        if self._start == end:
+            self._start += len(rest)
+        self._skipped = end + len(rest)
+        raise ReadingGoesOn(
+            "E-STUDIO-051",
+            f"{self.path}: the other program left its last line for so long that it was taken as complete, and has now written "
+            f"'{rest.decode('utf-8', 'replace').strip()[:60]}' behind it; "
+            "the row of that line is wrong: exclude it, and measure its pose again.",
+        )
