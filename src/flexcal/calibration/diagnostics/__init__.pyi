@@ -9,6 +9,7 @@ from .nearest_socket import NearestSocket, nearest_sockets
 from .noise_test import StatedNoise, stated_noise
 from .place_agreement import FEWEST_PLACES, Disagreement, PlaceAgreement, PlaceErrors
 from .plausibility import FarZero, far_zeros, implausible_shifts, is_implausible, residuals_implausible
+from .reading_lag import ReadingLag
 from .repeatability_floor import RepeatabilityFloor
 from .size_of_board import board_size
 
@@ -27,6 +28,7 @@ __all__ = [
     "PlaceAgreement",
     "PlaceErrors",
     "ReadingJump",
+    "ReadingLag",
     "RepeatabilityFloor",
     "StatedNoise",
     "board_size",

@@ -48,7 +48,8 @@ class RepeatabilityFloor:
         )
         return (
             f"{self.distance / MILLIMETRE:.1f} mm (rms) of scatter from pose to pose remain beside the geometry, as if every "
-            f"joint had {self.joint_degrees:.1f}° of play (1σ), or something moved between the poses: if nothing did, {whose}, "
+            f"joint had {self.joint_degrees:.1f}° of play (1σ), or something moved between the poses, or the robot while it was read: if "
+            f"nothing did, {whose}, "
             "and no calibration goes much below that"
         )
 

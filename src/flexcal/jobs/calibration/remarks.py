@@ -10,6 +10,7 @@ import numpy as np
 from flexcal.calibration.diagnostics import (
     Drift,
     NearestSocket,
+    ReadingLag,
     RepeatabilityFloor,
     StatedNoise,
     board_size,
@@ -366,6 +367,22 @@ def _contradicted(test: StatedNoise) -> str:
     )
 
 
+def lag_remark(lag: ReadingLag | None) -> tuple[str, ...]:
+    """Remark on points that were read at another instant than the joint positions."""
+    if lag is None or not lag.certain:
+        return ()
+    size = (
+        f"by {abs(lag.lag) * 1e3:.3g} ± {1.96 * lag.std * 1e3:.2g} ms"
+        if lag.timed
+        else f"by {abs(lag.lag):.2g} ± {1.96 * lag.std:.1g} of the time from one row to the next"
+    )
+    return (
+        f"the points {'lag behind' if lag.lag > 0 else 'are ahead of'} the joint positions {size} (95 %), which explains {lag.share:.0%} "
+        f"of the squares of the residuals ({chance_in_words(lag.probability)}): the robot moved while they were read, and not at the same "
+        "instant; let it stand still at every pose, or write both as they were at the same time, and calibrate again",
+    )
+
+
 def floor_remark(fit: GeometricFit, before: np.ndarray | None) -> tuple[str, ...]:
     """Remark where the scatter from pose to pose is what is left, and large; `before` (N, 3), m, are the errors without calibration."""
     rows = int(fit.poses.present.sum())
@@ -390,7 +407,7 @@ def floor_remark(fit: GeometricFit, before: np.ndarray | None) -> tuple[str, ...
     play = "" if floor is None else f", as if every joint had {floor.joint_degrees:.1f}° of play,"
     return (
         f"the scatter from pose to pose, {robot:.2f} mm per coordinate (1σ){play or ','} is the floor, if nothing moved between the "
-        f"poses: model errors of {model:.2f} mm and parameters known to {parameters:.2f} mm at these "
+        f"poses and the robot stood still at them: model errors of {model:.2f} mm and parameters known to {parameters:.2f} mm at these "
         "poses add little to it, so neither further terms nor more poses will make this "
         "robot much more accurate. Visits to the same poses tell how much of it is the robot's repeatability (flexcal repeatability)",
     )

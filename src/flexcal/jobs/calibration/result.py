@@ -15,6 +15,7 @@ from flexcal.calibration.diagnostics import (
     Drift,
     LearningCurve,
     PlaceAgreement,
+    ReadingLag,
     RepeatabilityFloor,
     gravity_loads,
     is_implausible,
@@ -53,7 +54,7 @@ from flexcal.jobs.calibration.held_out import HeldOut
 from flexcal.jobs.calibration.held_out_tilts import HeldOutTilts
 from flexcal.jobs.calibration.inclinations import inclination_document
 from flexcal.jobs.calibration.prior_of_fleet import contradicts, fleet_document, fleet_remarks
-from flexcal.jobs.calibration.remarks import calibration_remarks, floor_remark, outliers_of
+from flexcal.jobs.calibration.remarks import calibration_remarks, floor_remark, lag_remark, outliers_of
 from flexcal.jobs.calibration.sockets import base_remark, place_remarks, scale_document, scale_remark
 from flexcal.jobs.calibration.subsample import calibration_subsample_remark, subsample_document
 from flexcal.jobs.calibration.thermal import thermal_document
@@ -244,6 +245,11 @@ class Calibration(Identification):
         """Coupled drive that robot.yaml does not declare, where that is why the points are not met."""
         return undeclared_coupling(self.nominal, self.selected)
 
+    @cached_property
+    def lag(self) -> ReadingLag | None:
+        """Whether points and joint positions were read at different instants while the robot moved; None where the rows cannot tell."""
+        return ReadingLag.of(self.selected)
+
     @property
     def is_implausible(self) -> bool:
         """Whether data and robot are inconsistent, so that the calibration must not be used."""
@@ -269,7 +275,8 @@ class Calibration(Identification):
         fleet = fleet_document(selected)
         pooled = self.pooled_stiffness
         contradicted = contradicts(fleet) or (pooled is not None and pooled.contradicted)
-        misfits = coupling is not None or contradicted
+        lagging = self.lag is not None and self.lag.certain
+        misfits = coupling is not None or contradicted or lagging
         floor = None if misfits else RepeatabilityFloor.of(selected)
         learning = LearningCurve.of(selected)
         bearings = bearing_remarks(self.bearings, selected)
@@ -322,6 +329,7 @@ class Calibration(Identification):
             "floor": None if floor is None else floor.document(),
             "undeclared_coupling": None if coupling is None else coupling.document(),
             "drift": None if drift is None else drift.document(),
+            "lag": None if self.lag is None else self.lag.document(),
             "sample": subsample_document(self.sample, self.everywhere),
             "outliers": [outlier.document() for outlier in outliers_of(selected)],
             "places": None if agreement is None else agreement.document(),
@@ -341,6 +349,7 @@ class Calibration(Identification):
                 *([] if pooled is None else pooled.remarks),
                 *([] if self.levels is None or coupling is not None else [self.levels.sentence]),
                 *calibration_remarks(selected, self._cause, prior_misfits=contradicted),
+                *lag_remark(self.lag),
                 *(() if blamed else bearings),
                 *place_remarks(agreement),
                 *(() if self._cause or misfits else floor_remark(selected, self.before.robots_own)),

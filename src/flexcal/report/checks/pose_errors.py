@@ -165,6 +165,23 @@ def check_drift(drift: Mapping[str, Any]) -> Check:
     return Check(question, answer, "care")
 
 
+def check_lag(lag: Mapping[str, Any] | None) -> tuple[Check, ...]:
+    """Where joint positions and points were not read at the same instant while the robot moved; `lag` is the block of results.json."""
+    if lag is None or not lag["certain"]:
+        return ()
+    size = (
+        f"{abs(lag['lag']) * 1e3:.3g} ms"
+        if lag["unit"] == "s"
+        else f"{abs(lag['lag']):.2g} of the time from one row to the next"
+    )
+    answer = (
+        f"No: the points are {'behind' if lag['lag'] > 0 else 'ahead of'} the joint positions by {size}, which explains "
+        f"{lag['share']:.0%} of the squares of the residuals (p = {p_value(lag['p'])}). The robot moved while it was measured: let it "
+        "stand still at every pose."
+    )
+    return (Check("Were joint positions and points read at the same instant?", answer, "bad").named("lag"),)
+
+
 def check_rank(parameters: int, rank: int, gap: float) -> Check:
     """Whether the rank is unambiguous: a `gap` in decades between the parameters that are determined and the others."""
     question = "Is the rank of the identification clear?"

@@ -1,0 +1,137 @@
+"""Score test for points that were read at another instant than the joint positions, while the robot moved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from flexcal.calibration.fit import GeometricFit
+from flexcal.calibration.measurement import Readings, predict_measurements
+from flexcal.data.poses import PoseSet
+
+_CHANCE = 1e-6
+"""Significance level of a lag: what else goes with the order of measuring must not be called one."""
+_SHARE = 0.5
+"""Least share of the residuals that a lag explains: below it friction or wind-up of a robot that stands still may be what goes with it."""
+_SMOOTH = 0.1
+"""Largest square of what rows of a path are off the curve through those about them, relative to that of steps between rows."""
+_STENCIL = 5
+_STEP = 1e-3
+"""Finite difference of the velocity of the points, in time steps."""
+
+
+@dataclass(frozen=True)
+class ReadingLag:
+    """Points lag the joint positions by `lag` ± `std` (1σ), s, or steps from row to row where rows are not `timed`; negative: ahead.
+
+    `share` of the weighted squares of the residuals, 0 to 1, is explained by it, and `reversals` by friction or wind-up of every joint,
+    which go with the direction of its motion; `probability` is the p-value of the F test for none.
+    """
+
+    lag: float
+    std: float
+    share: float
+    reversals: float
+    probability: float
+    timed: bool
+
+    @property
+    def certain(self) -> bool:
+        """Whether there is one: significant, most of the residuals, and more of them than the direction of motion explains."""
+        return self.probability < _CHANCE and self.share > max(_SHARE, self.reversals)
+
+    def document(self) -> dict[str, Any]:
+        """Block of a JSON document."""
+        return {
+            "lag": self.lag,
+            "std": self.std,
+            "unit": "s" if self.timed else "steps",
+            "share": self.share,
+            "p": self.probability,
+            "certain": self.certain,
+        }
+
+    @classmethod
+    def of(cls, fit: GeometricFit) -> ReadingLag | None:
+        """First-order estimate with one further parameter, by the velocity along the rows; None where they are no path, or no points.
+
+        Rows are in measuring order, at the times of the file where it has them. Poses that were chosen one by one are no path: then
+        nothing tells how the robot moved.
+        """
+        from scipy.special import fdtrc
+
+        poses = fit.poses
+        if not poses.located.all() or fit.linear.readings.slopes is not None or len(poses) <= 2 * _STENCIL:
+            return None
+        timed = poses.time is not None and bool((np.diff(poses.time) > 0).all())
+        times = poses.time if timed and poses.time is not None else np.arange(len(poses), dtype=float)
+        if not _is_path(poses.q, times):
+            return None
+        rate = _rates(poses.q, times)
+        effects = np.stack([_velocity(fit, poses, rate), *_reversals(fit, poses, rate)], axis=2)
+        row = Readings.of(poses).row
+        kept = ~np.isin(row, fit.estimate.outliers)
+        # of orientations beside the points nothing is taken
+        columns = effects[row[kept]] * (np.flatnonzero(kept) < len(poses))[:, None, None]
+        products = fit.linear.products(replace(fit.scatter, order=0.0), columns)
+        freedom = int(fit.linear.readings.present.sum()) - fit.linear.free.shape[2] - 1
+        total, own, along = products[-1, -1], products[0, 0], products[0, -1]
+        if freedom < 1 or own <= 0 or total <= 0:
+            return None
+        explained = along**2 / own
+        left = (total - explained) / freedom
+        turned = np.linalg.lstsq(products[1:-1, 1:-1], products[1:-1, -1], rcond=1e-9)[0] @ products[1:-1, -1]
+        return cls(
+            float(along / own),
+            float(np.sqrt(max(left, 1.0) / own)),
+            float(explained / total),
+            float(turned / total),
+            float(fdtrc(1, freedom, explained / max(left, 1.0))),
+            timed,
+        )
+
+
+def _is_path(q: np.ndarray, times: np.ndarray) -> bool:
+    """Whether joint positions (N, n) at their times (N,) lie on smooth curves: each near the cubic through the two before and after it."""
+    middle = np.arange(2, len(q) - 2)
+    about = middle[:, None] + np.array([-2, -1, 1, 2])
+    weights = _weights(times[about] - times[middle][:, None], 0)
+    missed = q[middle] - np.einsum("mk,mkn->mn", weights, q[about])
+    steps = np.diff(q, axis=0)
+    return bool((missed**2).mean() < _SMOOTH * (steps**2).mean())
+
+
+def _rates(q: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Derivatives (N, n) of joint positions by time, of the polynomial through five rows."""
+    first = np.clip(np.arange(len(q)) - _STENCIL // 2, 0, len(q) - _STENCIL)
+    about = first[:, None] + np.arange(_STENCIL)
+    return np.einsum("mk,mkn->mn", _weights(times[about] - times[:, None], 1), q[about])
+
+
+def _weights(offsets: np.ndarray, order: int) -> np.ndarray:
+    """Weights (M, k) of values at `offsets` (M, k) in the derivative of this order, at 0, of the polynomial through them."""
+    scale = np.abs(offsets).max(axis=1, keepdims=True)
+    powers = (offsets / scale)[:, None, :] ** np.arange(offsets.shape[1])[:, None]
+    wanted = np.zeros((*offsets.shape, 1))
+    wanted[:, order, 0] = 1.0
+    return np.linalg.solve(powers, wanted)[:, :, 0] / scale**order
+
+
+def _velocity(fit: GeometricFit, poses: PoseSet, rate: np.ndarray) -> np.ndarray:
+    """Change (N, 3) of the predicted points, m, with a lag: against their velocity at joint rates (N, n)."""
+    ahead, behind = (
+        predict_measurements(fit.model, replace(poses, q=poses.q + sign * _STEP * rate)).position
+        for sign in (1.0, -1.0)
+    )
+    return (behind - ahead) / (2 * _STEP)
+
+
+def _reversals(fit: GeometricFit, poses: PoseSet, rate: np.ndarray) -> list[np.ndarray]:
+    """Changes (N, 3) of the predicted points, m/rad, with a joint that stays behind by the same angle whichever way it moves."""
+    signs = np.sign(rate)
+    return [
+        _velocity(fit, poses, signs * (np.arange(poses.q.shape[1]) == joint))
+        for joint in range(poses.q.shape[1])
+    ]
