@@ -12,6 +12,8 @@ from scipy.linalg import expm
 
 from flexcal.elasticity.time_periodic import FrictionPulses, ReferenceMotion, reference_shift
 from flexcal.elasticity.time_periodic.reference_motion import ArmState
+from flexcal.model.robot import ArmSensor
+from flexcal.model.robot.measuring_config import ArmSensorConfig
 from flexcal.model.statics import elastic_axes
 from flexcal.model.vibration import ElasticArm, Linearisation, linearise
 
@@ -90,6 +92,27 @@ def test_friction_pulses(tx90l, poses, motion):
         return np.zeros_like(more), more, np.zeros_like(more)
 
     check(system, motion, change, shift)
+
+
+def test_shift_by_form_is_the_derivative(tx90l, poses, motion):
+    config = ArmSensorConfig("link_3", (0.1, 0.0, 0.2), (0.6, 0.0, 0.8))
+    place, direction = np.array(config.xyz), np.array(config.direction)
+    sensor = ArmSensor("tip", 2, place, direction, moves=True, order=2, config=config)
+    system = linearise(tx90l, poses["default"][2], sensors=[sensor])
+    pulses = FrictionPulses.of(system, FREQUENCIES, motion, np.array([40.0, 30.0, 10.0]))
+    derivative, step = pulses.shift_by_form(), 1e-4
+    for axis, more in enumerate(np.exp(step * np.eye(3))):
+        for column, name in ((axis, "strength"), (3 + axis, "width")):
+            value = getattr(pulses, name)
+            above, below = (replace(pulses, **{name: value * factor}).shift for factor in (more, 1 / more))
+            measured = (above - below) / (2 * step)
+            assert measured.shape == (3, 4, 3)
+            for rows in (slice(3), slice(3, 4)):
+                size = np.abs(measured[:, rows]).max()
+                assert size > 0
+                np.testing.assert_allclose(
+                    derivative[:, rows, :, column], measured[:, rows], atol=1e-6 * size
+                )
 
 
 @pytest.mark.parametrize("bearings", ["after", "before"])

@@ -60,7 +60,7 @@ class FrictionPulses:
         for _ in range(WIDTH_PASSES):
             speed = _reversal_velocity(velocity, orders, motion.excitation)
             pulses = replace(pulses, width=speed / (motion.amplitude * omega**2))
-            velocity = pulses.velocity()
+            velocity = pulses.velocity
         return pulses
 
     def coefficients(self) -> np.ndarray:
@@ -71,6 +71,7 @@ class FrictionPulses:
         sign = np.where(apart == 0, 0.0, np.where(apart % 4 == 0, 1.0, -1.0))
         return sign[:, :, None] * decay * self.strength
 
+    @cached_property
     def velocity(self) -> np.ndarray:
         """Motor velocities (L, k, E, E) of all orders per N m at the line: v = Y (τ - F v)."""
         lines, orders, count, _ = self.mobility.shape
@@ -85,32 +86,39 @@ class FrictionPulses:
 
     @cached_property
     def shift(self) -> np.ndarray:
-        """G with pulsed friction less G with its mean, (L, E + S, E): rad/s² per N m, then the sensors' readings.
-
-        The readings follow the forces at the line: the torque less friction, over the measured torque, of which the controller's is part.
-        """
+        """G with pulsed friction less G with its mean, (L, E + S, E): rad/s² per N m, then the sensors' readings."""
         bands = self.sidebands
-        velocity, middle = self.velocity(), bands.middle
-        pulsed, mean = (v[:, middle] for v in (velocity, self.mobility))
-        change = bands.acceleration(pulsed) - bands.acceleration(mean)
-        if not self.sensed.shape[1]:
-            return change
-        friction = np.einsum("li,Llij->Lij", self.coefficients()[middle], velocity)
-        still = self.sensed @ np.linalg.inv(np.eye(mean.shape[1]) - bands.loop @ mean)
-        moving = (
-            self.sensed
-            @ (np.eye(mean.shape[1]) - friction)
-            @ np.linalg.inv(np.eye(mean.shape[1]) - bands.loop @ pulsed)
-        )
-        return np.concatenate([change, moving - still], axis=1)
+        pulsed, mean = (bands.measured_mobility(v[:, bands.middle]) for v in (self.velocity, self.mobility))
+        return self._readings @ (pulsed - mean)
 
     def shift_by_form(self) -> np.ndarray:
-        """∂ `shift` (L, E + S, E, 2 E) by the logarithm of every strength, then of every width, by forward differences."""
-        base, step = self.shift, 0.05
-        growth = np.exp(step * np.eye(len(self.width)))
-        changed = [replace(self, strength=g * self.strength) for g in growth]
-        changed += [replace(self, width=g * self.width) for g in growth]
-        return np.stack([(other.shift - base) / step for other in changed], axis=-1)
+        """∂ `shift` (L, E + S, E, 2 E) by the logarithm of every strength, then of every width.
+
+        The velocities at the line change by -vᵀ ∂F v, with those v at all orders: v = (Y⁻¹ + F)⁻¹ τ, and Y and F are symmetric.
+        """
+        bands, velocity = self.sidebands, self.velocity
+        by_strength = self.coefficients()
+        apart = (bands.orders[:, None] - bands.orders[None, :])[:, :, None]
+        by_width = -((apart * self.omega * self.width) ** 2) * by_strength
+        moved = velocity.transpose(2, 0, 1, 3)  # (j, L, k, E)
+        changes = [
+            -np.swapaxes(of_motor, 1, 2) @ (form[:, :, j] @ of_motor)
+            for form in (by_strength, by_width)
+            for j, of_motor in enumerate(moved)
+        ]
+        pulsed = velocity[:, bands.middle]
+        share = bands.measured_mobility(pulsed) @ np.linalg.inv(pulsed)
+        readings = self._readings @ share
+        return np.stack([readings @ change @ np.swapaxes(share, 1, 2) for change in changes], axis=-1)
+
+    @property
+    def _readings(self) -> np.ndarray:
+        """Accelerations and sensors' readings (L, E + S, E) per motor velocity at the line, rad/s; the readings follow the forces there,
+        the torque less friction.
+        """
+        middle, count = self.sidebands.middle, self.mobility.shape[2]
+        acceleration = self.sidebands.s[:, middle, None, None] * np.eye(count)
+        return np.concatenate([acceleration, self.sensed @ np.linalg.inv(self.mobility[:, middle])], axis=1)
 
 
 def _reversal_velocity(moved: np.ndarray, orders: np.ndarray, excitation: np.ndarray) -> np.ndarray:

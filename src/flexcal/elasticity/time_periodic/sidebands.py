@@ -46,7 +46,6 @@ class Sidebands:
         """Displacements (L, k, d, c) by `forces` (d, c) at every order."""
         return np.linalg.solve(self.dynamics, np.broadcast_to(forces, (*self.s.shape, *forces.shape)))
 
-    def acceleration(self, velocity: np.ndarray) -> np.ndarray:
-        """G (L, E, E) from the motors' velocities (L, E, E) at the lines: the controller's torque is part of the measured one."""
-        impedance = np.linalg.inv(velocity) - self.loop
-        return self.s[:, self.middle, None, None] * np.linalg.inv(impedance)
+    def measured_mobility(self, velocity: np.ndarray) -> np.ndarray:
+        """Motors' velocities (L, E, E) at the lines per measured torque, of which the controller's is part, from those per torque."""
+        return np.linalg.inv(np.linalg.inv(velocity) - self.loop)
