@@ -48,12 +48,21 @@ class LocalProcesses(Workers):
     def results(
         self, function: Callable[..., V], tasks: Iterable[Any], *common: Any
     ) -> Generator[Outcome[V], None, None]:
-        """As `Workers.results`."""
+        """As `Workers.results`; the first tasks begin at once, not when the first outcome is asked for."""
+        outcomes = self._outcomes(function, tasks, common)
+        next(outcomes)  # the first tasks are sent
+        return outcomes  # type: ignore[return-value]
+
+    def _outcomes(
+        self, function: Callable[..., V], tasks: Iterable[Any], common: tuple[Any, ...]
+    ) -> Generator[Outcome[V] | None, None, None]:
+        """None once the first tasks are sent, then the outcomes."""
         shared = CommonValues.of((function, *common))
         waiting = (_Numbered(index, task) for index, task in enumerate(tasks))
         suspects: deque[_Numbered] = deque()
         deaths: Counter[int] = Counter()
         running: dict[Future[Outcome[V]], _Numbered] = {}
+        begun = False
         try:
             while True:
                 ahead = 1 if suspects else _AHEAD * self._jobs
@@ -62,6 +71,9 @@ class LocalProcesses(Workers):
                     if following is None:
                         break
                     running[self._submit(shared, following)] = following
+                if not begun:
+                    begun = True
+                    yield None
                 if not running:
                     return
                 ended = wait(running, return_when=FIRST_COMPLETED).done

@@ -4,9 +4,10 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -58,6 +59,7 @@ from flexcal.jobs.two_stage.document import two_stage_document
 from flexcal.jobs.two_stage.inertial_stage import run_stage_zero
 from flexcal.jobs.two_stage.results import CadInertialsRun, TwoStageRun
 from flexcal.model.robot import MASS_AND_COM, RobotModel
+from flexcal.parallel import LocalProcesses, ThisProcess, Workers
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust
 from flexcal.report.pages import two_stage_checks
@@ -87,6 +89,27 @@ class Stopwatch:
         self.seconds[name] += time.perf_counter() - started
 
 
+@dataclass(frozen=True, eq=False)
+class StageOne:
+    """Stage 1 of a run: its fit depends on the robot that it starts from alone."""
+
+    responses: tuple[FrequencyResponse, ...]
+    plan: MultisinePlan
+    seed: int
+    inertias_known: bool
+
+    def springs(self, model: RobotModel, progress: Progress = silent) -> SpringFit:
+        """Springs of a robot with the inertials of `model`."""
+        return fit_springs(
+            model,
+            self.responses,
+            inertias_known=self.inertias_known,
+            plan=self.plan,
+            rng=np.random.default_rng([self.seed, 1]),
+            progress=progress,
+        )
+
+
 def run_two_stage(
     robot_file: Path,
     out: Path,
@@ -108,10 +131,44 @@ def run_two_stage(
     identified and stored. `inertias_known` gives the identification the true link inertias, to see what CAD costs. The plans `designed` and
     `quick` are chosen for the robot as stage 0 left it; `quick` takes half the time, and 25 calibration poses instead of 40. The robot of
     the hard `cell` has other parameters than the model: truth.yaml holds those that have a counterpart. What CAD alone would have found is
-    told for the virtual cell.
+    told for the virtual cell, fitted in a process beside this one where the machine has a second core.
 
     Raises `FlexcalError` for files that do not fit.
     """
+    beside = LocalProcesses(1) if (os.cpu_count() or 1) > 1 else ThisProcess()
+    with closing(beside):
+        return _run(
+            robot_file,
+            out,
+            seed=seed,
+            plan=plan,
+            cell=cell,
+            config=config,
+            truth=truth,
+            inertias_known=inertias_known,
+            report=report,
+            command=command,
+            progress=progress,
+            beside=beside,
+        )
+
+
+def _run(
+    robot_file: Path,
+    out: Path,
+    *,
+    seed: int,
+    plan: PlanName,
+    cell: CellName,
+    config: CellConfig | None,
+    truth: Path | None,
+    inertias_known: bool,
+    report: bool,
+    command: str,
+    progress: Progress,
+    beside: Workers,
+) -> TwoStageRun:
+    """As `run_two_stage`; `beside` runs what nothing else waits for."""
     watch = Stopwatch()
     nominal = RobotModel.from_yaml(robot_file, estimates=False)
     out.mkdir(parents=True, exist_ok=True)
@@ -139,20 +196,15 @@ def run_two_stage(
     files = [out / f"response_pose_{response.pose + 1}.npz" for response in responses]
     for response, file in zip(responses, files, strict=True):
         response.save(file)
+    stage_one = StageOne(responses, frequency, seed, inertias_known)
+    cad_springs = None
+    if dynamics is not None and cell == "virtual":
+        cad_springs = beside.values(stage_one.springs, [nominal])
     with watch.stage("stage1"):
         progress("stage1", 0.0)
-
-        def stage_one(robot: RobotModel, stage: str) -> SpringFit:
-            return fit_springs(
-                robot,
-                responses,
-                inertias_known=inertias_known,
-                plan=frequency,
-                rng=np.random.default_rng([seed, 1]),
-                progress=lambda part, share: progress(stage, (share + (part == "fitting")) / 2),
-            )
-
-        stiffness = stage_one(believed, "stage1")
+        stiffness = stage_one.springs(
+            believed, lambda part, share: progress("stage1", (share + (part == "fitting")) / 2)
+        )
         elastic = stiffness.robot(believed)
         progress("stage1", 1.0)
     with watch.stage("poses"):
@@ -228,9 +280,10 @@ def run_two_stage(
             command=command,
         )
         progress("verification", 1.0)
-    if dynamics is not None and cell == "virtual":
+    if cad_springs is not None:
         with watch.stage("cad_alone"):
-            springs = stage_one(nominal, "cad_alone")
+            progress("cad_alone", 0.0)
+            springs = next(cad_springs)
             fitted = fit_geometry(springs.robot(nominal), measured)
             run = replace(
                 run,
