@@ -8,6 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
+from flexcal.calibration.error_model.whitening import cholesky_inverses
+
 
 @dataclass(frozen=True, eq=False)
 class Arrowhead:
@@ -19,24 +21,26 @@ class Arrowhead:
     border: np.ndarray
     corner: np.ndarray
 
-    def scaled(self, outer: float, inner: np.ndarray, used: np.ndarray) -> Arrowhead:
-        """Scaled matrix S M S restricted to the columns `used` (d',) of the corner; S has `outer` for the first b rows and `inner` (d',)
-        for these.
-        """
+    def scaled(self, outer: float, inner: np.ndarray) -> Arrowhead:
+        """Scaled matrix S M S; the diagonal matrix S has `outer` for the first b rows and `inner` (d,) for the others."""
         blocks = tuple(outer**2 * values for values in self.blocks)
-        corner = self.corner[np.ix_(used, used)] * inner * inner[:, None]
-        return Arrowhead(blocks, self.border[:, used] * (outer * inner), corner)
+        return Arrowhead(blocks, self.border * (outer * inner), self.corner * inner * inner[:, None])
 
-    def rows(self, outer: float, inner: np.ndarray, used: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Rows S M (b + d', k) of some `columns` (k,) of the corner, S as in `scaled`."""
-        return np.concatenate(
-            [outer * self.border[:, columns], inner[:, None] * self.corner[np.ix_(used, columns)]]
-        )
+    def rows(self, outer: float, inner: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """Rows S M (b + d, k) of some `columns` (k,) of the corner, S as in `scaled`."""
+        return np.concatenate([outer * self.border[:, columns], inner[:, None] * self.corner[:, columns]])
 
     def plus_identity(self, inner: np.ndarray) -> Arrowhead:
         """Matrix M with 1 added to the diagonal of B and, where `inner` (d,) is set, of D."""
         blocks = tuple(values + np.eye(values.shape[1]) for values in self.blocks)
         return Arrowhead(blocks, self.border, self.corner + np.diag(inner.astype(float)))
+
+    def inner(self, other: Arrowhead) -> float:
+        """Sum of the products of all entries with those of an `other` matrix with blocks of the same sizes."""
+        pairs = (*zip(self.blocks, other.blocks, strict=True), (self.corner, other.corner))
+        return float(
+            sum(np.vdot(own, values) for own, values in pairs) + 2 * np.vdot(self.border, other.border)
+        )
 
     def times(self, vector: np.ndarray) -> np.ndarray:
         """Product M v (b + d,)."""
@@ -46,7 +50,7 @@ class Arrowhead:
 
     def factored(self) -> ArrowheadFactor:
         """Cholesky factor, with B eliminated first; raises `LinAlgError` if M is not positive definite."""
-        inverses = tuple(np.linalg.inv(np.linalg.cholesky(values)) for values in self.blocks)
+        inverses = tuple(cholesky_inverses(values) for values in self.blocks)
         border = _by_blocks(inverses, self.border)
         return ArrowheadFactor(inverses, border, np.linalg.cholesky(self.corner - border.T @ border))
 
@@ -84,13 +88,17 @@ class ArrowheadFactor:
         lower = dtrtrs(self.corner.T, columns[count:])[0]
         return np.concatenate([_by_blocks(self._turned, columns[:count] - self.border @ lower), lower])
 
-    def trace(self, other: Arrowhead) -> float:
-        """Trace of M⁻¹ A for an `other` matrix A with blocks of the same sizes."""
-        whole = float(np.sum(self._corner_inverse * other.corner))
-        for inverse, values in zip(self.inverses, other.blocks, strict=True):
-            whole += float(np.sum((inverse @ values) * inverse))
-        across = _by_blocks(other.blocks, self._eliminated) - 2 * other.border
-        return whole + float(np.sum(self._spread * across))
+    @cached_property
+    def selected_inverse(self) -> Arrowhead:
+        """Entries of M⁻¹ where M has blocks, border and corner (Takahashi, Fagan & Chin 1973)."""
+        blocks, first = [], 0
+        for inverse in self.inverses:
+            rows = slice(first, first + inverse.shape[0] * inverse.shape[1])
+            shape = *inverse.shape[:2], -1
+            beside = np.swapaxes(self._eliminated[rows].reshape(shape), 1, 2)
+            blocks.append(np.swapaxes(inverse, 1, 2) @ inverse + self._spread[rows].reshape(shape) @ beside)
+            first = rows.stop
+        return Arrowhead(tuple(blocks), -self._spread, self._corner_inverse)
 
     def squares(self, other: Arrowhead) -> float:
         """Squared norm ‖L⁻¹ A‖² of the first b columns of an `other` matrix A with blocks of the same sizes."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from flexcal.calibration.error_model.arrowhead_matrix import Arrowhead
 from flexcal.calibration.error_model.command_sums import CommandSums
-from flexcal.calibration.error_model.error_components import stated_covariance, translations
+from flexcal.calibration.error_model.error_components import ErrorComponents, stated_covariance, translations
 from flexcal.calibration.error_model.groups import COMMAND
 from flexcal.calibration.error_model.incidence_matrices import added, by_axes, incidence, pairs_of
 from flexcal.calibration.measurement import RADIANS, ROBOT
@@ -25,13 +25,15 @@ class PointSums:
     """Columns of a linear fit by visits to poses, and the sums for scalar products of columns shared by blocks.
 
     `columns` (G, 3 T, p + w + k + 1) are those of the fit, w waves of transmission errors, k further ones and, the last, its residual;
-    `structures` are ∂V/∂variance of the components that visits have on their own, (G, 3 T, 3 T) or as diagonals (G, 3 T); `blocks` says
-    which of K cells and stretches are a component's; `sums` (K, G T) and `pairs` (K K, G T T) add rows, and pairs of rows of one visit,
-    that belong to one, and to a pair of them. `commands` does so for errors of commands, of which there may be half as many as points.
+    `least` (G, 3 T, 3 T) is the visits' covariance V without any component, `structures` are ∂V/∂variance of the components that visits
+    have on their own, (G, 3 T, 3 T) or as diagonals (G, 3 T); `blocks` says which of K cells and stretches are a component's; `sums`
+    (K, G T) and `pairs` (K K, G T T) add rows, and pairs of rows of one visit, that belong to one, and to a pair of them. `commands` does
+    so for errors of commands, of which there may be half as many as points.
     """
 
     fit: LinearFit
     columns: np.ndarray
+    least: np.ndarray
     structures: dict[str, np.ndarray]
     blocks: dict[str, np.ndarray]
     sums: csr_matrix
@@ -58,6 +60,7 @@ class PointSums:
             "pose": together @ np.swapaxes(together, 1, 2),
             "angular": turned @ np.swapaxes(turned, 1, 2),
         }
+        least = ErrorComponents(share=0.0).jointly(fit.readings, fit.turns, cells)
         blocks, labels, count = {}, [], 0
         for name, own in cells.blocks.items():
             if name != COMMAND:
@@ -70,7 +73,23 @@ class PointSums:
         rows = np.arange(cells.visits.size).reshape(*cells.visits.shape, 1)
         sums = incidence(label, rows, (count, cells.visits.size))
         commands = None if cells.command is None else CommandSums.of(cells, label, count)
-        return cls(fit, columns, structures, blocks, sums, pairs_of(label, label, count, count), commands)
+        pairs = pairs_of(label, label, count, count)
+        return cls(fit, columns, least, structures, blocks, sums, pairs, commands)
+
+    def covariance(self, scatter: ErrorComponents, *, commands: bool) -> np.ndarray:
+        """Covariance (G, 3 T, 3 T) that visits have on their own, as `ErrorComponents.jointly`; with the error of commands that were
+        visited once where `commands` have one.
+        """
+        whole = self.least.copy()
+        diagonal = np.einsum("gii->gi", whole)
+        for name, structure in self.structures.items():
+            if structure.ndim == 2:
+                diagonal += getattr(scatter, name) ** 2 * structure
+            else:
+                whole += getattr(scatter, name) ** 2 * structure
+        if commands and self.commands is not None:
+            diagonal += scatter.command**2 * self.commands.once
+        return whole
 
     def gram(self, inner: np.ndarray, *, commands: bool) -> Arrowhead:
         """Gram matrix CᵀQC of all columns C with Q given by its blocks `inner` (G, 3 T, 3 T).

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -41,6 +41,31 @@ _TO_ZERO = 0.1
 """Share of a variance with a prior factor that a step leaves of it at least."""
 _ARMIJO = 1e-4
 """Share of the predicted change that a step must achieve (Armijo 1966)."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Maximum:
+    """Maximum of the restricted likelihood by the `variances` (k,) of the components `names`, its logarithm `likelihood`.
+
+    `scale` (k,) are the units of the search; `at` is the likelihood evaluated there, whose names begin with these.
+    """
+
+    names: list[str]
+    scale: np.ndarray
+    variances: np.ndarray
+    likelihood: float
+    at: RestrictedLikelihood
+
+    @property
+    def relative(self) -> np.ndarray:
+        """Variances (k,) in units of `scale`."""
+        return self.variances / self.scale
+
+    @property
+    def information(self) -> np.ndarray:
+        """Average information (k, k) of the variances, of the likelihood."""
+        count = len(self.names)
+        return 0.5 * self.at.information[:count, :count]
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,70 +123,64 @@ class LinearFit:
             if near is None
             else np.maximum(np.array([getattr(near, name) for name in names]) ** 2 / scale, _START)
         )
-        variances, likelihood = self._maximum(names, scale, share, start)
+        best = self._maximum(names, scale, share, start)
         if stated:
             # the points may scatter less than the instrument alone should, even if nothing else errs
             of_first = self.readings.of_scatter(ROBOT) if first == ROBOT else self.readings.unit == RADIANS
             whole = totals[first] / float(np.mean(self.readings.sigma[of_first] ** 2))
             narrow = [*own, *shared]
             tried = np.array([*(sizes[name] for name in narrow), whole])
-            alone = self._maximum([*narrow, "share"], tried, None, favour=False)[1]
+            alone = self._maximum([*narrow, "share"], tried, None, favour=False).likelihood
             # without the prior factor the maximum is this high at least
             power = np.array([self._favour(name) for name in names])
-            reached = likelihood - 0.5 * float(power @ np.log(variances / scale))
+            reached = best.likelihood - 0.5 * float(power @ np.log(best.relative))
             if (
                 alone - reached > _CLEAR_GAIN
-                and alone - self._maximum(names, scale, share, favour=False)[1] > _CLEAR_GAIN
+                and alone - self._maximum(names, scale, share, favour=False).likelihood > _CLEAR_GAIN
             ):
                 names, scale = [first, *narrow], np.append(totals[first], tried[:-1])
-                narrower, likelihood = self._maximum([*names, "share"], np.append(scale, whole), None)
-                variances, share = narrower[:-1], float(np.sqrt(narrower[-1]))
-        names, scale, variances = self._supported(names, scale, variances, likelihood, share)
-        variances = np.where(variances > _NEGLIGIBLE * scale, variances, 0.0)
-        stds = dict(zip(names, np.sqrt(variances).tolist(), strict=True))
-        components = ErrorComponents(share=share, **stds)
-        return components, self._uncertainties(names, variances, share)
+                narrower = self._maximum([*names, "share"], np.append(scale, whole), None)
+                share = float(np.sqrt(narrower.variances[-1]))
+                best = replace(narrower, names=names, scale=scale, variances=narrower.variances[:-1])
+        best = self._supported(best, share)
+        stds = dict(zip(best.names, np.sqrt(best.variances).tolist(), strict=True))
+        seen = self._without(best, best.relative <= _NEGLIGIBLE, share)
+        components = ErrorComponents(share=share, **{name: stds[name] for name in seen.names})
+        return components, _uncertainties(seen)
 
-    def _supported(
-        self, names: list[str], scale: np.ndarray, variances: np.ndarray, likelihood: float, share: float
-    ) -> tuple[list[str], np.ndarray, np.ndarray]:
+    def _supported(self, best: _Maximum, share: float) -> _Maximum:
         """Model error, and the components of repeatability supported by the data, by backward elimination with a likelihood-ratio test.
 
         Components far from zero are not tried: the likelihood falls by much more than the test asks for.
         """
-        seen = [k for k in range(len(names)) if names[k] in _ALWAYS or variances[k] > _NEGLIGIBLE * scale[k]]
-        names, scale, variances = [names[k] for k in seen], scale[seen], variances[seen]
-        optional = {name for name in names[1:] if name not in _ALWAYS and not self._favour(name)}
+        best = self._without(best, (best.relative <= _NEGLIGIBLE) & ~np.isin(best.names, _ALWAYS), share)
+        optional = {name for name in best.names[1:] if name not in _ALWAYS and not self._favour(name)}
         if optional:
-            optional -= self._certain(names, variances, share)
+            optional -= _certain(best)
         while optional:
             trials = []
-            for k in range(1, len(names)):
-                if names[k] not in optional:
+            for k, name in enumerate(best.names):
+                if k == 0 or name not in optional:
                     continue
-                rest = [i for i in range(len(names)) if i != k]
-                near = variances[rest] / scale[rest]
-                near[0] += variances[k] / scale[k] / 2
-                maximum = self._maximum([names[i] for i in rest], scale[rest], share, near)
-                trials.append((maximum[1], maximum[0], rest))
-            best, kept, rest = max(trials, key=lambda trial: trial[0])
-            if likelihood - best > _SUPPORTED:
+                near = np.delete(best.relative, k)
+                near[0] += best.relative[k] / 2
+                rest = [other for other in best.names if other != name]
+                trials.append(self._maximum(rest, np.delete(best.scale, k), share, near))
+            next_best = max(trials, key=lambda trial: trial.likelihood)
+            if best.likelihood - next_best.likelihood > _SUPPORTED:
                 break
-            optional -= {*names} - {names[i] for i in rest}
-            names, scale, variances, likelihood = [names[i] for i in rest], scale[rest], kept, best
-        return names, scale, variances
+            optional -= {*best.names} - {*next_best.names}
+            best = next_best
+        return best
 
-    def _certain(self, names: list[str], variances: np.ndarray, share: float) -> set[str]:
-        """Components whose variance is many of its standard deviations from zero, by the average information; none if that is singular."""
-        information = 0.5 * self._at(names, variances, share).information
-        sizes = np.sqrt(np.maximum(np.diag(information), 0.0))
-        if not sizes.all():
-            return set()
-        related = information / (sizes * sizes[:, None])
-        if np.linalg.cond(related) > _TOLD_APART:
-            return set()
-        stds = np.sqrt(np.diag(np.linalg.inv(related))) / sizes
-        return {name for name, far in zip(names, variances > _CERTAIN * stds, strict=True) if far}
+    def _without(self, best: _Maximum, negligible: np.ndarray, share: float) -> _Maximum:
+        """The same maximum without the components (k,) that are `negligible`."""
+        if not negligible.any():
+            return best
+        names = [name for name, out in zip(best.names, negligible, strict=True) if not out]
+        variances = best.variances[~negligible]
+        at = self._at(names, variances, share)
+        return replace(best, names=names, scale=best.scale[~negligible], variances=variances, at=at)
 
     def _favour(self, name: str) -> float:
         """Power of a standard deviation in the prior factor of the likelihood: 1 for transmission errors, together 1 for other model
@@ -208,8 +227,8 @@ class LinearFit:
         near: np.ndarray | None = None,
         *,
         favour: bool = True,
-    ) -> tuple[np.ndarray, float]:
-        """Variances (k,) that maximise the restricted likelihood, and its logarithm; `share` None: it is the last of the variances.
+    ) -> _Maximum:
+        """Maximum of the restricted likelihood; `share` None: it is the last of the variances.
 
         Newton's steps with the average information, cut at the bounds. `near` (k,) is where to begin, in units of `scale`. The
         likelihood is multiplied by each standard deviation to the power of `_favour`, unless not to `favour` any.
@@ -243,7 +262,7 @@ class LinearFit:
             x, at = tried, after
             if still:
                 break
-        return x * scale, -0.5 * deviance(x, at)
+        return _Maximum(names, scale, x * scale, -0.5 * deviance(x, at), at)
 
     @cached_property
     def _sums(self) -> PointSums:
@@ -257,16 +276,26 @@ class LinearFit:
             self._sums, names, ErrorComponents(share=float(np.sqrt(squared)), **stds)
         )
 
-    def _uncertainties(self, names: list[str], variances: np.ndarray, share: float) -> dict[str, float]:
-        """Standard deviations of the components, from the average information."""
-        seen = variances > 0
-        named = [name for name, own in zip(names, seen, strict=True) if own]
-        if not named:
-            return {}
-        information = 0.5 * self._at(named, variances[seen], share).information
-        spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(information)), 0.0))
-        stds = spread / (2 * np.sqrt(variances[seen]))
-        return dict(zip(named, stds.tolist(), strict=True))
+
+def _certain(best: _Maximum) -> set[str]:
+    """Components whose variance is many of its standard deviations from zero, by the average information; none if that is singular."""
+    sizes = np.sqrt(np.maximum(np.diag(best.information), 0.0))
+    if not sizes.all():
+        return set()
+    related = best.information / (sizes * sizes[:, None])
+    if np.linalg.cond(related) > _TOLD_APART:
+        return set()
+    stds = np.sqrt(np.diag(np.linalg.inv(related))) / sizes
+    return {name for name, far in zip(best.names, best.variances > _CERTAIN * stds, strict=True) if far}
+
+
+def _uncertainties(best: _Maximum) -> dict[str, float]:
+    """Standard deviations of the components, from the average information."""
+    if not best.names:
+        return {}
+    spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(best.information)), 0.0))
+    stds = spread / (2 * np.sqrt(best.variances))
+    return dict(zip(best.names, stds.tolist(), strict=True))
 
 
 def _lever(moved: np.ndarray) -> float:

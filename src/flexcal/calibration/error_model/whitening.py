@@ -21,15 +21,15 @@ class Whitening:
     def of(cls, blocks: np.ndarray, across: np.ndarray | None, beside: np.ndarray) -> Whitening:
         """Whitening of covariances `blocks` (R, 3, 3) of the readings, and `across` (M, 3, 3) of orientations with their points."""
         if across is None:
-            return cls(np.linalg.inv(np.linalg.cholesky(blocks)))
+            return cls(cholesky_inverses(blocks))
         own = np.empty_like(blocks)
         points = len(blocks) - len(beside)
         alone = np.setdiff1d(np.arange(points), beside)
-        own[alone] = np.linalg.inv(np.linalg.cholesky(blocks[alone]))
+        own[alone] = cholesky_inverses(blocks[alone])
         whole = np.empty((len(beside), 6, 6))
         whole[:, :3, :3], whole[:, 3:, 3:] = blocks[beside], blocks[points:]
         whole[:, 3:, :3], whole[:, :3, 3:] = across, np.swapaxes(across, 1, 2)
-        factor = np.linalg.inv(np.linalg.cholesky(whole))
+        factor = cholesky_inverses(whole)
         own[beside], own[points:] = factor[:, :3, :3], factor[:, 3:, 3:]
         return cls(own, factor[:, 3:, :3], beside)
 
@@ -56,3 +56,15 @@ class Whitening:
         kept = rows[len(rows) - len(self.across) :]
         number = np.cumsum(rows) - 1
         return Whitening(self.own[rows], self.across[kept], number[self.beside[kept]])
+
+
+def cholesky_inverses(blocks: np.ndarray) -> np.ndarray:
+    """Inverses L⁻¹ of the Cholesky factors of positive definite matrices (k, m, m), by forward substitution in all of them together."""
+    factors = np.linalg.cholesky(blocks)
+    inverses = np.zeros_like(factors)
+    pivots = 1 / np.diagonal(factors, axis1=1, axis2=2)
+    for i in range(blocks.shape[1]):
+        above = np.matmul(factors[:, i, None, :i], inverses[:, :i, :i])[:, 0]
+        inverses[:, i, :i] = -pivots[:, i, None] * above
+        inverses[:, i, i] = pivots[:, i]
+    return inverses
