@@ -22,6 +22,7 @@ from flexcal.elasticity.identification.held_joints import CompliantHeldJoints
 from flexcal.elasticity.identification.lack_of_fit import find_misfit, misfit_std
 from flexcal.elasticity.identification.profile_std import profile_std_ratio
 from flexcal.elasticity.identification.search import MultiStart, Search
+from flexcal.elasticity.identification.torque_scale import TorqueScale
 from flexcal.elasticity.response_model import (
     CovarianceWeighting,
     Tolerances,
@@ -46,7 +47,7 @@ class SpringFit:
     `predicted` (L, n, n) of the fitted model, the reference motion included; `errors` (L, n, n), the complex errors Δ of Eq. (27);
     `misfit` (poses, n, n), mean |error|² over the measured variance: above 1 where the model does not explain an element.
     `bearings` says with which bearing axes the robot was fitted, and why; None for one without bearings. `sensed` (L, S, n) per
-    pose is what sensors on the arm are predicted to read.
+    pose is what sensors on the arm are predicted to read. `scale` is the factor of all inertia where the torques may be in another unit.
     """
 
     estimate: Estimate
@@ -57,6 +58,7 @@ class SpringFit:
     springs: tuple[str, ...]
     bearings: ResponseBearings | None
     sensed: tuple[np.ndarray, ...]
+    scale: TorqueScale | None = None
 
     @property
     def sensors(self) -> tuple[str, ...]:
@@ -158,7 +160,8 @@ def fit_springs(
 
     model, fit, bearings = with_fitting_bearings(model, data, first, completed)
     progress("fitting", 0.8)
-    estimate = _widened(fit, data)
+    scale = TorqueScale.of(fit)
+    estimate = _widened(fit, data, scale)
     progress("fitting", 1.0)
     stacked, axes = fit.predicted(), len(responses[0].joints)
     pairs = zip(fit.residual.poses, stacked, strict=True)
@@ -179,6 +182,7 @@ def fit_springs(
         spring_names(model),
         bearings,
         tuple(g[:, axes:] for g in stacked),
+        scale,
     )
 
 
@@ -234,15 +238,19 @@ def _searched_fit(
     return final_fit(model, data, first)
 
 
-def _by_torque_constants(fit: ResponseFit) -> np.ndarray:
-    """Covariance (p, p) of the logarithms of stiffness and damping due to the torque constants: one error for all springs of a joint."""
+def _by_torque_constants(fit: ResponseFit, scale: TorqueScale | None) -> np.ndarray:
+    """Covariance (p, p) of the logarithms of stiffness and damping due to the torque constants: one error for all springs of a joint, and
+    one for all where the torques may have another `scale`.
+    """
     names = fit.estimate.parameters.names
     joints = [name.split(".")[0] if name.endswith((".stiffness", ".damping")) else "" for name in names]
     same = np.array([[own == other != "" for other in joints] for own in joints], dtype=float)
-    return fit.residual.model.robot.prior.torque_constant**2 * same
+    springs = np.array([joint != "" for joint in joints], dtype=float)
+    common = 0.0 if scale is None else scale.log_std**2
+    return fit.residual.model.robot.prior.torque_constant**2 * same + common * np.outer(springs, springs)
 
 
-def _widened(fit: ResponseFit, data: ResponseData) -> Estimate:
+def _widened(fit: ResponseFit, data: ResponseData, scale: TorqueScale | None) -> Estimate:
     """Estimate with the covariance for measurements whose variance is `Tolerances.inflation` times the assumed one.
 
     That is H + (f - 1) (H - H P H), with H the posterior and P = LᵀL the prior's information by its rows L, times the reduced χ² where it
@@ -269,7 +277,7 @@ def _widened(fit: ResponseFit, data: ResponseData) -> Estimate:
     factor = np.maximum(factor, np.sqrt(excess)) * profile_std_ratio(problem, fitted)
     springs = np.array([name.endswith(SPRING_VALUES) for name in fitted.parameters.names])
     alone = np.where(springs, (factor**2 - excess) * np.diag(covariance), 0.0)
-    covariance = excess * covariance + np.diag(alone) + _by_torque_constants(fit)
+    covariance = excess * covariance + np.diag(alone) + _by_torque_constants(fit, scale)
     sized = is_log_identified(fitted.parameters, covariance)
     small = {
         name: flag and size

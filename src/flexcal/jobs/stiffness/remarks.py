@@ -10,7 +10,7 @@ from flexcal.elasticity.identification import SpringFit
 from flexcal.estimation import Estimate
 from flexcal.jobs.stiffness.bearing_axes import response_bearings_remarks
 from flexcal.model.robot import RobotModel, mounting_names, sensitivity_name
-from flexcal.report.checks import misfit_sentences
+from flexcal.report.checks import misfit_sentences, torque_scale_sentence
 from flexcal.report.sections import hardening_sentence
 
 _ONE_SIDED = 1.645
@@ -53,6 +53,8 @@ def stiffness_remarks(result: SpringFit, model: RobotModel) -> tuple[str, ...]:
         remarks.append(hardening[0].lower() + hardening.rstrip(".")[1:])
     if estimate.misfit is not None:
         remarks.append(f"unexplained responses: {misfit_sentences(estimate.misfit).rstrip('.')}")
+    if result.scale is not None:
+        remarks.append(torque_scale_sentence(result.scale.document()))
     return (*remarks, *response_bearings_remarks(result.bearings))
 
 

@@ -107,7 +107,11 @@ class StiffnessIdentification(Identification):
     @cached_property
     def trust(self) -> Trust:
         """The verdict, from the same checks as on the page."""
-        return Trust(stiffness_checks(self.estimate, response_bearings_block(self.fit.bearings)))
+        return Trust(stiffness_checks(self.estimate, response_bearings_block(self.fit.bearings), self._scale))
+
+    @property
+    def _scale(self) -> dict[str, Any] | None:
+        return None if self.fit.scale is None else self.fit.scale.document()
 
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
@@ -120,6 +124,7 @@ class StiffnessIdentification(Identification):
                 "message": estimate.message,
                 "reduced_chi2": estimate.reduced_chi2,
                 "misfit": misfit_document(estimate.misfit),
+                "torque_scale": self._scale,
                 "rank": estimate.rank,
                 "reference_motion_modelled": self.reference_known,
                 "missing_poses": list(self.missing_poses),

@@ -17,7 +17,15 @@ from .dynamics import (
     dynamics_checks,
     held_out_recordings,
 )
-from .elastic_model import check_misfit, check_responses, misfit_document, misfit_sentences, read_misfit
+from .elastic_model import (
+    check_misfit,
+    check_responses,
+    check_torque_scale,
+    misfit_document,
+    misfit_sentences,
+    read_misfit,
+    torque_scale_sentence,
+)
 from .excitation import excitation_checks
 from .fleet import fleet_checks
 from .fleet_prior import check_fleet
@@ -85,6 +93,7 @@ __all__ = [
     "check_setup_unchanged",
     "check_shown",
     "check_springs",
+    "check_torque_scale",
     "check_truth",
     "check_unseen",
     "check_unseen_torques",
@@ -104,6 +113,7 @@ __all__ = [
     "prediction_checks",
     "read_misfit",
     "response_checks",
+    "torque_scale_sentence",
     "verdict_answer",
     "verification_checks",
     "worst_pose",

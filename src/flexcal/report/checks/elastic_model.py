@@ -8,6 +8,7 @@ from typing import Any
 from flexcal.estimation import Estimate, Misfit
 from flexcal.report.checks.pose_errors import check_residual
 from flexcal.report.layout import Check, spring_label
+from flexcal.report.results import chance_in_words
 
 CODE = "residual_stiffness"
 QUESTION = "Does the elastic model explain the frequency responses?"
@@ -25,6 +26,29 @@ def check_misfit(misfit: Misfit | None) -> Check:
     if misfit is None:
         return Check(QUESTION, "Yes, within noise and model error.", "good", CODE)
     return Check(QUESTION, misfit_sentences(misfit), "bad" if misfit.severe else "care", CODE)
+
+
+_ANOTHER_UNIT = 1.5
+"""Factor of all inertia, or its inverse, from which no masses are likely to be the cause."""
+
+
+def check_torque_scale(scale: Mapping[str, Any] | None) -> tuple[Check, ...]:
+    """Where all inertia came out at another size than was known, as the block `torque_scale` of results.json has it."""
+    if scale is None:
+        return ()
+    far = max(scale["factor"], 1 / scale["factor"]) > _ANOTHER_UNIT
+    answer = f"No: {torque_scale_sentence(scale)}."
+    return (Check("Are the torques in N m at the joint?", answer, "bad" if far else "care", "torque_scale"),)
+
+
+def torque_scale_sentence(scale: Mapping[str, Any]) -> str:
+    """What it means that all inertia came out at another size than was known."""
+    return (
+        f"masses and rotor inertias all come out at {scale['factor']:.3g} times those of URDF and robot.yaml, beyond what `prior:` allows "
+        f"them ({chance_in_words(scale['p'])}): either those are wrong, or the torques are, as motor currents in A, torques at the motor, "
+        "or another torque constant; stiffness and damping are then wrong by the same factor, and their intervals allow for it. Check the "
+        "unit of the torques (flexcal identify gains finds it from a payload), or correct the masses"
+    )
 
 
 def misfit_sentences(misfit: Misfit) -> str:
@@ -46,6 +70,7 @@ def misfit_sentences(misfit: Misfit) -> str:
         )
     cause = (
         "The model lacks a mode or has wrong parameters. Possible causes: elasticity of base, tool or payload, wrong bearing axes, "
+        "friction that is not kept sliding by the reference motion, "
         "or a plan.yaml that does not belong to the recordings. "
     )
     if misfit.axis.startswith("sensor "):

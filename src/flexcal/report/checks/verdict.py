@@ -163,6 +163,9 @@ PHRASES: dict[str, dict[str, str]] = {
         "else": "it is not clear which parameters the poses determine",
     },
     "drift": {"good": "no drift was detected", "else": "residuals drift with time"},
+    "torque_scale": {
+        "else": "all masses come out at another size than declared, or the torques are in another unit"
+    },
     "lag": {"else": "points and joint positions were not read at the same instant, while the robot moved"},
     "instrument_change": {"else": "the instrument's readings change with temperature or time"},
     "temperature_sensor": {"else": "the temperature may be measured too imprecisely for its coefficients"},

@@ -7,7 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from flexcal.estimation import Estimate
-from flexcal.report.checks import Trust, check_response_bearings, check_responses, check_springs
+from flexcal.report.checks import (
+    Trust,
+    check_response_bearings,
+    check_responses,
+    check_springs,
+    check_torque_scale,
+)
 from flexcal.report.layout import Block, Check, Page, Section, Status, Text, Verdict, sentences
 from flexcal.report.results import FittedResponse
 from flexcal.report.sections import provenance_section, response_blocks, spring_table, unseen_springs
@@ -50,19 +56,26 @@ def stiffness_page(study: StiffnessStudy) -> Page:
     )
 
 
-def stiffness_checks(estimate: Estimate, bearings: Mapping[str, Any] | None = None) -> tuple[Check, ...]:
-    """The checks behind the verdict."""
+def stiffness_checks(
+    estimate: Estimate,
+    bearings: Mapping[str, Any] | None = None,
+    torque_scale: Mapping[str, Any] | None = None,
+) -> tuple[Check, ...]:
+    """The checks behind the verdict; `bearings` and `torque_scale` are blocks of results.json."""
     return (
         check_responses(estimate),
         check_springs(estimate, springs_of(estimate, "stiffness"), springs_of(estimate, "damping")).named(
             "springs"
         ),
         *check_response_bearings(bearings),
+        *check_torque_scale(torque_scale),
     )
 
 
 def _verdict(study: StiffnessStudy) -> Verdict:
-    checks = stiffness_checks(study.estimate, study.results.get("bearings"))
+    checks = stiffness_checks(
+        study.estimate, study.results.get("bearings"), study.results["fit"].get("torque_scale")
+    )
     trust = Trust(checks)
     facts = (trust.fact(),)
     sentence = "Stiffness and damping were identified from frequency responses; measured positions verify the accuracy of the tool."
