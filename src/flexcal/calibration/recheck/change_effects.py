@@ -9,6 +9,7 @@ import numpy as np
 
 from flexcal.calibration.measurement import PredictedMeasurements, predict_measurements
 from flexcal.model.robot import GEOMETRY, STATION, RobotModel
+from flexcal.model.statics import certain_flank
 
 ChangeKind = Literal[
     "joint_shifted",
@@ -18,7 +19,10 @@ ChangeKind = Literal[
     "instrument_moved",
     "wrong_reading",
     "readings_drift",
+    "gear_worn",
 ]
+_BOTH_FLANKS = 2
+"""Least number of poses on either flank of a gear at which its play is told from another zero of the joint."""
 _STEP = 0.1
 """Payload, kg, of the finite difference."""
 
@@ -92,6 +96,26 @@ def drift_of_readings(poses: int) -> PossibleChange:
     """
     columns = np.kron(np.linspace(0.0, 1.0, poses)[:, None], np.eye(3))
     return PossibleChange("readings_drift", "the readings", ("dx", "dy", "dz"), ("m",) * 3, columns)
+
+
+def worn_gears(model: RobotModel, at: PredictedMeasurements) -> list[PossibleChange]:
+    """Play in the gear of every joint, by half of it: the arm lies on the flank to which gravity presses it.
+
+    Joints that gravity does not press to either side, for certain, at several poses are left out: play there is another zero.
+    """
+    torque = at.rest.torque
+    certain = certain_flank(model, at.poses.q, torque, at.poses.payload)
+    changes = []
+    for joint in model.motor_joints:
+        k = model.joint_index(joint.name)
+        # gravity turns the arm against the torque that holds it
+        side = -np.sign(torque[:, k])
+        if min((side[certain[:, k]] > 0).sum(), (side[certain[:, k]] < 0).sum()) < _BOTH_FLANKS:
+            continue
+        columns = _flat(at.jacobian([f"{joint.name}.offset"])) * np.repeat(side, 3)[:, None]
+        unit = "m" if joint.kind == "prismatic" else "rad"
+        changes.append(PossibleChange("gear_worn", joint.name, (f"{joint.name}.backlash",), (unit,), columns))
+    return changes
 
 
 def _flat(columns: np.ndarray) -> np.ndarray:

@@ -8,7 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.calibration.measurement import PredictedMeasurements, random_poses, seen_from_base
-from flexcal.calibration.recheck.change_effects import OF_THE_MEASUREMENT, WHOLE_TOOL, possible_changes
+from flexcal.calibration.recheck.change_effects import (
+    OF_THE_MEASUREMENT,
+    WHOLE_TOOL,
+    possible_changes,
+    worn_gears,
+)
 from flexcal.calibration.recheck.judged_visit import Suspect
 from flexcal.model.kinematics import joint_limits
 from flexcal.model.robot import RobotModel
@@ -104,7 +109,7 @@ def _columns(model: RobotModel, at: PredictedMeasurements, suspect: Suspect) -> 
         return None
     return next(
         change.columns
-        for change in possible_changes(at.model, at)
+        for change in (*possible_changes(at.model, at), *worn_gears(at.model, at))
         if (change.kind, change.subject) == (suspect.change.kind, suspect.change.subject)
     )
 

@@ -11,6 +11,7 @@ from flexcal.calibration.recheck.change_effects import (
     PossibleChange,
     drift_of_readings,
     possible_changes,
+    worn_gears,
     wrong_readings,
 )
 from flexcal.calibration.recheck.cumulative_sums import ShiftAtVisit
@@ -173,6 +174,9 @@ def _judge(errors: VisitErrors) -> JudgedVisit:
     if probability > VISIT_ALARM:
         return JudgedVisit(test, probability, (), together, shifts)
     found = _explanations(test)
+    worn = () if _suspects(found) else _suspects(_worn(test))
+    if worn:
+        return JudgedVisit(test, probability, worn, together, shifts)
     scatter = scatter_about(test, [suspect.remainder for _, suspect in found], together)
     if scatter is None:
         return JudgedVisit(test, probability, _suspects(found), together, shifts)
@@ -205,6 +209,15 @@ def _explanations(test: GlobalTest) -> list[tuple[SeenChange, Suspect]]:
     every = [*test.seen, *(item for item in others if item.seen and item.basis.shape[1] < test.size)]
     kinds = [item.change.kind for item in every]
     return [(item, _suspect(test, item, kinds.count(item.change.kind))) for item in every]
+
+
+def _worn(test: GlobalTest) -> list[tuple[SeenChange, Suspect]]:
+    """Play of every gear as if it alone were the cause; gaps are not negative."""
+    errors = test.errors
+    root = np.linalg.cholesky(errors.covariance)
+    gears = [seen_change(change, test.whitening, root) for change in worn_gears(errors.model, errors.at)]
+    found = [(item, _suspect(test, item, len(gears))) for item in gears if item.seen]
+    return [(item, suspect) for item, suspect in found if suspect.estimate[0] > 0]
 
 
 def _suspects(found: list[tuple[SeenChange, Suspect]]) -> tuple[Suspect, ...]:

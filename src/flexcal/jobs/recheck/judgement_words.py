@@ -23,6 +23,8 @@ _LEAST_CHANCE = 1e-4
 """Least probability that the draws of the test tell."""
 _KELVIN = 12e-6
 """Growth of steel, m/m/K."""
+_NO_WARMTH = 3e-3
+"""Growth, m/m, that no temperature makes: 250 K of steel."""
 _CLEAR = 4.0
 """Distance, in standard deviations of a mean of readings, that tells two points apart."""
 _SMALL = 0.5
@@ -50,7 +52,7 @@ def judgement_sentence(judged: JudgedVisit, course: CourseOverVisits | None = No
         usual = "repeated readings of these poses" if errors.noise == "repeats" else "at the calibration"
         scatters = (
             f"the readings scatter {judged.scatter.factor:.1f} times as much as {usual} ({chance_in_words(judged.scatter.chance)}): check "
-            "the instrument and its targets, and measure again"
+            "the instrument and its targets, and the robot for play in joints and tool, and measure again"
         )
         if not judged.suspects:
             return f"{lead}{scatters}; whether the robot changed too cannot be told by them ({chance} of the whole)"
@@ -59,7 +61,7 @@ def judgement_sentence(judged: JudgedVisit, course: CourseOverVisits | None = No
         if judged.together > FALSE_ALARM:
             return (
                 f"{lead}recalibrate ({size}): no single change of a joint, of the tool, of all lengths, of the payload or of the "
-                "instrument explains the errors, several together would"
+                "instrument explains the errors; several together would, or play in a gear"
             )
         return (
             f"{lead}recalibrate ({size}): the errors are not those of shifted joints, a bumped tool, growth or a moved instrument, all "
@@ -146,6 +148,7 @@ def suspect_name(suspect: Suspect) -> str:
         "tool_bumped": f"a bump of {subject}",
         "thermal_growth": "thermal growth",
         "payload_changed": "another payload",
+        "gear_worn": f"play in the gear of {subject}",
         "instrument_moved": "another place of the instrument",
         "wrong_reading": f"a wrong reading of pose {subject}",
         "readings_drift": "a drift of the readings",
@@ -158,6 +161,16 @@ def suspect_in_words(suspect: Suspect, model: RobotModel) -> str:
     value, half = float(values[0]), float(stds[0])
     if change.kind == "joint_shifted":
         return f"{change.subject} shifted by {amount(value, half, change.units[0])}"
+    if change.kind == "gear_worn":
+        play = amount(value, half, change.units[0]).lstrip("+")
+        return (
+            f"play in the gear of {change.subject}: {play} to either side, as of a worn gear or a loose belt"
+        )
+    if change.kind == "thermal_growth" and abs(value) > _NO_WARMTH:
+        return (
+            f"all lengths are {1 + value:.5g} times those of the robot, which no temperature does: the points are in another unit, or the "
+            "scale of the instrument is off"
+        )
     if change.kind == "thermal_growth":
         return (
             f"thermal growth: all lengths by {amount(1e6 * value, 1e6 * half, 'µm/m')} ({_as_warmth(value, model)}), unless it is the "

@@ -32,6 +32,7 @@ _HEADLINES = {
     "tool_bumped": "Tool bumped",
     "thermal_growth": "Thermal growth",
     "payload_changed": "Another payload",
+    "gear_worn": "Play in a gear",
     "instrument_moved": "The instrument moved, the robot is as calibrated",
     "wrong_reading": "Readings disagree: mend or repeat them",
     "noisier_readings": "The readings scatter more than they did: check the instrument",
@@ -124,7 +125,14 @@ def _headline(results: Mapping[str, Any]) -> str:
 def _change_headline(results: Mapping[str, Any]) -> str:
     block, drift = results["recheck"], results["drift"]
     courses = {item["course"] for item in drift["courses"]}
-    if block["verdict"] in ("joint_shifted", "tool_bumped", "thermal_growth", "payload_changed", "ambiguous"):
+    if block["verdict"] in (
+        "joint_shifted",
+        "tool_bumped",
+        "thermal_growth",
+        "payload_changed",
+        "gear_worn",
+        "ambiguous",
+    ):
         if courses == {"drift"}:
             return "It drifts from visit to visit"
         if block["reference_against_calibration"] is not None:
