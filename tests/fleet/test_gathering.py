@@ -336,3 +336,31 @@ def test_refusals(tmp_path: Path) -> None:
         review_fleet("nosuch://bucket")
     with refused("E-FLEET-005", "robot.yaml"):
         review_fleet(tmp_path)
+
+
+def test_a_calibration_that_its_points_refute_hides_nothing(tmp_path: Path) -> None:
+    """A robot once calibrated on points in feet is named, and its parameters count nowhere; another's drift is found beside it."""
+    rng = np.random.default_rng(7)
+    for number in range(4):
+        folder = tmp_path / f"arm_{number}"
+        write_robot(folder)
+        for visit, day in enumerate(DAYS):
+            steps = [1e-6 * rng.standard_normal(), 1e-6 * rng.standard_normal()]
+            if number == 0:
+                steps[0] += 4e-5 * visit
+            feet = number == 1 and visit == 4
+            if feet:
+                steps = [0.4, 1.4]
+            write_calibration(
+                folder / day,
+                {"j1.offset": (1e-3 + steps[0], 2e-6), "j2.length_x": (2e-3 + steps[1], 2e-6)},
+                data=f"{number} {day}",
+            )
+            document = {"kind": "calibration", "schema": 1, "fit": {"is_implausible": feet}, "lag": None}
+            (folder / day / "results.json").write_text(json.dumps(document), "utf-8")
+    gathered = gather_fleet(tmp_path)
+    (problem,) = [item for item in gathered.problems if "estimates.yaml" in item.place]
+    assert problem.place == f"arm_1/{DAYS[4]}/estimates.yaml"
+    values = gathered.table.frame.filter(pl.col("kind") == "calibration")["value"]
+    assert len(values) == 2 * 19 and values.abs().max() < 0.1
+    assert robot_named(review_fleet(tmp_path), "arm_0")["drifting_parameters"] == ["j1.offset"]

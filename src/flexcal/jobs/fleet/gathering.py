@@ -117,11 +117,22 @@ def gather_fleet(place: str | Path, progress: Progress = silent) -> GatheredFlee
 
 def _results(root: Path, folder: ResultFolder, problems: list[Problem]) -> Iterator[_Result]:
     at, project = folder.folder, folder.project
+    refuted = folder.refuted and folder.estimates.is_file()
+    if refuted:
+        problems.append(
+            Problem(
+                folder.estimates.relative_to(root).as_posix(),
+                "the measurements of this calibration do not go together with its robot, so its parameters count in no trend, spread or "
+                "prior; correct what its report names, and calibrate again.",
+            )
+        )
     for path, read in ((folder.estimates, _estimates), (at / RESULTS, _values), (at / VISITS, _visits)):
         if not path.is_file():
             continue
         try:
-            yield from read(_row(root, folder, path), project, path)
+            for result in read(_row(root, folder, path), project, path):
+                if not (refuted and path == folder.estimates and result.first.kind == "calibration"):
+                    yield result
         except FlexcalError as problem:
             problems.append(problem_of(root, path, problem))
         except (KeyError, TypeError, ValueError, AttributeError) as problem:

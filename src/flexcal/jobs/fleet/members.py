@@ -39,7 +39,7 @@ def latest_members(
     folders: Sequence[ResultFolder], blocks: Sequence[Block] = POOLED
 ) -> tuple[dict[Block, list[Member]], list[str]]:
     """Every robot with what was identified last of it, by block, and remarks on those that cannot be read; a file is read where no later
-    one has all `blocks` of its robot.
+    one has all `blocks` of its robot. Calibrations that their own measurements refute do not count.
     """
     latest: dict[Block, dict[str, Member]] = {block: {} for block in blocks}
     remarks: list[str] = []
@@ -54,7 +54,7 @@ def latest_members(
             remarks.append(str(problem).rstrip("."))
             continue
         for block, robots in latest.items():
-            if block in read:
+            if block in read and not (block == "calibration" and folder.refuted):
                 robots.setdefault(project.robot, read[block])
     return {block: [robots[name] for name in sorted(robots)] for block, robots in latest.items()}, remarks
 

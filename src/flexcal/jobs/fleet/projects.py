@@ -13,7 +13,7 @@ from flexcal.errors import FlexcalError
 from flexcal.files.formats import read_yaml, sha256_of
 from flexcal.jobs.fleet.places import ROBOT
 from flexcal.jobs.recheck import VISITS
-from flexcal.jobs.result_files import ESTIMATES, RESULTS
+from flexcal.jobs.result_files import ESTIMATES, RESULTS, read_results
 from flexcal.model.robot import RobotConfig
 from flexcal.model.urdf import Element, read_elements
 
@@ -56,6 +56,22 @@ class ResultFolder:
     def estimates(self) -> Path:
         """Its file of estimates, whether it is there or not; beside robot.yaml the one that this names."""
         return self.project.estimates if self.folder == self.project.folder else self.folder / ESTIMATES
+
+    @property
+    def refuted(self) -> bool:
+        """Whether it has a calibration that its own measurements refute: by robot and data that do not go together, or by points of a robot
+        that moved.
+        """
+        if not (self.folder / RESULTS).is_file():
+            return False
+        try:
+            document = read_results(self.folder)
+            fit, lag = document.get("fit"), document.get("lag") or {}
+            return document["kind"] == "calibration" and bool(
+                (fit or {}).get("is_implausible") or lag.get("certain")
+            )
+        except (FlexcalError, AttributeError):
+            return False
 
 
 def find_results(root: Path) -> tuple[list[ResultFolder], list[Project], list[Problem]]:
