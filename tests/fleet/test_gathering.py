@@ -347,7 +347,7 @@ def test_a_calibration_that_its_points_refute_hides_nothing(tmp_path: Path) -> N
         for visit, day in enumerate(DAYS):
             steps = [1e-6 * rng.standard_normal(), 1e-6 * rng.standard_normal()]
             if number == 0:
-                steps[0] += 4e-5 * visit
+                steps[1] += 4e-5 * visit
             feet = number == 1 and visit == 4
             if feet:
                 steps = [0.4, 1.4]
@@ -363,4 +363,4 @@ def test_a_calibration_that_its_points_refute_hides_nothing(tmp_path: Path) -> N
     assert problem.place == f"arm_1/{DAYS[4]}/estimates.yaml"
     values = gathered.table.frame.filter(pl.col("kind") == "calibration")["value"]
     assert len(values) == 2 * 19 and values.abs().max() < 0.1
-    assert robot_named(review_fleet(tmp_path), "arm_0")["drifting_parameters"] == ["j1.offset"]
+    assert robot_named(review_fleet(tmp_path), "arm_0")["drifting_parameters"] == ["j2.length_x"]
