@@ -14,6 +14,8 @@ from flexcal.estimation.student_t import student_quantile
 
 NORMAL_QUANTILE = 1.959963984540054
 
+_TAKEN_UP = 1e-9
+"""Coefficient below which a kept parameter has taken up nothing of a dropped one."""
 _NOISE_UNKNOWN = 0.1
 """Relative excess of chi2 over its expectation that is tolerated, because the noise level is hardly better known."""
 
@@ -198,6 +200,16 @@ class Estimate:
         """
         numbers = [self.parameters.index(name) for name in names]
         return self.parameters.coordinates()[numbers], self.covariance[np.ix_(numbers, numbers)]
+
+    @property
+    def absorbed(self) -> dict[str, tuple[str, ...]]:
+        """Names of the dropped parameters that each kept one has taken up, sorted: estimates with others are of other quantities."""
+        found: dict[str, list[str]] = {}
+        for dropped in self.dropped:
+            for kept, coefficient in dropped.absorbed_by:
+                if abs(coefficient) > _TAKEN_UP:
+                    found.setdefault(kept, []).append(dropped.name)
+        return {kept: tuple(sorted(names)) for kept, names in found.items()}
 
     def regrouped(self, truth: Mapping[str, float]) -> dict[str, float]:
         """Expected estimate for given true values: dropped parameters are mapped into the kept ones.

@@ -181,11 +181,7 @@ def _estimates(common: Row, project: Project, path: Path) -> Iterator[_Result]:
 
 
 def _block(common: Row, project: Project, block: Block, estimate: Estimate) -> _Result:
-    absorbed: dict[str, list[str]] = {}
-    for dropped in estimate.dropped:
-        for kept, coefficient in dropped.absorbed_by:
-            if abs(coefficient) > 1e-9:
-                absorbed.setdefault(kept, []).append(dropped.name)
+    absorbed = estimate.absorbed
     held = {dropped.name for dropped in estimate.dropped}
     common = replace(
         common,
@@ -210,7 +206,7 @@ def _block(common: Row, project: Project, block: Block, estimate: Estimate) -> _
                 identifiable=known and estimate.identifiable[k],
                 prior_share=min(1.0, float(deviation[k] / item.prior_std) ** 2) if known else None,
                 of_robot=is_of_robot(item.name, absorbed.get(item.name, ()), project.base),
-                absorbs=" ".join(sorted(absorbed.get(item.name, ()))),
+                absorbs=" ".join(absorbed.get(item.name, ())),
             )
         )
     return _Result(rows)

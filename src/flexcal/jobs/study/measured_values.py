@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from typing import Any
 
 from flexcal.calibration.error_model import ErrorStatistics
@@ -12,8 +12,10 @@ QUANTITIES = ("estimate", "std", "low", "high", "truth")
 """What is stored of every parameter, in columns named `<parameter>.<quantity>`."""
 
 
-def parameter_columns(estimate: Estimate, truth: Mapping[str, float] | None = None) -> dict[str, float]:
-    """Estimate, standard deviation, 95 % interval and true value of every identifiable parameter, SI units.
+def parameter_columns(
+    estimate: Estimate, truth: Mapping[str, float] | None = None, other: Container[str] = ()
+) -> dict[str, float]:
+    """Estimate, standard deviation, 95 % interval and true value of every identifiable parameter, SI units, without the `other` ones.
 
     True values are those that the estimate is expected to have: parameters that the data cannot tell apart are mapped into the kept ones.
     """
@@ -21,7 +23,7 @@ def parameter_columns(estimate: Estimate, truth: Mapping[str, float] | None = No
     columns: dict[str, float] = {}
     for name in estimate.parameters.names:
         interval, std = estimate.interval(name), estimate.std(name)
-        if interval is None or std is None:
+        if interval is None or std is None or name in other:
             continue
         values = {"estimate": estimate.values[name], "std": std, "low": interval[0], "high": interval[1]}
         if truth and name in truth:

@@ -12,6 +12,7 @@ import numpy as np
 
 from flexcal.data.poses import PoseSet, read_grouped_poses, read_poses, tables_of
 from flexcal.errors import FlexcalError
+from flexcal.estimation import Estimate
 from flexcal.files.formats import provenance, read_estimates
 from flexcal.jobs.calibration import Fits, FitSettings, held_out_group, requested_terms, sampled
 from flexcal.jobs.study.config import ResamplingConfig
@@ -129,7 +130,9 @@ class ResampledCalibrations(StudyTasks):
             **error_columns("fit", fit.errors),
             **fit_columns(fit.estimate, fit.variances),
             "terms": " ".join(fits.terms),
-            **parameter_columns(fit.estimate),
+            **parameter_columns(
+                fit.estimate, other=_of_another_meaning(fit.estimate, whole.selected.estimate)
+            ),
         }
 
     def _whole(self, row: StudyRow, options: CalibrateOptions) -> Fits:
@@ -142,6 +145,14 @@ class ResampledCalibrations(StudyTasks):
         terms = requested_terms(self.model, options.terms)
         settings = FitSettings(terms, options.loss, options.secant_scale, options.elasticity)
         return Fits.of(self.model, poses, settings, near=near)
+
+
+def _of_another_meaning(estimate: Estimate, whole: Estimate) -> frozenset[str]:
+    """Parameters of a resample that took up others than in the fit to all data: as the places of all instruments do with another first
+    one, in whose frame the base is.
+    """
+    own, there = estimate.absorbed, whole.absorbed
+    return frozenset(name for name in estimate.parameters.names if own.get(name) != there.get(name))
 
 
 def _with_residuals(fits: Fits, rng: np.random.Generator) -> PoseSet:
