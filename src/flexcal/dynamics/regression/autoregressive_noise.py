@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
 
 from flexcal.dynamics.regression.scores import Scores
 
@@ -69,21 +68,22 @@ def _own(
     lag = np.abs(np.subtract.outer(number, number))
     sizes = np.outer(root, root) / np.mean(level)
     memories = np.geomspace(0.5, max(1.0, _LONGEST * (number[-1] + 1)), _STEPS)
-    tried = [(0.0, np.eye(batches))]
-    tried += [
-        (share * memory, share * np.exp(-lag / memory) * sizes + (1.0 - share) * np.eye(batches))
-        for memory in memories
-        for share in _SHARES
-    ]
-    evidence, squares = [], []
-    for _, noise in tried:
-        factor = cholesky(left @ noise @ left.T + others, lower=True)
-        squares.append(float(np.sum(solve_triangular(factor, seen, lower=True) ** 2)))
-        evidence.append(-np.sum(np.log(np.diag(factor))) - 0.5 * len(seen) * np.log(squares[-1]))
-    weights = np.exp(np.array(evidence) - np.max(evidence))
-    weights[0] *= len(tried) - 1.0
+    processes = np.exp(-lag / memories[:, None, None]) * sizes
+    of = np.concatenate([[0], np.repeat(np.arange(_STEPS), len(_SHARES))])
+    shares = np.concatenate(
+        [[0.0], np.tile(_SHARES, _STEPS)]
+    )  # white noise alone, then every process with every share
+    white = left @ left.T
+    covariances = shares[:, None, None] * ((left @ processes @ left.T)[of] - white) + (white + others)
+    factors = np.linalg.cholesky(covariances)
+    squares = np.sum(np.linalg.solve(factors, seen[:, None]) ** 2, axis=(1, 2))
+    diagonals = np.diagonal(factors, axis1=1, axis2=2)
+    evidence = -np.sum(np.log(diagonals), axis=1) - 0.5 * len(seen) * np.log(squares)
+    weights = np.exp(evidence - np.max(evidence))
+    weights[0] *= len(shares) - 1.0
     weights /= weights.sum()
-    each = zip(weights, squares, tried, strict=True)
-    noise = sum(w * s / (len(seen) - 2.0) * matrix for w, s, (_, matrix) in each)
-    memory = float(sum(w * time for w, (time, _) in zip(weights, tried, strict=True)))
+    levels = weights * squares / (len(seen) - 2.0)
+    noise = np.tensordot(np.bincount(of, levels * shares), processes, 1)
+    noise += (levels @ (1.0 - shares)) * np.eye(batches)
+    memory = float(weights @ (shares * memories[of]))
     return regressors.T @ noise @ regressors, memory

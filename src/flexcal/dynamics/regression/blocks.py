@@ -13,8 +13,8 @@ from flexcal.dynamics.inverse_model import Equations, Memory
 from flexcal.dynamics.signals import Experiment, Motion, Window, slowest_speeds, stretches
 
 _BLOCK = 2300
-"""Approximate number of samples whose columns are in memory at once, some three megabytes: with fewer, what is done once a block weighs more
-than the cache gains. Not a power of two, which would use little of it.
+"""Approximate number of samples whose columns are in memory at once, some three megabytes: with fewer, what is done once a block weighs
+more than the cache gains. Not a power of two, which would use little of it.
 """
 
 
