@@ -32,9 +32,10 @@ CLASSES = {
 
 
 @pytest.fixture(scope="module")
-def trees(root: Path) -> dict[str, ast.Module]:
+def nodes(root: Path) -> dict[str, list[ast.AST]]:
+    """All nodes of every file of the source."""
     files = sorted((root / "src" / "flexcal").rglob("*.py"))
-    return {str(file): ast.parse(file.read_text(encoding="utf-8")) for file in files}
+    return {str(file): list(ast.walk(ast.parse(file.read_text(encoding="utf-8")))) for file in files}
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +48,12 @@ def script(root: Path) -> dict[str, Any]:
     return runpy.run_path(str(root / "docs" / "error_codes.py"))
 
 
+@pytest.fixture(scope="module")
+def errors(script: dict[str, Any]) -> list[tuple[str, str]]:
+    """Code and sentence of every error, as the script reads them from the source."""
+    return list(script["errors"]())
+
+
 def name_of(called: ast.expr) -> str:
     return (
         called.attr
@@ -57,21 +64,20 @@ def name_of(called: ast.expr) -> str:
     )
 
 
-def test_the_classes_are_all(trees: dict[str, ast.Module]) -> None:
+def test_the_classes_are_all(nodes: dict[str, list[ast.AST]]) -> None:
     """Those that derive from `FlexcalError`; of a `StructureError` the first failure has the code."""
     known = {"FlexcalError"}
-    nodes = (node for tree in trees.values() for node in ast.walk(tree))
-    classes = [node for node in nodes if isinstance(node, ast.ClassDef)]
+    classes = [node for those in nodes.values() for node in those if isinstance(node, ast.ClassDef)]
     for _ in range(3):
         known |= {node.name for node in classes if known & {name_of(base) for base in node.bases}}
     assert known == CLASSES - {"Fault", "Failure"} | {"StructureError"}
 
 
-def test_every_error_has_a_code(trees: dict[str, ast.Module]) -> None:
+def test_every_error_has_a_code(nodes: dict[str, list[ast.AST]]) -> None:
     """A literal, the code of the error in whose place it is raised, or, in a function that makes errors, what that was given."""
     makers, calls = set(CLASSES), []
-    for file, tree in trees.items():
-        for node in ast.walk(tree):
+    for file, those in nodes.items():
+        for node in those:
             if (
                 isinstance(node, ast.FunctionDef)
                 and node.returns is not None
@@ -94,20 +100,20 @@ def test_every_error_has_a_code(trees: dict[str, ast.Module]) -> None:
     assert checked > 750
 
 
-def test_no_code_stands_twice(trees: dict[str, ast.Module], script: dict[str, Any]) -> None:
+def test_no_code_stands_twice(nodes: dict[str, list[ast.AST]], errors: list[tuple[str, str]]) -> None:
     literals = Counter(
         node.value
-        for tree in trees.values()
-        for node in ast.walk(tree)
+        for those in nodes.values()
+        for node in those
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and CODE.fullmatch(node.value)
     )
     assert [code for code, count in literals.items() if count > 1] == []
-    assert set(literals) == {code for code, _ in script["errors"]()}
+    assert set(literals) == {code for code, _ in errors}
 
 
-def test_the_page_has_every_code(page: str, script: dict[str, Any]) -> None:
+def test_the_page_has_every_code(page: str, script: dict[str, Any], errors: list[tuple[str, str]]) -> None:
     """If this fails, run docs/error_codes.py."""
-    sentences = dict(script["errors"]())
+    sentences = dict(errors)
     assert page == script["render"](page, sentences)
     assert all(sentence.strip(" …") for sentence in sentences.values())
     listed = re.findall(r"^\| `(E-[A-Z]+-\d{3})` \| .+ \|$", page, flags=re.MULTILINE)
@@ -118,8 +124,10 @@ def test_the_page_has_every_code(page: str, script: dict[str, Any]) -> None:
         assert f"E-{subject}-{count:03d}" in {*listed, *gone}, f"numbers of {subject} are left out"
 
 
-def test_a_code_that_is_gone_stays_on_the_page(page: str, script: dict[str, Any]) -> None:
-    sentences = dict(script["errors"]())
+def test_a_code_that_is_gone_stays_on_the_page(
+    page: str, script: dict[str, Any], errors: list[tuple[str, str]]
+) -> None:
+    sentences = dict(errors)
     in_use = page.partition("## No longer in use")[0]
     later = script["render"](in_use + "| `E-CAL-900` | the loop was open. |\n", sentences)
     assert later.startswith(in_use.rstrip()) and later.endswith("## No longer in use\n\n`E-CAL-900`\n")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from fuzz_mutations import (
@@ -30,6 +31,12 @@ class Subject:
     file: str
     mutations: tuple[Mutation, ...]
     lines: tuple[str, ...]
+
+
+@cache
+def broken_contents(subject: Subject, content: bytes) -> tuple[tuple[str, bytes], ...]:
+    """Label and content of every mutation of a subject's `content`; made once, for they are thousands."""
+    return tuple(labelled for mutation in subject.mutations for labelled in mutation(content))
 
 
 @dataclass(frozen=True)
@@ -200,14 +207,11 @@ def cases(seeds: Path, *, every_line: bool = False) -> Iterator[Case]:
         if not (seeds / subject.file).is_file():
             continue
         content = (seeds / subject.file).read_bytes()
-        turn = 0
-        for mutation in subject.mutations:
-            for label, broken in mutation(content):
-                lines = subject.lines if every_line else (subject.lines[turn % len(subject.lines)],)
-                turn += 1
-                for line in lines:
-                    verb = line.partition(" ")[0] if len(lines) == 1 else "_".join(line.split()[:2])
-                    yield Case(f"{subject.file}-{label}-{verb}", subject.file, broken, tuple(line.split()))
+        for turn, (label, broken) in enumerate(broken_contents(subject, content)):
+            lines = subject.lines if every_line else (subject.lines[turn % len(subject.lines)],)
+            for line in lines:
+                verb = line.partition(" ")[0] if len(lines) == 1 else "_".join(line.split()[:2])
+                yield Case(f"{subject.file}-{label}-{verb}", subject.file, broken, tuple(line.split()))
 
 
 def names_of(case: Case) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from fuzz_cases import CALIBRATE, IMPORT, RESPONSE, SUBJECTS, VIRTUAL, Case
+from fuzz_cases import CALIBRATE, IMPORT, RESPONSE, SUBJECTS, VIRTUAL, Case, broken_contents
 
 _EXPORT = "export urdf robot.yaml --out new.urdf"
 _MEASURE = f"measure plan.yaml {VIRTUAL}"
@@ -131,11 +131,8 @@ def regressions(seeds: Path) -> Iterator[Case]:
         if not (seeds / file).is_file():
             continue
         subject = next(subject for subject in SUBJECTS if subject.file == file)
-        content = (seeds / file).read_bytes()
-        found = (
-            broken for mutation in subject.mutations for name, broken in mutation(content) if name == label
-        )
-        broken = next(found, None)
+        contents = broken_contents(subject, (seeds / file).read_bytes())
+        broken = next((broken for name, broken in contents if name == label), None)
         if broken is None:
             raise LookupError(f"{file}-{label} is not generated any more")
         yield Case(f"{file}-{label}", file, broken, tuple(line.split()))
