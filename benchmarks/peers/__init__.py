@@ -48,8 +48,8 @@ def environment(script: str, requirements: tuple[str, ...], *, compiled: tuple[s
     home = ENVIRONMENTS / script.removesuffix(".py")
     if (home / ".installed").exists():
         return home
-    pip = [str(home / "bin" / "python"), "-m", "pip", "install", "--quiet"]
-    _install([sys.executable, "-m", "venv", str(home)], script)
+    pip = [sys.executable, "-m", "pip", "--python", str(home), "install", "--quiet"]
+    _install([sys.executable, "-m", "venv", "--without-pip", str(home)], script)
     _install([*pip, *requirements], " ".join(requirements))
     casadi = next(home.glob("lib/python*/site-packages")) / "casadi"
     headers, libraries = casadi / "include" / "coin-or", f"-L{casadi} -Wl,-rpath,{casadi}"
