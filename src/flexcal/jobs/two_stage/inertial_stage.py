@@ -21,6 +21,7 @@ def run_stage_zero(cell: Cell, nominal: RobotModel, out: Path, *, seed: int, pro
 
     Leaves trajectory_plan.yaml and estimates.yaml.
     """
+    progress("dynamics", 0.0)
     plan = exciting_plan(nominal, seed=seed)
     file = out / "trajectory_plan.yaml"
     write_plan(file, plan)
