@@ -31,8 +31,9 @@ demo: install
 	cp demo/report.html report.html
 	@echo "open report.html"
 
-# two processes, a file always in one of them: its fixtures are made once; in the order of names, else the long files of one test come last
-PARALLEL := -n 2 --dist loadfile --no-loadscope-reorder
+# three processes for two cores, as tests of pages and of killed processes wait half of their time; a file always in one of them: its
+# fixtures are made once; in the order of names, else the long files of one test come last
+PARALLEL := -n 3 --dist loadfile --no-loadscope-reorder
 
 test: $(VENV)/.developer
 	$(BIN)/python -m pytest $(PARALLEL)
