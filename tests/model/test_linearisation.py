@@ -7,7 +7,7 @@ from scipy.linalg import eigh
 
 from flexcal.model.parts import Bearings
 from flexcal.model.robot import RobotModel
-from flexcal.model.vibration import linearise, transfer_matrix
+from flexcal.model.vibration import ElasticArm, linearise, transfer_matrix
 from flexcal.units import DEGREE
 
 LINES = np.arange(3.25, 80, 2.0)
@@ -107,3 +107,22 @@ def test_free_rotors_show_poles_and_zeros(tx90l: RobotModel) -> None:
 def test_a_robot_without_springs_is_refused(ur5: RobotModel) -> None:
     with refused("E-MODEL-013"):
         linearise(ur5, np.zeros(6))
+
+
+@pytest.mark.parametrize("bearings", ["after", "before"])
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"link_3.mass": 31.0, "link_2.com_y": 0.04, "payload.mass": 4.0, "joint_2.drive.stiffness": 5e5},
+        {"joint_2.misalignment_1": 0.02, "joint_3.length_x": 0.01},
+    ],
+)
+def test_an_arm_that_is_made_from_another_is_the_same(tx90l, bearings, values):
+    q, like = np.array([0.3, -0.5, 1.2, 0.4, 0.9, -0.5]), ElasticArm(tx90l, 7.0)
+    robot = tx90l.with_values(values).with_bearings(bearings)
+    own, made = linearise(robot, q, 3.0), linearise(robot, q, 3.0, like=like)
+    for name in ("mass", "damping", "stiffness"):
+        assert np.array_equal(getattr(own, name), getattr(made, name))
+    before = linearise(tx90l, q, 7.0)
+    assert not np.array_equal(own.mass, before.mass)
+    assert np.array_equal(before.mass, linearise(tx90l, q, 7.0, like=like).mass)

@@ -19,7 +19,7 @@ from flexcal.model.robot import (
     declared_parameter,
     uncertain_inertials,
 )
-from flexcal.model.vibration import periodic_torque
+from flexcal.model.vibration import ElasticArm, periodic_torque
 
 SAMPLES_PER_LINE = 4
 _STEP = 1e-3
@@ -113,10 +113,11 @@ def _links(
     states = motion.states(SAMPLES_PER_LINE * motion.lines)
     moved = [k for k, name in enumerate(parameters.names) if name in model.values and not _of_drive(name)]
     names = [parameters.names[k] for k in moved]
+    arm = ElasticArm(model, payload)
 
     def rows(at: np.ndarray) -> np.ndarray:
         robot = model.with_values(dict(zip(names, parameters.natural(at)[moved], strict=True)))
-        return motion.rows(periodic_torque(robot, *states, 1 / motion.base_frequency_hz, payload))
+        return motion.rows(periodic_torque(robot, *states, 1 / motion.base_frequency_hz, payload, like=arm))
 
     torque = rows(x)
     jacobian = np.zeros((*torque.shape, len(parameters)))

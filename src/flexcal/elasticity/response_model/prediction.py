@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from flexcal.elasticity.time_periodic import DriveTorque, HardenedStiffness
 from flexcal.estimation import Parameters
 from flexcal.frequency.periodic import FrequencyResponse
 from flexcal.model.robot import ArmSensor, RobotModel, mounting_names, sensitivity_name, sensor_delay_name
-from flexcal.model.vibration import linearise, transfer_matrix
+from flexcal.model.vibration import ElasticArm, linearise, transfer_matrix
 
 _MOUNTING_STEP = 1e-6
 """Step, m or rad, of the difference quotients by mounting errors, in which readings are linear but for the length of the direction."""
@@ -217,6 +218,11 @@ class ResponseModel:
             poses.append(replace(pose, backlash_compliance=loaded.backlash_compliance(), torque=loaded))
         return replace(self, poses=tuple(poses))
 
+    @cached_property
+    def _arm(self) -> ElasticArm:
+        """Arm of the robot; those of all poses differ in values alone."""
+        return ElasticArm(self.robot)
+
     def predict(self, x: np.ndarray) -> list[PredictedMeasurements]:
         """Responses and derivatives of every pose."""
         values, slopes = self.parameters.natural(x), self.parameters.natural_slope(x)
@@ -235,7 +241,7 @@ class ResponseModel:
         softened = {name: axis for axis in pose.changing for name in _drive(robot, axis)}
         names = tuple(dict.fromkeys((*pose.robot_names, *softened))) if derivatives else ()
         sensors = pose.placed(values)
-        system = linearise(robot, pose.q, payload, derivatives=names, sensors=sensors)
+        system = linearise(robot, pose.q, payload, derivatives=names, sensors=sensors, like=self._arm)
         s = 2j * np.pi * pose.frequencies_hz
         moved = transfer_matrix(system, pose.frequencies_hz)
         response, change = moved.response, moved.derivatives
@@ -269,7 +275,9 @@ class ResponseModel:
         for row, way in np.argwhere(pose.mounting >= 0):
             errors = pose.mounting_errors(values)[row] + _MOUNTING_STEP * np.eye(5)[way]
             moved = pose.sensors[row].misplaced(errors)
-            nearby = transfer_matrix(linearise(robot, pose.q, payload, sensors=[moved]), pose.frequencies_hz)
+            nearby = transfer_matrix(
+                linearise(robot, pose.q, payload, sensors=[moved], like=self._arm), pose.frequencies_hz
+            )
             number, at = int(pose.mounting[row, way]), response.shape[2] + row
             blocks[number] = np.zeros_like(response)
             change = nearby.response[:, -1] * factor[:, at] - response[:, at]

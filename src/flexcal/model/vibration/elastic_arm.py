@@ -5,6 +5,7 @@ Where the bearings are fixed to the parent link the two tilts come first.
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -26,17 +27,13 @@ class ElasticArm:
         import pinocchio as pin
 
         robot.require_motors("vibration")
-        self.robot = robot
-        self.payload = robot.payload_mass if payload is None else float(payload)
+        self._carry(robot, payload)
         self.model: Any = pin.Model()
         self.model.gravity = pin.Motion(robot.gravity, np.zeros(3))
         self.bodies: list[int] = []
         self.turns: list[np.ndarray] = []
         added: dict[tuple[int, int], int] = {}
         components = {e.index: e.components for e in robot.elastic}
-        hung = robot.payload
-        self._payload_joint = -1 if hung is None else hung.joint
-        self._carried = None if hung is None or self.payload <= 0 else hung.carried(self.payload)
         for i, joint in enumerate(robot.joints):
             frame = robot.springs.bearing_frames.get(i)
             frame = bearing_frame(joint) if frame is None else frame
@@ -63,6 +60,33 @@ class ElasticArm:
         self.elastic = np.array([idx_v[spring] for spring in self._springs], dtype=int)
         self._block = np.ix_(self.elastic, self.elastic)
         self._upper = np.minimum(*self._block), np.maximum(*self._block)
+
+    def with_inertials(self, robot: RobotModel, payload: float | None = None) -> ElasticArm:
+        """Arm of another robot with a payload mass (kg): this one with other inertias, where the robots differ in nothing else of it."""
+        before = self.robot
+        same = (
+            robot.joints is before.joints
+            and robot.config is before.config
+            and robot.geometry is before.geometry
+            and robot.springs.bearing_frames is before.springs.bearing_frames
+            and elastic_axes(robot) == elastic_axes(before)
+        )
+        if not same:
+            return ElasticArm(robot, payload)
+        arm = copy(self)
+        arm._carry(robot, payload)
+        arm.model = self.model.copy()
+        for i, link in enumerate(robot.inertias):
+            arm.set_inertia(i, link)
+        arm.data = arm.model.createData()
+        return arm
+
+    def _carry(self, robot: RobotModel, payload: float | None) -> None:
+        self.robot = robot
+        self.payload = robot.payload_mass if payload is None else float(payload)
+        hung = robot.payload
+        self._payload_joint = -1 if hung is None else hung.joint
+        self._carried = None if hung is None or self.payload <= 0 else hung.carried(self.payload)
 
     def set_inertia(self, joint: int, link: Inertia, carried: Inertia | None = None) -> None:
         """Set the inertia of a joint's link; the payload, or the `carried` one, is added where the link carries it."""

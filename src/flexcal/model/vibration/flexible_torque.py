@@ -10,6 +10,9 @@ from flexcal.model.robot import RobotModel
 from flexcal.model.statics import elastic_axes
 from flexcal.model.vibration.elastic_arm import ElasticArm
 
+_PASSES = 2
+"""Number of evaluations of the torques, each with the deflections by the last."""
+
 
 def periodic_torque(
     model: RobotModel,
@@ -18,10 +21,12 @@ def periodic_torque(
     ddq: np.ndarray,
     period: float,
     payload: float | None = None,
+    like: ElasticArm | None = None,
 ) -> np.ndarray:
     """Torque (N, n), N m, at each motor for the arm beyond it, at N even samples of one `period` (s) of a motion of the motors.
 
-    As `flexible_joint_torque`, with exact derivatives.
+    As `flexible_joint_torque`, with exact derivatives. `like` is the arm of a robot that may differ in its values alone: from it this
+    one's is made faster.
     """
     omega = 2j * np.pi / period * np.arange(len(q) // 2 + 1)[:, None]
 
@@ -29,7 +34,8 @@ def periodic_torque(
         lines = np.fft.rfft(bent, axis=0)
         return np.array([np.fft.irfft(lines * omega**order, n=len(q), axis=0) for order in range(3)])
 
-    return flexible_joint_torque(model, q, dq, ddq, derivatives, payload)
+    arm = ElasticArm(model, payload) if like is None else like.with_inertials(model, payload)
+    return _loads(model, arm, (q, dq, ddq), derivatives, _PASSES, None)[:, arm.joint_velocity]
 
 
 def flexible_joint_torque(
@@ -39,7 +45,7 @@ def flexible_joint_torque(
     ddq: np.ndarray,
     derivatives: Callable[[np.ndarray], np.ndarray],
     payload: float | None = None,
-    passes: int = 2,
+    passes: int = _PASSES,
     flanks: np.ndarray | None = None,
 ) -> np.ndarray:
     """Torque (N, n), N m, at each motor for the arm beyond it, at N samples of a motion of the motors.
@@ -67,7 +73,7 @@ def spring_load(
     `flexible_joint_torque`.
     """
     arm = ElasticArm(model, payload)
-    return -_loads(model, arm, (q, dq, ddq), derivatives, 2, None)[:, arm.elastic]
+    return -_loads(model, arm, (q, dq, ddq), derivatives, _PASSES, None)[:, arm.elastic]
 
 
 def _loads(

@@ -50,11 +50,13 @@ def linearise(
     *,
     derivatives: Sequence[str] = (),
     sensors: Sequence[ArmSensor] = (),
+    like: ElasticArm | None = None,
 ) -> Linearisation:
     """Linearise about the rest position of motors held at `q` (n,) with `payload` kg (None: the declared mass), with outputs of `sensors`.
 
     `derivatives` names parameters: `<joint>.<spring>.stiffness|damping`, `<joint>.rotor_inertia|viscous|held_inertia`,
-    `<link>.mass|com_x…`, `payload.mass|com_x…`. Setting a mass carries the inertia along as `RobotModel.with_values` does. Raises
+    `<link>.mass|com_x…`, `payload.mass|com_x…`. Setting a mass carries the inertia along as `RobotModel.with_values` does. `like` is the
+    arm of a robot that may differ in its values alone: from it this one's is made faster. Raises
     `FlexcalError` where a rotor inertia is not declared, or a name is none of these.
     """
     if not robot.elastic:
@@ -64,7 +66,7 @@ def linearise(
         )
     count, axes = len(robot.driven), elastic_axes(robot)
     size = count + len(axes)
-    arm = ElasticArm(robot, payload)
+    arm = ElasticArm(robot, payload) if like is None else like.with_inertials(robot, payload)
     rest = static_equilibrium(robot, q, arm.payload, sensitivities=bool(derivatives))
     at = arm.configuration(np.asarray(q, dtype=float), rest.deflection[0])
     mass, damping, stiffness = np.zeros((size, size)), np.zeros((size, size)), np.zeros((size, size))
