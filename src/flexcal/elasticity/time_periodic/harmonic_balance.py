@@ -64,12 +64,14 @@ def reference_shift(
     orders = np.arange(-sidebands, sidebands + 1)
     s = 2j * np.pi * (frequencies_hz[:, None] + orders * motion.frequency_hz)
     system = np.empty((len(s), len(orders), size, len(orders), size), dtype=complex)
+    polynomial = np.stack([stiffness, damping, mass])
     for column in range(len(orders)):
-        at = s[:, column, None, None, None]
         rows = slice(2 * sidebands - column, 4 * sidebands + 1 - column)  # by their order less the column's
-        system[:, :, :, column] = at**2 * mass[rows] + at * damping[rows] + stiffness[rows]
+        powers = s[:, column, None] ** np.arange(3)
+        block = powers @ polynomial[:, rows].reshape(3, -1)
+        system[:, :, :, column] = block.reshape(len(s), len(orders), size, size)
         if column != sidebands:
-            loop = motion.kp + at[:, :, 0, 0] * motion.kd
+            loop = motion.kp + s[:, column, None] * motion.kd
             system[:, column, range(count), column, range(count)] += loop
     width, middle = len(orders) * size, sidebands * size
     forces = np.zeros((width, count))
