@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from cli_files import FLEXCAL, read_csv, snapshot, write_csv
 
+from flexcal.calibration.diagnostics import Coupling, undeclared_coupling
 from flexcal.calibration.fit import StratifiedSample
 from flexcal.data.poses import PoseSet, write_poses
 from flexcal.estimation import Estimate, Parameter, Parameters
 from flexcal.files.formats import read_estimates, write_estimates
+from flexcal.jobs.calibration import result
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import static_equilibrium
@@ -231,7 +233,16 @@ def test_a_column_with_the_wrong_sign_is_remarked(run, ur5_folder: Path, some: P
     assert remarks.count("look for a column with wrong sign") == 1
 
 
-def test_scatter_that_no_instrument_has_is_remarked(run, ur5_folder: Path, some: Path) -> None:
+def test_scatter_that_no_instrument_has_is_remarked(
+    run, ur5_folder: Path, some: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sought = []
+
+    def counted(*fit) -> Coupling | None:
+        sought.append(fit)
+        return undeclared_coupling(*fit)
+
+    monkeypatch.setattr(result, "undeclared_coupling", counted)
     header, rows = read_csv(some)
     rows, at = rows[::2], [header.index(key) for key in ("q2", "q3")]
     rows[:, at] = rows[:, at[::-1]]
@@ -244,6 +255,7 @@ def test_scatter_that_no_instrument_has_is_remarked(run, ur5_folder: Path, some:
     assert (
         "in addition to the stated sigma of 0.05 mm" in page.out and page.out.count("look for a column") == 1
     )
+    assert len(sought) == 2, "the cause is sought once a calibration: it takes several fits"
 
 
 @pytest.fixture

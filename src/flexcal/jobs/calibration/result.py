@@ -158,7 +158,14 @@ class Calibration(Identification):
         if trust.status != "bad":
             return self
         origin = {**self.estimate.provenance, REFUSED: trust.because}
-        return replace(self, estimate=replace(self.estimate, provenance=origin))
+        marked = replace(self, estimate=replace(self.estimate, provenance=origin))
+        for name in (
+            "coupling",
+            "lag",
+            "_numbers",
+        ):  # which no provenance changes, and which take as long as a fit
+            vars(marked)[name] = getattr(self, name)
+        return marked
 
     @property
     def residuals(self) -> np.ndarray:
