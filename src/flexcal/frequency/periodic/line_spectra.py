@@ -96,11 +96,11 @@ def _odd_bins(signal: np.ndarray, periods: int, bins: np.ndarray) -> np.ndarray:
     X_{N-4m-3}: a transform of a quarter of the length.
     """
     quarter = len(signal) // (4 * periods)
-    weights = np.tile([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, -1.0]], periods) / (2 * quarter * periods)
+    weights, turn = _folding(periods, quarter)
     folded = (weights @ signal.reshape(4 * periods, -1)).reshape(2, quarter, -1)
     turned = np.empty((folded.shape[2], quarter), complex)
-    turned.real, turned.imag = folded[0].T, -folded[1].T
-    turned *= _quarter_turn(quarter)
+    turned.real, turned.imag = folded[0].T, folded[1].T
+    turned *= turn
     first = bins % 4 == 1
     phasors = np.fft.fft(turned, axis=1, out=turned).take(
         np.where(first, bins // 4, quarter - 1 - bins // 4), axis=1
@@ -110,9 +110,10 @@ def _odd_bins(signal: np.ndarray, periods: int, bins: np.ndarray) -> np.ndarray:
 
 
 @lru_cache(maxsize=1)
-def _quarter_turn(samples: int) -> np.ndarray:
-    """exp(-jπn/2N), n = 0 … N - 1."""
-    return np.exp(-0.5j * np.pi / samples * np.arange(samples))
+def _folding(periods: int, quarter: int) -> tuple[np.ndarray, np.ndarray]:
+    """Weights (2, 4 periods) of the quarter periods in the real and imaginary part of what is transformed, and exp(-jπn/2N), n < N."""
+    weights = np.tile([[1.0, 0.0, -1.0, 0.0], [0.0, -1.0, 0.0, 1.0]], periods) / (2 * quarter * periods)
+    return weights, np.exp(-0.5j * np.pi / quarter * np.arange(quarter))
 
 
 def noise_in_half_sum(plan: MultisinePlan) -> bool:

@@ -25,10 +25,11 @@ def keep_periods(plan: MultisinePlan, recording: Recording) -> tuple[np.ndarray,
     """
     rows, axes = kept_samples(plan, recording), np.asarray(plan.joints)
     position, torque, sensed = recording.q[rows], recording.torque[rows], recording.sensor_readings[rows]
+    periods = plan.periods - plan.settle_periods
 
     def columns(lines: np.ndarray) -> np.ndarray:
-        q, s, u = (spectrum(x, plan.periods - plan.settle_periods, lines) for x in (position, sensed, torque))
-        return np.hstack([q[:, axes], s, u[:, axes]])
+        q, u = (spectrum(x, periods, lines)[:, axes] for x in (position, torque))
+        return np.hstack([q, spectrum(sensed, periods, lines), u] if recording.sensors else [q, u])
 
     mean = np.full(len(position), 1.0 / len(position)) @ position
     whole = columns(np.concatenate([plan.lines, plan.detection_lines]))
