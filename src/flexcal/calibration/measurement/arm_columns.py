@@ -44,7 +44,7 @@ class ArmColumns:
     def columns(self, names: Sequence[str]) -> np.ndarray:
         """Derivatives (R, 3, p) of the readings by p parameters, natural units; raises `FlexcalError` for one without effect."""
         result = np.empty((len(self.at.readings.row), 3, len(names)))
-        places, errors, loads = self.at.model.geometry_columns, {}, {}
+        places, errors, twists, loads = self.at.model.geometry_columns, {}, {}, {}
         for k, name in enumerate(names):
             owner, _, key = name.rpartition(".")
             kind = "transmission" if key.startswith(("transmission_", RATIO)) else key
@@ -52,12 +52,18 @@ class ArmColumns:
                 result[:, :, k] = self._point(owner.removeprefix("point."), key)
             elif name in places:
                 errors[k] = places[name]
+            elif kind in _TWISTS:
+                twists[k] = (joint := self.at.model.joint_index(owner)), self._twist(joint, key)
             elif kind in _BY_KEY:
                 result[:, :, k] = _BY_KEY[kind](self, owner, key)
             else:
                 loads[k] = self._load(name)
         if errors:
             result[:, :, list(errors)] = self._by_geometry[:, :, list(errors.values())]
+        if twists:
+            joints, moved = zip(*twists.values(), strict=True)
+            twist = self.at.by_row(np.stack(moved, axis=1))[:, None]
+            result[:, :, list(twists)] = twist * self._by_geometry.take(6 * np.array(joints), axis=2)
         if loads:
             load = self.at.by_row(np.stack(list(loads.values()), axis=2))
             result[:, :, list(loads)] = np.matmul(self._by_load, load)
@@ -81,8 +87,9 @@ class ArmColumns:
     def _by_geometry(self) -> np.ndarray:
         """Readings (R, 3, G + 6) by the errors of `RobotModel.geometry_columns`, and six of the tool."""
         columns = self.at.moved(self.at.kinematics.geometry_jacobian)
-        coupling = self.at.by_row(self.at.rest.coupling)
-        columns[:, :, : len(self.at.model.geometry_columns)] += np.matmul(self._by_load, coupling)
+        if self.at.rest.axes.size:
+            coupling = self.at.by_row(self.at.rest.coupling)
+            columns[:, :, : len(self.at.model.geometry_columns)] += np.matmul(self._by_load, coupling)
         return columns
 
     def _point(self, target: str, key: str) -> np.ndarray:
@@ -120,10 +127,6 @@ class ArmColumns:
             weight += carried_mass(model, at.poses.payload, len(at.poses))
         load = weight[:, None] * at.rest.regressor[:, :, 4 * parent + 1 + axis]
         return moved + np.matmul(self._by_load, at.by_row(load)[:, :, None])[:, :, 0]
-
-    def _twisted(self, owner: str, key: str) -> np.ndarray:
-        joint = self.at.model.joint_index(owner)
-        return self.at.by_row(self._twist(joint, key))[:, None] * self._by_geometry[:, :, 6 * joint]
 
     def _hardened(self, owner: str, key: str) -> np.ndarray:
         joint = self.at.model.joint_index(owner.removesuffix(".drive"))
@@ -202,10 +205,10 @@ def _shifted(at: PointKinematics, parent: int, axis: int, carried: np.ndarray) -
     return np.where(carried[:, None, None], moved, 0.0)
 
 
+_TWISTS = ("backlash", "gravity_compliance", "transmission")
 _BY_KEY: Mapping[str, Callable[[ArmColumns, str, str], np.ndarray]] = {
     **dict.fromkeys(GEOMETRY, ArmColumns._tool),
     **dict.fromkeys(ORIGIN, ArmColumns._origin),
-    **dict.fromkeys(("backlash", "gravity_compliance", "transmission"), ArmColumns._twisted),
     **dict.fromkeys(LATERAL, ArmColumns._tilted),
     "hardening": ArmColumns._hardened,
     EXPANSION.rpartition(".")[2]: ArmColumns._expanded,
