@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from flexcal.calibration.recheck.another_geometry import CLEAR, for_another_geometry
 from flexcal.calibration.recheck.change_effects import (
     PossibleChange,
     drift_of_readings,
@@ -96,6 +97,9 @@ class JudgedVisit:
         Where the instrument stands then, where that alone explains the errors.
     scatter : LargerScatter or None
         By how much the readings scatter more than was assumed, where the test rejects and they do; the test and suspects are then by it.
+    geometry : bool
+        Whether many differences of the geometry, as of another robot, explain the errors about as well as scatter or suspects do; where
+        there is neither, far better.
     """
 
     test: GlobalTest
@@ -106,6 +110,7 @@ class JudgedVisit:
     instrument: str = "known"
     place: Suspect | None = None
     scatter: LargerScatter | None = None
+    geometry: bool = False
 
     @property
     def as_calibrated(self) -> bool:
@@ -174,12 +179,16 @@ def _judge(errors: VisitErrors) -> JudgedVisit:
     if probability > VISIT_ALARM:
         return JudgedVisit(test, probability, (), together, shifts)
     found = _explanations(test)
-    worn = () if _suspects(found) else _suspects(_worn(test))
-    if worn:
-        return JudgedVisit(test, probability, worn, together, shifts)
-    scatter = scatter_about(test, [suspect.remainder for _, suspect in found], together)
+    suspects = _suspects(found)
+    worn = [] if suspects else _worn(test)
+    explained = [(suspect.misfit, item.basis.shape[1]) for item, suspect in (*found, *worn)]
+    other = for_another_geometry(test, explained)
+    if other > CLEAR:
+        return JudgedVisit(test, probability, (), together, shifts, geometry=True)
+    suspects = suspects or _suspects(worn)
+    scatter = scatter_about(test, [suspect.remainder for _, suspect in (*found, *worn)], together)
     if scatter is None:
-        return JudgedVisit(test, probability, _suspects(found), together, shifts)
+        return JudgedVisit(test, probability, suspects, together, shifts, geometry=other > 0)
     # causes by the scatter that the visit has; what that explains is none
     wider = GlobalTest.of(scatter.applied(errors), changes, directed=True)
     caused = wider.probability(errors.errors) <= VISIT_ALARM
@@ -187,7 +196,9 @@ def _judge(errors: VisitErrors) -> JudgedVisit:
     if caused and not suspects:  # scatter is not it: more changed, or this is another robot
         return JudgedVisit(test, probability, (), together, shifts)
     shifts = tuple(_suspect(wider, item, 1) for item in wider.seen if len(item.change.names) == 1)
-    return JudgedVisit(wider, probability, suspects, together, shifts, scatter=scatter)
+    return JudgedVisit(
+        wider, probability, suspects, together, shifts, scatter=scatter, geometry=other > -CLEAR
+    )
 
 
 def _together(test: GlobalTest) -> float:

@@ -54,10 +54,17 @@ def judgement_sentence(judged: JudgedVisit, course: CourseOverVisits | None = No
             f"the readings scatter {judged.scatter.factor:.1f} times as much as {usual} ({chance_in_words(judged.scatter.chance)}): check "
             "the instrument and its targets, and the robot for play in joints and tool, and measure again"
         )
+        if judged.geometry:
+            scatters += "; the geometry in several places, as of another robot, would explain them too"
         if not judged.suspects:
             return f"{lead}{scatters}; whether the robot changed too cannot be told by them ({chance} of the whole)"
         lead = f"{lead}{scatters}; what is more than such scatter: "
     if not judged.suspects:
+        if judged.geometry and judged.scatter is None:
+            return (
+                f"{lead}recalibrate ({size}): the errors are not those of shifted joints, a bumped tool, growth or a moved instrument, nor "
+                "noise, but go together as those of a robot whose geometry differs in many places: is this the robot that was calibrated?"
+            )
         if judged.together > FALSE_ALARM:
             return (
                 f"{lead}recalibrate ({size}): no single change of a joint, of the tool, of all lengths, of the payload or of the "
@@ -71,6 +78,8 @@ def judgement_sentence(judged: JudgedVisit, course: CourseOverVisits | None = No
     if course is not None and course.drifting:
         return f"{lead}{course.drift_words} ({chance})"
     told = ", or ".join(suspect_in_words(s, judged.test.errors.model) for s in judged.suspects)
+    if judged.geometry and judged.scatter is None:
+        told += ", or the geometry in several places, as of another robot"
     since = "" if course is None else course.since_words
     if len(judged.suspects) == 1:
         return f"{lead}{told} (beyond chance: {chance}; no other single change explains the readings){since}"

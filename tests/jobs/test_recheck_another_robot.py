@@ -1,0 +1,67 @@
+"""Another robot of the type, and a noisier instrument: told apart by how the errors go together, by an own simulator."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dh_arm import DHArm
+from test_recheck import Visited
+
+from flexcal.calibration.recheck import JudgedVisit, errors_from_reference, judge_visit
+from flexcal.data.poses import PoseSet
+from flexcal.jobs.recheck.judgement_words import judgement_sentence
+
+
+@pytest.fixture(scope="module")
+def visited(tmp_path_factory: pytest.TempPathFactory) -> Visited:
+    return Visited(tmp_path_factory.mktemp("arm"), 6)
+
+
+def _judged(visited: Visited, visit: PoseSet, reference: PoseSet) -> JudgedVisit:
+    model = visited.robot.model
+    found = judge_visit(
+        lambda placed: errors_from_reference(model, visit, reference, placed=placed), placed=True
+    )
+    assert found is not None
+    return found
+
+
+def _like(arm: DHArm, rng: np.random.Generator, size: float) -> DHArm:
+    """Another arm of the same workshop, `size` times as different as any two."""
+    return DHArm(
+        arm.rows + size * rng.normal(size=(6, 4)) * [8e-4, 3e-4, 3e-4, 4e-4],
+        arm.tilts + size * 3e-4 * rng.normal(size=6),
+        arm.tool + size * 1e-3 * rng.normal(size=3),
+    )
+
+
+def test_another_robot_is_no_noise_and_no_bumped_tool(visited: Visited, tmp_path: Path) -> None:
+    """Arms that differ by a third of what the workshop's do, with the instrument set up anew: most are told as robots of another geometry,
+    and none as readings that scatter alone.
+    """
+    shop = replace(visited.shop, folder=tmp_path, rng=np.random.default_rng(3))
+    model = visited.robot.model
+    said = []
+    for _ in range(10):
+        visit = shop.measured(model, visited.q, arm=_like(shop.arm, shop.rng, 0.3), place=shop.new_place())
+        judged = _judged(visited, visit, shop.measured(model, np.repeat(visited.q, 3, axis=0)))
+        assert not judged.as_calibrated
+        said.append(judgement_sentence(judged))
+    assert sum("another robot" in text or "is this the robot" in text for text in said) >= 8, said
+    assert not any("scatter" in text and "another robot" not in text for text in said), said
+
+
+def test_a_noisier_instrument_is_no_other_robot(visited: Visited, tmp_path: Path) -> None:
+    shop = replace(visited.shop, folder=tmp_path, rng=np.random.default_rng(4))
+    model = visited.robot.model
+    other = 0
+    for _ in range(12):
+        visit = shop.measured(model, visited.q, place=shop.new_place())
+        noise = 2.5 * 3e-5 * shop.rng.normal(size=visit.position.shape)
+        visit = replace(visit, position=visit.position + noise)
+        judged = _judged(visited, visit, shop.measured(model, np.repeat(visited.q, 3, axis=0)))
+        other += judged.verdict == "recalibrate"
+    assert other <= 1
