@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.data.poses.length_units import unit_advice
+from flexcal.data.poses.length_units import unit_advice, unit_of_ratio
 from flexcal.data.poses.pose_set import PoseSet
 from flexcal.data.tables import Signal, Table
 from flexcal.errors import InputError
@@ -18,6 +18,12 @@ _ALIKE = 1.5
 """Factor by which the extent of measured points differs from that of the nominal robot's at the same poses, at most."""
 _POSSIBLE = (0.02, 1.3)
 """Extent of the points or distances of all poses about their middle, relative to the robot's reach, where the nominal one tells nothing."""
+_ANOTHER_SIZE = 1.5
+"""Size of a figure of points, relative to the nominal robot's at the same poses, from which its unit is looked for."""
+_SAME_SHAPE = 0.25
+"""Root mean square by which figures of one shape differ, relative to their size: by errors of the robot and the place of its target."""
+_FEWEST, _MOST = 4, 200
+"""Rows of a station and target whose figure is compared."""
 STILL = 1e-3
 """Range over all poses (rad or m) below which a joint counts as never moving."""
 SAME_POSE = 0.02
@@ -85,11 +91,53 @@ def _nominal_extent(poses: PoseSet, model: RobotModel) -> float | None:
     return float(np.median(extent))
 
 
+def _check_size(poses: PoseSet, model: RobotModel, table: Table, signal: Signal) -> None:
+    """Raise `InputError` where the points of a station and target have the shape of the nominal robot's at the same poses in the size of
+    another unit.
+    """
+    from flexcal.model.kinematics import point_kinematics
+
+    if poses.kind is not None or not set(model.points).issuperset(poses.targets):
+        return
+    for station in poses.stations:
+        for target in poses.targets:
+            rows = np.flatnonzero(
+                (poses.station == station) & (poses.target == target) & poses.present.all(axis=1)
+            )
+            if len(rows) < _FEWEST:
+                continue
+            rows = rows[np.linspace(0, len(rows) - 1, min(len(rows), _MOST)).astype(int)]
+            nominal = point_kinematics(model, poses.q[rows], point=target, jacobians=False).position
+            ratio, left = _similarity(nominal, poses.position[rows])
+            advice = unit_of_ratio(ratio) if max(ratio, 1 / ratio) > _ANOTHER_SIZE else ""
+            if advice and left < _SAME_SHAPE:
+                raise table.error(
+                    "E-POSES-082",
+                    int(rows[0]),
+                    signal.column_of(0),
+                    f"the points lie as this robot's do, but {ratio:.4g} times as far apart; {advice}",
+                )
+
+
+def _similarity(nominal: np.ndarray, measured: np.ndarray) -> tuple[float, float]:
+    """Size of the figure of `measured` points (N, 3) over that of the `nominal` ones, and what remains of it after the best fit of place,
+    rotation and size (Umeyama 1991), relative.
+    """
+    a, b = nominal - nominal.mean(axis=0), measured - measured.mean(axis=0)
+    u, stretch, vt = np.linalg.svd(a.T @ b)
+    stretch[-1] *= np.sign(np.linalg.det(u @ vt))
+    whole, own = float((b**2).sum()), float((a**2).sum())
+    if whole <= 0 or own <= 0 or stretch.sum() <= 0:
+        return 1.0, 1.0
+    return float(stretch.sum() / own), float(np.sqrt(max(whole - stretch.sum() ** 2 / own, 0.0) / whole))
+
+
 def check_metres(poses: PoseSet, model: RobotModel, table: Table, signal: Signal) -> None:
     """Raise `InputError` where points cannot be in m.
 
     The points of one target seen from one station lie within twice the robot's reach of each other, and the instrument
-    stands no farther than ten times the reach (at least 60 m) away: what lies beyond twice that is refused.
+    stands no farther than ten times the reach (at least 60 m) away: what lies beyond twice that is refused. So are points that are the
+    robot's in the size of another unit, as feet, which are not too far away for that.
     """
     reach = float(model.reach)
     values = poses.position if poses.kind is None else poses.position[:, :1]
@@ -103,6 +151,7 @@ def check_metres(poses: PoseSet, model: RobotModel, table: Table, signal: Signal
     farthest = max(10 * reach, 60.0)
     wrong = (spread > 4 * reach) | (distance > farthest)
     if not wrong.any():
+        _check_size(poses, model, table, signal)
         return
     row = int(np.argmax(wrong))
     column = signal.column_of(int(np.argmax(np.abs(values[row]))))

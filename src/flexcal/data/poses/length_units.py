@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from flexcal.data.tables import UNITS
 
+_NEAR = 0.1
+"""Relative deviation of the ratio of two sizes from that of two units."""
 _WORDS = {"mm": "millimetres", "cm": "centimetres", "in": "inches", "ft": "feet", "um": "micrometres"}
 
 
@@ -17,3 +19,9 @@ def unit_advice(extent: float, smallest: float, largest: float) -> str:
         if units
         else ""
     )
+
+
+def unit_of_ratio(ratio: float) -> str:
+    """Advice on points whose extent is `ratio` times that of the robot's; empty where no unit makes them so large."""
+    wanted = 1 / ratio
+    return unit_advice(1.0, wanted * (1 - _NEAR), wanted * (1 + _NEAR)) if ratio > 0 else ""
