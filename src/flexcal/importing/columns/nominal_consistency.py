@@ -38,6 +38,8 @@ _MOST_JOINTS = 8
 _TURNS = (0.0, np.pi / 2, -np.pi / 2, np.pi)
 _WORDS = {"in": "inches", "ft": "feet"}
 """Units that are written as words."""
+_SIZE = 0.02
+"""Deviation of the size of points from the nominal robot's, relative, that is none of a robot."""
 _ROUNDS = 20
 _SOME_ROUNDS = 2
 _ALIKE = 1.5
@@ -125,6 +127,12 @@ class _Tool:
                 shift = np.einsum("nji,nj->i", frame, inward) / len(q)
         return float(np.sqrt(np.mean(np.sum(left**2, axis=1)))), shift
 
+    def size(self, q: np.ndarray, xyz: np.ndarray) -> float:
+        """Factor by which points (N, 3) have the nominal robot's size, by their distances from their middle."""
+        expected = point_kinematics(self.model, q, point=self.point, jacobians=False).position
+        own, there = (float(np.sqrt(((p - p.mean(axis=0)) ** 2).sum())) for p in (xyz, expected))
+        return there / own if own > 0 else 1.0
+
     def miss_from_hand(self, q: np.ndarray, xyz: np.ndarray) -> float:
         """Least rms distance (m) with `xyz` seen by an instrument on the hand: p + R (X xyz + c) is one place, whatever X (3, 3) and c.
 
@@ -145,7 +153,7 @@ class _Tool:
 class _Change:
     """Another reading of the columns: their `order`, `signs` and `zeros` (rad) of the joints, points in a `mirrored` frame or a `unit`.
 
-    `scale` is that unit in the one that was read.
+    `scale` is that unit in the one that was read, or, without a unit, another size of the points.
     """
 
     order: tuple[int, ...]
@@ -176,6 +184,11 @@ def _explained(
         for change in simple:
             if tool.miss(*change.read(q, xyz), rounds)[0] < enough:
                 return replace(mismatch, **_said(model, placed, points, change))
+    size = tool.size(q, xyz)
+    if points is not None and abs(size - 1) > _SIZE:
+        change = replace(simple[0], mirrored=False, scale=size)
+        if tool.miss(*change.read(q, xyz), _ROUNDS)[0] < enough:
+            return replace(mismatch, **_said(model, placed, points, change))
     if model.n <= _MOST_JOINTS:
         change = _signs_and_zeros(model, tool, q, xyz)
         if tool.miss(*change.read(q, xyz), _ROUNDS)[0] < enough:
@@ -253,10 +266,14 @@ def _said(
         words.append(
             "the points are in a left-handed frame: one of x, y, z has the opposite sign, or two are exchanged"
         )
-    if change.unit and points is not None:
+    if change.scale != 1.0 and points is not None:
         words.append(
             f"the points fit this robot if they are in {change.unit}, but were read in {_WORDS.get(str(points.unit), points.unit)}"
+            if change.unit
+            else f"the points fit this robot if they are {change.scale:.3g} times as large: they are in another unit, whose exact "
+            "factor is to be given (x=FACTOR*COLUMN), or the robot is of another size than in the URDF"
         )
+    if change.unit and points is not None:
         options += [
             f"{axis}={change.scale * gain:.10g}*{column}[{points.unit}]"
             for axis, column, gain in zip("xyz", points.columns, points.gains, strict=True)
