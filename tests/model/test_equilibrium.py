@@ -123,8 +123,13 @@ def test_the_flank_is_the_sign_of_the_torque_at_rest(
 
 def test_springs_too_weak_for_gravity_are_refused(tx90l: RobotModel) -> None:
     weak = tx90l.with_values({"joint_2.drive.stiffness": 1.0})
-    with refused("E-MODEL-006", "springs cannot carry the arm"):
+    with refused("E-MODEL-006", "springs cannot carry the arm", "drive of joint_2", "by the estimates"):
         static_equilibrium(weak, np.zeros((1, 6)))
+
+
+def test_a_payload_that_no_spring_carries_is_named_with_what_robot_yaml_declares(tx90l: RobotModel) -> None:
+    with refused("E-MODEL-006", "in robot.yaml", "3e+06 kg", "where robot.yaml declares 6"):
+        static_equilibrium(tx90l, Q[:1], 3e6)
 
 
 def test_payload_needs_a_declaration(tx90l: RobotModel) -> None:

@@ -110,7 +110,7 @@ def _solve(
             by_offset = coupling[:, :, : 6 * joints : 6]
     except ValueError as problem:
         raise FlexcalError(
-            "E-MODEL-006", f"{model.name}: {problem}; check the stiffnesses in robot.yaml and the payload."
+            "E-MODEL-006", f"{model.name}: {problem}; {_to_check(model, axes, stiffness, payload)}."
         ) from problem
     if step > 1e-9:
         raise FlexcalError(
@@ -118,6 +118,35 @@ def _solve(
             f"{model.name}: no stable equilibrium was found (last step {step:.1e} rad); check the stiffnesses.",
         )
     return deflection, compliance, by_offset, regressor, coupling
+
+
+def _to_check(
+    model: RobotModel, axes: list[tuple[int, int]], stiffness: np.ndarray, payload: np.ndarray
+) -> str:
+    """Where the softest spring and the largest payload come from, and that these are to be checked."""
+    softest = int(np.argmin(stiffness))
+    joint, part = model.joints[axes[softest][0]].name, ("bearing_x", "bearing_y", "drive")[axes[softest][1]]
+    value = float(stiffness[softest])
+    declared = next((getattr(entry, part) for entry in model.config.elastic if entry.joint == joint), None)
+    own = declared is not None and bool(np.isclose(declared.stiffness, value, rtol=1e-6))
+    spring = f"the softest spring, {part} of {joint}, has {value:.3g} N m/rad " + (
+        "in robot.yaml"
+        if own
+        else "by the estimates"
+        + (
+            ", where robot.yaml declares none"
+            if declared is None
+            else f", {declared.stiffness:.3g} in robot.yaml"
+        )
+    )
+    heaviest = float(np.max(payload, initial=0.0))
+    of_rows = (
+        ""
+        if np.isclose(heaviest, model.payload_mass)
+        else f", where robot.yaml declares {model.payload_mass:.4g}"
+    )
+    load = f", and the payload is {heaviest:.4g} kg{of_rows}" if heaviest > 0 else ""
+    return f"{spring}{load}; check these, and the masses of the links"
 
 
 def _independent(
