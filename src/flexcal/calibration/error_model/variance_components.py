@@ -37,6 +37,8 @@ _ALWAYS = (ROBOT, *OF_INSTRUMENTS, ORIENTATION)
 """Components that the data need not support: points and orientations scatter."""
 _STILL = 1e-6
 """Change of the deviance, by its slope, below which the maximisation has converged."""
+_COMPARABLE = 1e-2
+"""The same where only the likelihood counts, beside another by `_CLEAR_GAIN`."""
 _TO_ZERO = 0.1
 """Share of a variance with a prior factor that a step leaves of it at least."""
 _ARMIJO = 1e-4
@@ -130,13 +132,14 @@ class LinearFit:
             whole = totals[first] / float(np.mean(self.readings.sigma[of_first] ** 2))
             narrow = [*own, *shared]
             tried = np.array([*(sizes[name] for name in narrow), whole])
-            alone = self._maximum([*narrow, "share"], tried, None, favour=False).likelihood
+            alone = self._maximum([*narrow, "share"], tried, None, favour=False, still=_COMPARABLE).likelihood
             # without the prior factor the maximum is this high at least
             power = np.array([self._favour(name) for name in names])
             reached = best.likelihood - 0.5 * float(power @ np.log(best.relative))
             if (
                 alone - reached > _CLEAR_GAIN
-                and alone - self._maximum(names, scale, share, favour=False).likelihood > _CLEAR_GAIN
+                and alone - self._maximum(names, scale, share, favour=False, still=_COMPARABLE).likelihood
+                > _CLEAR_GAIN
             ):
                 names, scale = [first, *narrow], np.append(totals[first], tried[:-1])
                 narrower = self._maximum([*names, "share"], np.append(scale, whole), None)
@@ -227,11 +230,13 @@ class LinearFit:
         near: np.ndarray | None = None,
         *,
         favour: bool = True,
+        still: float = _STILL,
     ) -> _Maximum:
         """Maximum of the restricted likelihood; `share` None: it is the last of the variances.
 
         Newton's steps with the average information, cut at the bounds. `near` (k,) is where to begin, in units of `scale`. The
-        likelihood is multiplied by each standard deviation to the power of `_favour`, unless not to `favour` any.
+        likelihood is multiplied by each standard deviation to the power of `_favour`, unless not to `favour` any. It has converged when
+        the deviance changes by less than `still`, by its slope.
         """
         start = np.full(len(names), 0.7 / len(names)) if near is None else near
         largest = np.full(len(names), _LARGEST)
@@ -258,9 +263,9 @@ class LinearFit:
                 step /= 2
             else:
                 break
-            still = abs(float(slope @ (tried - x))) < _STILL
+            change = abs(float(slope @ (tried - x)))
             x, at = tried, after
-            if still:
+            if change < still:
                 break
         return _Maximum(names, scale, x * scale, -0.5 * deviance(x, at), at)
 

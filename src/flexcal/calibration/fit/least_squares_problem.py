@@ -71,7 +71,8 @@ class GeometryProblem:
         def linearise(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             at = self.predicted(values(x), jacobians=True)
             columns = self.columns(at, parameters.names)[there]
-            return self.residual(at)[there], -columns * parameters.natural_slope(x)
+            columns *= -parameters.natural_slope(x)
+            return self.residual(at)[there], columns
 
         size = len(parameters)
         covariance = np.zeros((size, size))
