@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -52,8 +53,9 @@ def page_html(page: Page) -> str:
     )
 
 
+@cache
 def templates() -> Environment:
-    """The templates of pages; a name that is not given to one is an error."""
+    """The templates of pages, compiled once in a process; a name that is not given to one is an error."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     return Environment(
