@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from refusals import refused
 
 from flexcal.cli.main import main
 from flexcal.jobs.fleet import Fleet, gather_fleet, review_fleet
+from flexcal.jobs.fleet.projects import date_of
 
 DAYS = ("2024-01-10", "2024-07-01", "2025-01-12", "2025-06-30", "2026-01-05")
 
@@ -364,3 +366,20 @@ def test_a_calibration_that_its_points_refute_hides_nothing(tmp_path: Path) -> N
     values = gathered.table.frame.filter(pl.col("kind") == "calibration")["value"]
     assert len(values) == 2 * 19 and values.abs().max() < 0.1
     assert robot_named(review_fleet(tmp_path), "arm_0")["drifting_parameters"] == ["j2.length_x"]
+
+
+@pytest.mark.parametrize(
+    ("name", "date"),
+    [
+        ("2026-03-01T14-30_after", datetime(2026, 3, 1, 14, 30)),
+        ("visit_2026_03_01", datetime(2026, 3, 1)),
+        ("2026.03.01", datetime(2026, 3, 1)),
+        ("01.03.2026", datetime(2026, 3, 1)),
+        ("20260301", None),
+        ("2026-13-01", None),
+        ("2026-03_01", None),
+        ("serial_12345.01.2026", None),
+    ],
+)
+def test_dates_in_names_of_folders(name: str, date: datetime | None) -> None:
+    assert date_of(("hall", name)) == date

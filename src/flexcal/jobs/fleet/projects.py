@@ -17,7 +17,11 @@ from flexcal.jobs.result_files import ESTIMATES, RESULTS, read_results
 from flexcal.model.robot import RobotConfig
 from flexcal.model.urdf import Element, read_elements
 
-_DATE = re.compile(r"(?<!\d)(\d{4}-\d\d-\d\d)(?:[T_ ](\d\d)[-:.]?(\d\d)(?!\d))?(?!\d)")
+_DATE = re.compile(
+    r"(?<!\d)(?:(?P<year>\d{4})(?P<between>[-_.])(?P<month>\d\d)(?P=between)(?P<day>\d\d)|(?P<d>\d\d)\.(?P<m>\d\d)\.(?P<y>\d{4}))"
+    r"(?:[T_ ](?P<hour>\d\d)[-:.]?(?P<minute>\d\d)(?!\d))?(?!\d)"
+)
+"""Year, month and day with hyphens, underscores or dots between them, or day, month and year with dots."""
 
 
 @dataclass(frozen=True)
@@ -116,13 +120,20 @@ def find_results(root: Path) -> tuple[list[ResultFolder], list[Project], list[Pr
 
 
 def date_of(parts: tuple[str, ...]) -> datetime | None:
-    """Date, and time if there is one, in the last name that has one, as in `2026-03-01` or `2026-03-01T14-30_after_repair`."""
+    """Date, and time if there is one, in the last name that has one, as in `2026-03-01` or `2026-03-01T14-30_after_repair`; also
+    `2026_03_01`, `2026.03.01` and `01.03.2026`.
+    """
     for part in reversed(parts):
         match = _DATE.search(part)
         if match is not None:
-            day, hour, minute = match.groups()
+            found = match.groupdict(default="")
+            year, month, day = (
+                found[long] or found[short] for long, short in (("year", "y"), ("month", "m"), ("day", "d"))
+            )
             try:
-                return datetime.strptime(f"{day} {hour or '00'}:{minute or '00'}", "%Y-%m-%d %H:%M")
+                return datetime(
+                    int(year), int(month), int(day), int(found["hour"] or 0), int(found["minute"] or 0)
+                )
             except ValueError:
                 continue
     return None
