@@ -9,7 +9,6 @@ import numpy as np
 
 from flexcal.calibration.measurement import PredictedMeasurements, predict_measurements
 from flexcal.model.robot import GEOMETRY, STATION, RobotModel
-from flexcal.model.statics import certain_flank
 
 ChangeKind = Literal[
     "joint_shifted",
@@ -21,8 +20,8 @@ ChangeKind = Literal[
     "readings_drift",
     "gear_worn",
 ]
-_BOTH_FLANKS = 2
-"""Least number of poses on either flank of a gear at which its play is told from another zero of the joint."""
+_NO_LOAD = 1e-4
+"""Gravity torque, relative to the largest of the arm, that presses a gear to neither side."""
 _STEP = 0.1
 """Payload, kg, of the finite difference."""
 
@@ -101,16 +100,16 @@ def drift_of_readings(poses: int) -> PossibleChange:
 def worn_gears(model: RobotModel, at: PredictedMeasurements) -> list[PossibleChange]:
     """Play in the gear of every joint, by half of it: the arm lies on the flank to which gravity presses it.
 
-    Joints that gravity does not press to either side, for certain, at several poses are left out: play there is another zero.
+    Joints that gravity presses to one side alone, or to none, are left out: play there is another zero.
     """
     torque = at.rest.torque
-    certain = certain_flank(model, at.poses.q, torque, at.poses.payload)
+    least = _NO_LOAD * np.abs(torque).max(initial=0.0)
     changes = []
     for joint in model.motor_joints:
-        k = model.joint_index(joint.name)
+        load = torque[:, model.joint_index(joint.name)]
         # gravity turns the arm against the torque that holds it
-        side = -np.sign(torque[:, k])
-        if min((side[certain[:, k]] > 0).sum(), (side[certain[:, k]] < 0).sum()) < _BOTH_FLANKS:
+        side = np.where(np.abs(load) > least, -np.sign(load), 0.0)
+        if not ((side > 0).any() and (side < 0).any()):
             continue
         columns = _flat(at.jacobian([f"{joint.name}.offset"])) * np.repeat(side, 3)[:, None]
         unit = "m" if joint.kind == "prismatic" else "rad"
