@@ -59,7 +59,7 @@ class PooledUse:
             s for s, scale in zip(self.pooled.std.tolist(), self.pooled.scales, strict=True) if scale == "log"
         ]
         known = (
-            f", known to {100 * min(log):.2g} to {100 * max(log):.2g} % for a robot of the model"
+            f", known to {' to '.join(dict.fromkeys(f'{100 * std:.2g}' for std in (min(log), max(log))))} % for a robot of the model"
             if log
             else ""
         )
