@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from dh_arm import HOME, DHArm, postures, tracked, write_poses, write_robot
 
-from flexcal import Calibration, RobotModel, calibrate, read_poses
+from flexcal import Calibration, RobotModel, calibrate, read_poses, verify
 
 SIGMA = 3e-5
 
@@ -59,3 +59,26 @@ def test_an_arm_that_stands_still_has_no_lag(tmp_path: Path) -> None:
     assert (wound := _calibrated(tmp_path, q, q - stays_behind, times).lag) is not None and not wound.certain
     scattered = postures(np.random.default_rng(3), 60)
     assert _calibrated(tmp_path, scattered, scattered, None).lag is None
+
+
+def test_a_good_calibration_is_not_blamed_for_points_of_a_moving_arm(tmp_path: Path) -> None:
+    """Verified on a path whose points lag: the lag is told, and none where the arm stood still at each."""
+    times = np.linspace(0, 600, 120)
+    rng = np.random.default_rng(6)
+    scattered = postures(rng, 50)
+    result = _calibrated(tmp_path, scattered, scattered, None)
+    # the tracker, which is drawn first, stands where it stood at the calibration
+    for delay in (0.05, 0.0):
+        seen = DHArm.made(4).points(np.vstack([scattered, _path(3, times - delay)]))
+        seen = tracked(seen, np.random.default_rng(5), SIGMA)[50:]
+        file = write_poses(tmp_path / "path.csv", _path(3, times), seen, SIGMA)
+        lines = [
+            f"{line},{t}"
+            for line, t in zip(file.read_text().splitlines(), ["t", *times.tolist()], strict=True)
+        ]
+        file.write_text("\n".join(lines) + "\n")
+        verified = verify(result.robot, read_poses([file], result.robot.model))
+        assert verified.lag is not None and verified.lag.certain == (delay > 0)
+        assert ("lag" in verified.trust.reasons) == (delay > 0)
+        if delay:
+            assert abs(verified.lag.lag - delay) < min(0.04 * delay, 3 * verified.lag.std)

@@ -10,6 +10,7 @@ import numpy as np
 from flexcal.calibration.fit import GeometricFit
 from flexcal.calibration.measurement import Readings, predict_measurements
 from flexcal.data.poses import PoseSet
+from flexcal.model.robot import RobotModel
 
 _CHANCE = 1e-6
 """Significance level of a lag: what else goes with the order of measuring must not be called one."""
@@ -17,7 +18,8 @@ _SHARE = 0.5
 """Least share of the residuals that a lag explains: below it friction or wind-up of a robot that stands still may be what goes with it."""
 _SMOOTH = 0.1
 """Largest square of what rows of a path are off the curve through those about them, relative to that of steps between rows."""
-_STENCIL = 5
+_STENCIL, _SHORT = 5, 3
+"""Rows for a derivative, and for one from which its error is told."""
 _STEP = 1e-3
 """Finite difference of the velocity of the points, in time steps."""
 
@@ -55,42 +57,77 @@ class ReadingLag:
 
     @classmethod
     def of(cls, fit: GeometricFit) -> ReadingLag | None:
-        """First-order estimate with one further parameter, by the velocity along the rows; None where they are no path, or no points.
+        """First-order estimate with one further parameter of a fit, by the velocity along the rows; None where they are no path, or no
+        points.
 
         Rows are in measuring order, at the times of the file where it has them. Poses that were chosen one by one are no path: then
         nothing tells how the robot moved.
         """
-        from scipy.special import fdtrc
-
         poses = fit.poses
-        if not poses.located.all() or fit.linear.readings.slopes is not None or len(poses) <= 2 * _STENCIL:
+        if fit.linear.readings.slopes is not None:
             return None
-        timed = poses.time is not None and bool((np.diff(poses.time) > 0).all())
-        times = poses.time if timed and poses.time is not None else np.arange(len(poses), dtype=float)
-        if not _is_path(poses.q, times):
+        found = _effects(fit.model, poses)
+        if found is None:
             return None
-        rate = _rates(poses.q, times)
-        effects = np.stack([_velocity(fit, poses, rate), *_reversals(fit, poses, rate)], axis=2)
+        effects, timed = found
         row = Readings.of(poses).row
         kept = ~np.isin(row, fit.estimate.outliers)
         # of orientations beside the points nothing is taken
         columns = effects[row[kept]] * (np.flatnonzero(kept) < len(poses))[:, None, None]
         products = fit.linear.products(replace(fit.scatter, order=0.0), columns)
         freedom = int(fit.linear.readings.present.sum()) - fit.linear.free.shape[2] - 1
+        return cls._by(products, freedom, timed, 1.0)
+
+    @classmethod
+    def of_errors(cls, model: RobotModel, poses: PoseSet, errors: np.ndarray) -> ReadingLag | None:
+        """The same of `errors` (N, 3), m, of a calibrated robot at points to which nothing was fitted, all weighted alike."""
+        found = _effects(model, poses)
+        if found is None:
+            return None
+        effects, timed = found
+        columns = np.column_stack([effects.reshape(-1, effects.shape[2]), errors.ravel()])
+        return cls._by(columns.T @ columns, errors.size - 1, timed, 0.0)
+
+    @classmethod
+    def _by(cls, products: np.ndarray, freedom: int, timed: bool, least: float) -> ReadingLag | None:
+        """By scalar products of the effect of a lag, the same by fewer rows, those of reversals and, last, the residuals, whose variance is
+        `least` or larger.
+        """
+        from scipy.special import fdtrc
+
         total, own, along = products[-1, -1], products[0, 0], products[0, -1]
         if freedom < 1 or own <= 0 or total <= 0:
             return None
         explained = along**2 / own
-        left = (total - explained) / freedom
-        turned = np.linalg.lstsq(products[1:-1, 1:-1], products[1:-1, -1], rcond=1e-9)[0] @ products[1:-1, -1]
+        variance = max((total - explained) / freedom, least, 1e-12 * total)
+        turned = np.linalg.lstsq(products[2:-1, 2:-1], products[2:-1, -1], rcond=1e-9)[0] @ products[2:-1, -1]
+        lag = along / own
+        # the errors of derivatives by three and five rows are of second and fourth order in the step
+        bent = (products[1, -1] / products[1, 1] / lag - 1) ** 2 if products[1, 1] > 0 and lag != 0 else 0.0
         return cls(
-            float(along / own),
-            float(np.sqrt(max(left, 1.0) / own)),
+            float(lag),
+            float(np.hypot(np.sqrt(variance / own), bent * lag)),
             float(explained / total),
             float(turned / total),
-            float(fdtrc(1, freedom, explained / max(left, 1.0))),
+            float(fdtrc(1, freedom, explained / variance)),
             timed,
         )
+
+
+def _effects(model: RobotModel, poses: PoseSet) -> tuple[np.ndarray, bool] | None:
+    """Changes (N, 3, 2 + n) of the points with a lag, by five and by three rows, and with reversals, and whether by times of the file.
+
+    None where the rows are no path.
+    """
+    if not poses.located.all() or len(poses) <= 2 * _STENCIL:
+        return None
+    timed = poses.time is not None and bool((np.diff(poses.time) > 0).all())
+    times = poses.time if timed and poses.time is not None else np.arange(len(poses), dtype=float)
+    if not _is_path(poses.q, times):
+        return None
+    rate = _rates(poses.q, times, _STENCIL)
+    velocities = [_velocity(model, poses, rate), _velocity(model, poses, _rates(poses.q, times, _SHORT))]
+    return np.stack([*velocities, *_reversals(model, poses, rate)], axis=2), timed
 
 
 def _is_path(q: np.ndarray, times: np.ndarray) -> bool:
@@ -103,10 +140,10 @@ def _is_path(q: np.ndarray, times: np.ndarray) -> bool:
     return bool((missed**2).mean() < _SMOOTH * (steps**2).mean())
 
 
-def _rates(q: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Derivatives (N, n) of joint positions by time, of the polynomial through five rows."""
-    first = np.clip(np.arange(len(q)) - _STENCIL // 2, 0, len(q) - _STENCIL)
-    about = first[:, None] + np.arange(_STENCIL)
+def _rates(q: np.ndarray, times: np.ndarray, rows: int) -> np.ndarray:
+    """Derivatives (N, n) of joint positions by time, of the polynomial through as many `rows`."""
+    first = np.clip(np.arange(len(q)) - rows // 2, 0, len(q) - rows)
+    about = first[:, None] + np.arange(rows)
     return np.einsum("mk,mkn->mn", _weights(times[about] - times[:, None], 1), q[about])
 
 
@@ -119,19 +156,19 @@ def _weights(offsets: np.ndarray, order: int) -> np.ndarray:
     return np.linalg.solve(powers, wanted)[:, :, 0] / scale**order
 
 
-def _velocity(fit: GeometricFit, poses: PoseSet, rate: np.ndarray) -> np.ndarray:
+def _velocity(model: RobotModel, poses: PoseSet, rate: np.ndarray) -> np.ndarray:
     """Change (N, 3) of the predicted points, m, with a lag: against their velocity at joint rates (N, n)."""
     ahead, behind = (
-        predict_measurements(fit.model, replace(poses, q=poses.q + sign * _STEP * rate)).position
+        predict_measurements(model, replace(poses, q=poses.q + sign * _STEP * rate)).position
         for sign in (1.0, -1.0)
     )
     return (behind - ahead) / (2 * _STEP)
 
 
-def _reversals(fit: GeometricFit, poses: PoseSet, rate: np.ndarray) -> list[np.ndarray]:
+def _reversals(model: RobotModel, poses: PoseSet, rate: np.ndarray) -> list[np.ndarray]:
     """Changes (N, 3) of the predicted points, m/rad, with a joint that stays behind by the same angle whichever way it moves."""
     signs = np.sign(rate)
     return [
-        _velocity(fit, poses, signs * (np.arange(poses.q.shape[1]) == joint))
+        _velocity(model, poses, signs * (np.arange(poses.q.shape[1]) == joint))
         for joint in range(poses.q.shape[1])
     ]

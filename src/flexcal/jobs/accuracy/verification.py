@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from flexcal.calibration.diagnostics import ReadingLag
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.fit import StratifiedSample, all_errors
 from flexcal.calibration.measurement import require_points
@@ -40,6 +41,7 @@ from flexcal.jobs.calibration import (
     fitted_files,
     fitted_points,
     ignored_columns_remarks,
+    lag_remark,
     outside_ranges,
     subsample_document,
     verification_subsample_remark,
@@ -145,6 +147,11 @@ class Verification(ReportedResult):
         write_points(folder, points)
         write_arm(folder, arms_at(self.model, self.poses, points.shown))
 
+    @cached_property
+    def lag(self) -> ReadingLag | None:
+        """Whether points and joint positions were read at different instants while the robot moved; None where the rows cannot tell."""
+        return ReadingLag.of_errors(self.model, self.poses, self.predicted.errors)
+
     @property
     def points(self) -> MeasuredPoints:
         """Points with the errors before and after."""
@@ -167,6 +174,7 @@ class Verification(ReportedResult):
             *self.temperatures,
             *([self.outside] if self.outside else []),
             *refit_remarks(self.predicted, self.poses, self.refit, self.better),
+            *lag_remark(self.lag),
         ]
         if self.uncalibrated:
             remarks.append(
@@ -221,6 +229,7 @@ class Verification(ReportedResult):
             },
             "prediction": prediction_document(result, self.covariance),
             "ambiguous_poses": int(result.ambiguous.sum()),
+            "lag": None if self.lag is None else self.lag.document(),
             "sample": subsample_document(self.sample, self.everywhere),
             "fitted": list(self.fitted),
             "refused": self.refused,

@@ -6,6 +6,7 @@ from .job import calibrate_robot
 from .joint_ranges import outside_ranges
 from .odd_temperatures import plausible_temperatures, with_plausible_temperatures
 from .procedure import calibrate, requested_terms
+from .remarks import lag_remark
 from .result import Calibration
 from .subsample import subsample_document, verification_subsample_remark
 
@@ -19,6 +20,7 @@ __all__ = [
     "fitted_points",
     "held_out_group",
     "ignored_columns_remarks",
+    "lag_remark",
     "measurement_digests",
     "outside_ranges",
     "plausible_temperatures",

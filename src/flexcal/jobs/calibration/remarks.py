@@ -379,7 +379,7 @@ def lag_remark(lag: ReadingLag | None) -> tuple[str, ...]:
     return (
         f"the points {'lag behind' if lag.lag > 0 else 'are ahead of'} the joint positions {size} (95 %), which explains {lag.share:.0%} "
         f"of the squares of the residuals ({chance_in_words(lag.probability)}): the robot moved while they were read, and not at the same "
-        "instant; let it stand still at every pose, or write both as they were at the same time, and calibrate again",
+        "instant; let it stand still at every pose, or write both as they were at the same time, and measure again",
     )
 
 

@@ -14,6 +14,7 @@ from flexcal.report.checks.pose_errors import (
     check_enough,
     check_flanks,
     check_known_points,
+    check_lag,
     check_setup_unchanged,
     check_unseen,
 )
@@ -33,6 +34,7 @@ def verification_checks(results: Mapping[str, Any], points: MeasuredPoints) -> t
         check_enough(verification.all.poses).named("enough_poses"),
         check_claimed_uncertainty(results["prediction"]).named("claimed_uncertainty", independent=True),
         *check_own_verdict(results.get("refused", "")),
+        *check_lag(results.get("lag")),
         *_improvement(results, points),
         *flanks,
         *(
