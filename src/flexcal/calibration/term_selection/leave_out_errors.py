@@ -75,28 +75,22 @@ def _distances(
     fold: np.ndarray,
     places: Sequence[tuple[np.ndarray, np.ndarray]],
 ) -> np.ndarray:
-    distance = np.empty(len(left))
+    """Distances (N,) of the points, of which the fit to all leaves `left` (N, 3), from their prediction without their fold (N,)."""
+    errors = np.empty_like(left)
     number, sizes = np.unique(fold, return_inverse=True, return_counts=True)[1:]
-    single = sizes[number] == 1
-    if single.any() and all(len(rows) > 1 for rows, _ in places):
-        q = basis[single]
-        alone = np.linalg.solve(np.eye(3) - q @ q.swapaxes(1, 2), left[single][:, :, None])
-        distance[single] = np.linalg.norm(alone[:, :, 0], axis=1)
-    else:
-        single[:] = False
-    for k in np.unique(fold[~single]):
-        own = fold == k
-        q, r = basis[own].reshape(-1, basis.shape[2]), left[own].ravel()
-        if len(r) <= q.shape[1]:
-            error = np.linalg.solve(np.eye(len(r)) - q @ q.T, r)
+    by_fold, first = np.argsort(number, kind="stable"), np.cumsum(sizes) - sizes
+    for size in np.unique(sizes):
+        rows = by_fold[first[sizes == size, None] + np.arange(size)]  # of all folds of this size
+        q, r = basis[rows].reshape(len(rows), 3 * size, -1), left[rows].reshape(len(rows), 3 * size, 1)
+        turned = q.swapaxes(1, 2)
+        if q.shape[1] <= q.shape[2]:
+            error = np.linalg.solve(np.eye(q.shape[1]) - q @ turned, r)
         else:
-            error = r + q @ np.linalg.solve(np.eye(q.shape[1]) - q.T @ q, q.T @ r)
-        errors = np.zeros((len(left), 3))
-        errors[own] = error.reshape(-1, 3)
-        for rows, columns in places:
-            if own[rows].all():
-                flat = columns.reshape(3 * len(rows), -1)
-                shift = flat @ np.linalg.lstsq(flat, errors[rows].ravel(), rcond=1e-9)[0]
-                errors[rows] -= shift.reshape(-1, 3)
-        distance[own] = np.linalg.norm(errors[own], axis=1)
-    return distance
+            error = r + q @ np.linalg.solve(np.eye(q.shape[2]) - turned @ q, turned @ r)
+        errors[rows] = error.reshape(*rows.shape, 3)
+    for rows, columns in places:
+        if (fold[rows] == fold[rows[0]]).all():
+            flat = columns.reshape(3 * len(rows), -1)
+            shift = flat @ np.linalg.lstsq(flat, errors[rows].ravel(), rcond=1e-9)[0]
+            errors[rows] -= shift.reshape(-1, 3)
+    return np.linalg.norm(errors, axis=1)
