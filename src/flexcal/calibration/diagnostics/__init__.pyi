@@ -11,6 +11,7 @@ from .place_agreement import FEWEST_PLACES, Disagreement, PlaceAgreement, PlaceE
 from .plausibility import FarZero, far_zeros, implausible_shifts, is_implausible, residuals_implausible
 from .reading_lag import ReadingLag
 from .repeatability_floor import RepeatabilityFloor
+from .sensor_lag import SensorLag
 from .size_of_board import board_size
 
 __all__ = [
@@ -30,6 +31,7 @@ __all__ = [
     "ReadingJump",
     "ReadingLag",
     "RepeatabilityFloor",
+    "SensorLag",
     "StatedNoise",
     "board_size",
     "compare_bearings",

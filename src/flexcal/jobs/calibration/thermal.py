@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from flexcal.calibration.diagnostics import SensorLag
 from flexcal.calibration.fit import GeometricFit, TemperatureEvidence
 from flexcal.model.robot import EXPANSION, STATION_DRIFT
 from flexcal.report.results import chance_in_words
@@ -26,10 +27,13 @@ def thermal_remarks(fit: GeometricFit) -> tuple[str, ...]:
     remarks = [_expansion(fit, told)]
     if told.confounded:
         remarks.append(_confounded(told))
-    if told.drifts:
+    lag = SensorLag.of(fit)
+    if lag is not None and lag.certain:
+        remarks.append(_lagging(lag))
+    elif told.drifts:
         remarks.append(
             f"beside temperature, residuals change with {_clock(told)} ({chance_in_words(told.probability)}): something drifts that the "
-            "temperature column does not say, as the instrument, or a link that warms up later than the sensor"
+            "temperature column does not say, as the instrument, or a link that warms up later or earlier than the sensor"
         )
     if told.scatter is None:
         remarks.append(
@@ -58,12 +62,28 @@ def thermal_document(fit: GeometricFit) -> dict[str, Any] | None:
         "confounded": told.confounded,
         "drift_p": told.probability,
         "sensor_std": told.scatter,
+        "sensor_lag": None if (lag := SensorLag.of(fit)) is None else lag.document(),
         "attenuation": told.attenuation,
         "instrument_mm": None if (change := _instrument_change(fit, told)) is None else change / MILLIMETRE,
         "parameters": {
             name: {"std": told.wide[name], "std_without_time": narrow} for name, narrow in told.narrow.items()
         },
     }
+
+
+def _lagging(lag: SensorLag) -> str:
+    """What a sensor does that is slower, or faster, than the arm."""
+    half = 1.96 * lag.std
+    size = (
+        f"{abs(lag.lag) / 60:.2g} ± {half / 60:.1g} min"
+        if lag.timed
+        else f"{abs(lag.lag):.2g} ± {half:.1g} measurements"
+    )
+    return (
+        f"the temperatures {'lag behind' if lag.lag > 0 else 'are ahead of'} those of the arm by {size} (95 %), which explains "
+        f"{lag.share:.0%} of the squares of the residuals ({chance_in_words(lag.probability)}): fix the sensor to the arm itself, at a "
+        "link that warms up as the others do, or measure when both have settled; a prediction while the arm warms up is off by as much"
+    )
 
 
 def _expansion(fit: GeometricFit, told: TemperatureEvidence) -> str:

@@ -25,9 +25,18 @@ def check_instrument_change(told: Mapping[str, Any]) -> Check:
 
 
 def check_temperature_sensor(told: Mapping[str, Any], fit: Mapping[str, Any]) -> tuple[Check, ...]:
-    """Whether noise of the temperature's sensor makes coefficients too small; none where it does not, or nothing tells."""
+    """Whether the temperature's sensor lags, or its noise makes coefficients too small; none where neither does, or nothing tells."""
     question = "Was the temperature measured well enough?"
-    if told["attenuation"] > _ATTENUATED:
+    lag = told.get("sensor_lag")
+    if lag is not None and lag["certain"]:
+        size = (
+            f"{abs(lag['lag']) / 60:.2g} min" if lag["unit"] == "s" else f"{abs(lag['lag']):.2g} measurements"
+        )
+        answer = (
+            f"Its temperatures {'lag behind' if lag['lag'] > 0 else 'are ahead of'} those of the arm by {size}, which explains "
+            f"{lag['share']:.0%} of the squares of the residuals."
+        )
+    elif told["attenuation"] > _ATTENUATED:
         answer = f"Its sensor scatters by {told['sensor_std']:.2g} K, which makes coefficients {told['attenuation']:.0%} too small."
     elif told["sensor_std"] is None and fit["sigma_given"] and (fit["reduced_chi2"] or 0.0) > _SCATTERED:
         answer = (

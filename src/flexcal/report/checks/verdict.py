@@ -168,7 +168,9 @@ PHRASES: dict[str, dict[str, str]] = {
     },
     "lag": {"else": "points and joint positions were not read at the same instant, while the robot moved"},
     "instrument_change": {"else": "the instrument's readings change with temperature or time"},
-    "temperature_sensor": {"else": "the temperature may be measured too imprecisely for its coefficients"},
+    "temperature_sensor": {
+        "else": "the temperature may be measured too late or too imprecisely for its coefficients"
+    },
     "bearings": {
         "good": "the bearings tilt about the right axes",
         "else": "the data fit other bearing axes than the declared ones",
