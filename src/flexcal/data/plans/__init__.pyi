@@ -1,6 +1,7 @@
 from .multisines import MultisinePlan
+from .page_path import page_beside
 from .periodic_paths import FourierPaths, SplinePaths, fourier_basis, spline_basis
-from .plan_files import Plan, page_beside, read_plan, read_plan_of, write_plan
+from .plan_files import Plan, read_plan, read_plan_of, write_plan
 from .poses import PosePlan
 from .timed_positions import TimedPositions
 from .trajectories import TrajectoryPlan

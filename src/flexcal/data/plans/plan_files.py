@@ -77,11 +77,6 @@ def read_plan_of(path: str | Path, kind: type[P]) -> P:
     return plan
 
 
-def page_beside(plan: Path) -> Path:
-    """Path of the page of a plan, beside it."""
-    return plan.with_suffix(".html")
-
-
 def write_plan(path: str | Path, plan: Plan) -> None:
     """Write a plan, atomically, as CSV where the file ends so; `read_plan` gives back the same numbers bit by bit.
 
