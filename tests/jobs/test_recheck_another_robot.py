@@ -10,6 +10,7 @@ import pytest
 from dh_arm import DHArm
 from test_recheck import Visited
 
+from flexcal import recheck
 from flexcal.calibration.recheck import JudgedVisit, errors_from_reference, judge_visit
 from flexcal.data.poses import PoseSet
 from flexcal.jobs.recheck.judgement_words import judgement_sentence
@@ -65,3 +66,15 @@ def test_a_noisier_instrument_is_no_other_robot(visited: Visited, tmp_path: Path
         judged = _judged(visited, visit, shop.measured(model, np.repeat(visited.q, 3, axis=0)))
         other += judged.verdict == "recalibrate"
     assert other <= 1
+
+
+def test_two_changes_are_said_to_be_several_and_no_wrong_readings(visited: Visited, tmp_path: Path) -> None:
+    """Two joints that shifted: together they explain the errors, and neither poses nor the robot as a whole are blamed alone."""
+    shop = replace(visited.shop, folder=tmp_path, rng=np.random.default_rng(5))
+    model = visited.robot.model
+    for one, other in ((3e-4, -6e-4), (4e-4, 5e-4)):
+        arm = shop.arm.turned(3, one).turned(5, other)
+        visit = shop.measured(model, visited.q, arm=arm)
+        found = recheck(visited.robot, visit, reference=shop.measured(model, np.repeat(visited.q, 3, axis=0)))
+        assert "several together would" in found.headline, found.headline
+        assert "disagree" not in found.headline

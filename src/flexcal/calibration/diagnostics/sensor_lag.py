@@ -75,9 +75,8 @@ class SensorLag:
         smooth = savgol_filter(temperature, _WINDOW, _ORDER)
         if np.std(temperature - smooth) > _ROUGH * np.std(temperature):
             return None
-        rate = savgol_filter(temperature, _WINDOW, _ORDER, deriv=1) / savgol_filter(
-            times, _WINDOW, _ORDER, deriv=1
-        )
+        steps = np.asarray(savgol_filter(times, _WINDOW, _ORDER, deriv=1), dtype=float)
+        rate = np.asarray(savgol_filter(temperature, _WINDOW, _ORDER, deriv=1), dtype=float) / steps
         at = predict_measurements(fit.model, poses, jacobians=True)
         grown = np.zeros((len(poses), 6, 1))
         grown[:, :3, 0] = at.kinematics.position

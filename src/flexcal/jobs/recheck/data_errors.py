@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -67,11 +68,16 @@ def misread_visit(
 def disagreeing_poses(
     judged: JudgedVisit, poses: PoseSet, judge: Callable[[PoseSet], JudgedVisit | None]
 ) -> DataErrors | None:
-    """The fewest poses, at most a quarter of them, without which the visit is as calibrated or shows one change; None for none."""
+    """The fewest poses, at most a quarter of them, without which the visit is as calibrated or shows one change; None for none.
+
+    Several are not blamed where two changes of the robot explain all errors, which has fewer numbers than their readings.
+    """
     test = judged.test
     changes = [np.zeros((test.size, 0)), *(item.basis for item in test.seen)]
     found = [left for basis in changes if (left := _left_out(test, basis)) is not None]
     for wrong, _ in sorted(found, key=lambda item: (len(item[0]), -item[1])):
+        if len(wrong) > 1 and _by_two_changes(test):
+            continue
         numbers = test.errors.poses.pose[list(wrong)]
         rest = judge(poses.subset(~np.isin(poses.pose, numbers)))
         if rest is None or not (rest.as_calibrated or rest.suspects):
@@ -84,6 +90,16 @@ def disagreeing_poses(
             f"{told} disagree{'s' if len(wrong) == 1 else ''} with the others: measure again", rest
         )
     return None
+
+
+def _by_two_changes(test: GlobalTest) -> bool:
+    """Whether chance leaves what two changes of the robot, or of its place, do not explain."""
+    values = test.whitening @ test.errors.errors
+    for one, other in combinations([item.basis for item in test.seen], 2):
+        misfit, rank = _misfit(values, np.hstack([one, other]))
+        if test.size > rank and float(test.chance(misfit, test.size - rank)) > FALSE_ALARM:
+            return True
+    return False
 
 
 def _left_out(test: GlobalTest, basis: np.ndarray) -> tuple[tuple[int, ...], float] | None:

@@ -60,15 +60,17 @@ def judgement_sentence(judged: JudgedVisit, course: CourseOverVisits | None = No
             return f"{lead}{scatters}; whether the robot changed too cannot be told by them ({chance} of the whole)"
         lead = f"{lead}{scatters}; what is more than such scatter: "
     if not judged.suspects:
-        if judged.geometry and judged.scatter is None:
+        several = (
+            f"{lead}recalibrate ({size}): no single change of a joint, of the tool, of all lengths, of the payload or of the instrument "
+            "explains the errors; several together would"
+        )
+        if judged.together > FALSE_ALARM:
+            another = ", as after a crash, and so would the geometry of another robot: is this the one that was calibrated?"
+            return several + (another if judged.geometry else ", or play in a gear")
+        if judged.geometry:
             return (
                 f"{lead}recalibrate ({size}): the errors are not those of shifted joints, a bumped tool, growth or a moved instrument, nor "
                 "noise, but go together as those of a robot whose geometry differs in many places: is this the robot that was calibrated?"
-            )
-        if judged.together > FALSE_ALARM:
-            return (
-                f"{lead}recalibrate ({size}): no single change of a joint, of the tool, of all lengths, of the payload or of the "
-                "instrument explains the errors; several together would, or play in a gear"
             )
         return (
             f"{lead}recalibrate ({size}): the errors are not those of shifted joints, a bumped tool, growth or a moved instrument, all "
