@@ -72,9 +72,22 @@ def test_two_changes_are_said_to_be_several_and_no_wrong_readings(visited: Visit
     """Two joints that shifted: together they explain the errors, and neither poses nor the robot as a whole are blamed alone."""
     shop = replace(visited.shop, folder=tmp_path, rng=np.random.default_rng(5))
     model = visited.robot.model
-    for one, other in ((3e-4, -6e-4), (4e-4, 5e-4)):
-        arm = shop.arm.turned(3, one).turned(5, other)
+    for one, other in ((3e-4, -6e-4), (2e-4, 5e-4)):
+        arm = shop.arm.turned(2, one).turned(5, other)
         visit = shop.measured(model, visited.q, arm=arm)
         found = recheck(visited.robot, visit, reference=shop.measured(model, np.repeat(visited.q, 3, axis=0)))
         assert "several together would" in found.headline, found.headline
         assert "disagree" not in found.headline
+
+
+def test_two_shifts_that_look_like_another_place_are_named_beside_it(
+    visited: Visited, tmp_path: Path
+) -> None:
+    """Two nearly parallel joints turned against each other, which moves the tool as another place of the instrument would."""
+    shop = replace(visited.shop, folder=tmp_path, rng=np.random.default_rng(5))
+    arm = shop.arm.turned(3, 3e-4).turned(5, -6e-4)
+    visit = shop.measured(visited.robot.model, visited.q, arm=arm)
+    reference = shop.measured(visited.robot.model, np.repeat(visited.q, 3, axis=0))
+    headline = recheck(visited.robot, visit, reference=reference).headline
+    assert "stands elsewhere" in headline and "together would explain the readings too" in headline
+    assert "a shift of joint_3 and a shift of joint_5" in headline

@@ -25,6 +25,7 @@ from flexcal.calibration.recheck.global_test import (
     seen_change,
 )
 from flexcal.calibration.recheck.scatter_of_visit import LargerScatter, scatter_about, unexplained
+from flexcal.calibration.recheck.two_changes import Pair, two_changes
 from flexcal.calibration.recheck.visit_errors import VisitErrors
 from flexcal.estimation import student_quantile
 
@@ -100,6 +101,8 @@ class JudgedVisit:
     geometry : bool
         Whether many differences of the geometry, as of another robot, explain the errors about as well as scatter or suspects do; where
         there is neither, far better.
+    rivals : tuple of two PossibleChange, or None
+        Where the instrument stands elsewhere and nothing else changed, two changes of the robot that together explain the errors too.
     """
 
     test: GlobalTest
@@ -111,6 +114,7 @@ class JudgedVisit:
     place: Suspect | None = None
     scatter: LargerScatter | None = None
     geometry: bool = False
+    rivals: Pair | None = None
 
     @property
     def as_calibrated(self) -> bool:
@@ -166,7 +170,10 @@ def judge_visit(errors_of: Callable[[bool], VisitErrors | None], *, placed: bool
     after = float(np.sum((moved.test.whitening @ again.errors) ** 2))
     explained = moved.suspects and moved.scatter is None and after < _EVIDENT * before
     if moved.as_calibrated or explained:
-        return replace(moved, instrument="evident", place=judged.suspects[0] if alone else None)
+        rivals = two_changes(judged.test) if moved.as_calibrated else None
+        return replace(
+            moved, instrument="evident", place=judged.suspects[0] if alone else None, rivals=rivals
+        )
     return judged
 
 

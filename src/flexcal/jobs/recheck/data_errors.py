@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
 from flexcal.calibration.measurement import predict_measurements
-from flexcal.calibration.recheck import FALSE_ALARM, GlobalTest, JudgedVisit
+from flexcal.calibration.recheck import FALSE_ALARM, GlobalTest, JudgedVisit, two_changes
 from flexcal.data.poses import PoseSet
 from flexcal.jobs.inputs import misread_point, planned_pose
 from flexcal.model.robot import RobotModel
@@ -76,7 +75,7 @@ def disagreeing_poses(
     changes = [np.zeros((test.size, 0)), *(item.basis for item in test.seen)]
     found = [left for basis in changes if (left := _left_out(test, basis)) is not None]
     for wrong, _ in sorted(found, key=lambda item: (len(item[0]), -item[1])):
-        if len(wrong) > 1 and _by_two_changes(test):
+        if len(wrong) > 1 and two_changes(test) is not None:
             continue
         numbers = test.errors.poses.pose[list(wrong)]
         rest = judge(poses.subset(~np.isin(poses.pose, numbers)))
@@ -90,16 +89,6 @@ def disagreeing_poses(
             f"{told} disagree{'s' if len(wrong) == 1 else ''} with the others: measure again", rest
         )
     return None
-
-
-def _by_two_changes(test: GlobalTest) -> bool:
-    """Whether chance leaves what two changes of the robot, or of its place, do not explain."""
-    values = test.whitening @ test.errors.errors
-    for one, other in combinations([item.basis for item in test.seen], 2):
-        misfit, rank = _misfit(values, np.hstack([one, other]))
-        if test.size > rank and float(test.chance(misfit, test.size - rank)) > FALSE_ALARM:
-            return True
-    return False
 
 
 def _left_out(test: GlobalTest, basis: np.ndarray) -> tuple[tuple[int, ...], float] | None:

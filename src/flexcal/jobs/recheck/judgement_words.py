@@ -11,6 +11,7 @@ from flexcal.calibration.recheck import (
     VISIT_ALARM,
     JudgedVisit,
     MovedTool,
+    PossibleChange,
     Suspect,
     TellingPose,
 )
@@ -45,7 +46,14 @@ def judgement_sentence(judged: JudgedVisit, course: CourseOverVisits | None = No
         if moved:
             place = "the instrument, or the base of the robot, stands elsewhere"
             told = place if judged.place is None else suspect_in_words(judged.place, judged.test.errors.model)
-            return f"{told}; beside that the robot is as calibrated{_as_far_as_seen(judged)} ({chance}; false alarms {VISIT_ALARM:.1%})"
+            rivals = ""
+            if judged.rivals is not None:
+                one, other = (change_name(change) for change in judged.rivals)
+                rivals = f"; {one} and {other} together would explain the readings too"
+            return (
+                f"{told}; beside that the robot is as calibrated{_as_far_as_seen(judged)} ({chance}; false alarms {VISIT_ALARM:.1%})"
+                f"{rivals}"
+            )
         return f"as calibrated ({chance}; false alarms {VISIT_ALARM:.1%})"
     lead = "the instrument, or the base of the robot, stands elsewhere; beside that: " if moved else ""
     if judged.scatter is not None:
@@ -152,8 +160,13 @@ def telling_sentence(judged: JudgedVisit, telling: TellingPose | None, noise: fl
 
 
 def suspect_name(suspect: Suspect) -> str:
+    """Name of a suspected change without its size."""
+    return change_name(suspect.change)
+
+
+def change_name(change: PossibleChange) -> str:
     """Name of a change without its size."""
-    subject = suspect.change.subject
+    subject = change.subject
     return {
         "joint_shifted": f"a shift of {subject}",
         "tool_bumped": f"a bump of {subject}",
@@ -163,7 +176,7 @@ def suspect_name(suspect: Suspect) -> str:
         "instrument_moved": "another place of the instrument",
         "wrong_reading": f"a wrong reading of pose {subject}",
         "readings_drift": "a drift of the readings",
-    }[suspect.change.kind]
+    }[change.kind]
 
 
 def suspect_in_words(suspect: Suspect, model: RobotModel) -> str:
