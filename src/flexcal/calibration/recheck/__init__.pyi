@@ -5,7 +5,7 @@ from .detection import DetectionLimit, detection_limits
 from .displaced_tool import MovedTool, TellingPose, moved_tool, telling_pose
 from .global_test import FALSE_ALARM, VISIT_ALARM, GlobalTest
 from .judged_visit import JudgedVisit, Suspect, judge_visit
-from .two_changes import two_changes
+from .pairs_of_changes import two_changes
 from .visit_errors import (
     LEAST_MATCHED,
     Compared,

@@ -24,8 +24,8 @@ from flexcal.calibration.recheck.global_test import (
     SeenChange,
     seen_change,
 )
+from flexcal.calibration.recheck.pairs_of_changes import Pair, two_changes
 from flexcal.calibration.recheck.scatter_of_visit import LargerScatter, scatter_about, unexplained
-from flexcal.calibration.recheck.two_changes import Pair, two_changes
 from flexcal.calibration.recheck.visit_errors import VisitErrors
 from flexcal.estimation import student_quantile
 
