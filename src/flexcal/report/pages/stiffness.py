@@ -74,7 +74,7 @@ def stiffness_checks(
 
 def _verdict(study: StiffnessStudy) -> Verdict:
     checks = stiffness_checks(
-        study.estimate, study.results.get("bearings"), study.results["fit"].get("torque_scale")
+        study.estimate, study.results.get("bearings"), (study.results.get("fit") or {}).get("torque_scale")
     )
     trust = Trust(checks)
     facts = (trust.fact(),)
