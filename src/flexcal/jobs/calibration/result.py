@@ -159,11 +159,8 @@ class Calibration(Identification):
             return self
         origin = {**self.estimate.provenance, REFUSED: trust.because}
         marked = replace(self, estimate=replace(self.estimate, provenance=origin))
-        for name in (
-            "coupling",
-            "lag",
-            "_numbers",
-        ):  # which no provenance changes, and which take as long as a fit
+        # no provenance changes these, and they take as long as a fit
+        for name in ("coupling", "lag", "_numbers"):
             vars(marked)[name] = getattr(self, name)
         return marked
 

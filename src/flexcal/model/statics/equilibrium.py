@@ -128,24 +128,17 @@ def _to_check(
     joint, part = model.joints[axes[softest][0]].name, ("bearing_x", "bearing_y", "drive")[axes[softest][1]]
     value = float(stiffness[softest])
     declared = next((getattr(entry, part) for entry in model.config.elastic if entry.joint == joint), None)
-    own = declared is not None and bool(np.isclose(declared.stiffness, value, rtol=1e-6))
-    spring = f"the softest spring, {part} of {joint}, has {value:.3g} N m/rad " + (
-        "in robot.yaml"
-        if own
-        else "by the estimates"
-        + (
-            ", where robot.yaml declares none"
-            if declared is None
-            else f", {declared.stiffness:.3g} in robot.yaml"
-        )
-    )
+    if declared is None:
+        origin = "by the estimates, where robot.yaml declares none"
+    elif np.isclose(declared.stiffness, value, rtol=1e-6):
+        origin = "in robot.yaml"
+    else:
+        origin = f"by the estimates, {declared.stiffness:.3g} in robot.yaml"
+    spring = f"the softest spring, {part} of {joint}, has {value:.3g} N m/rad {origin}"
     heaviest = float(np.max(payload, initial=0.0))
-    of_rows = (
-        ""
-        if np.isclose(heaviest, model.payload_mass)
-        else f", where robot.yaml declares {model.payload_mass:.4g}"
-    )
-    load = f", and the payload is {heaviest:.4g} kg{of_rows}" if heaviest > 0 else ""
+    load = f", and the payload is {heaviest:.4g} kg" if heaviest > 0 else ""
+    if heaviest > 0 and not np.isclose(heaviest, model.payload_mass):
+        load += f", where robot.yaml declares {model.payload_mass:.4g}"
     return f"{spring}{load}; check these, and the masses of the links"
 
 
