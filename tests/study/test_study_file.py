@@ -57,6 +57,11 @@ def test_groups_and_draws_of_a_data_set(tmp_path: Path) -> None:
     assert len(resamples(leave_one_out="pose")) == 1 + 20
     with refused("E-STUDY-011", "station"):
         resamples(leave_one_out="station")
+    with refused("E-STUDY-026", "'q1'", "20 poses"):
+        resamples(leave_one_out="q1")
+    assert len(resamples(jackknife=20)) == 1 + 20
+    with refused("E-STUDY-027", "jackknife: 21", "at most 20"):
+        resamples(jackknife=21)
     assert len(read_study(write_study(tmp_path, **DATA_SET)).rows) == 1
 
 

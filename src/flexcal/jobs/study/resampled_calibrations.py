@@ -63,6 +63,18 @@ class ResampledCalibrations(StudyTasks):
             poses = read_poses(list(listed), model)
         if by in _OF_ROWS:
             labels = _OF_ROWS[by](poses).astype(str)
+        count = len(np.unique(poses.pose))
+        if by not in ("", *_OF_ROWS) and labels is not None and len(set(labels.tolist())) >= count:
+            raise FlexcalError(
+                "E-STUDY-026",
+                f"'{by}' has another value at each of the {count} poses, so that it makes no groups; where every pose is to be left out "
+                "by itself, write leave_one_out: pose.",
+            )
+        if resampling is not None and resampling.jackknife > count:
+            raise FlexcalError(
+                "E-STUDY-027",
+                f"jackknife: {resampling.jackknife} asks for more groups than the {count} poses; write at most {count}.",
+            )
         if resampling is not None and resampling.jackknife:
             labels = _random_groups(poses.pose, resampling)
         if labels is not None and len(set(labels.tolist())) < 2:
