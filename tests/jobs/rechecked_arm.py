@@ -9,6 +9,7 @@ import numpy as np
 from dh_arm import DHArm, postures, rx, ry, rz, write_poses, write_robot
 
 from flexcal import CalibratedRobot, RobotModel, calibrate, read_poses
+from flexcal.calibration.recheck import JudgedVisit, errors_from_reference, judge_visit
 from flexcal.data.poses import PoseSet
 
 
@@ -66,3 +67,14 @@ class Workshop:
         rows[link, 2] += length
         rows[link, 3] += 2 * length
         return replace(self.arm, rows=rows)
+
+
+def judged_beside(
+    model: RobotModel, visit: PoseSet, reference: PoseSet, *, placed: bool = False
+) -> JudgedVisit:
+    """The judgement alone of a visit beside a reference."""
+    found = judge_visit(
+        lambda place: errors_from_reference(model, visit, reference, placed=place), placed=placed
+    )
+    assert found is not None
+    return found

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from dh_arm import postures, write_poses, write_robot
 from over_seeds import over_seeds
-from rechecked_arm import Workshop
+from rechecked_arm import Workshop, judged_beside
 from refusals import refused
 from scipy.stats import binom, kstest, norm
 
@@ -23,7 +23,6 @@ from flexcal.calibration.recheck import (
     drift_sums,
     errors_from_calibration,
     errors_from_reference,
-    judge_visit,
     possible_changes,
 )
 from flexcal.calibration.recheck.cumulative_sums import decision_limit, innovations, run_length
@@ -49,13 +48,7 @@ class Visited:
 
     def quickly(self, **change) -> JudgedVisit:
         """The judgement alone."""
-        visit = self.visit(**change)
-        judged = judge_visit(
-            lambda placed: errors_from_reference(self.robot.model, visit, self.reference, placed=placed),
-            placed=False,
-        )
-        assert judged is not None
-        return judged
+        return judged_beside(self.robot.model, self.visit(**change), self.reference)
 
     def judged(self, **change) -> Recheck:
         return recheck(self.robot, self.visit(**change), reference=self.reference)

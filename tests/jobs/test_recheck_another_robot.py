@@ -8,26 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dh_arm import DHArm
+from rechecked_arm import judged_beside
 from test_recheck import Visited
 
 from flexcal import recheck
-from flexcal.calibration.recheck import JudgedVisit, errors_from_reference, judge_visit
-from flexcal.data.poses import PoseSet
 from flexcal.jobs.recheck.judgement_words import judgement_sentence
 
 
 @pytest.fixture(scope="module")
 def visited(tmp_path_factory: pytest.TempPathFactory) -> Visited:
     return Visited(tmp_path_factory.mktemp("arm"), 6)
-
-
-def _judged(visited: Visited, visit: PoseSet, reference: PoseSet) -> JudgedVisit:
-    model = visited.robot.model
-    found = judge_visit(
-        lambda placed: errors_from_reference(model, visit, reference, placed=placed), placed=True
-    )
-    assert found is not None
-    return found
 
 
 def _like(arm: DHArm, rng: np.random.Generator, size: float) -> DHArm:
@@ -48,7 +38,9 @@ def test_another_robot_is_no_noise_and_no_bumped_tool(visited: Visited, tmp_path
     said = []
     for _ in range(10):
         visit = shop.measured(model, visited.q, arm=_like(shop.arm, shop.rng, 0.3), place=shop.new_place())
-        judged = _judged(visited, visit, shop.measured(model, np.repeat(visited.q, 3, axis=0)))
+        judged = judged_beside(
+            visited.robot.model, visit, shop.measured(model, np.repeat(visited.q, 3, axis=0)), placed=True
+        )
         assert not judged.as_calibrated
         said.append(judgement_sentence(judged))
     assert sum("another robot" in text or "is this the robot" in text for text in said) >= 8, said
@@ -63,7 +55,9 @@ def test_a_noisier_instrument_is_no_other_robot(visited: Visited, tmp_path: Path
         visit = shop.measured(model, visited.q, place=shop.new_place())
         noise = 2.5 * 3e-5 * shop.rng.normal(size=visit.position.shape)
         visit = replace(visit, position=visit.position + noise)
-        judged = _judged(visited, visit, shop.measured(model, np.repeat(visited.q, 3, axis=0)))
+        judged = judged_beside(
+            visited.robot.model, visit, shop.measured(model, np.repeat(visited.q, 3, axis=0)), placed=True
+        )
         other += judged.verdict == "recalibrate"
     assert other <= 1
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dh_arm import DHArm
+from rechecked_arm import judged_beside
 from test_recheck import Visited
 
 from flexcal import recheck
-from flexcal.calibration.recheck import JudgedVisit, errors_from_reference, judge_visit
 from flexcal.data.poses import PoseSet
 
 _MECHANICAL = {"joint_shifted", "tool_bumped", "thermal_growth", "ambiguous", "recalibrate"}
@@ -20,15 +20,6 @@ _MECHANICAL = {"joint_shifted", "tool_bumped", "thermal_growth", "ambiguous", "r
 @pytest.fixture(scope="module")
 def visited(tmp_path_factory: pytest.TempPathFactory) -> Visited:
     return Visited(tmp_path_factory.mktemp("arm"), 5)
-
-
-def _judged(visited: Visited, visit: PoseSet, reference: PoseSet) -> JudgedVisit:
-    model = visited.robot.model
-    found = judge_visit(
-        lambda placed: errors_from_reference(model, visit, reference, placed=placed), placed=False
-    )
-    assert found is not None
-    return found
 
 
 def _again(visited: Visited) -> PoseSet:
@@ -40,7 +31,7 @@ def test_a_small_shift_is_not_told_as_another_cause(visited: Visited) -> None:
     missed, named = 0, 0
     for k in range(30):
         shifted = visited.visit(arm=visited.shop.arm.turned(2 + k % 2, 7e-5))
-        judged = _judged(visited, shifted, _again(visited))
+        judged = judged_beside(visited.robot.model, shifted, _again(visited))
         if not judged.suspects:
             continue
         subjects = [suspect.change.subject for suspect in judged.suspects]
@@ -67,7 +58,9 @@ def test_a_noisier_instrument_is_no_change_of_the_robot(
     for _ in range(visits):
         visit = shop.measured(visited.robot.model, visited.q)
         noise = 1.7 * 3e-5 * shop.rng.normal(size=visit.position.shape)
-        judged = _judged(visited, replace(visit, position=visit.position + noise), _again(visited))
+        judged = judged_beside(
+            visited.robot.model, replace(visit, position=visit.position + noise), _again(visited)
+        )
         if judged.as_calibrated:
             continue
         alarms += 1
@@ -106,7 +99,7 @@ def test_a_shift_beyond_a_larger_scatter_is_still_named(visited: Visited) -> Non
     rng = np.random.default_rng(3)
     shifted = visited.visit(arm=visited.shop.arm.turned(2, 1.5e-3))
     position = shifted.position + 6e-5 * rng.normal(size=(10, 3))
-    judged = _judged(visited, replace(shifted, position=position), visited.reference)
+    judged = judged_beside(visited.robot.model, replace(shifted, position=position), visited.reference)
     (item,) = judged.suspects
     assert judged.scatter is not None and item.change.subject == "joint_2"
     assert abs(item.estimate[0] - 1.5e-3) < 4 * item.std[0]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from dh_arm import postures
 from over_seeds import over_seeds
-from rechecked_arm import Workshop
+from rechecked_arm import Workshop, judged_beside
 from scipy.stats import binom
 
 from flexcal import CalibratedRobot
@@ -19,7 +19,6 @@ from flexcal.calibration.recheck import (
     VisitErrors,
     drift_sums,
     errors_from_reference,
-    judge_visit,
     possible_changes,
     visit_courses,
 )
@@ -46,9 +45,7 @@ class Course:
         return found
 
     def judged(self, poses: PoseSet) -> JudgedVisit:
-        found = judge_visit(lambda placed: self.errors(poses, placed), placed=False)
-        assert found is not None
-        return found
+        return judged_beside(self.robot.model, poses, self.reference)
 
     def visit(self, joint: int = 2, shift: float = 0.0) -> PoseSet:
         return self.shop.measured(self.robot.model, self.q, arm=self.shop.arm.turned(joint, shift))

@@ -10,15 +10,13 @@ import numpy as np
 import pytest
 from dh_arm import DHArm, postures, write_poses, write_robot
 from over_seeds import over_seeds
-from rechecked_arm import Workshop
+from rechecked_arm import Workshop, judged_beside
 from scipy.stats import binom
 
 from flexcal import CalibratedRobot, RobotModel, calibrate, read_poses
 from flexcal.calibration.recheck import (
     DetectionLimit,
     JudgedVisit,
-    errors_from_reference,
-    judge_visit,
 )
 from flexcal.data.poses import PoseSet, concatenate
 from flexcal.jobs.recheck.longer_tool import ROUNDS, LongerTools, longer_tools
@@ -110,12 +108,7 @@ class Visited:
 
     def judged(self, arm: DHArm) -> JudgedVisit:
         visit = self.seen(np.repeat(self.q, self.readings, axis=0), arm)
-        found = judge_visit(
-            lambda placed: errors_from_reference(self.robot.model, visit, self.reference, placed=placed),
-            placed=False,
-        )
-        assert found is not None
-        return found
+        return judged_beside(self.robot.model, visit, self.reference)
 
 
 def found_of_visits(number: int, arm: Visited, root: Path) -> np.ndarray:

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rechecked_arm import judged_beside
 from yielding_robot import CARRIER, PANDA_LIKE, YieldingRobot, write_robot
 
 from flexcal import CalibratedRobot, RobotModel, calibrate, read_poses
-from flexcal.calibration.recheck import JudgedVisit, errors_from_reference, judge_visit
+from flexcal.calibration.recheck import JudgedVisit
 from flexcal.data.poses import PoseSet
 from flexcal.jobs.recheck.judgement_words import judgement_sentence
 
@@ -48,11 +49,7 @@ def _judged(worn: tuple[WornRobot, CalibratedRobot, np.ndarray, Path]) -> Judged
     before = _read(robot, calibrated.model, np.repeat(q, 3, axis=0), folder)
     robot.play, robot.zeros = play, zeros
     now = _read(robot, calibrated.model, q, folder)
-    found = judge_visit(
-        lambda placed: errors_from_reference(calibrated.model, now, before, placed=placed), placed=False
-    )
-    assert found is not None
-    return found
+    return judged_beside(calibrated.model, now, before)
 
 
 def _read(robot: WornRobot, model: RobotModel, q: np.ndarray, folder: Path) -> PoseSet:
@@ -66,13 +63,11 @@ def _read(robot: WornRobot, model: RobotModel, q: np.ndarray, folder: Path) -> P
 
 
 @pytest.mark.parametrize(("joint", "half"), [(1, 4e-4), (3, 3e-4)])
-def test_play_is_named_and_neither_the_instrument_nor_a_payload(worn, joint: int, half: float) -> None:
-    robot = worn[0]
-    robot.play = half * (np.arange(7) == joint)
-    try:
-        judged = _judged(worn)
-    finally:
-        robot.play = np.zeros(7)
+def test_play_is_named_and_neither_the_instrument_nor_a_payload(
+    worn, monkeypatch: pytest.MonkeyPatch, joint: int, half: float
+) -> None:
+    monkeypatch.setattr(worn[0], "play", half * (np.arange(7) == joint))
+    judged = _judged(worn)
     assert judged.scatter is None
     best = judged.suspects[0]
     assert (best.change.kind, best.change.subject) == ("gear_worn", f"a{joint + 1}")
@@ -80,23 +75,17 @@ def test_play_is_named_and_neither_the_instrument_nor_a_payload(worn, joint: int
     assert "play in the gear" in judgement_sentence(judged)
 
 
-def test_play_of_a_gear_that_gravity_hardly_loads_is_not_laid_on_the_instrument_alone(worn) -> None:
+def test_play_of_a_gear_that_gravity_hardly_loads_is_not_laid_on_the_instrument_alone(
+    worn, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A wrist, whose flanks these poses do not tell: the readings scatter, and what to look for includes play."""
-    robot = worn[0]
-    robot.play = 1.2e-3 * (np.arange(7) == 5)
-    try:
-        judged = _judged(worn)
-    finally:
-        robot.play = np.zeros(7)
+    monkeypatch.setattr(worn[0], "play", 1.2e-3 * (np.arange(7) == 5))
+    judged = _judged(worn)
     assert judged.scatter is not None
     assert "the robot for play in joints and tool" in judgement_sentence(judged)
 
 
-def test_a_shifted_zero_is_no_play(worn) -> None:
-    robot = worn[0]
-    robot.zeros = 4e-4 * (np.arange(7) == 3)
-    try:
-        judged = _judged(worn)
-    finally:
-        robot.zeros = np.zeros(7)
+def test_a_shifted_zero_is_no_play(worn, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(worn[0], "zeros", 4e-4 * (np.arange(7) == 3))
+    judged = _judged(worn)
     assert [(s.change.kind, s.change.subject) for s in judged.suspects] == [("joint_shifted", "a4")]

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.error_model import translations
+from flexcal.calibration.diagnostics.further_columns import columns_of_drift, ramp
 from flexcal.calibration.fit import GeometricFit
-from flexcal.calibration.measurement import Readings
 from flexcal.units import MILLIMETRE
 
 _CHANCE = 0.0027
@@ -70,14 +69,11 @@ class Drift:
         drift for another place of fixture, wire or face: at least one point must be of an instrument.
         """
         poses = fit.poses
-        share = np.linspace(-0.5, 0.5, len(poses)) * poses.located
-        row = Readings.of(poses).row
-        kept = ~np.isin(row, fit.estimate.outliers)
-        ramp = share[row[kept]][:, None, None] * translations(fit.linear.readings)
-        products = fit.linear.products(replace(fit.scatter, order=0.0), ramp)
+        share = ramp(fit)
+        products = fit.linear.products_in_time(fit.scatter, columns_of_drift(fit))
         covariance = np.linalg.inv(products[:-1, :-1])
         travel = covariance @ products[:-1, -1]
-        freedom = int(fit.linear.readings.present.sum()) - fit.linear.free.shape[2] - len(travel)
+        freedom = fit.linear.freedom - len(travel)
         left = float(products[-1, -1] - products[:-1, -1] @ travel)
         seen = np.flatnonzero(poses.located & ~np.isin(np.arange(len(poses)), fit.estimate.outliers))
         centred = share[seen] - share[seen].mean()

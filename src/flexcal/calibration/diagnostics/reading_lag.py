@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
+from flexcal.calibration.diagnostics.further_columns import columns_of_points
+from flexcal.calibration.diagnostics.lag import Lag, measuring_times
 from flexcal.calibration.fit import GeometricFit
-from flexcal.calibration.measurement import Readings, predict_measurements
+from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.model.robot import RobotModel
 
-_CHANCE = 1e-6
-"""Significance level of a lag: what else goes with the order of measuring must not be called one."""
-_SHARE = 0.5
-"""Least share of the residuals that a lag explains: below it friction or wind-up of a robot that stands still may be what goes with it."""
 _SMOOTH = 0.1
 """Largest square of what rows of a path are off the curve through those about them, relative to that of steps between rows."""
 _STENCIL, _SHORT = 5, 3
@@ -25,35 +22,14 @@ _STEP = 1e-3
 
 
 @dataclass(frozen=True)
-class ReadingLag:
-    """Points lag the joint positions by `lag` ± `std` (1σ), s, or steps from row to row where rows are not `timed`; negative: ahead.
+class ReadingLag(Lag):
+    """Points lag the joint positions; its rival is friction or wind-up of every joint, which go with the direction of its motion.
 
-    `share` of the weighted squares of the residuals, 0 to 1, is explained by it, and `reversals` by friction or wind-up of every joint,
-    which go with the direction of its motion; `probability` is the p-value of the F test for none.
+    Below half of the residuals that of a robot that stands still may be what goes with it.
     """
 
-    lag: float
-    std: float
-    share: float
-    reversals: float
-    probability: float
-    timed: bool
-
-    @property
-    def certain(self) -> bool:
-        """Whether there is one: significant, most of the residuals, and more of them than the direction of motion explains."""
-        return self.probability < _CHANCE and self.share > max(_SHARE, self.reversals)
-
-    def document(self) -> dict[str, Any]:
-        """Block of a JSON document."""
-        return {
-            "lag": self.lag,
-            "std": self.std,
-            "unit": "s" if self.timed else "steps",
-            "share": self.share,
-            "p": self.probability,
-            "certain": self.certain,
-        }
+    least_share = 0.5
+    rows = "steps"
 
     @classmethod
     def of(cls, fit: GeometricFit) -> ReadingLag | None:
@@ -70,13 +46,8 @@ class ReadingLag:
         if found is None:
             return None
         effects, timed = found
-        row = Readings.of(poses).row
-        kept = ~np.isin(row, fit.estimate.outliers)
-        # of orientations beside the points nothing is taken
-        columns = effects[row[kept]] * (np.flatnonzero(kept) < len(poses))[:, None, None]
-        products = fit.linear.products(replace(fit.scatter, order=0.0), columns)
-        freedom = int(fit.linear.readings.present.sum()) - fit.linear.free.shape[2] - 1
-        return cls._by(products, freedom, timed, 1.0)
+        products = fit.linear.products_in_time(fit.scatter, columns_of_points(fit, effects))
+        return cls._by(products, fit.linear.freedom - 1, timed, 1.0)
 
     @classmethod
     def of_errors(cls, model: RobotModel, poses: PoseSet, errors: np.ndarray) -> ReadingLag | None:
@@ -93,25 +64,12 @@ class ReadingLag:
         """By scalar products of the effect of a lag, the same by fewer rows, those of reversals and, last, the residuals, whose variance is
         `least` or larger.
         """
-        from scipy.special import fdtrc
-
-        total, own, along = products[-1, -1], products[0, 0], products[0, -1]
-        if freedom < 1 or own <= 0 or total <= 0:
-            return None
-        explained = along**2 / own
-        variance = max((total - explained) / freedom, least, 1e-12 * total)
-        turned = np.linalg.lstsq(products[2:-1, 2:-1], products[2:-1, -1], rcond=1e-9)[0] @ products[2:-1, -1]
-        lag = along / own
+        found = cls.by_products(products, slice(2, -1), freedom, timed, least)
+        if found is None or found.lag == 0 or products[1, 1] <= 0:
+            return found
         # the errors of derivatives by three and five rows are of second and fourth order in the step
-        bent = (products[1, -1] / products[1, 1] / lag - 1) ** 2 if products[1, 1] > 0 and lag != 0 else 0.0
-        return cls(
-            float(lag),
-            float(np.hypot(np.sqrt(variance / own), bent * lag)),
-            float(explained / total),
-            float(turned / total),
-            float(fdtrc(1, freedom, explained / variance)),
-            timed,
-        )
+        bent = (products[1, -1] / products[1, 1] / found.lag - 1) ** 2
+        return replace(found, std=float(np.hypot(found.std, bent * found.lag)))
 
 
 def _effects(model: RobotModel, poses: PoseSet) -> tuple[np.ndarray, bool] | None:
@@ -121,8 +79,7 @@ def _effects(model: RobotModel, poses: PoseSet) -> tuple[np.ndarray, bool] | Non
     """
     if not poses.located.all() or len(poses) <= 2 * _STENCIL:
         return None
-    timed = poses.time is not None and bool((np.diff(poses.time) > 0).all())
-    times = poses.time if timed and poses.time is not None else np.arange(len(poses), dtype=float)
+    times, timed = measuring_times(poses)
     if not _is_path(poses.q, times):
         return None
     rate = _rates(poses.q, times, _STENCIL)

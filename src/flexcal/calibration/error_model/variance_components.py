@@ -87,6 +87,11 @@ class LinearFit:
     turns: np.ndarray
     cells: ErrorGroups
 
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom of the residual: coordinates that are there, less the parameters."""
+        return int(self.readings.present.sum()) - self.free.shape[2]
+
     def products(self, scatter: ErrorComponents, columns: np.ndarray) -> np.ndarray:
         """Scalar products (k + 1, k + 1) of further `columns` (N, 3, k) m and, last, the residual, after projection off the parameters.
 
@@ -98,6 +103,10 @@ class LinearFit:
         last = sums.columns.shape[2]
         own = np.arange(last - columns.shape[2] - 1, last)
         return RestrictedLikelihood.of(sums, names, scatter).products(own)
+
+    def products_in_time(self, scatter: ErrorComponents, columns: np.ndarray) -> np.ndarray:
+        """`products` of columns that change in time, without the errors of stretches of the measuring order, which would take them up."""
+        return self.products(replace(scatter, order=0.0), columns)
 
     def scatter(
         self, *, stated: bool, near: ErrorComponents | None = None

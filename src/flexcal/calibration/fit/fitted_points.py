@@ -206,15 +206,14 @@ class FittedPoints:
         slopes = estimate.parameters.natural_slope(estimate.parameters.coordinates())
         rows = np.repeat(self.inliers, 3)
         own = rows[:, None] * task.columns(self.at, names) * slopes
-        # what stretches of the measuring order share would take up a change in time
-        products = self.linear.products(replace(self.scatter, order=0.0), columns[self.inliers])
+        products = self.linear.products_in_time(self.scatter, columns[self.inliers])
         wide, stds, probability = widened(
             poses,
             estimate.values,
             narrow,
             -estimate.covariance @ own.T @ task.whitening(columns),
             products,
-            int(self.linear.readings.present.sum()) - self.linear.free.shape[2],
+            self.linear.freedom,
         )
         before = dict(zip(names, np.sqrt(np.diag(narrow)).tolist(), strict=True))
         reference = float(self.model.thermal.reference[0])

@@ -3,7 +3,7 @@ from .course_likelihood import VisitCourse, visit_courses
 from .cumulative_sums import AVERAGE_RUN, DriftSum, ShiftAtVisit, drift_sums
 from .detection import DetectionLimit, detection_limits
 from .displaced_tool import MovedTool, TellingPose, moved_tool, telling_pose
-from .global_test import FALSE_ALARM, VISIT_ALARM, GlobalTest
+from .global_test import FALSE_ALARM, VISIT_ALARM, GlobalTest, misfit_of
 from .judged_visit import JudgedVisit, Suspect, judge_visit
 from .pairs_of_changes import two_changes
 from .visit_errors import (
@@ -37,6 +37,7 @@ __all__ = [
     "errors_from_calibration",
     "errors_from_reference",
     "judge_visit",
+    "misfit_of",
     "moved_tool",
     "planned_errors",
     "possible_changes",

@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from flexcal.calibration.recheck.change_effects import PossibleChange
-from flexcal.calibration.recheck.global_test import FALSE_ALARM, GlobalTest
+from flexcal.calibration.recheck.global_test import FALSE_ALARM, GlobalTest, misfit_of
 
 Pair = tuple[PossibleChange, PossibleChange]
 
@@ -18,11 +18,9 @@ def two_changes(test: GlobalTest) -> Pair | None:
     robot = [item for item in test.seen if item.change.kind != "instrument_moved"]
     best: tuple[float, Pair] | None = None
     for one, other in combinations(robot, 2):
-        basis, sizes, _ = np.linalg.svd(np.hstack([one.basis, other.basis]), full_matrices=False)
-        basis = basis[:, sizes > 1e-6]
-        left = values - basis @ (basis.T @ values)
-        freedom = test.size - basis.shape[1]
-        chance = float(test.chance(float(left @ left), freedom)) if freedom > 0 else 0.0
+        misfit, rank = misfit_of(values, np.hstack([one.basis, other.basis]))
+        freedom = test.size - rank
+        chance = float(test.chance(misfit, freedom)) if freedom > 0 else 0.0
         if chance > FALSE_ALARM and (best is None or chance > best[0]):
             best = chance, (one.change, other.change)
     return None if best is None else best[1]

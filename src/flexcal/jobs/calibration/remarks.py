@@ -12,6 +12,7 @@ from flexcal.calibration.diagnostics import (
     NearestSocket,
     ReadingLag,
     RepeatabilityFloor,
+    SensorLag,
     StatedNoise,
     board_size,
     far_zeros,
@@ -138,15 +139,19 @@ def outliers_of(fit: GeometricFit) -> tuple[Outlier, ...]:
 
 
 def calibration_remarks(
-    fit: GeometricFit, cause: Sequence[str] = (), *, prior_misfits: bool = False
+    fit: GeometricFit,
+    cause: Sequence[str] = (),
+    *,
+    prior_misfits: bool = False,
+    sensor_lag: SensorLag | None = None,
 ) -> tuple[str, ...]:
     """Remarks on a calibration, the most important last; a known `cause` of a bad fit precedes its consequences, and
-    `prior_misfits` says that a prior of other robots is one.
+    `prior_misfits` says that a prior of other robots is one. `sensor_lag` is that of the temperature's sensor.
     """
     remarks = [
         *fit.poses.notes,
         *ignored_columns_remarks(fit.poses, () if fit.temperature is None else ("temperature", "time")),
-        *thermal_remarks(fit),
+        *thermal_remarks(fit, sensor_lag),
         *_without_readings(fit),
         *_nominal_springs(fit),
     ]

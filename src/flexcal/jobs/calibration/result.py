@@ -17,6 +17,7 @@ from flexcal.calibration.diagnostics import (
     PlaceAgreement,
     ReadingLag,
     RepeatabilityFloor,
+    SensorLag,
     gravity_loads,
     is_implausible,
     stated_noise,
@@ -282,6 +283,7 @@ class Calibration(Identification):
         lagging = self.lag is not None and self.lag.certain
         misfits = coupling is not None or contradicted or lagging
         floor = None if misfits else RepeatabilityFloor.of(selected)
+        sensor_lag = SensorLag.of(selected)
         learning = LearningCurve.of(selected)
         bearings = bearing_remarks(self.bearings, selected)
         blamed = self.bearings is not None and self.bearings.contradicted
@@ -342,7 +344,7 @@ class Calibration(Identification):
             "bearings": bearings_block(self.bearings),
             "fleet": fleet,
             "pooled_stiffness": None if pooled is None else pooled.document(),
-            "temperature": thermal_document(selected),
+            "temperature": thermal_document(selected, sensor_lag),
             "stage1": None if self.stiffness is None else {"misfit": misfit_document(self.stiffness.misfit)},
             "remarks": [
                 *calibration_subsample_remark(self.sample, self.everywhere),
@@ -352,7 +354,9 @@ class Calibration(Identification):
                 *fleet_remarks(fleet),
                 *([] if pooled is None else pooled.remarks),
                 *([] if self.levels is None or coupling is not None else [self.levels.sentence]),
-                *calibration_remarks(selected, self._cause, prior_misfits=contradicted),
+                *calibration_remarks(
+                    selected, self._cause, prior_misfits=contradicted, sensor_lag=sensor_lag
+                ),
                 *lag_remark(self.lag),
                 *(() if blamed else bearings),
                 *place_remarks(agreement),

@@ -19,15 +19,14 @@ _WORTH = 0.02
 """Attenuation from which it has a sentence."""
 
 
-def thermal_remarks(fit: GeometricFit) -> tuple[str, ...]:
-    """Remarks on a fit with terms of temperature; none for others."""
+def thermal_remarks(fit: GeometricFit, lag: SensorLag | None) -> tuple[str, ...]:
+    """Remarks on a fit with terms of temperature, whose sensor may `lag`; none for others."""
     told = fit.temperature
     if told is None:
         return ()
     remarks = [_expansion(fit, told)]
     if told.confounded:
         remarks.append(_confounded(told))
-    lag = SensorLag.of(fit)
     if lag is not None and lag.certain:
         remarks.append(_lagging(lag))
     elif told.drifts:
@@ -48,8 +47,8 @@ def thermal_remarks(fit: GeometricFit) -> tuple[str, ...]:
     return tuple(remarks)
 
 
-def thermal_document(fit: GeometricFit) -> dict[str, Any] | None:
-    """Block `temperature` of results.json; None for a robot that does not change with it."""
+def thermal_document(fit: GeometricFit, lag: SensorLag | None) -> dict[str, Any] | None:
+    """Block `temperature` of results.json, with the `lag` of the sensor; None for a robot that does not change with it."""
     told = fit.temperature
     if told is None:
         return None
@@ -62,7 +61,7 @@ def thermal_document(fit: GeometricFit) -> dict[str, Any] | None:
         "confounded": told.confounded,
         "drift_p": told.probability,
         "sensor_std": told.scatter,
-        "sensor_lag": None if (lag := SensorLag.of(fit)) is None else lag.document(),
+        "sensor_lag": None if lag is None else lag.document(),
         "attenuation": told.attenuation,
         "instrument_mm": None if (change := _instrument_change(fit, told)) is None else change / MILLIMETRE,
         "parameters": {

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.calibration.measurement import predict_measurements
-from flexcal.calibration.recheck import FALSE_ALARM, GlobalTest, JudgedVisit, two_changes
+from flexcal.calibration.recheck import FALSE_ALARM, GlobalTest, JudgedVisit, misfit_of, two_changes
 from flexcal.data.poses import PoseSet
 from flexcal.jobs.inputs import misread_point, planned_pose
 from flexcal.model.robot import RobotModel
@@ -74,9 +74,9 @@ def disagreeing_poses(
     test = judged.test
     changes = [np.zeros((test.size, 0)), *(item.basis for item in test.seen)]
     found = [left for basis in changes if (left := _left_out(test, basis)) is not None]
+    if any(len(wrong) > 1 for wrong, _ in found) and two_changes(test) is not None:
+        found = [left for left in found if len(left[0]) == 1]
     for wrong, _ in sorted(found, key=lambda item: (len(item[0]), -item[1])):
-        if len(wrong) > 1 and two_changes(test) is not None:
-            continue
         numbers = test.errors.poses.pose[list(wrong)]
         rest = judge(poses.subset(~np.isin(poses.pose, numbers)))
         if rest is None or not (rest.as_calibrated or rest.suspects):
@@ -100,7 +100,7 @@ def _left_out(test: GlobalTest, basis: np.ndarray) -> tuple[tuple[int, ...], flo
     blocks = [test.whitening[:, 3 * k : 3 * k + 3] for k in range(count)]
     wrong: list[int] = []
     while len(wrong) < min(count // 4, count - _LEAST):
-        left = [_misfit(values, np.hstack([basis, block])) for block in blocks]
+        left = [misfit_of(values, np.hstack([basis, block])) for block in blocks]
         best = int(np.argmin([misfit if k not in wrong else np.inf for k, (misfit, _) in enumerate(left)]))
         wrong.append(best)
         misfit, rank = left[best]
@@ -108,12 +108,3 @@ def _left_out(test: GlobalTest, basis: np.ndarray) -> tuple[tuple[int, ...], flo
         if test.size > rank and (chance := float(test.chance(misfit, test.size - rank))) > FALSE_ALARM:
             return tuple(wrong), chance
     return None
-
-
-def _misfit(values: np.ndarray, columns: np.ndarray) -> tuple[float, int]:
-    """Sum of squares of `values` (m,) that `columns` (m, k) do not explain, and their rank."""
-    sizes = np.linalg.norm(columns, axis=0)
-    left, singular, _ = np.linalg.svd(columns / np.where(sizes > 0, sizes, 1.0), full_matrices=False)
-    span = left[:, singular > 1e-6]
-    rest = values - span @ (span.T @ values)
-    return float(rest @ rest), span.shape[1]
