@@ -69,10 +69,9 @@ def _own(
     sizes = np.outer(root, root) / np.mean(level)
     memories = np.geomspace(0.5, max(1.0, _LONGEST * (number[-1] + 1)), _STEPS)
     processes = np.exp(-lag / memories[:, None, None]) * sizes
+    # white noise alone, then every process with every share
     of = np.concatenate([[0], np.repeat(np.arange(_STEPS), len(_SHARES))])
-    shares = np.concatenate(
-        [[0.0], np.tile(_SHARES, _STEPS)]
-    )  # white noise alone, then every process with every share
+    shares = np.concatenate([[0.0], np.tile(_SHARES, _STEPS)])
     white = left @ left.T
     covariances = shares[:, None, None] * ((left @ processes @ left.T)[of] - white) + (white + others)
     factors = np.linalg.cholesky(covariances)
