@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -58,8 +59,10 @@ def write_fleet(
 
 
 def test_a_slow_drift_is_found_and_named(tmp_path: Path) -> None:
-    """joint_4 turns by 0.1 mrad from visit to visit, which moves the tool by less than 0.1 mm: no single parameter says so."""
-    fleet = write_fleet(tmp_path, 4, 1, lambda arm, n, visit: arm.turned(4, 1e-4 * visit) if n == 1 else arm)
+    """joint_4 turns by 0.15 mrad from visit to visit, which moves the tool by less than 0.1 mm: no single parameter says so."""
+    fleet = write_fleet(
+        tmp_path, 4, 1, lambda arm, n, visit: arm.turned(4, 1.5e-4 * visit) if n == 1 else arm
+    )
     document = fleet.document()
     assert document["counts"]["geometry_trends_tested"] == 4 and not document["problems"]
     (drift,) = document["geometry_drifts"]
@@ -67,9 +70,9 @@ def test_a_slow_drift_is_found_and_named(tmp_path: Path) -> None:
     assert drift["change"] == "trend" and (drift["first"], drift["last"]) == (DAYS[0], DAYS[3])
     (cause,) = drift["explanations"]
     assert cause["name"] == "joint_4.offset"
-    assert abs(cause["change"] - 3e-4) < 3 * cause["std"] < 1.5e-4
+    assert abs(cause["change"] - 4.5e-4) < 3 * cause["std"] < 1.5e-4
     moved = drift["tool_mm"]
-    # a turn by 0.3 mrad moves a point 0.1 m from the axis of joint 4 by 0.03 mm
+    # a turn by 0.45 mrad moves a point 0.1 m from the axis of joint 4 by 0.045 mm
     assert 0.01 < moved["mean"] < moved["largest"] < 0.15
     assert "significant, but small beside the tolerance of 1 mm" in drift["sentence"]
     assert document["headline"].endswith("; drifting or changed: r1")
@@ -144,12 +147,12 @@ def test_rate_of_false_alarms(largest: float, robots: int, fleets: int) -> None:
 
 
 def courses(rng: np.random.Generator, robots: int, visits: int, spread: np.ndarray) -> list[GeometryCourse]:
-    """Robots that do not change, with independent values of variance 1 by their covariances and `spread` (m,) in truth: least squares of a
-    line and of every step, in closed form.
+    """Robots that do not change, with independent values of variance 1 by their covariances and `spread` (n, m) in truth: least squares
+    of a line and of every step, in closed form.
     """
     found = []
     for number in range(robots):
-        values = spread * rng.normal(size=(visits, len(spread)))
+        values = spread[number] * rng.normal(size=(visits, spread.shape[1]))
         along = []
         for shape in (
             np.arange(visits) / (visits - 1),
@@ -158,7 +161,7 @@ def courses(rng: np.random.Generator, robots: int, visits: int, spread: np.ndarr
             span = shape - shape.mean()
             slope = span @ values / (span @ span)
             rest = values - values.mean(axis=0) - np.outer(span, slope)
-            none = np.zeros((len(spread), 0))
+            none = np.zeros((spread.shape[1], 0))
             change = slope * np.sqrt(span @ span)
             along.append(GeometryTrend(change, float((rest**2).sum()), visits, 2000.0, (), (), none, none))
         trend, *steps = along
@@ -167,38 +170,41 @@ def courses(rng: np.random.Generator, robots: int, visits: int, spread: np.ndarr
     return found
 
 
-def any_alarm(seed: int, largest: float, robots: int, visits: int) -> bool:
+def any_alarm(seed: int, factor: float, share: float, directions: int, robots: int, visits: int) -> bool:
     rng = np.random.default_rng([visits + robots, seed])
-    drifts = geometry_drifts(courses(rng, robots, visits, np.sqrt(np.r_[largest, np.ones(19)])), 1, 0.05)
+    spread = np.ones((robots, 20))
+    spread[: max(1, round(share * robots)), :directions] = factor
+    drifts = geometry_drifts(courses(rng, robots, visits, spread), 1, 0.05)
     return any(drift.probability <= 0.05 for drift in drifts)
+
+
+def slow(*values: float) -> Any:
+    return pytest.param(*values, marks=pytest.mark.slow)
 
 
 @pytest.mark.parametrize("fleets", FLEETS)
 @pytest.mark.parametrize(
-    ("largest", "robots", "visits"),
+    ("factor", "share", "directions", "robots", "visits"),
     [
-        (1.0, 8, 4),
-        (9.0, 8, 4),
-        (100.0, 1, 3),
-        pytest.param(
-            9.0,
-            20,
-            3,
-            marks=[
-                pytest.mark.slow,
-                pytest.mark.xfail(
-                    strict=False, reason="about 10 % of fleets of many robots with three visits"
-                ),
-            ],
-        ),
+        slow(1.0, 1.0, 1, 8, 4),
+        (3.0, 1.0, 1, 8, 4),
+        (5.0, 0.25, 1, 8, 3),
+        slow(100.0, 1.0, 1, 2, 3),
+        slow(3.0, 1.0, 1, 20, 3),
+        slow(5.0, 0.2, 1, 20, 3),
+        slow(5.0, 0.5, 1, 20, 4),
+        slow(5.0, 0.3, 1, 3, 4),
+        slow(3.0, 1.0, 5, 20, 3),
     ],
 )
 def test_rate_of_false_alarms_of_trends_and_jumps_together(
-    largest: float, robots: int, visits: int, fleets: int
+    factor: float, share: float, directions: int, robots: int, visits: int, fleets: int
 ) -> None:
-    """Any robot of a fleet is named, for a trend or a jump, in 5 % of the fleets at most, though all scatter by more than they should."""
-    alarms = sum(over_seeds(any_alarm, range(fleets), largest, robots, visits))
-    print(f"{largest} {robots} {visits}: {alarms} of {fleets}")
+    """Any robot of a fleet is named, for a trend or a jump, in 5 % of the fleets at most, though a share of them scatters by a factor more
+    than their covariances tell.
+    """
+    alarms = sum(over_seeds(any_alarm, range(fleets), factor, share, directions, robots, visits))
+    print(f"{factor} {share} {directions} {robots} {visits}: {alarms} of {fleets}")
     assert alarms <= binom.ppf(0.999, fleets, 0.05)
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
-from flexcal.fleet.excess_tail import excess_tail
+import numpy as np
+
+from flexcal.fleet.visit_scatter import excess_tails
 
 
 @dataclass(frozen=True)
@@ -37,28 +39,32 @@ class JointTest:
 def joint_tests(lines: Sequence[JointLine]) -> list[JointTest]:
     """Tests of lines, of three visits or more, in their order.
 
-    Values scatter from visit to visit by more than their covariances tell where something else changes, such as the temperature. How
-    much more is taken from the residuals of its family, or from the unit's own where these are more, and is supposed to be all
-    along one combination of the quantities, the worst case (`excess_tail`).
+    Values scatter from visit to visit by more than their covariances tell where something else changes, such as the temperature, and by
+    more in some units than in others. How much more is taken from the residuals of the unit and of its family, and is supposed to be all
+    along one combination of the quantities, the worst case (`excess_tails`).
     """
-    totals: dict[Hashable, tuple[float, float, int]] = {}
-    for line in lines:
-        squares, count, times = totals.get(line.family, (0.0, 0.0, 0))
-        totals[line.family] = (
-            squares + line.residual,
-            count + line.quantities * (line.visits - 2),
-            times + line.visits - 2,
-        )
+    families: dict[Hashable, list[int]] = {}
+    for number, line in enumerate(lines):
+        families.setdefault(line.family, []).append(number)
+    tests: dict[int, JointTest] = {}
+    for members in families.values():
+        own = [lines[number] for number in members]
+        tests.update(zip(members, _tests_of_family(own), strict=True))
+    return [tests[number] for number in range(len(lines))]
+
+
+def _tests_of_family(lines: Sequence[JointLine]) -> list[JointTest]:
+    visits = np.array([line.visits - 2 for line in lines])
+    quantities = np.array([line.quantities for line in lines])
+    residuals = np.array([line.residual for line in lines])
+    statistics = np.array([line.statistic for line in lines])
+    probabilities = excess_tails(statistics, residuals, visits, quantities)
+    common = residuals.sum() / (visits @ quantities)
     tests = []
-    for line in lines:
-        squares, count, times = totals[line.family]
-        own = line.residual / (line.quantities * (line.visits - 2))
-        scale, of = squares / count, times
-        if own > max(scale, 1.0):
-            scale, of = own, line.visits - 2
-        probability = excess_tail(line.statistic, scale * line.quantities * of, of, line.quantities)
-        freedom = of * _effective(line.quantities, scale) if scale > 1 else line.freedom
-        tests.append(JointTest(probability, max(scale, 1.0), min(freedom, line.freedom)))
+    for line, own, p in zip(lines, residuals / (visits * quantities), probabilities, strict=True):
+        scale, of = (own, line.visits - 2) if own > max(common, 1.0) else (common, int(visits.sum()))
+        freedom = of * _effective(line.quantities, float(scale)) if scale > 1 else line.freedom
+        tests.append(JointTest(float(p), max(float(scale), 1.0), min(freedom, line.freedom)))
     return tests
 
 
