@@ -53,7 +53,7 @@ def excess_tails(
 
 @cache
 def _populations() -> tuple[np.ndarray, np.ndarray]:
-    """Probabilities (h, e) of no excess and of each of `_EXCESSES` in populations of units, and those of the populations (h,) beforehand."""
+    """Probabilities (h, e) of no excess and of each of `_EXCESSES` in populations of units, and of the populations (h,) beforehand."""
     logs = np.log(_EXCESSES)
     narrowest = (logs[1] - logs[0]) / 2
     rows = [np.eye(len(logs) + 1)[0]]
@@ -67,7 +67,7 @@ def _populations() -> tuple[np.ndarray, np.ndarray]:
 
 @cache
 def _rule() -> tuple[np.ndarray, np.ndarray]:
-    """Squared nodes and steps on [0, 1] of an integral whose integrand may be infinite at 0 like the χ²-density of one degree of freedom."""
+    """Squared nodes and steps on [0, 1] of an integral whose integrand may be infinite at 0 as the density of χ² with one degree is."""
     nodes, steps = np.polynomial.legendre.leggauss(_NODES)
     root = (nodes + 1) / 2
     return root**2, root * steps
