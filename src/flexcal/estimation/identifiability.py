@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -27,18 +28,33 @@ class Identifiability:
     largest, show how clear the `rank` is; the diagonal has the kept columns first, each part descending. `gap` is the
     number of decades between the last kept and the first dropped diagonal (inf without dropped ones). With x the
     parameters, `regrouping` (rank, p) @ x are the combinations that the kept parameters estimate: identity on the kept
-    columns. `directions` (p, p) are the right singular vectors as rows, in units of the column scale.
+    columns. `factor` (p, p) is the triangular factor of the scaled Jacobian.
     """
 
     names: tuple[str, ...]
     rank: int
     kept: tuple[int, ...]
     dropped: tuple[Dropped, ...]
-    singular_values: np.ndarray
     diagonal: np.ndarray
     gap: float
     regrouping: np.ndarray
-    directions: np.ndarray
+    factor: np.ndarray
+
+    @property
+    def singular_values(self) -> np.ndarray:
+        """Singular values (p,) of the scaled Jacobian, relative to the largest."""
+        values = self._decomposition[0]
+        return values / (np.max(values, initial=0.0) or 1.0)
+
+    @property
+    def directions(self) -> np.ndarray:
+        """Right singular vectors (p, p) as rows, in units of the column scale."""
+        return self._decomposition[1]
+
+    @cached_property
+    def _decomposition(self) -> tuple[np.ndarray, np.ndarray]:
+        values, directions = np.linalg.svd(self.factor)[1:]
+        return values, directions
 
     @property
     def kept_names(self) -> tuple[str, ...]:
@@ -110,17 +126,15 @@ def analyse(
     first_dropped = np.max(diagonal[len(kept) :], initial=0.0)
     last_kept = np.min(diagonal[: len(kept)], initial=math.inf)
     gap = math.log10(last_kept / first_dropped) if kept and first_dropped > 0 else math.inf
-    singular_values, directions = np.linalg.svd(scaled)[1:]
     return Identifiability(
         names=names,
         rank=len(kept),
         kept=tuple(kept),
         dropped=tuple(described),
-        singular_values=singular_values / (np.max(singular_values, initial=0.0) or 1.0),
         diagonal=diagonal / largest,
         gap=gap,
         regrouping=regrouping,
-        directions=directions,
+        factor=scaled,
     )
 
 

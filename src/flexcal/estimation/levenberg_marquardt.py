@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexcal.estimation.anderson_acceleration import AndersonAcceleration
 from flexcal.estimation.objective import Objective
 from flexcal.progress import Progress, silent
 
@@ -53,7 +54,7 @@ def minimise(
     largest column norms seen (Moré 1978). Robust losses are reweighted at every linearisation; the weighted quadratic
     bounds them from above, so the gain ratio keeps its meaning. Near the minimum, while the gain ratio stays near 1, each
     fall of the damping is three times the last one, and a fit that starts near it starts with less, or weak directions would take a
-    dozen steps. Steps are clipped at the
+    dozen steps. There the steps are accelerated (`AndersonAcceleration`) unless that raises the cost. Steps are clipped at the
     bounds, and a coordinate that is at one and pushed outwards rests for that step. Directions without information are not
     moved.
 
@@ -68,6 +69,7 @@ def minimise(
     scale = np.zeros(x.size)
     damping, growth, fall, best_offset = _FIRST_DAMPING, 2.0, 1.0 / 3.0, np.inf
     status, message, iteration, polishing = "iteration limit", "", 0, False
+    acceleration, moved = AndersonAcceleration(), np.zeros(0, dtype=int)
     while True:
         progress("fitting", iteration / max_iterations)
         weights = objective.weights(residual)
@@ -94,10 +96,15 @@ def minimise(
             message = f"not converged after {iteration} iterations (relative offset {offset:.1e}); allow more"
             break
         iteration += 1
-        linearised, rejected = None, False
+        linearised, rejected, accelerated = None, False, offset < _CLOSE
+        if not (accelerated and np.array_equal(moving, moved)):
+            acceleration.forget()
+        moved = moving
         while True:
             step = np.zeros(x.size)
             step[moving] = -(right.T @ (singular * left / (singular**2 + damping))) / unit[moving]
+            if accelerated:
+                step = acceleration.step(x, step, factor)
             trial = np.clip(x + step, lower, upper)
             step = trial - x
             if damping > _LARGEST_DAMPING or np.linalg.norm(unit * step) <= tolerance * 1e-3 * np.linalg.norm(
@@ -106,7 +113,13 @@ def minimise(
                 negligible = not rejected or offset <= _STATIONARY or cost <= _EXACT * first_cost
                 status, message = _CANNOT_STEP[negligible]
                 break
-            predicted = -float(gradient @ step) - 0.5 * float(np.sum((factor @ step) ** 2))
+            # an extrapolated step is one of Newton's, whose Hessian is not that of the linearisation
+            bend = (
+                -gradient @ step
+                if accelerated and acceleration.extrapolates
+                else np.sum((factor @ step) ** 2)
+            )
+            predicted = -float(gradient @ step) - 0.5 * float(bend)
             trial_cost, linearised = objective.trial(trial)
             actual = cost - trial_cost
             polishing = abs(predicted) <= _ROUNDING * cost and abs(actual) <= 10 * _ROUNDING * cost
@@ -117,6 +130,10 @@ def minimise(
                 damping, growth = max(damping, _SMALLEST_DAMPING), 2.0
                 fall = fall / 3.0 if close else 1.0 / 3.0
                 break
+            if accelerated and acceleration.extrapolates:
+                acceleration.forget()
+                accelerated = False
+                continue
             damping, growth = damping * growth, growth * 2.0
             rejected = True
         if status != "iteration limit":

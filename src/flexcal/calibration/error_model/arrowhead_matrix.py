@@ -35,13 +35,6 @@ class Arrowhead:
         blocks = tuple(values + np.eye(values.shape[1]) for values in self.blocks)
         return Arrowhead(blocks, self.border, self.corner + np.diag(inner.astype(float)))
 
-    def inner(self, other: Arrowhead) -> float:
-        """Sum of the products of all entries with those of an `other` matrix with blocks of the same sizes."""
-        pairs = (*zip(self.blocks, other.blocks, strict=True), (self.corner, other.corner))
-        return float(
-            sum(np.vdot(own, values) for own, values in pairs) + 2 * np.vdot(self.border, other.border)
-        )
-
     def times(self, vector: np.ndarray) -> np.ndarray:
         """Product M v (b + d,)."""
         first, last = vector[: len(self.border)], vector[len(self.border) :]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -71,9 +72,22 @@ class CommandSums:
             products.append(own.transpose(0, 1, 3, 2, 4).reshape(-1, 3 * size, 3 * size))
         return tuple(products)
 
+    def entries(self, blocks: Sequence[np.ndarray], crossed: np.ndarray) -> np.ndarray:
+        """Entries (G T T, 9) of all visits' blocks from `blocks` and, twice, from `crossed` (3 K, 3 c): the adjoint of both methods."""
+        own = crossed.reshape(-1, 3, self.count, 3).transpose(0, 2, 1, 3)
+        result = 2 * (self.cells.T @ own.reshape(-1, 9))
+        for (size, pairs), values in zip(self.groups, blocks, strict=True):
+            own = values.reshape(-1, size, 3, size, 3).transpose(0, 1, 3, 2, 4)
+            result += pairs.T @ own.reshape(-1, 9)
+        return result
+
     def spread(self, values: np.ndarray) -> np.ndarray:
         """Errors (G T, 3) of all points from the errors (3 K,) of the commands."""
-        return self.sums.T @ values.reshape(-1, 3)
+        return self.placed(values[:, None])
+
+    def placed(self, values: np.ndarray) -> np.ndarray:
+        """Rows (G T, 3 k) of all points from the `values` (3 K, k) of the commands."""
+        return self.sums.T @ values.reshape(len(self.sums.indptr) - 1, 3 * values.shape[1])
 
 
 def _tied(command: np.ndarray, count: int) -> np.ndarray:

@@ -37,6 +37,12 @@ def by_axes(inner: np.ndarray) -> np.ndarray:
     return inner.reshape(-1, places, 3, places, 3).transpose(0, 1, 3, 2, 4).reshape(-1, 9)
 
 
+def by_visits(entries: np.ndarray, places: int) -> np.ndarray:
+    """Blocks (G, 3 T, 3 T) of T `places` from the entries (G T T, 9) of their 3 × 3 submatrices."""
+    blocks = entries.reshape(-1, places, places, 3, 3).transpose(0, 1, 3, 2, 4)
+    return blocks.reshape(-1, 3 * places, 3 * places)
+
+
 def added(sums: csr_matrix, rows: np.ndarray) -> np.ndarray:
     """Sums (3 K, k) of `rows` (G, 3 T, k) over K blocks."""
     width = rows.shape[2]

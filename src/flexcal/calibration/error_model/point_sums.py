@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +12,13 @@ from flexcal.calibration.error_model.arrowhead_matrix import Arrowhead
 from flexcal.calibration.error_model.command_sums import CommandSums
 from flexcal.calibration.error_model.error_components import ErrorComponents, stated_covariance, translations
 from flexcal.calibration.error_model.groups import COMMAND
-from flexcal.calibration.error_model.incidence_matrices import added, by_axes, incidence, pairs_of
+from flexcal.calibration.error_model.incidence_matrices import (
+    added,
+    by_axes,
+    by_visits,
+    incidence,
+    pairs_of,
+)
 from flexcal.calibration.measurement import RADIANS, ROBOT
 
 if TYPE_CHECKING:
@@ -91,17 +98,19 @@ class PointSums:
             diagonal += scatter.command**2 * self.commands.once
         return whole
 
-    def gram(self, inner: np.ndarray, *, commands: bool) -> Arrowhead:
-        """Gram matrix CᵀQC of all columns C with Q given by its blocks `inner` (G, 3 T, 3 T).
+    def gram(self, whitening: np.ndarray, *, commands: bool) -> Arrowhead:
+        """Gram matrix CᵀQC of all columns C with Q = WᵀW given by the blocks W, the `whitening` (G, 3 T, 3 T).
 
         The corner is of `columns` and of the cells and stretches (three columns each, 1 where a point belongs to it); the blocks are of
         the commands, where they are asked for.
         """
         size, count = self.columns.shape[2], self.count
-        moved = np.matmul(inner, self.columns)
+        turned = np.swapaxes(whitening, 1, 2)
+        white = np.matmul(whitening, self.columns)
+        moved, flat = np.matmul(turned, white), white.reshape(-1, size)
         corner = np.empty((size + 3 * count, size + 3 * count))
-        corner[:size, :size] = self.columns.reshape(-1, size).T @ moved.reshape(-1, size)
-        entries = by_axes(inner)
+        corner[:size, :size] = flat.T @ flat
+        entries = by_axes(turned @ whitening)
         if count:
             corner[size:, :size] = added(self.sums, moved)
             corner[:size, size:] = corner[size:, :size].T
@@ -112,6 +121,21 @@ class PointSums:
         border = np.concatenate([added(self.commands.sums, moved), self.commands.crossed(entries)], axis=1)
         return Arrowhead(self.commands.blocks(entries), border, corner)
 
+    def gram_adjoint(self, weights: Arrowhead) -> np.ndarray:
+        """Blocks D (G, 3 T, 3 T) with Σ tr Dᵀ Q = ⟨`weights`, CᵀQC⟩ for every Q of symmetric blocks: the adjoint of `gram`."""
+        size, count, corner = self.columns.shape[2], self.count, weights.corner
+        visits, coordinates = self.columns.shape[:2]
+        half = (self.columns.reshape(-1, size) @ corner[:size, :size]).reshape(visits, coordinates, size)
+        entries = np.zeros((visits * (coordinates // 3) ** 2, 9))
+        if count:
+            half += 2 * (self._placing @ corner[size:, :size].reshape(count, -1)).reshape(half.shape)
+            own = corner[size:, size:].reshape(count, 3, count, 3).transpose(0, 2, 1, 3)
+            entries += self.pairs.T @ own.reshape(-1, 9)
+        if self.commands is not None and weights.blocks:
+            half += 2 * self.commands.placed(weights.border[:, :size]).reshape(half.shape)
+            entries += self.commands.entries(weights.blocks, weights.border[:, size:])
+        return half @ np.swapaxes(self.columns, 1, 2) + by_visits(entries, coordinates // 3)
+
     @property
     def count(self) -> int:
         """Number of cells and stretches."""
@@ -119,7 +143,12 @@ class PointSums:
 
     def spread(self, values: np.ndarray) -> np.ndarray:
         """Errors (G, 3 T) of all points from the errors (3 K,) of each cell and stretch."""
-        return (self.sums.T @ values.reshape(-1, 3)).reshape(len(self.columns), -1)
+        return (self._placing @ values.reshape(-1, 3)).reshape(len(self.columns), -1)
+
+    @cached_property
+    def _placing(self) -> csr_matrix:
+        """The transpose of `sums`."""
+        return self.sums.T.tocsr()
 
     @property
     def fixed(self) -> int:

@@ -40,7 +40,7 @@ class RestrictedLikelihood:
         """Likelihood at a scatter, with derivatives by the variances of the components `names`."""
         whitening = cholesky_inverses(sums.covariance(scatter, commands=COMMAND in names))
         inverse = np.swapaxes(whitening, 1, 2) @ whitening
-        gram = sums.gram(inverse, commands=COMMAND in names)
+        gram = sums.gram(whitening, commands=COMMAND in names)
         sizes, outer = np.zeros(len(gram.corner)), scatter.command
         sizes[: sums.fixed] = 1.0
         for name in _shared(names, sums):
@@ -98,12 +98,14 @@ class RestrictedLikelihood:
     def _slope_by_visits(self, structure: np.ndarray) -> float:
         """Derivative by the variance of an error independent in every visit, (G, 3 T, 3 T) or its diagonal (G, 3 T)."""
         if structure.ndim == 2:
-            inner = (self.inverse * structure[:, None]) @ self.inverse
-            trace = float(np.sum(np.diagonal(self.inverse, axis1=1, axis2=2) * structure))
-        else:
-            inner = self.inverse @ structure @ self.inverse
-            trace = float(np.sum(self.inverse * structure))
-        return trace - self._weights.inner(self.sums.gram(inner, commands=COMMAND in self.names))
+            return float(np.sum(np.diagonal(self._by_covariance, axis1=1, axis2=2) * structure))
+        return float(np.sum(self._by_covariance * structure))
+
+    @cached_property
+    def _by_covariance(self) -> np.ndarray:
+        """Derivative (G, 3 T, 3 T) of the deviance by the visits' own covariance."""
+        spread = self.sums.gram_adjoint(self._weights)
+        return self.inverse - self.inverse @ spread @ self.inverse
 
     @cached_property
     def _weights(self) -> Arrowhead:

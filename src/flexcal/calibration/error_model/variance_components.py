@@ -31,11 +31,13 @@ _SMALLEST = 1e-9
 """Share of the total variance that bounds a component from below."""
 _START = 0.01
 """Least share of the total variance from which the search for a component begins."""
+_ALONE = 0.9
+"""Share of the total variance at which the search for a stated sigma's part begins, the only error of single points then."""
 _STEPS, _HALVINGS = 60, 30
 ORIENTATION = "orientation"
 _ALWAYS = (ROBOT, *OF_INSTRUMENTS, ORIENTATION)
 """Components that the data need not support: points and orientations scatter."""
-_STILL = 1e-6
+_STILL = 1e-5
 """Change of the deviance, by its slope, below which the maximisation has converged."""
 _COMPARABLE = 1e-2
 """The same where only the likelihood counts, beside another by `_CLEAR_GAIN`."""
@@ -141,13 +143,19 @@ class LinearFit:
             whole = totals[first] / float(np.mean(self.readings.sigma[of_first] ** 2))
             narrow = [*own, *shared]
             tried = np.array([*(sizes[name] for name in narrow), whole])
-            alone = self._maximum([*narrow, "share"], tried, None, favour=False, still=_COMPARABLE).likelihood
+            shared_out = np.append(best.relative[np.isin(names, narrow)], 1.0)
+            alone = self._maximum(
+                [*narrow, "share"], tried, None, shared_out, favour=False, still=_COMPARABLE
+            ).likelihood
             # without the prior factor the maximum is this high at least
             power = np.array([self._favour(name) for name in names])
             reached = best.likelihood - 0.5 * float(power @ np.log(best.relative))
             if (
                 alone - reached > _CLEAR_GAIN
-                and alone - self._maximum(names, scale, share, favour=False, still=_COMPARABLE).likelihood
+                and alone
+                - self._maximum(
+                    names, scale, share, best.relative, favour=False, still=_COMPARABLE
+                ).likelihood
                 > _CLEAR_GAIN
             ):
                 names, scale = [first, *narrow], np.append(totals[first], tried[:-1])
@@ -247,10 +255,10 @@ class LinearFit:
         likelihood is multiplied by each standard deviation to the power of `_favour`, unless not to `favour` any. It has converged when
         the deviance changes by less than `still`, by its slope.
         """
-        start = np.full(len(names), 0.7 / len(names)) if near is None else near
+        start = np.full(len(names), 0.7 / len(names)) if near is None else near.copy()
         largest = np.full(len(names), _LARGEST)
         if share is None:
-            start[-1], largest[-1] = 0.5, min(1.0 / float(scale[-1]), _LARGEST)
+            start[-1], largest[-1] = _ALONE, min(1.0 / float(scale[-1]), _LARGEST)
         x = np.clip(start, _SMALLEST, largest)
         at = self._at(names, x * scale, share)
         favoured = np.array([self._favour(name) if favour else 0.0 for name in names])

@@ -11,10 +11,9 @@ import numpy as np
 from flexcal.calibration.error_model import Whitening
 from flexcal.calibration.fit.elastic_prior import ElasticPrior
 from flexcal.calibration.fit.fleet_prior import FleetPrior, prior_covariance
-from flexcal.calibration.measurement import PredictedMeasurements, Readings, predict_measurements
-from flexcal.data.poses import PoseSet
+from flexcal.calibration.fit.predictions import Predictions
+from flexcal.calibration.measurement import PredictedMeasurements, Readings
 from flexcal.estimation import Estimate, Loss, Parameters, Problem, solve
-from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress
 
 PlainLoss = Literal["squares", "huber", "cauchy"]
@@ -23,18 +22,16 @@ LossName = Literal["auto", "squares", "huber", "cauchy"]
 
 @dataclass(frozen=True, eq=False)
 class GeometryProblem:
-    """Problem of fitting the geometric parameters `kept` of the robot `start` to `poses` on the backlash flanks `flank` (N, n).
+    """Problem of fitting the geometric parameters `kept` to measured points on the backlash flanks `flank` (N, n).
 
-    `prior` is what is known of stiffness and inertia beforehand, `fleet` what other robots of the model tell of the geometry; `elastic`
-    says whether the arm deflects at all; `whitening` weighs the readings.
+    `prior` is what is known of stiffness and inertia beforehand, `fleet` what other robots of the model tell of the geometry; `whitening`
+    weighs the readings.
     """
 
-    start: RobotModel
-    poses: PoseSet
+    predictions: Predictions
     kept: Parameters
     prior: ElasticPrior
     flank: np.ndarray
-    elastic: bool
     whitening: Whitening
     fleet: FleetPrior | None = None
 
@@ -45,10 +42,7 @@ class GeometryProblem:
 
     def predicted(self, values: Mapping[str, float], *, jacobians: bool = False) -> PredictedMeasurements:
         """Predicted measurements of the robot with the given named values, on the flanks of this fit."""
-        robot = self.start.with_values(values)
-        return predict_measurements(
-            robot, self.poses, flank=self.flank, elastic=self.elastic, jacobians=jacobians
-        )
+        return self.predictions.at(values, self.flank, jacobians=jacobians)
 
     def residual(self, at: PredictedMeasurements) -> np.ndarray:
         """Whitened residual (3 R,), measured minus predicted coordinates, Eq. (28)."""
@@ -65,7 +59,7 @@ class GeometryProblem:
         def values(x: np.ndarray) -> dict[str, float]:
             return dict(zip(parameters.names, parameters.natural(x), strict=True))
 
-        readings = Readings.of(self.poses)
+        readings = Readings.of(self.predictions.poses)
         there = readings.present.ravel()
 
         def linearise(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

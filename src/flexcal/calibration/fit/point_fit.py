@@ -22,6 +22,7 @@ from flexcal.calibration.fit.held_size import held_lengths
 from flexcal.calibration.fit.least_squares_problem import GeometryProblem, PlainLoss
 from flexcal.calibration.fit.marginalised_elasticity import marginalised
 from flexcal.calibration.fit.practical_identifiability import Undetermined
+from flexcal.calibration.fit.predictions import Predictions
 from flexcal.calibration.fit.structural_identifiability import (
     kinematic_identifiability,
     random_identifiability,
@@ -184,6 +185,11 @@ class PointFit:
         return ErrorGroups.of(self.poses)
 
     @cached_property
+    def predictions(self) -> Predictions:
+        """Predicted measurements with changed parameters."""
+        return Predictions(self.start, self.poses, self.elastic)
+
+    @cached_property
     def straight(self) -> PredictedMeasurements:
         """Points of the undeflected robot at the start of the fit."""
         return predict_measurements(self.start, self.poses, elastic=False, jacobians=True)
@@ -306,15 +312,12 @@ class PointFit:
         prior = prior.started(values)
         passes = 0
         while True:
-            task = GeometryProblem(
-                self.start, self.poses, kept, prior, flank, self.elastic, whitening, self.fleet
-            )
+            task = GeometryProblem(self.predictions, kept, prior, flank, whitening, self.fleet)
             if self.marginalised and len(prior.parameters):
                 estimate = marginalised(task, progress=self.progress)
             else:
                 estimate = task.reestimated(loss=loss, tolerance=tolerance, progress=self.progress)
-            fitted = self.start.with_values(estimate.values)
-            after = predict_measurements(fitted, self.poses, elastic=self.elastic, jacobians=True)
+            after = self.predictions.consistent(estimate.values, flank)
             if (after.rest.flank == flank).all():
                 break
             flank, passes = after.rest.flank, passes + 1
@@ -322,4 +325,4 @@ class PointFit:
                 require_both_flanks(self.start, flank)
             if passes == _FLANK_PASSES:
                 break
-        return FittedPoints(self, scatter, spread or {}, fixed, estimate, fitted, after, flank, task)
+        return FittedPoints(self, scatter, spread or {}, fixed, estimate, after.model, after, flank, task)

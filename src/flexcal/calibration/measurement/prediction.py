@@ -89,6 +89,11 @@ class PredictedMeasurements:
         return residual
 
     @cached_property
+    def _known(self) -> dict[tuple[str, ...], np.ndarray]:
+        """The columns of `jacobian` that were computed last, by their names."""
+        return {}
+
+    @cached_property
     def _stations(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         return {}
 
@@ -145,8 +150,20 @@ class PredictedMeasurements:
     def jacobian(self, names: Sequence[str]) -> np.ndarray:
         """∂reading/∂parameter (R, 3, len(names)) in natural units, the motion of the deflection included.
 
-        Raises `FlexcalError` for a name without effect on the readings.
+        Read-only, as it is kept for other calls with some of these names. Raises `FlexcalError` for a name without effect on the readings.
         """
+        names = tuple(names)
+        for others, columns in self._known.items():
+            places = {name: k for k, name in enumerate(others)}
+            if names == others:
+                return columns
+            if places.keys() >= set(names):
+                return columns.take([places[name] for name in names], axis=2)
+        self._known.clear()
+        self._known[names] = self._columns(names)
+        return self._known[names]
+
+    def _columns(self, names: Sequence[str]) -> np.ndarray:
         result = np.zeros((len(self.readings.row), 3, len(names)))
         joints, of_arm = self.model.joint_names, list[int]()
         for k, name in enumerate(names):
@@ -162,6 +179,7 @@ class PredictedMeasurements:
                 result[:, :, k] = kind.column(self, name)
         if of_arm:
             result[:, :, of_arm] = ArmColumns(self).columns([names[k] for k in of_arm])
+        result.setflags(write=False)
         return result
 
     @cached_property
