@@ -88,7 +88,9 @@ def minimise(
         if offset <= tolerance:
             status, message = "converged", f"relative offset {offset:.1e}"
             break
-        if polishing and offset >= 0.5 * best_offset:
+        if polishing and offset >= 0.5 * best_offset and acceleration.extrapolates:
+            acceleration.forget()
+        elif polishing and offset >= 0.5 * best_offset:
             status, message = "converged", "the cost no longer changes beyond rounding"
             break
         best_offset = min(best_offset, offset)
