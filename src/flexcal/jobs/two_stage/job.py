@@ -59,7 +59,7 @@ from flexcal.jobs.two_stage.document import two_stage_document
 from flexcal.jobs.two_stage.inertial_stage import run_stage_zero
 from flexcal.jobs.two_stage.results import CadInertialsRun, TwoStageRun
 from flexcal.model.robot import MASS_AND_COM, RobotModel
-from flexcal.parallel import LocalProcesses, ThisProcess, Workers
+from flexcal.parallel import LocalProcesses, ThisProcess
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust
 from flexcal.report.pages import two_stage_checks
@@ -135,180 +135,156 @@ def run_two_stage(
 
     Raises `FlexcalError` for files that do not fit.
     """
-    beside = LocalProcesses(1) if (os.cpu_count() or 1) > 1 else ThisProcess()
-    with closing(beside):
-        return _run(
-            robot_file,
-            out,
-            seed=seed,
-            plan=plan,
-            cell=cell,
-            config=config,
-            truth=truth,
-            inertias_known=inertias_known,
-            report=report,
-            command=command,
-            progress=progress,
-            beside=beside,
+    # what nothing else waits for runs beside
+    with closing(LocalProcesses(1) if (os.cpu_count() or 1) > 1 else ThisProcess()) as beside:
+        watch = Stopwatch()
+        nominal = RobotModel.from_yaml(robot_file, estimates=False)
+        out.mkdir(parents=True, exist_ok=True)
+        hidden = out / "truth.yaml"
+        robot_in_cell = open_cell(
+            cell, robot_file, nominal, truth=truth, hidden=hidden, seed=seed, config=config
         )
+        dynamics = None
+        if inertias_known:
+            believed = nominal.with_values(_inertias(read_truth(hidden)))
+        else:
+            with watch.stage("dynamics"):
+                dynamics = run_stage_zero(robot_in_cell, nominal, out, seed=seed, progress=progress)
+            believed = nominal.with_estimate(dynamics)
 
-
-def _run(
-    robot_file: Path,
-    out: Path,
-    *,
-    seed: int,
-    plan: PlanName,
-    cell: CellName,
-    config: CellConfig | None,
-    truth: Path | None,
-    inertias_known: bool,
-    report: bool,
-    command: str,
-    progress: Progress,
-    beside: Workers,
-) -> TwoStageRun:
-    """As `run_two_stage`; `beside` runs what nothing else waits for."""
-    watch = Stopwatch()
-    nominal = RobotModel.from_yaml(robot_file, estimates=False)
-    out.mkdir(parents=True, exist_ok=True)
-    hidden = out / "truth.yaml"
-    robot_in_cell = open_cell(cell, robot_file, nominal, truth=truth, hidden=hidden, seed=seed, config=config)
-    dynamics = None
-    if inertias_known:
-        believed = nominal.with_values(_inertias(read_truth(hidden)))
-    else:
-        with watch.stage("dynamics"):
-            dynamics = run_stage_zero(robot_in_cell, nominal, out, seed=seed, progress=progress)
-        believed = nominal.with_estimate(dynamics)
-
-    if plan == "default" or plan == "paper":
-        frequency = frequency_plan(nominal, robot_file.parent / "frequency_poses.csv", plan, seed)
-    else:
+        if plan == "default" or plan == "paper":
+            frequency = frequency_plan(nominal, robot_file.parent / "frequency_poses.csv", plan, seed)
+        else:
+            with watch.stage("frequency"):
+                flat = plan_without_poses(believed, plan, seed=seed)
+                frequency = optimise_excitation(
+                    believed, flat, sensors=response_sensors(robot_file)
+                ).planned.plan
+        write_plan(out / "frequency_plan.yaml", frequency)
         with watch.stage("frequency"):
-            flat = plan_without_poses(believed, plan, seed=seed)
-            frequency = optimise_excitation(believed, flat, sensors=response_sensors(robot_file)).planned.plan
-    write_plan(out / "frequency_plan.yaml", frequency)
-    with watch.stage("frequency"):
-        responses = tuple(
-            measure_responses(robot_in_cell, frequency, believed, lambda share: progress("frequency", share))
-        )
-    files = [out / f"response_pose_{response.pose + 1}.npz" for response in responses]
-    for response, file in zip(responses, files, strict=True):
-        response.save(file)
-    stage_one = StageOne(responses, frequency, seed, inertias_known)
-    cad_springs = None
-    if dynamics is not None and cell == "virtual":
-        cad_springs = beside.values(stage_one.springs, [nominal])
-    with watch.stage("stage1"):
-        progress("stage1", 0.0)
-        stiffness = stage_one.springs(
-            believed, lambda part, share: progress("stage1", (share + (part == "fitting")) / 2)
-        )
-        elastic = stiffness.robot(believed)
-        progress("stage1", 1.0)
-    with watch.stage("poses"):
-        progress("poses", 0.0)
-        setup = MeasuringSetup(payload=frequency.payload)
-        count = QUICK_POSES if plan == "quick" else CALIBRATION_POSES
-        chosen = select_poses(elastic, count, rng=np.random.default_rng([seed, 2]), setup=setup).plan
-        progress("poses", 0.25)
-        for_rigid = [
-            select_poses(believed, n, rng=np.random.default_rng([seed, 3, n]), setup=setup).plan
-            for n in RIGID_POSES
-        ]
-        progress("poses", 0.9)
-        anywhere = random_poses(nominal, VERIFICATION_POSES, np.random.default_rng([seed, 4]), setup)
-        progress("poses", 1.0)
-    with watch.stage("stage2"):
-        progress("stage2", 0.0)
-        measured = robot_in_cell.measure(chosen)
-        calibration = fit_geometry(elastic, measured)
-        progress("stage2", 0.5)
-        rigid = tuple(
-            fit_geometry(believed, robot_in_cell.measure(p), terms=RIGID_TERMS, elastic=False)
-            for p in for_rigid
-        )
-        progress("stage2", 1.0)
-    write_poses(out / "calibration_poses.csv", measured)
-    options = {"plan": plan, "seed": seed, "inertias_known": inertias_known}
-    options |= {"bearings": elastic.bearings} if elastic.has_bearings else {}
-    geometry = replace(calibration.estimate, measurements=measurement_digests(measured))
-    stored = _store(out, (robot_file, nominal.urdf), files, options, stiffness.estimate, geometry)
-    calibration = replace(calibration, estimate=stored)
-    exported = export_urdf(calibration.model, out / "calibrated.urdf")
-    with watch.stage("verification"):
-        progress("verification", 0.0)
-        seen = robot_in_cell.measure(anywhere)
-        write_poses(out / "verification_poses.csv", seen)
-        known = read_truth(hidden)
-        exact = replace(seen, position=robot_in_cell.noise_free(anywhere))
-        floor = None
-        if cell == "virtual":
-            floor = ErrorStatistics.of(
-                exact.position - predict_measurements(nominal.with_values(known), exact).position
+            responses = tuple(
+                measure_responses(
+                    robot_in_cell, frequency, believed, lambda share: progress("frequency", share)
+                )
             )
-        placed = uncalibrated_model(nominal, measured)
-        assert placed.registered is not None and placed.own is not None
-        measured_verification, measured_covariance = prediction_errors_with_covariance(
-            calibration.model, seen
-        )
-        run = TwoStageRun(
-            nominal=nominal,
-            informed=believed,
-            dynamics=dynamics,
-            plan=frequency,
-            responses=responses,
-            stiffness=stiffness,
-            calibration=calibration,
-            rigid=rigid,
-            before=placed.errors(measured),
-            verification_poses=exact,
-            nominal_verification=prediction_errors(placed.registered, exact, elastic=False, noise_free=True),
-            own_verification=prediction_errors(placed.own, exact, elastic=False, noise_free=True),
-            elastic_verification=prediction_errors(calibration.model, exact, noise_free=True),
-            rigid_verification=tuple(
-                prediction_errors(c.model, exact, elastic=False, noise_free=True) for c in rigid
-            ),
-            measured_verification=measured_verification,
-            measured_covariance=measured_covariance,
-            floor=floor,
-            truth=known,
-            seconds=watch.seconds,
-            seed=seed,
-            cell=cell,
-            command=command,
-        )
-        progress("verification", 1.0)
-    if cad_springs is not None:
-        with watch.stage("cad_alone"):
-            progress("cad_alone", 0.0)
-            springs = next(cad_springs)
-            fitted = fit_geometry(springs.robot(nominal), measured)
-            run = replace(
-                run,
-                cad_alone=CadInertialsRun(
-                    springs, fitted, prediction_errors(fitted.model, exact, noise_free=True)
+        files = [out / f"response_pose_{response.pose + 1}.npz" for response in responses]
+        for response, file in zip(responses, files, strict=True):
+            response.save(file)
+        stage_one = StageOne(responses, frequency, seed, inertias_known)
+        cad_springs = None
+        if dynamics is not None and cell == "virtual":
+            cad_springs = beside.values(stage_one.springs, [nominal])
+        with watch.stage("stage1"):
+            progress("stage1", 0.0)
+            stiffness = stage_one.springs(
+                believed, lambda part, share: progress("stage1", (share + (part == "fitting")) / 2)
+            )
+            elastic = stiffness.robot(believed)
+            progress("stage1", 1.0)
+        with watch.stage("poses"):
+            progress("poses", 0.0)
+            setup = MeasuringSetup(payload=frequency.payload)
+            count = QUICK_POSES if plan == "quick" else CALIBRATION_POSES
+            chosen = select_poses(elastic, count, rng=np.random.default_rng([seed, 2]), setup=setup).plan
+            progress("poses", 0.25)
+            for_rigid = [
+                select_poses(believed, n, rng=np.random.default_rng([seed, 3, n]), setup=setup).plan
+                for n in RIGID_POSES
+            ]
+            progress("poses", 0.9)
+            anywhere = random_poses(nominal, VERIFICATION_POSES, np.random.default_rng([seed, 4]), setup)
+            progress("poses", 1.0)
+        with watch.stage("stage2"):
+            progress("stage2", 0.0)
+            measured = robot_in_cell.measure(chosen)
+            calibration = fit_geometry(elastic, measured)
+            progress("stage2", 0.5)
+            rigid = tuple(
+                fit_geometry(believed, robot_in_cell.measure(p), terms=RIGID_TERMS, elastic=False)
+                for p in for_rigid
+            )
+            progress("stage2", 1.0)
+        write_poses(out / "calibration_poses.csv", measured)
+        options = {"plan": plan, "seed": seed, "inertias_known": inertias_known}
+        options |= {"bearings": elastic.bearings} if elastic.has_bearings else {}
+        geometry = replace(calibration.estimate, measurements=measurement_digests(measured))
+        stored = _store(out, (robot_file, nominal.urdf), files, options, stiffness.estimate, geometry)
+        calibration = replace(calibration, estimate=stored)
+        exported = export_urdf(calibration.model, out / "calibrated.urdf")
+        with watch.stage("verification"):
+            progress("verification", 0.0)
+            seen = robot_in_cell.measure(anywhere)
+            write_poses(out / "verification_poses.csv", seen)
+            known = read_truth(hidden)
+            exact = replace(seen, position=robot_in_cell.noise_free(anywhere))
+            floor = None
+            if cell == "virtual":
+                floor = ErrorStatistics.of(
+                    exact.position - predict_measurements(nominal.with_values(known), exact).position
+                )
+            placed = uncalibrated_model(nominal, measured)
+            assert placed.registered is not None and placed.own is not None
+            measured_verification, measured_covariance = prediction_errors_with_covariance(
+                calibration.model, seen
+            )
+            run = TwoStageRun(
+                nominal=nominal,
+                informed=believed,
+                dynamics=dynamics,
+                plan=frequency,
+                responses=responses,
+                stiffness=stiffness,
+                calibration=calibration,
+                rigid=rigid,
+                before=placed.errors(measured),
+                verification_poses=exact,
+                nominal_verification=prediction_errors(
+                    placed.registered, exact, elastic=False, noise_free=True
                 ),
+                own_verification=prediction_errors(placed.own, exact, elastic=False, noise_free=True),
+                elastic_verification=prediction_errors(calibration.model, exact, noise_free=True),
+                rigid_verification=tuple(
+                    prediction_errors(c.model, exact, elastic=False, noise_free=True) for c in rigid
+                ),
+                measured_verification=measured_verification,
+                measured_covariance=measured_covariance,
+                floor=floor,
+                truth=known,
+                seconds=watch.seconds,
+                seed=seed,
+                cell=cell,
+                command=command,
             )
-            progress("cad_alone", 1.0)
-    run = replace(run, results=two_stage_document(run, exported))
-    progress("report", 0.0)
-    write_fitted_responses(out, fitted_responses(stiffness, nominal))
-    write_verification(out / VERIFICATION, run)
-    points = MeasuredPoints(
-        measured, errors_before(run.before) | {CALIBRATED: calibration.residuals}, calibration.ambiguous
-    )
-    write_points(out, points)
-    write_arm(out, arms_at(calibration.model, measured, points.shown))
-    write_results(out, run.results)
-    trust = Trust(two_stage_checks(two_stage_study(out)))
-    run = replace(run, trust=trust, results={**run.results, "verdict": trust.document()})
-    write_results(out, run.results)
-    if report:
-        report_folder(out)
-    progress("report", 1.0)
-    return run
+            progress("verification", 1.0)
+        if cad_springs is not None:
+            with watch.stage("cad_alone"):
+                progress("cad_alone", 0.0)
+                springs = next(cad_springs)
+                fitted = fit_geometry(springs.robot(nominal), measured)
+                run = replace(
+                    run,
+                    cad_alone=CadInertialsRun(
+                        springs, fitted, prediction_errors(fitted.model, exact, noise_free=True)
+                    ),
+                )
+                progress("cad_alone", 1.0)
+        run = replace(run, results=two_stage_document(run, exported))
+        progress("report", 0.0)
+        write_fitted_responses(out, fitted_responses(stiffness, nominal))
+        write_verification(out / VERIFICATION, run)
+        points = MeasuredPoints(
+            measured, errors_before(run.before) | {CALIBRATED: calibration.residuals}, calibration.ambiguous
+        )
+        write_points(out, points)
+        write_arm(out, arms_at(calibration.model, measured, points.shown))
+        write_results(out, run.results)
+        trust = Trust(two_stage_checks(two_stage_study(out)))
+        run = replace(run, trust=trust, results={**run.results, "verdict": trust.document()})
+        write_results(out, run.results)
+        if report:
+            report_folder(out)
+        progress("report", 1.0)
+        return run
 
 
 def measure_responses(
