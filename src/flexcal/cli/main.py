@@ -152,10 +152,12 @@ def _carry_out(verb: Verb, arguments: list[str]) -> int:
 def _keep_freed_memory() -> None:
     """Let the C library of Linux keep up to 64 MB that were freed, and arrays below 4 MB beside others.
 
-    By default it gives such memory back at once, and the next array costs a page fault every 4 KB.
+    By default it gives such memory back at once, and the next array costs a page fault every 4 KB. What a user has set stays.
     """
     import ctypes
 
+    if any(name.startswith("MALLOC_") or name == "GLIBC_TUNABLES" for name in os.environ):
+        return
     with suppress(AttributeError, OSError, TypeError):  # others have no mallopt
         library = ctypes.CDLL(None)
         library.mallopt(_MMAP_THRESHOLD, 4 << 20)
