@@ -13,12 +13,15 @@ from refusals import refused
 from simulated_fleet import (
     Fleet,
     SimulatedRobot,
+    points,
     random_poses,
+    turned,
     write_poses,
     write_robot,
 )
 
 from flexcal import RobotModel, fit_geometry
+from flexcal.calibration.diagnostics import EnoughPoses
 from flexcal.calibration.fit import FleetPrior, GeometricFit, base_errors
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.cli.main import main
@@ -138,6 +141,51 @@ def test_eight_poses_are_enough_with_the_prior_and_too_few_without(six: Pooled) 
     assert errors_elsewhere(nominal, robot, rng)[0] > 10 * p90
 
 
+def errors_by_count(q: np.ndarray, robot: SimulatedRobot, counts: Sequence[int], known: bool) -> np.ndarray:
+    """Root mean square errors at other poses after so many of the first 40 poses, by derivatives of the simulator's own positions by the
+    place of the tracker, the target and, unless they are `known`, the links' errors.
+    """
+
+    def measured(x: np.ndarray) -> np.ndarray:
+        moved = points(q, robot.errors + x[9:].reshape(6, 6), robot.tool + x[:3])
+        return moved @ turned(x[3:6]).T + x[6:9]
+
+    steps, here = 1e-7 * np.eye(45)[: 9 if known else 45], measured(np.zeros(45))
+    columns = np.stack([(measured(d) - here) / 1e-7 for d in steps], axis=-1)
+    found = []
+    for count in counts:
+        rows = np.concatenate([columns[:count].reshape(-1, len(steps)), 1e-3 * np.eye(len(steps))])
+        others = columns[40:].reshape(-1, len(steps)).T
+        # what links and their neighbours do alike moves no point
+        variance = np.sum(others * np.linalg.lstsq(rows.T @ rows, others, rcond=1e-12)[0])
+        found.append(np.sqrt(variance))
+    return np.array(found)
+
+
+def test_how_many_poses_are_enough_is_said_with_a_prior(six: Pooled) -> None:
+    """Against derivatives of the simulator, where the other robots tell everything; and nothing."""
+    rng = np.random.default_rng(51)
+    robot = six.fleet.robot(rng)
+    fit = fitted(six.model, robot, 20, rng, six.prior)
+    assert fit.fleet is not None
+    small, large = (
+        replace(fit.fleet, uncertainty=f**2 * fit.fleet.uncertainty, spread=f * fit.fleet.spread)
+        for f in (1e-3, 1e3)
+    )
+    nothing, everything = (EnoughPoses.of(replace(fit, fleet=fleet)) for fleet in (large, small))
+    assert nothing is not None and nothing.poses == 40
+    plans = [random_poses(56, rng) for _ in range(2)]
+    (alone,) = np.mean([errors_by_count(q, robot, [40], False) for q in plans], axis=0)
+    counts = range(6, 31)
+    known = np.mean([errors_by_count(q, robot, counts, True) for q in plans], axis=0)
+    expected = counts[int(np.flatnonzero(known <= alone)[0])]
+    assert everything is not None and abs(everything.poses - expected) <= 2
+    middle = EnoughPoses.of(fit)
+    assert middle is not None and expected < middle.poses < 40
+    twice = replace(fit, poses=replace(fit.poses, target=np.repeat(["ball", "other"], 10)))
+    assert EnoughPoses.of(twice) is None
+
+
 def test_the_place_of_the_base_and_the_tool_are_not_pooled(six: Pooled) -> None:
     assert set(base_errors(six.model)) == {
         "joint_1.offset", "joint_1.misalignment_1", "joint_1.misalignment_2", "joint_1.length_z",
@@ -190,6 +238,8 @@ def test_the_file_has_the_prior_and_refuses_other_robots(six: Pooled, tmp_path: 
     assert block["robots"] == list(prior.robots)
     assert not block["conflict"]["contradicted"]
     assert any("prior of 3 other robots" in remark for remark in result.document()["remarks"])
+    assert 20 < block["enough"]["poses"] <= 40
+    assert any("40 without it" in remark for remark in result.document()["remarks"])
     assert (tmp_path / "out" / "report.html").exists()
 
     with refused("E-PRIOR-010", "25", "25", "robot_0"):
@@ -201,6 +251,7 @@ def test_the_file_has_the_prior_and_refuses_other_robots(six: Pooled, tmp_path: 
     unlike = write_poses(tmp_path / "unlike.csv", q, stranger.measured(q, NOISE, rng))
     told = calibrate_robot(new, [unlike], prior=out, out=tmp_path / "unlike")
     assert told.trust.document() == {"trusted": False, "reasons": ["fleet"]}
+    assert told.document()["fleet"]["enough"] is None
     assert "the prior of other robots does not fit this one" in told.trust.sentence
     said = " ".join(told.document()["remarks"])
     assert "the prior does not fit this robot" in said

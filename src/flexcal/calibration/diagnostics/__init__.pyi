@@ -1,6 +1,7 @@
 from .bearing_axes import BearingAxes, compare_bearings
 from .coupled_drives import Coupling, undeclared_coupling
 from .drift_test import Drift
+from .enough_poses import EnoughPoses
 from .fleet_conflict import FleetConflict
 from .gravity_residuals import GravityLoads, gravity_loads
 from .jumps_in_readings import ReadingJump, reading_jumps
@@ -20,6 +21,7 @@ __all__ = [
     "Coupling",
     "Disagreement",
     "Drift",
+    "EnoughPoses",
     "FarZero",
     "FleetConflict",
     "GravityLoads",

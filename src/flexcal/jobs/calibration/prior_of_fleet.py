@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration.diagnostics import FleetConflict
+from flexcal.calibration.diagnostics import EnoughPoses, FleetConflict
 from flexcal.calibration.fit import GeometricFit
 from flexcal.report.layout import listed
 
@@ -19,9 +19,9 @@ def fleet_document(fit: GeometricFit) -> dict[str, Any] | None:
     """Block `fleet` of results.json; None for a calibration without such a prior.
 
     `from_fleet` are the parameters of which these measurements tell so little that their standard deviation is at least 0.8 times the
-    prior's, and which the other robots tell.
+    prior's, and which the other robots tell; `enough` is how many poses with the prior reach what many do without it.
     """
-    fleet, conflict = fit.fleet, FleetConflict.of(fit)
+    fleet, conflict, enough = fit.fleet, FleetConflict.of(fit), EnoughPoses.of(fit)
     if fleet is None or conflict is None:
         return None
     before = np.sqrt(np.diag(fleet.covariance))
@@ -37,6 +37,7 @@ def fleet_document(fit: GeometricFit) -> dict[str, Any] | None:
         "parameters": len(fleet.names),
         "from_fleet": known,
         "conflict": conflict.document(),
+        "enough": None if enough is None or conflict.contradicted else enough.document(),
     }
 
 
@@ -57,7 +58,16 @@ def fleet_remarks(block: dict[str, Any] | None) -> list[str]:
         if known
         else f": the measurements improve all its {block['parameters']} parameters"
     )
+    if block["enough"] is not None:
+        sentence += f"; {_enough_sentence(block['enough'])}"
     return [sentence, *([conflict_sentence(block)] if contradicts(block) else [])]
+
+
+def _enough_sentence(enough: dict[str, Any]) -> str:
+    reached = f"of {enough['alone']} without it ({enough['rms_mm']:.2g} mm RMS predicted, at random poses in these joint ranges)"
+    if enough["poses"] < enough["alone"]:
+        return f"about {enough['poses']} poses with this prior reach the accuracy {reached}"
+    return f"robots differ so much that no fewer poses with this prior reach the accuracy {reached}"
 
 
 def conflict_sentence(block: dict[str, Any]) -> str:
