@@ -32,12 +32,12 @@ class SensorLag(Lag):
 
         Points grow by the expansion times the temperature, which is the sensor's plus its rate times the lag.
         """
-        from scipy.signal import savgol_filter
-
         poses = fit.poses
         known = EXPANSION in fit.estimate.parameters and fit.estimate.std(EXPANSION) is not None
         if not known or poses.temperature is None or not poses.located.all() or len(poses) <= 2 * _WINDOW:
             return None
+        from scipy.signal import savgol_filter  # loads half of SciPy: late
+
         temperature, (times, timed) = poses.temperature, measuring_times(poses)
         smooth = savgol_filter(temperature, _WINDOW, _ORDER)
         if np.std(temperature - smooth) > _ROUGH * np.std(temperature):
