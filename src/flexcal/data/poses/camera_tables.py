@@ -8,17 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.data.camera import (
-    FEWEST_CORNERS,
-    FreeViews,
-    Lens,
-    View,
-    board_corners,
-    detected_views,
-    free_views,
-    half_turns,
-    view_poses,
-)
+from flexcal.data import camera as camera_views  # loaded where a table has images
 from flexcal.data.poses.checks import check_same_pose
 from flexcal.data.poses.columns import first_point, payload_column, target_column, whole_numbers
 from flexcal.data.poses.pose_set import PoseSet
@@ -27,6 +17,7 @@ from flexcal.files.structuring import suggestion
 from flexcal.model.kinematics import point_kinematics
 
 if TYPE_CHECKING:
+    from flexcal.data.camera import FreeViews, View
     from flexcal.model.robot import CameraConfig, RobotModel
 
 CAMERA_COLUMNS = ("camera", "image")
@@ -67,10 +58,10 @@ def read_views(file: TableFile, model: RobotModel, further: Sequence[str] = ()) 
     first = first[np.argsort(first)]
     if images:
         paths = [file.path.parent / text for text in table.columns["image"][first].tolist()]
-        views, size = detected_views(camera, paths)
+        views, size = camera_views.detected_views(camera, paths)
     else:
         views, size = _tabled_views(table, camera, pose, first), np.array(camera.size, dtype=float)
-    shown = np.array([len(view.points) >= FEWEST_CORNERS for view in views])
+    shown = np.array([len(view.points) >= camera_views.FEWEST_CORNERS for view in views])
     sharp = np.median([view.edge for view, enough in zip(views, shown, strict=True) if enough] or [np.nan])
     # without contrast an image is empty, not blurred
     blurred = np.array([np.isfinite(view.edge) and view.edge > _BLURRED * sharp for view in views])
@@ -81,7 +72,7 @@ def read_views(file: TableFile, model: RobotModel, further: Sequence[str] = ()) 
     ]
     blurred = blurred[shown]
     views, first = [view for view, enough in zip(views, shown, strict=True) if enough], first[shown]
-    found = free_views(views, size)
+    found = camera_views.free_views(views, size)
     usable = _usable(file, views, found, blurred)
     notes = _left_out(name, views, found, usable, blurred, blank)
     rows = first[usable]
@@ -94,7 +85,7 @@ def read_views(file: TableFile, model: RobotModel, further: Sequence[str] = ()) 
             if turned
             else []
         )
-    poses = view_poses(found, on_hand=camera.mounted == "hand")
+    poses = camera_views.view_poses(found, on_hand=camera.mounted == "hand")
     payload = payload_column(table, signals, model)
     covariance = poses.covariance[usable]
     spread = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
@@ -113,7 +104,7 @@ def read_views(file: TableFile, model: RobotModel, further: Sequence[str] = ()) 
         covariance=covariance,
         camera=np.full(len(rows), name),
         by_lens=poses.by_lens[usable],
-        lenses={name: Lens(found.lens, found.covariance)},
+        lenses={name: camera_views.Lens(found.lens, found.covariance)},
         notes=tuple(notes),
     )
 
@@ -143,7 +134,7 @@ def _camera(table: Table, model: RobotModel) -> tuple[str, CameraConfig]:
 
 
 def _tabled_views(table: Table, camera: CameraConfig, pose: np.ndarray, first: np.ndarray) -> list[View]:
-    board = board_corners(camera.board)
+    board = camera_views.board_corners(camera.board)
     numbers = [np.asarray(table.columns[name], dtype=float) for name in _CORNERS]
     corner = whole_numbers(table, "corner", numbers[0])
     known = (corner >= 0) & (corner < len(board))
@@ -166,7 +157,7 @@ def _tabled_views(table: Table, camera: CameraConfig, pose: np.ndarray, first: n
     views = []
     for row in first:
         own = pose == pose[row]
-        views.append(View(f"pose {pose[row]}", board[corner[own]], pixels[own]))
+        views.append(camera_views.View(f"pose {pose[row]}", board[corner[own]], pixels[own]))
     return views
 
 
@@ -218,7 +209,7 @@ def _left_out(
         )
     if empty:
         notes.append(
-            f"{name}: {len(empty)} views show fewer than {FEWEST_CORNERS} corners of the board: {_some(empty)}"
+            f"{name}: {len(empty)} views show fewer than {camera_views.FEWEST_CORNERS} corners of the board: {_some(empty)}"
         )
     return notes
 
@@ -231,7 +222,7 @@ def _some(names: Sequence[str]) -> str:
 def _upright(model: RobotModel, found: FreeViews, q: np.ndarray, target: str) -> tuple[FreeViews, int]:
     """Views with their chessboards the same way up, and how many were turned for it."""
     hand = point_kinematics(model, q, point=target, jacobians=False).orientation
-    turned = half_turns(hand, found.rotation)
+    turned = camera_views.half_turns(hand, found.rotation)
     signs = np.where(turned[:, None], [-1.0, -1.0, 1.0], 1.0)
     return replace(found, rotation=found.rotation * signs[:, None, :]), int(turned.sum())
 

@@ -10,9 +10,9 @@ from typing import Literal
 from flexcal.calibration.fit import LossName
 from flexcal.data.poses import read_grouped_poses, read_poses, tables_of
 from flexcal.files.formats import provenance, read_estimates, sha256_of
+from flexcal.jobs import fleet_prior  # loaded where a prior is given
 from flexcal.jobs.calibration.procedure import calibrate
 from flexcal.jobs.calibration.result import Calibration
-from flexcal.jobs.fleet_prior import FLEET, PooledUse, conflict_after, read_model_prior, with_stiffness
 from flexcal.jobs.inputs import image_provenance, require_distinct_files
 from flexcal.jobs.result_files import estimates_target
 from flexcal.model.robot import RobotModel, with_blocks
@@ -60,10 +60,10 @@ def calibrate_robot(
     else:
         poses, groups = read_grouped_poses(files, model, hold_out)
         labels = hold_out, groups
-    others = None if prior is None else read_model_prior(prior, bare)
+    others = None if prior is None else fleet_prior.read_model_prior(prior, bare)
     springs = None
     if others is not None:
-        model, springs = with_stiffness(model, others.stiffness)
+        model, springs = fleet_prior.with_stiffness(model, others.stiffness)
     progress("reading", 1.0)
     calibration = calibrate(
         model,
@@ -79,10 +79,11 @@ def calibrate_robot(
     origin = provenance([robot_file, bare.urdf, *files], None, source if blocks else None, tuple(blocks))
     origin |= image_provenance(files)
     if prior is not None:
-        origin[f"input.{FLEET}"] = sha256_of(prior)
+        origin[f"input.{fleet_prior.FLEET}"] = sha256_of(prior)
     pooled = None
     if springs is not None and prior is not None:
-        pooled = PooledUse("stiffness", str(prior), springs, conflict_after(springs, calibration.estimate))
+        conflict = fleet_prior.conflict_after(springs, calibration.estimate)
+        pooled = fleet_prior.PooledUse("stiffness", str(prior), springs, conflict)
     estimate = replace(calibration.estimate, provenance=origin | dict(calibration.estimate.provenance))
     result = replace(
         calibration,

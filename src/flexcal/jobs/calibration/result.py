@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -59,7 +59,6 @@ from flexcal.jobs.calibration.remarks import calibration_remarks, floor_remark, 
 from flexcal.jobs.calibration.sockets import base_remark, place_remarks, scale_document, scale_remark
 from flexcal.jobs.calibration.subsample import calibration_subsample_remark, subsample_document
 from flexcal.jobs.calibration.thermal import thermal_document
-from flexcal.jobs.fleet_prior import PooledUse
 from flexcal.jobs.inputs import REFUSED, CalibratedRobot
 from flexcal.jobs.pages import Identification
 from flexcal.jobs.result_files import (
@@ -83,6 +82,9 @@ from flexcal.report.checks import (
     misfit_sentences,
 )
 from flexcal.units import MILLIMETRE
+
+if TYPE_CHECKING:
+    from flexcal.jobs.fleet_prior import PooledUse
 
 
 @dataclass(frozen=True, eq=False, repr=False)

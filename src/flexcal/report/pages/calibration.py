@@ -16,6 +16,7 @@ from flexcal.report.layout import (
     NOTHING,
     Page,
     Section,
+    Status,
     Table,
     Text,
     Verdict,
@@ -25,7 +26,6 @@ from flexcal.report.layout import (
     sentences,
     statistics_cells,
 )
-from flexcal.report.pages.two_stage import HEADLINES
 from flexcal.report.results import IdentifiableParameters
 from flexcal.report.sections import (
     MeasuredWords,
@@ -49,6 +49,14 @@ from flexcal.report.sections import (
     uncalibrated_ranges,
     uncalibrated_rows,
 )
+
+HEADLINES: dict[Status, str] = {
+    "good": "Calibrated, and the numbers can be trusted",
+    "care": "Calibrated, with reservations: read the checks below before relying on the result",
+    "bad": "Do not rely on this calibration yet",
+    "unknown": "Calibrated; whether it can be trusted cannot be judged yet",
+}
+"""Headline of a calibration by its verdict."""
 
 
 @dataclass(frozen=True, eq=False)

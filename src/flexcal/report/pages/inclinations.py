@@ -10,7 +10,7 @@ from flexcal.calibration.verification import MILLIRADIAN, MeasuredTilts, TiltSta
 from flexcal.estimation import Estimate
 from flexcal.report.checks import Trust, inclination_checks
 from flexcal.report.layout import Fact, Page, Section, Text, Verdict, sentences, significant
-from flexcal.report.pages.two_stage import HEADLINES
+from flexcal.report.pages.calibration import HEADLINES
 from flexcal.report.results import IdentifiableParameters
 from flexcal.report.sections import (
     identifiability_blocks,

@@ -20,11 +20,11 @@ from flexcal.report.layout import (
     Check,
     ErrorRange,
     Page,
-    Status,
     Verdict,
     millimetres,
     ratio,
 )
+from flexcal.report.pages.calibration import HEADLINES
 from flexcal.report.results import TwoStageStudy
 from flexcal.report.sections import (
     common_origin,
@@ -40,14 +40,6 @@ from flexcal.report.sections import (
     uncalibrated_ranges,
     verification_section,
 )
-
-HEADLINES: dict[Status, str] = {
-    "good": "Calibrated, and the numbers can be trusted",
-    "care": "Calibrated, with reservations: read the checks below before relying on the result",
-    "bad": "Do not rely on this calibration yet",
-    "unknown": "Calibrated; whether it can be trusted cannot be judged yet",
-}
-"""Headline of a calibration by its verdict."""
 
 _ROBOTS = {
     "virtual": "simulated robot, its truth known",

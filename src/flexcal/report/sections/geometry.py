@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from flexcal.calibration.verification import CALIBRATED, NOMINAL, ArmPoses
 from flexcal.data.poses import PoseSet
 from flexcal.report.figures import arm_poses, calibration_errors, error_components, error_histogram
 from flexcal.report.layout import FigureBlock, Section, Selector, Slider, millimetres
-from flexcal.report.results import TwoStageStudy
 from flexcal.report.sections.identifiability import identifiability_blocks
 from flexcal.report.sections.measured_words import MeasuredWords
 from flexcal.report.sections.parameters import parameter_table
 from flexcal.report.sections.uncertainty_budget import budget_table
+
+if TYPE_CHECKING:
+    from flexcal.report.results import TwoStageStudy
 
 _ARROW_LENGTH = 0.25
 """Length (m) at which the largest error is drawn, about, where points are few."""
