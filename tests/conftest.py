@@ -13,6 +13,7 @@ from hypothesis import settings
 
 if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
+    from flexcal.report.layout import FigureBlock
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
@@ -37,6 +38,22 @@ def no_waiting_for_the_disk() -> Iterator[None]:
     """What a test writes need not outlast a power failure: `fsync` returns at once, in this process."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(os, "fsync", lambda handle: None)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def figures_are_plotly_s() -> Iterator[None]:
+    """Plotly knows each property of each figure of the pages that this process writes: flexcal itself does not ask it."""
+    from flexcal.report.layout import rendering
+
+    written = rendering.figure_json
+
+    def checked(block: FigureBlock) -> str:
+        block.figure.plotly()
+        return written(block)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rendering, "figure_json", checked)
         yield
 
 

@@ -109,7 +109,7 @@ def test_no_line_is_drawn_across_a_gap() -> None:
     none = np.zeros((0, 2))
     log = TorquePrediction("log", 1, time, torque, torque, 4.5, np.zeros(0), none, none)
     figure = torque_traces({"a": "N m", "b": "N m"}, {"log": log})
-    measured, fitted, unseen = (cast(Any, figure.data[k]) for k in (0, 2, 4))
+    measured, fitted, unseen = (cast(Any, figure.plotly().data[k]) for k in (0, 2, 4))
     assert [int(np.isnan(trace.y).sum()) for trace in (measured, fitted, unseen)] == [1, 1, 0]
     at = int(np.flatnonzero(np.isnan(measured.y))[0])
     assert measured.x[at - 1] == pytest.approx(1.9) and measured.x[at + 1] == pytest.approx(4.0)

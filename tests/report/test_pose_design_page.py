@@ -79,7 +79,7 @@ def test_space_shows_the_targets_in_order_and_the_box(tx90l: RobotModel, rng: np
     q = rng.uniform(-1, 1, (5, 6))
     box = np.array([[0.4, -0.3, 0.2], [0.9, 0.3, 0.8]])
     figure = plan_space(joint_origins(tx90l, q), links_at(tx90l, q[:1])[0], box, box, np.array([2.5, 0, 1]))
-    traces = {trace.name: trace for trace in figure.data}
+    traces = {trace.name: trace for trace in figure.plotly().data}
     target = traces["target"]
     there = point_kinematics(tx90l, q, jacobians=False).position
     np.testing.assert_allclose(np.stack([target.x, target.y, target.z], axis=1), there, atol=1e-6)
@@ -90,10 +90,12 @@ def test_space_shows_the_targets_in_order_and_the_box(tx90l: RobotModel, rng: np
 
 def test_joints_stand_between_their_limits(tx90l: RobotModel) -> None:
     ends = np.array([[joint.lower for joint in tx90l.joints], [joint.upper for joint in tx90l.joints]])
-    marks = [trace for trace in joint_positions(tx90l, ends).data if trace.mode == "markers"]
+    marks = [trace for trace in joint_positions(tx90l, ends).plotly().data if trace.mode == "markers"]
     np.testing.assert_allclose([trace.x for trace in marks], [[0, 1]] * 6, atol=1e-6)
 
 
 def test_the_curve_and_its_marks() -> None:
     figure = pose_numbers([1, 2], {"a": [0.2, 0.1], "b": [0.3, 0.2]}, 2, 0.15)
-    assert [trace.name for trace in figure.data] == ["a", "b"] and len(figure.layout.shapes) == 2
+    assert [trace.name for trace in figure.plotly().data] == ["a", "b"] and len(
+        figure.plotly().layout.shapes
+    ) == 2

@@ -23,7 +23,7 @@ def test_first_screen(tx90l: RobotModel) -> None:
 
 def test_path_and_arrows(tx90l: RobotModel) -> None:
     (block,) = program_page(ProgramStudy(tx90l, program_results(), np.zeros(6))).figures
-    traces = {trace.name: trace for trace in block.figure.data if trace.name}
+    traces = {trace.name: trace for trace in block.figure.plotly().data if trace.name}
     written = np.stack([traces["as written"][axis] for axis in "xyz"], axis=1)
     np.testing.assert_allclose(written[[0, 2]], [[0.5, 0, 0.3], [0.5, 0.1, 0.3]], atol=1e-6)
     assert np.isnan(written[1]).all(), "the path is cut where a target stays"

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import plotly.graph_objects as go
 
 from flexcal.calibration.accuracy import PredictedAccuracy
 from flexcal.report.figures.robot_arm import space_axes
-from flexcal.report.layout import ELASTIC, GRID, RIGID, as_float32, canvas, panels
+from flexcal.report.layout import ELASTIC, GRID, RIGID, Figure, Trace, as_float32, canvas, panels, trace
 from flexcal.units import MILLIMETRE
 
 COLOURS = [[0, GRID], [0.5, ELASTIC], [1, RIGID]]
@@ -17,7 +16,7 @@ SHOWN = 4000
 """Largest number of points drawn; of more, a regular subset."""
 
 
-def accuracy_space(accuracy: PredictedAccuracy) -> go.Figure:
+def accuracy_space(accuracy: PredictedAccuracy) -> Figure:
     """Points in the robot's base frame, coloured by the distance (mm) that 95 % of errors stay below."""
     rows = slice(None, None, max(1, -(-len(accuracy.q) // SHOWN)))
     at, error = accuracy.position[rows], accuracy.p95[rows] / MILLIMETRE
@@ -44,7 +43,7 @@ def coloured_points(
     hover: str,
     *,
     largest: float | None = None,
-) -> go.Scatter3d:
+) -> Trace:
     """Points (N, 3), m, coloured by `values` (N,) up to the `largest`; `title` is that of the colour bar, `hover` shows each as `told`."""
     bar = {"title": {"text": title, "side": "top"}, "thickness": 12, "len": 0.7, "x": 1, "xanchor": "right"}
     marker = {
@@ -54,7 +53,8 @@ def coloured_points(
         "cmin": 0.0,
         "colorbar": bar,
     } | ({} if largest is None else {"cmax": largest})
-    return go.Scatter3d(
+    return trace(
+        "scatter3d",
         x=as_float32(at[:, 0]),
         y=as_float32(at[:, 1]),
         z=as_float32(at[:, 2]),
@@ -72,7 +72,7 @@ _POINTS = 8
 _VIEWS = {"from above": (0, 1), "from the side": (0, 2), "from the front": (1, 2)}
 
 
-def accuracy_views(accuracy: PredictedAccuracy) -> go.Figure:
+def accuracy_views(accuracy: PredictedAccuracy) -> Figure:
     """For each cell of three views of the volume (base frame) the 95 % error in mm, averaged over the poses behind it."""
     cells = int(np.clip(np.sqrt(len(accuracy.q) / _POINTS), 3, _CELLS))
     titles = [f"{'xyz'[up]} / m, {view}" for view, (_, up) in _VIEWS.items()]
@@ -86,7 +86,8 @@ def accuracy_views(accuracy: PredictedAccuracy) -> go.Figure:
         mean = np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0)
         largest = max(largest, float(np.nanmax(mean)))
         figure.add_trace(
-            go.Heatmap(
+            trace(
+                "heatmap",
                 x=as_float32((x_edges[1:] + x_edges[:-1]) / 2),
                 y=as_float32((y_edges[1:] + y_edges[:-1]) / 2),
                 z=as_float32(mean.T),
@@ -106,7 +107,7 @@ def accuracy_views(accuracy: PredictedAccuracy) -> go.Figure:
     return figure
 
 
-def variance_shares(over_all: Mapping[str, float], worst: Mapping[str, float]) -> go.Figure:
+def variance_shares(over_all: Mapping[str, float], worst: Mapping[str, float]) -> Figure:
     """Shares of the variance (0 to 1) that knowing a kind of parameter would take away, over all poses and at the worst place."""
     figure = canvas(90 + 44 * len(over_all))
     for label, shares, colour in (
@@ -114,7 +115,8 @@ def variance_shares(over_all: Mapping[str, float], worst: Mapping[str, float]) -
         ("at the worst place", worst, RIGID),
     ):
         figure.add_trace(
-            go.Bar(
+            trace(
+                "bar",
                 x=[100 * share for share in shares.values()],
                 y=list(shares),
                 orientation="h",

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import plotly.graph_objects as go
-
-from flexcal.report.layout import ELASTIC, INK, NOMINAL, RIGID, as_float32, canvas
+from flexcal.report.layout import ELASTIC, INK, NOMINAL, RIGID, Figure, as_float32, canvas, trace
 
 _COLOURS = (ELASTIC, RIGID, NOMINAL, INK)
 _DASHES = ("solid", "dash", "dot", "dashdot")
 
 
-def cumulative_sums(drift: Mapping[str, Any]) -> go.Figure:
+def cumulative_sums(drift: Mapping[str, Any]) -> Figure:
     """Upward sums of every subject above zero and downward ones below, against the visits, with the limits of an alarm; `drift` as in
     results.json.
     """
@@ -27,7 +25,8 @@ def cumulative_sums(drift: Mapping[str, Any]) -> go.Figure:
         }
         for sign, key in ((1, "upward"), (-1, "downward")):
             figure.add_trace(
-                go.Scatter(
+                trace(
+                    "scatter",
                     x=visits, y=as_float32([sign * v for v in item[key]]), mode="lines+markers", name=subject, line=line,
                     marker={"size": 5}, legendgroup=subject, showlegend=sign == 1, text=drift["visits"],
                     hovertemplate="%{text}: %{y:.2f}<extra>%{fullData.name}</extra>",
@@ -40,7 +39,7 @@ def cumulative_sums(drift: Mapping[str, Any]) -> go.Figure:
     return figure
 
 
-def visit_errors(each: list[Mapping[str, Any]]) -> go.Figure:
+def visit_errors(each: list[Mapping[str, Any]]) -> Figure:
     """Distances between measured and expected points of a visit, mm, beside those expected of a robot as calibrated; items of
     `recheck.each`.
     """
@@ -51,7 +50,8 @@ def visit_errors(each: list[Mapping[str, Any]]) -> go.Figure:
         ("expected (root mean square)", "expected_mm", NOMINAL),
     ):
         figure.add_trace(
-            go.Bar(
+            trace(
+                "bar",
                 x=labels,
                 y=as_float32([item[key] for item in each]),
                 name=name,

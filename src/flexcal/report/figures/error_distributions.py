@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import plotly.graph_objects as go
 
 from flexcal.calibration.verification import CALIBRATED, NOMINAL, PredictionErrors
 from flexcal.report.figures.pose_errors import ErrorSeries
@@ -15,18 +14,18 @@ from flexcal.report.layout import (
     GRID,
     INK,
     QUIET,
+    Figure,
     as_float32,
     canvas,
     millimetre_axis,
     positive,
+    trace,
 )
 from flexcal.report.layout import NOMINAL as GREY
 from flexcal.units import MILLIMETRE
 
 
-def error_distribution(
-    series: Sequence[ErrorSeries], published: Mapping[str, tuple[float, float]]
-) -> go.Figure:
+def error_distribution(series: Sequence[ErrorSeries], published: Mapping[str, tuple[float, float]]) -> Figure:
     """Share of poses (percent) against error (mm, log scale); `published` holds points (error in m, share) by name."""
     figure = canvas(400)
     figure.add_hline(y=90, line={"color": GRID, "width": 2})
@@ -34,7 +33,8 @@ def error_distribution(
         distance = np.sort(item.millimetres)
         share = 100 * np.arange(1, len(distance) + 1) / len(distance)
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=positive(distance),
                 y=as_float32(share),
                 mode="lines",
@@ -45,7 +45,8 @@ def error_distribution(
         )
     for name, (error, share) in published.items():
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=[error * 1e3],
                 y=[100 * share],
                 mode="markers",
@@ -75,7 +76,7 @@ _PER_DECADE = 12
 _LOOK = {NOMINAL: ("as delivered", GREY), CALIBRATED: ("calibrated", ELASTIC)}
 
 
-def error_histogram(errors: Mapping[str, np.ndarray]) -> go.Figure:
+def error_histogram(errors: Mapping[str, np.ndarray]) -> Figure:
     """Share of points (percent) by distance (mm), in bins of equal ratio; `errors` (N, 3) m by model, as delivered and calibrated."""
     figure = canvas(360)
     distances = {
@@ -93,7 +94,8 @@ def error_histogram(errors: Mapping[str, np.ndarray]) -> go.Figure:
         share = 100 * count / len(distance)
         outline = np.repeat(edges, 2)[1:-1]
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=as_float32(outline), y=as_float32(np.repeat(share, 2)), mode="lines", fill="tozeroy", name=label,
                 line={"color": colour, "width": 1.5}, opacity=0.7,
                 hovertemplate="%{x:.3f} mm: %{y:.1f} % of points",
@@ -111,7 +113,7 @@ def error_histogram(errors: Mapping[str, np.ndarray]) -> go.Figure:
     return figure
 
 
-def predicted_quantiles(verification: PredictionErrors) -> go.Figure:
+def predicted_quantiles(verification: PredictionErrors) -> Figure:
     """Quantiles of the observed distance against those predicted from parameters and scatter, in millimetres.
 
     Poses with an uncertain flank are left out: the
@@ -123,13 +125,15 @@ def predicted_quantiles(verification: PredictionErrors) -> go.Figure:
     largest = 1.06 * max(float(observed.max(initial=1e-3)), float(expected.max(initial=1e-3)))
     figure = canvas(400)
     figure.add_trace(
-        go.Scatter(
+        trace(
+            "scatter",
             x=[0, largest], y=[0, largest], mode="lines", line={"color": AXIS, "width": 1.5, "dash": "dash"},
             name="prediction and observation agree", hoverinfo="skip",
         )
     )  # fmt: skip
     figure.add_trace(
-        go.Scatter(
+        trace(
+            "scatter",
             x=as_float32(expected), y=as_float32(observed), mode="markers",
             marker={"color": ELASTIC, "size": 6, "line": {"width": 0}},
             name="verification poses, sorted", hovertemplate="predicted %{x:.3f} mm<br>observed %{y:.3f} mm<extra></extra>",

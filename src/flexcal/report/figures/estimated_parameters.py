@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import plotly.graph_objects as go
 
 from flexcal.calibration.fit import TOLERANCE
 from flexcal.calibration.term_selection import TermComparison
@@ -18,11 +17,13 @@ from flexcal.report.layout import (
     PAGE,
     QUIET,
     RIGID,
+    Figure,
     as_float32,
     canvas,
     log_ticks,
     panels,
     spring_label,
+    trace,
 )
 from flexcal.units import MILLIMETRE
 
@@ -38,7 +39,7 @@ def shown_parameters(estimate: Estimate, names: Sequence[str]) -> list[str]:
     ]
 
 
-def parameter_bars(estimate: Estimate, names: Sequence[str], axis: str) -> go.Figure:
+def parameter_bars(estimate: Estimate, names: Sequence[str], axis: str) -> Figure:
     """Estimates and 95 % intervals of `shown_parameters`, over 0.3 mm, 0.5 mrad or 1 µrad/(N m) by unit; `axis` is the axis title."""
     chosen = shown_parameters(estimate, names)
     tolerance = np.array([TOLERANCE[estimate.parameters[name].unit] for name in chosen])
@@ -49,7 +50,8 @@ def parameter_bars(estimate: Estimate, names: Sequence[str], axis: str) -> go.Fi
     )
     figure = canvas(90 + 17 * len(chosen), legend=False)
     figure.add_trace(
-        go.Bar(
+        trace(
+            "bar",
             x=as_float32(value), y=chosen, orientation="h", marker={"color": ELASTIC, "opacity": 0.75},
             error_x={
                 "type": "data", "symmetric": False, "array": as_float32(ends[:, 1] - value),
@@ -75,7 +77,7 @@ def spring_intervals(
     damping: Sequence[str],
     reference: Mapping[str, float],
     word: str,
-) -> go.Figure:
+) -> Figure:
     """Estimate/reference - 1 in percent with 95 % intervals; `word` says what the reference is. Unidentifiable ones are named."""
     figure = panels(
         2, 1, 90 + 24 * (len(stiffness) + len(damping)), ["stiffness", "damping"], legend=False, row_gap=0.13
@@ -86,7 +88,8 @@ def spring_intervals(
         ends = np.array([estimate.interval(name) for name in known], dtype=float).reshape(-1, 2)
         base = np.array([reference[name] for name in known])
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=as_float32(100 * centre),
                 y=[spring_label(name) for name in known],
                 error_x={
@@ -108,7 +111,8 @@ def spring_intervals(
         for name in names:
             if name not in known:
                 figure.add_trace(
-                    go.Scatter(
+                    trace(
+                        "scatter",
                         x=[0],
                         y=[spring_label(name)],
                         mode="text",
@@ -141,7 +145,7 @@ def spring_intervals(
 _SMALLEST = 1e-17
 
 
-def singular_values(values: np.ndarray, diagonal: np.ndarray, rank: int, gap: float) -> go.Figure:
+def singular_values(values: np.ndarray, diagonal: np.ndarray, rank: int, gap: float) -> Figure:
     """Singular `values` and |`diagonal` of R| (p,) of the scaled Jacobian, relative to the largest; `rank` and `gap` marked."""
     figure = canvas(400)
     number = np.arange(1, len(values) + 1)
@@ -151,7 +155,8 @@ def singular_values(values: np.ndarray, diagonal: np.ndarray, rank: int, gap: fl
     ):
         kept = number <= rank
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=as_float32(number),
                 y=as_float32(np.maximum(sizes, _SMALLEST)),
                 mode="markers",
@@ -180,11 +185,12 @@ def singular_values(values: np.ndarray, diagonal: np.ndarray, rank: int, gap: fl
     return figure
 
 
-def correlation_map(names: Sequence[str], correlation: np.ndarray) -> go.Figure:
+def correlation_map(names: Sequence[str], correlation: np.ndarray) -> Figure:
     """Correlation (p, p) of the errors of the parameters `names`, from -1 to 1."""
     figure = canvas(620, legend=False)
     figure.add_trace(
-        go.Heatmap(
+        trace(
+            "heatmap",
             x=list(names),
             y=list(names),
             z=as_float32(correlation),
@@ -202,7 +208,7 @@ def correlation_map(names: Sequence[str], correlation: np.ndarray) -> go.Figure:
     return figure
 
 
-def term_scores(rows: Sequence[TermComparison], by: str = "folds") -> go.Figure:
+def term_scores(rows: Sequence[TermComparison], by: str = "folds") -> Figure:
     """Mean error (mm) on left-out poses by term: of whole "folds" in measuring order and in the workspace, of single "poses", or of whole
     "places" of a fixture.
     """
@@ -219,7 +225,8 @@ def term_scores(rows: Sequence[TermComparison], by: str = "folds") -> go.Figure:
         series = {"left out by place of the fixture": ([row.order for row in rows], ELASTIC)}
     for name, (values, colour) in series.items():
         figure.add_trace(
-            go.Bar(
+            trace(
+                "bar",
                 x=as_float32(np.array(values) / MILLIMETRE), y=labels, orientation="h", name=name, marker={"color": colour},
                 text=[f"{v / MILLIMETRE:.4f}" for v in values], textposition="auto", insidetextanchor="end", textangle=0,
                 insidetextfont={"size": 11, "color": PAGE}, outsidetextfont={"size": 11, "color": INK}, hovertemplate="%{y}: %{x:.4f} mm",

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import plotly.graph_objects as go
-
 from flexcal.report.layout import (
     AXIS,
     ELASTIC,
     NOMINAL,
     RIGID,
+    Figure,
     as_float32,
     canvas,
     millimetre_axis,
     panels,
     scaled,
+    trace,
 )
 from flexcal.report.results import TOLERANCE_STATES
 
@@ -28,7 +28,7 @@ _LOOK = {
 }
 
 
-def fleet_errors(robots: Sequence[Mapping[str, Any]]) -> go.Figure:
+def fleet_errors(robots: Sequence[Mapping[str, Any]]) -> Figure:
     """P90 (mm, log scale) of verified robots in the order of its size, with 95 % intervals, and their tolerances."""
     ordered = sorted(robots, key=lambda robot: robot["p90_mm"])
     figure = canvas(420)
@@ -38,7 +38,8 @@ def fleet_errors(robots: Sequence[Mapping[str, Any]]) -> go.Figure:
             continue
         shown = [ordered[k - 1] for k in places]
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=as_float32(places),
                 y=as_float32([robot["p90_mm"] for robot in shown]),
                 error_y={
@@ -58,7 +59,8 @@ def fleet_errors(robots: Sequence[Mapping[str, Any]]) -> go.Figure:
     limited = [(k, robot["tolerance_mm"]) for k, robot in enumerate(ordered, 1) if robot["tolerance_mm"]]
     if limited:
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=as_float32([k for k, _ in limited]),
                 y=as_float32([tolerance for _, tolerance in limited]),
                 mode="markers",
@@ -72,7 +74,7 @@ def fleet_errors(robots: Sequence[Mapping[str, Any]]) -> go.Figure:
     return figure
 
 
-def trend_courses(titles: Sequence[str], trends: Sequence[Mapping[str, Any]]) -> go.Figure:
+def trend_courses(titles: Sequence[str], trends: Sequence[Mapping[str, Any]]) -> Figure:
     """Small panels of values over time with 95 % intervals, and the fitted lines; `trends` as in the document of the verb."""
     columns = min(2, len(trends))
     rows = -(-len(trends) // columns)
@@ -81,7 +83,8 @@ def trend_courses(titles: Sequence[str], trends: Sequence[Mapping[str, Any]]) ->
         factor, unit = scaled(trend["unit"])
         row, column = k // columns + 1, k % columns + 1
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=list(trend["dates"]),
                 y=as_float32([factor * value for value in trend["values"]]),
                 error_y={
@@ -99,7 +102,8 @@ def trend_courses(titles: Sequence[str], trends: Sequence[Mapping[str, Any]]) ->
             column,
         )
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=[trend["first"], trend["last"]],
                 y=as_float32([factor * value for value in trend["line"]]),
                 mode="lines",

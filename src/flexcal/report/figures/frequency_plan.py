@@ -6,23 +6,33 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 
 from flexcal.data.plans import MultisinePlan
 from flexcal.model.kinematics import joint_origins
 from flexcal.model.robot import RobotModel
 from flexcal.report.figures.robot_arm import links_at, space_axes
-from flexcal.report.layout import AXIS, ELASTIC, NOMINAL, as_float32, canvas, panels, spring_label
+from flexcal.report.layout import (
+    AXIS,
+    ELASTIC,
+    NOMINAL,
+    Figure,
+    as_float32,
+    canvas,
+    panels,
+    spring_label,
+    trace,
+)
 
 
-def predicted_springs(planned: Mapping[str, float], flat: Mapping[str, float]) -> go.Figure:
+def predicted_springs(planned: Mapping[str, float], flat: Mapping[str, float]) -> Figure:
     """Predicted standard deviation (per cent, logarithmic) of every stiffness and damping, beside that with a flat spectrum."""
     stiffness = [name for name in planned if name.endswith(".stiffness")]
     figure = panels(1, 2, 90 + 34 * len(stiffness), ["stiffness", "damping"])
     for column, names in enumerate((stiffness, [n for n in planned if n not in stiffness]), start=1):
         for name, std, colour in (("flat", flat, NOMINAL), ("planned", planned, ELASTIC)):
             figure.add_trace(
-                go.Scatter(
+                trace(
+                    "scatter",
                     x=as_float32([100 * std[n] for n in names]),
                     y=[spring_label(n) for n in names],
                     name=name,
@@ -44,13 +54,14 @@ def predicted_springs(planned: Mapping[str, float], flat: Mapping[str, float]) -
     return figure
 
 
-def poses_against_std(curve: np.ndarray, planned: int) -> go.Figure:
+def poses_against_std(curve: np.ndarray, planned: int) -> Figure:
     """Largest predicted standard deviation of a stiffness (per cent) against the number of poses; `curve` (3, K): poses, chosen, random."""
     counts, chosen, random = curve
     figure = canvas(320)
     for name, values, colour in (("at random", random, NOMINAL), ("chosen one by one", chosen, ELASTIC)):
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=as_float32(counts),
                 y=as_float32(100 * values),
                 name=name,
@@ -67,14 +78,15 @@ def poses_against_std(curve: np.ndarray, planned: int) -> go.Figure:
     return figure
 
 
-def amplitude_spectrum(plan: MultisinePlan, flat: MultisinePlan) -> go.Figure:
+def amplitude_spectrum(plan: MultisinePlan, flat: MultisinePlan) -> Figure:
     """Torque (N m) of every line of each excited axis, one panel an axis."""
     axes = len(plan.joints)
     figure = panels(axes, 1, 60 + 150 * axes, [f"axis {joint + 1}" for joint in plan.joints], row_gap=0.09)
     for k in range(axes):
         for name, source, colour, width in (("flat", flat, NOMINAL, 1.6), ("planned", plan, ELASTIC, 2.0)):
             figure.add_trace(
-                go.Scatter(
+                trace(
+                    "scatter",
                     x=as_float32(source.frequencies_hz),
                     y=as_float32(source.amplitude[k]),
                     name=name,
@@ -93,13 +105,14 @@ def amplitude_spectrum(plan: MultisinePlan, flat: MultisinePlan) -> go.Figure:
     return figure
 
 
-def planned_arm(model: RobotModel, q: np.ndarray) -> go.Figure:
+def planned_arm(model: RobotModel, q: np.ndarray) -> Figure:
     """The links in the first pose, and lines from the base through every joint to the measured point at each of `q` (P, n) rad."""
     figure, arms = canvas(520), joint_origins(model, q)
     figure.add_trace(links_at(model, q[:1])[0])
     for number, corners in enumerate(arms, start=1):
         figure.add_trace(
-            go.Scatter3d(
+            trace(
+                "scatter3d",
                 x=as_float32(corners[:, 0]),
                 y=as_float32(corners[:, 1]),
                 z=as_float32(corners[:, 2]),

@@ -5,15 +5,26 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import plotly.graph_objects as go
 
-from flexcal.report.layout import ELASTIC, INK, NOMINAL, RIGID, as_float32, log_ticks, panels, positive
+from flexcal.report.layout import (
+    ELASTIC,
+    INK,
+    NOMINAL,
+    RIGID,
+    Figure,
+    Trace,
+    as_float32,
+    log_ticks,
+    panels,
+    positive,
+    trace,
+)
 from flexcal.report.results import FittedResponse, MeasuredResponse
 
 FREQUENCY_TICKS = (1, 3, 10, 30, 100, 300)
 
 
-def response_levels(responses: Sequence[MeasuredResponse], labels: Sequence[str]) -> go.Figure:
+def response_levels(responses: Sequence[MeasuredResponse], labels: Sequence[str]) -> Figure:
     """Magnitude of every element against frequency, and 1σ of its mean from noise and from nonlinear distortion (eq. 19).
 
     One pose is shown at a time: traces carry `meta = {"pose": label}`, by which the page chooses.
@@ -31,7 +42,8 @@ def response_levels(responses: Sequence[MeasuredResponse], labels: Sequence[str]
             for j in range(n):
                 for name, values, colour in curves:
                     figure.add_trace(
-                        go.Scatter(
+                        trace(
+                            "scatter",
                             x=as_float32(response.frequencies_hz),
                             y=positive(values[:, i, j]),
                             name=name,
@@ -50,7 +62,7 @@ def response_levels(responses: Sequence[MeasuredResponse], labels: Sequence[str]
     return figure
 
 
-def frequency_axes(figure: go.Figure, rows: int, columns: int) -> None:
+def frequency_axes(figure: Figure, rows: int, columns: int) -> None:
     """Logarithmic axes for magnitudes against frequency; labels on the outer panels only, one range for all."""
     figure.update_xaxes(type="log", tickvals=FREQUENCY_TICKS, showticklabels=False)
     figure.update_yaxes({"type": "log", "showticklabels": False, "matches": "y"} | log_ticks(-9, 6))
@@ -62,7 +74,7 @@ def frequency_axes(figure: go.Figure, rows: int, columns: int) -> None:
     figure.update_yaxes(title_text="rad/s² per N m", row=(rows + 1) // 2, col=1)
 
 
-def response_fit(responses: Sequence[FittedResponse], labels: Sequence[str]) -> go.Figure:
+def response_fit(responses: Sequence[FittedResponse], labels: Sequence[str]) -> Figure:
     """Magnitude of every element and phase of the diagonal ones: dots measured, lines the model, one pose shown at a time.
 
     Traces carry `meta = {"pose": label}`, by which the page chooses.
@@ -100,7 +112,7 @@ def response_fit(responses: Sequence[FittedResponse], labels: Sequence[str]) -> 
     return figure
 
 
-def sensor_fit(responses: Sequence[FittedResponse], labels: Sequence[str]) -> go.Figure:
+def sensor_fit(responses: Sequence[FittedResponse], labels: Sequence[str]) -> Figure:
     """Magnitude of the readings of every sensor on the arm (row) per torque on each motor (column): dots measured, lines the model, one
     pose shown at a time as in `response_fit`.
     """
@@ -136,13 +148,14 @@ def sensor_fit(responses: Sequence[FittedResponse], labels: Sequence[str]) -> go
     return figure
 
 
-def _trace(frequencies: np.ndarray, values: np.ndarray, kind: str, label: str) -> go.Scatter:
+def _trace(frequencies: np.ndarray, values: np.ndarray, kind: str, label: str) -> Trace:
     look = (
         {"mode": "markers", "marker": {"color": INK, "size": 3.5, "opacity": 0.55}}
         if kind == "measured"
         else {"mode": "lines", "line": {"color": ELASTIC, "width": 1.8}}
     )
-    return go.Scatter(
+    return trace(
+        "scatter",
         x=as_float32(frequencies),
         y=values,
         name="measured" if kind == "measured" else "fitted model",
@@ -160,7 +173,7 @@ def bode(
     coherence: np.ndarray,
     fits: Mapping[str, np.ndarray],
     unit: str,
-) -> go.Figure:
+) -> Figure:
     """Bode plot of one element: response (L,), its standard deviation (L,), the coherence (L,) and fitted responses (L,) by name."""
     figure = panels(3, 1, 640, ("magnitude", "phase", "coherence"), row_gap=0.08)
     x = as_float32(frequencies_hz)
@@ -172,7 +185,8 @@ def bode(
     for name, values, colour, dash in curves:
         line = {"color": colour, "width": 1.6, "dash": dash}
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=x,
                 y=positive(np.abs(values)),
                 name=name,
@@ -186,7 +200,8 @@ def bode(
         )
         phase = np.degrees(np.angle(values * np.exp(-0.5j * np.pi))) + 90.0
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=x,
                 y=as_float32(phase),
                 name=name,
@@ -200,7 +215,8 @@ def bode(
             col=1,
         )
     figure.add_trace(
-        go.Scatter(
+        trace(
+            "scatter",
             x=x,
             y=positive(std),
             name="1σ of the measured",
@@ -212,7 +228,8 @@ def bode(
         col=1,
     )
     figure.add_trace(
-        go.Scatter(
+        trace(
+            "scatter",
             x=x,
             y=as_float32(coherence),
             showlegend=False,

@@ -6,19 +6,19 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 
-from flexcal.report.layout import ELASTIC, NOMINAL, QUIET, as_float32, canvas
+from flexcal.report.layout import ELASTIC, NOMINAL, QUIET, Figure, as_float32, canvas, trace
 
 
-def learning_curves(points: Sequence[Mapping[str, Any]]) -> go.Figure:
+def learning_curves(points: Sequence[Mapping[str, Any]]) -> Figure:
     """Mean error (mm) at places left out against the number of places in the fit, a line for each number of poses in a socket."""
     figure = canvas(360)
     numbers = list(dict.fromkeys(point["poses_per_socket"] for point in points))
     for poses, colour in zip(numbers, (QUIET, NOMINAL, ELASTIC), strict=False):
         own = [point for point in points if point["poses_per_socket"] == poses]
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=[point["places"] for point in own],
                 y=as_float32(np.array([point["mean_mm"] for point in own])),
                 mode="lines+markers",

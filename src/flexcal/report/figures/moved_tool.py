@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
 
 from flexcal.calibration.comparison import GeometryChange
 from flexcal.report.figures.accuracy_map import SHOWN, coloured_points
 from flexcal.report.figures.robot_arm import space_axes
-from flexcal.report.layout import RIGID, as_float32, canvas
+from flexcal.report.layout import RIGID, Figure, as_float32, canvas, trace
 from flexcal.units import MILLIMETRE
 
 _ARROW = 0.15
 """Length of the longest arrow, relative to the extent of the points."""
 
 
-def tool_displacement(change: GeometryChange) -> go.Figure:
+def tool_displacement(change: GeometryChange) -> Figure:
     """Points in the base frame, coloured by how far they moved (mm), with exaggerated arrows that show where to."""
     rows = slice(None, None, max(1, -(-len(change.q) // SHOWN)))
     at, moved, size, std = (
@@ -28,7 +27,8 @@ def tool_displacement(change: GeometryChange) -> go.Figure:
     ends = lines.reshape(-1, 3)
     figure = canvas(560, legend=False)
     figure.add_trace(
-        go.Scatter3d(
+        trace(
+            "scatter3d",
             x=as_float32(ends[:, 0]),
             y=as_float32(ends[:, 1]),
             z=as_float32(ends[:, 2]),

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.verification import PredictionErrors
@@ -18,16 +17,18 @@ from flexcal.report.layout import (
     NOMINAL,
     QUIET,
     RIGID,
+    Figure,
     as_float32,
     canvas,
     millimetre_axis,
     panels,
     positive,
+    trace,
 )
 from flexcal.units import MILLIMETRE
 
 
-def calibration_errors(poses: PoseSet, before: np.ndarray, after: np.ndarray) -> go.Figure:
+def calibration_errors(poses: PoseSet, before: np.ndarray, after: np.ndarray) -> Figure:
     """Distances in millimetres (log scale) of the error vectors `before` and `after` (N, 3) m, against the number of the pose."""
     figure = canvas(380)
     for name, errors, colour, symbol in (
@@ -35,7 +36,8 @@ def calibration_errors(poses: PoseSet, before: np.ndarray, after: np.ndarray) ->
         ("calibrated", after, ELASTIC, "circle"),
     ):
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=as_float32(poses.pose),
                 y=positive(np.linalg.norm(errors, axis=1) / MILLIMETRE),
                 mode="markers",
@@ -49,7 +51,7 @@ def calibration_errors(poses: PoseSet, before: np.ndarray, after: np.ndarray) ->
     return figure
 
 
-def error_components(poses: PoseSet, residuals: np.ndarray) -> go.Figure:
+def error_components(poses: PoseSet, residuals: np.ndarray) -> Figure:
     """Components x, y, z of the residuals (N, 3) m in millimetres, one panel each, with the instrument's ± 2σ around them."""
     figure = panels(3, 1, 470, ["x", "y", "z"], row_gap=0.08)
     noise = 2 * poses.sigma / MILLIMETRE
@@ -57,7 +59,8 @@ def error_components(poses: PoseSet, residuals: np.ndarray) -> go.Figure:
     for k in range(3):
         for sign in (1, -1):
             figure.add_trace(
-                go.Scatter(
+                trace(
+                    "scatter",
                     x=as_float32(poses.pose),
                     y=as_float32(sign * noise[:, k]),
                     line={"width": 1.2, "dash": "dot", "color": QUIET},
@@ -71,7 +74,8 @@ def error_components(poses: PoseSet, residuals: np.ndarray) -> go.Figure:
                 col=1,
             )
         figure.add_trace(
-            go.Bar(
+            trace(
+                "bar",
                 x=as_float32(poses.pose),
                 y=as_float32(residuals[:, k] / MILLIMETRE),
                 marker={"color": ELASTIC, "line": {"width": 0}},
@@ -107,12 +111,13 @@ class ErrorSeries:
 
 def verification_errors(
     poses: PoseSet, series: Sequence[ErrorSeries], calibrated: PredictionErrors, paper: ErrorStatistics | None
-) -> go.Figure:
+) -> Figure:
     """Distances in millimetres (log scale) against the number of the pose; poses with an uncertain flank are ringed."""
     figure = canvas(420)
     for item in series:
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=as_float32(poses.pose),
                 y=positive(item.millimetres),
                 mode="markers",
@@ -125,7 +130,8 @@ def verification_errors(
     if unclear.any():
         distance = np.linalg.norm(calibrated.errors, axis=1) / MILLIMETRE
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=as_float32(poses.pose[unclear]),
                 y=positive(distance[unclear]),
                 mode="markers",
@@ -147,7 +153,7 @@ def verification_errors(
                 line = {"color": INK, "width": 1.2, "dash": dash}
                 both = as_float32(np.full(2, value / MILLIMETRE))
                 figure.add_trace(
-                    go.Scatter(x=ends, y=both, mode="lines", line=line, name=name, hoverinfo="name+y")
+                    trace("scatter", x=ends, y=both, mode="lines", line=line, name=name, hoverinfo="name+y")
                 )
     millimetre_axis(figure)
     figure.update_xaxes(title_text="verification pose")
@@ -159,7 +165,7 @@ _COLOURS = (ELASTIC, RIGID, NOMINAL, INK)
 _DASHES = ("solid", "dash", "dot")
 
 
-def pose_courses(drifting: Sequence[Mapping[str, Any]]) -> go.Figure:
+def pose_courses(drifting: Sequence[Mapping[str, Any]]) -> Figure:
     """Way of the barycentre and RP (mm) of the sets of every pose, items of `drift.each`, against time from the first set of all."""
     start = min(item["t_s"][0] for item in drifting)
     longest = max(item["t_s"][-1] for item in drifting) - start
@@ -175,7 +181,8 @@ def pose_courses(drifting: Sequence[Mapping[str, Any]]) -> go.Figure:
         }
         for row, key in enumerate(("way_mm", "rp_mm"), start=1):
             figure.add_trace(
-                go.Scatter(
+                trace(
+                    "scatter",
                     x=as_float32([(t - start) / unit for t in item["t_s"]]), y=as_float32(item[key]), mode="lines+markers",
                     name=f"pose {item['pose']}", line=line, marker={"size": 5}, legendgroup=str(k), showlegend=row == 1,
                     hovertemplate=f"%{{x:.2f}} {word}: %{{y:.4f}} mm",

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import plotly.graph_objects as go
 
 from flexcal.model.robot import RobotModel
 from flexcal.report.figures.robot_arm import polyline, space_axes
@@ -16,15 +15,18 @@ from flexcal.report.layout import (
     NOMINAL,
     QUIET,
     RIGID,
+    Figure,
+    Trace,
     as_float32,
     canvas,
     millimetre_axis,
     positive,
+    trace,
 )
 from flexcal.units import DEGREE, MILLIMETRE
 
 
-def joint_positions(model: RobotModel, q: np.ndarray) -> go.Figure:
+def joint_positions(model: RobotModel, q: np.ndarray) -> Figure:
     """One row a joint of the positions `q` (N, n), from its lower limit at the left to the upper at the right."""
     figure = canvas(90 + 44 * model.n, legend=False)
     for i, joint in enumerate(model.motor_joints):
@@ -34,14 +36,16 @@ def joint_positions(model: RobotModel, q: np.ndarray) -> go.Figure:
             ends = [min(-np.pi, float(q[:, i].min())), max(np.pi, float(q[:, i].max()))]
         share = (q[:, i] - ends[0]) / (ends[1] - ends[0])
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=[0, 1], y=[joint.name] * 2, mode="lines+text", cliponaxis=False, line={"color": AXIS, "width": 2},
                 text=[f"{end / unit:.0f} {name}".replace("-", "−") for end in ends], textposition=["middle left", "middle right"],
                 hoverinfo="skip",
             )
         )  # fmt: skip
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=as_float32(share), y=[joint.name] * len(q), mode="markers",
                 marker={"color": ELASTIC, "size": 14, "symbol": "line-ns-open", "line": {"width": 1.5, "color": ELASTIC}},
                 text=[f"pose {k}: {value / unit:.1f} {name}" for k, value in enumerate(q[:, i], 1)],
@@ -61,12 +65,13 @@ _NUMBERS = [m * 10**e for e in range(5) for m in (1, 2, 5)]
 
 def pose_numbers(
     numbers: Sequence[int], errors: Mapping[str, Sequence[float]], plan: int, desired_error: float | None
-) -> go.Figure:
+) -> Figure:
     """Named `errors` (mm) against the `numbers` of poses, both logarithmic, with the number of the `plan` and the `desired_error`."""
     figure = canvas(400)
     for colour, (name, values) in zip(_COLOURS, errors.items(), strict=False):
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=as_float32(numbers), y=positive(np.asarray(values)), mode="lines+markers", name=name,
                 line={"color": colour, "width": 2}, marker={"size": 5, "color": colour},
                 hovertemplate="%{x} poses: %{y:.4f} mm",
@@ -87,11 +92,11 @@ _EDGES = np.array(
 
 def plan_space(
     corners: np.ndarray,
-    links: go.Mesh3d,
+    links: Trace,
     working: np.ndarray | None,
     box: np.ndarray | None,
     station: np.ndarray | None,
-) -> go.Figure:
+) -> Figure:
     """Skeletons `corners` (N, K, 3), the `links` in one pose, the target's path, `working` points (W, 3), their `box` (2, 3), the
     instrument (3,); all in m."""
     figure = canvas(620)
@@ -112,8 +117,9 @@ def plan_space(
     return figure
 
 
-def _points(places: np.ndarray, name: str, colour: str, size: float, labels: list[str]) -> go.Scatter3d:
-    return go.Scatter3d(
+def _points(places: np.ndarray, name: str, colour: str, size: float, labels: list[str]) -> Trace:
+    return trace(
+        "scatter3d",
         x=as_float32(places[:, 0]), y=as_float32(places[:, 1]), z=as_float32(places[:, 2]), mode="markers", name=name,
         marker={"size": size, "color": colour}, text=labels, hovertemplate="%{text}<extra></extra>",
         hoverinfo=None if labels[0] else "skip",

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import plotly.graph_objects as go
 
 from flexcal.calibration.diagnostics import GravityLoads
 from flexcal.calibration.verification import CALIBRATED, RIGID
 from flexcal.data.poses import PoseSet
 from flexcal.report.figures.robot_arm import space_axes
-from flexcal.report.layout import AXIS, ELASTIC, GRID, INK, NOMINAL, as_float32, canvas, panels
+from flexcal.report.layout import AXIS, ELASTIC, GRID, INK, NOMINAL, Figure, as_float32, canvas, panels, trace
 from flexcal.report.layout import RIGID as RIGID_COLOUR
 from flexcal.units import DEGREE, MILLIMETRE
 
@@ -19,7 +18,7 @@ _BINS = 12
 _COLUMNS = 3
 
 
-def residual_joints(joints: Mapping[str, str], poses: PoseSet, residuals: np.ndarray) -> go.Figure:
+def residual_joints(joints: Mapping[str, str], poses: PoseSet, residuals: np.ndarray) -> Figure:
     """Distance (mm) of residuals (N, 3) m against each joint (degrees, or mm where prismatic), and its mean in twelve bins.
 
     `joints` are kinds (revolute, prismatic) by name.
@@ -32,7 +31,8 @@ def residual_joints(joints: Mapping[str, str], poses: PoseSet, residuals: np.nda
         revolute = kind == "revolute"
         q = poses.q[:, i] / (DEGREE if revolute else MILLIMETRE)
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=as_float32(q), y=as_float32(distance), mode="markers", name="error", legendgroup="a", showlegend=i == 0,
                 marker={"color": ELASTIC, "size": 3.5, "opacity": 0.45},
                 hovertemplate="%{x:.1f}: %{y:.3f} mm",
@@ -40,7 +40,8 @@ def residual_joints(joints: Mapping[str, str], poses: PoseSet, residuals: np.nda
         )  # fmt: skip
         centres, means = _binned(q, distance)
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=as_float32(centres), y=as_float32(means), mode="lines+markers", name="mean", legendgroup="b", showlegend=i == 0,
                 line={"color": INK, "width": 1.6}, marker={"size": 4}, hoverinfo="skip",
             ), row=row, col=column,
@@ -72,7 +73,7 @@ def loaded_joints(joints: Mapping[str, str], loads: GravityLoads) -> list[int]:
     return [i for i, kind in enumerate(joints.values()) if kind == "revolute" and spread[i] > clear]
 
 
-def residual_torque(joints: Mapping[str, str], loads: GravityLoads) -> go.Figure:
+def residual_torque(joints: Mapping[str, str], loads: GravityLoads) -> Figure:
     """Residual (mm) along the motion of the point by each loaded joint against its gravity torque (N m), with fitted lines by model."""
     chosen, names = loaded_joints(joints, loads), list(joints)
     count = -(-len(chosen) // _TORQUE_COLUMNS)
@@ -91,7 +92,8 @@ def residual_torque(joints: Mapping[str, str], loads: GravityLoads) -> go.Figure
                 continue
             along = loads.along[model][:, i] / MILLIMETRE
             figure.add_trace(
-                go.Scatter(
+                trace(
+                    "scatter",
                     x=as_float32(torque), y=as_float32(along), mode="markers", name=label, legendgroup=model, showlegend=k == 0,
                     marker={"color": colour, "size": 3.5, "opacity": 0.5}, hovertemplate="%{x:.2f} N m: %{y:+.3f} mm",
                 ), row=row, col=column,
@@ -99,7 +101,8 @@ def residual_torque(joints: Mapping[str, str], loads: GravityLoads) -> go.Figure
             slope, start = np.polyfit(torque - torque.mean(), along, 1)
             ends = np.array([torque.min(), torque.max()])
             figure.add_trace(
-                go.Scatter(
+                trace(
+                    "scatter",
                     x=as_float32(ends), y=as_float32(start + slope * (ends - torque.mean())), mode="lines", legendgroup=model,
                     showlegend=False, line={"color": colour, "width": 2}, hoverinfo="skip",
                 ), row=row, col=column,
@@ -117,7 +120,7 @@ _WINDOW = 25
 
 def residual_trend(
     values: np.ndarray, residuals: np.ndarray, title: str, label: str = "measured minus predicted"
-) -> go.Figure:
+) -> Figure:
     """Components x, y, z (mm) of residuals (N, 3) m, what the `label` says, against `values` (N,), with a running mean of 25 neighbours."""
     figure = panels(3, 1, 500, ["x", "y", "z"], row_gap=0.08)
     order = np.argsort(values, kind="stable")
@@ -128,14 +131,16 @@ def residual_trend(
     for k in range(3):
         components = residuals[:, k] / MILLIMETRE
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=as_float32(values), y=as_float32(components), mode="markers", name=label,
                 marker={"color": ELASTIC, "size": 4, "opacity": 0.6}, legendgroup="a", showlegend=k == 0,
                 hovertemplate="%{x}: %{y:+.3f} mm",
             ), row=k + 1, col=1,
         )  # fmt: skip
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=as_float32(np.convolve(values, kernel, mode="valid")), y=as_float32(np.convolve(components, kernel, mode="valid")),
                 mode="lines", name=f"mean of {window} neighbours",
                 line={"color": INK, "width": 1.6}, legendgroup="b", showlegend=k == 0, hoverinfo="skip",
@@ -148,12 +153,13 @@ def residual_trend(
     return figure
 
 
-def residual_workspace(pose: np.ndarray, position: np.ndarray, residuals: np.ndarray) -> go.Figure:
+def residual_workspace(pose: np.ndarray, position: np.ndarray, residuals: np.ndarray) -> Figure:
     """Points (N, 3) m of poses with numbers (N,), coloured by the distance (mm) of residuals (N, 3) m."""
     figure = canvas(560, legend=False)
     distance = np.linalg.norm(residuals, axis=1) / MILLIMETRE
     figure.add_trace(
-        go.Scatter3d(
+        trace(
+            "scatter3d",
             x=as_float32(position[:, 0]),
             y=as_float32(position[:, 1]),
             z=as_float32(position[:, 2]),
@@ -180,7 +186,7 @@ _SHOWN = 0.998
 """Quantile of the sizes spanned by the axis, so that outliers do not compress the rest."""
 
 
-def error_field(position: np.ndarray, residuals: np.ndarray) -> go.Figure:
+def error_field(position: np.ndarray, residuals: np.ndarray) -> Figure:
     """Components (mm) of residuals (N, 3) m against the coordinates (m) of the points (N, 3), with means in ten bins of equal count.
 
     Rows are components of the error, columns coordinates of the point, both in the instrument's frame.
@@ -193,7 +199,8 @@ def error_field(position: np.ndarray, residuals: np.ndarray) -> go.Figure:
             first = component == 0 and axis == 0
             error = residuals[:, component] / MILLIMETRE
             figure.add_trace(
-                go.Scatter(
+                trace(
+                    "scatter",
                     x=as_float32(position[:, axis]), y=as_float32(error), mode="markers", name="error", legendgroup="error",
                     showlegend=first, marker={"color": ELASTIC, "size": 3.5, "opacity": 0.4},
                     hovertemplate=f"{along} %{{x:.3f}} m: %{{y:+.3f}} mm in {name}",
@@ -201,7 +208,8 @@ def error_field(position: np.ndarray, residuals: np.ndarray) -> go.Figure:
             )  # fmt: skip
             centres, means = _means(position[:, axis], error)
             figure.add_trace(
-                go.Scatter(
+                trace(
+                    "scatter",
                     x=as_float32(centres), y=as_float32(means), mode="lines+markers", name="mean", legendgroup="mean",
                     showlegend=first, line={"color": INK, "width": 1.6}, marker={"size": 4}, hoverinfo="skip",
                 ), row=row, col=column,

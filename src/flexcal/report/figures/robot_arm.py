@@ -6,12 +6,23 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 
 from flexcal.calibration.verification import CALIBRATED, ArmPoses
 from flexcal.model.kinematics import LinkSurface
 from flexcal.model.robot import RobotModel
-from flexcal.report.layout import ELASTIC, GRID, LINKS, NOMINAL, QUIET, RIGID, as_float32, canvas
+from flexcal.report.layout import (
+    ELASTIC,
+    GRID,
+    LINKS,
+    NOMINAL,
+    QUIET,
+    RIGID,
+    Figure,
+    Trace,
+    as_float32,
+    canvas,
+    trace,
+)
 from flexcal.units import MILLIMETRE
 
 _FAINT = 0.25
@@ -21,7 +32,7 @@ _HEAD = 0.35
 """Length of an arrow's head relative to that of the arrow."""
 
 
-def arm_poses(arms: ArmPoses, labels: Mapping[str, str], factors: Mapping[str, float]) -> go.Figure:
+def arm_poses(arms: ArmPoses, labels: Mapping[str, str], factors: Mapping[str, float]) -> Figure:
     """The links in a few poses, the arm as lines in others, and at each measured point an error vector.
 
     `labels` are the words for the models of `arms.errors`, `factors` how many times longer than they are their arrows are drawn. The
@@ -36,7 +47,8 @@ def arm_poses(arms: ArmPoses, labels: Mapping[str, str], factors: Mapping[str, f
         )
     tips = arms.tip
     figure.add_trace(
-        go.Scatter3d(
+        trace(
+            "scatter3d",
             x=as_float32(tips[:, 0]), y=as_float32(tips[:, 1]), z=as_float32(tips[:, 2]),
             mode="markers", marker={"size": 2.5, "color": NOMINAL}, name="measured point",
             text=[f"pose {k}" for k in arms.pose], hovertemplate="%{text}<extra></extra>",
@@ -47,9 +59,9 @@ def arm_poses(arms: ArmPoses, labels: Mapping[str, str], factors: Mapping[str, f
         colour = ELASTIC if model == CALIBRATED else RIGID
         sizes = np.linalg.norm(vectors, axis=1) / MILLIMETRE
         texts = [f"pose {k}: {size:.3f} mm" for k, size in zip(arms.pose, sizes, strict=True)]
-        for trace in arrows(tips, factor * vectors, "error", colour, texts):
+        for part in arrows(tips, factor * vectors, "error", colour, texts):
             figure.add_trace(
-                trace.update({"meta": {"arrows": label, "exaggeration": factor}, "visible": number == 0})
+                part | {"meta": {"arrows": label, "exaggeration": factor}, "visible": number == 0}
             )
     figure.update_layout(scene=space_axes(), margin={"l": 0, "r": 0, "t": 40, "b": 0})
     return figure
@@ -57,10 +69,11 @@ def arm_poses(arms: ArmPoses, labels: Mapping[str, str], factors: Mapping[str, f
 
 def arrows(
     tips: np.ndarray, vectors: np.ndarray, name: str, colour: str, texts: Sequence[str]
-) -> tuple[go.Scatter3d, go.Cone]:
+) -> tuple[Trace, Trace]:
     """Arrows `vectors` (N, 3) from `tips` (N, 3), m, as lines and heads with a text each."""
     ends = tips + vectors
-    heads = go.Cone(
+    heads = trace(
+        "cone",
         x=as_float32(ends[:, 0]), y=as_float32(ends[:, 1]), z=as_float32(ends[:, 2]),
         u=as_float32(vectors[:, 0]), v=as_float32(vectors[:, 1]), w=as_float32(vectors[:, 2]),
         anchor="tip", sizemode="raw", sizeref=_HEAD, showscale=False, colorscale=[[0, colour], [1, colour]],
@@ -88,10 +101,11 @@ def space_axes() -> dict[str, Any]:
     }
 
 
-def polyline(corners: np.ndarray, name: str, colour: str, width: float, opacity: float = 1.0) -> go.Scatter3d:
+def polyline(corners: np.ndarray, name: str, colour: str, width: float, opacity: float = 1.0) -> Trace:
     """Several lines (lines, corners, 3) as one trace, parted by gaps."""
     parted = np.concatenate([corners, np.full((len(corners), 1, 3), np.nan)], axis=1).reshape(-1, 3)
-    return go.Scatter3d(
+    return trace(
+        "scatter3d",
         x=as_float32(parted[:, 0]),
         y=as_float32(parted[:, 1]),
         z=as_float32(parted[:, 2]),
@@ -103,10 +117,11 @@ def polyline(corners: np.ndarray, name: str, colour: str, width: float, opacity:
     )
 
 
-def link_mesh(vertices: np.ndarray, triangles: np.ndarray, opacity: float, *, legend: bool) -> go.Mesh3d:
+def link_mesh(vertices: np.ndarray, triangles: np.ndarray, opacity: float, *, legend: bool) -> Trace:
     """The links of the arm (V, 3), (F, 3) as one shaded trace."""
     numbers = triangles.astype(np.int32)
-    return go.Mesh3d(
+    return trace(
+        "mesh3d",
         x=as_float32(vertices[:, 0]), y=as_float32(vertices[:, 1]), z=as_float32(vertices[:, 2]),
         i=numbers[:, 0], j=numbers[:, 1], k=numbers[:, 2],
         color=LINKS, opacity=opacity, flatshading=True, name="links", showlegend=legend, hoverinfo="skip",
@@ -115,7 +130,7 @@ def link_mesh(vertices: np.ndarray, triangles: np.ndarray, opacity: float, *, le
     )  # fmt: skip
 
 
-def links_at(model: RobotModel, q: np.ndarray) -> list[go.Mesh3d]:
+def links_at(model: RobotModel, q: np.ndarray) -> list[Trace]:
     """The links of a robot at joint positions `q` (P, n), one shaded trace a pose."""
     surface = LinkSurface.of(model)
     return [link_mesh(vertices, surface.triangles, 1.0, legend=True) for vertices in surface.at(model, q)]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import plotly.graph_objects as go
 
 from flexcal.report.layout import (
     AXIS,
@@ -13,16 +12,18 @@ from flexcal.report.layout import (
     NOMINAL,
     QUIET,
     RIGID,
+    Figure,
     as_float32,
     canvas,
     millimetre_axis,
+    trace,
 )
 
 _DRAWN = 400
 """Points of a curve at most."""
 
 
-def task_distribution(errors: Mapping[str, np.ndarray]) -> go.Figure:
+def task_distribution(errors: Mapping[str, np.ndarray]) -> Figure:
     """Share of tasks (percent) whose error, mm, is at most that of the axis, by kind of error."""
     figure = canvas(380)
     for (name, values), colour in zip(errors.items(), _colours(len(errors)), strict=True):
@@ -31,7 +32,8 @@ def task_distribution(errors: Mapping[str, np.ndarray]) -> go.Figure:
             continue
         shares = np.linspace(0, 1, min(_DRAWN, len(ordered)))
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=as_float32(np.quantile(ordered, shares)), y=as_float32(100 * shares), mode="lines", name=name,
                 line={"color": colour, "width": 2.5},
                 hovertemplate="%{y:.0f} % of tasks within %{x:.3f} mm<extra>%{fullData.name}</extra>",
@@ -42,7 +44,7 @@ def task_distribution(errors: Mapping[str, np.ndarray]) -> go.Figure:
     return figure
 
 
-def level_distributions(levels: Sequence[tuple[str, np.ndarray]]) -> go.Figure:
+def level_distributions(levels: Sequence[tuple[str, np.ndarray]]) -> Figure:
     """Boxes of the errors, mm, of the tasks with each value of an option: quartiles, and whiskers at 2.5 and 97.5 %."""
     figure = canvas(320, legend=False)
     for name, values in levels:
@@ -51,7 +53,8 @@ def level_distributions(levels: Sequence[tuple[str, np.ndarray]]) -> go.Figure:
             continue
         low, first, middle, third, high = np.quantile(own, [0.025, 0.25, 0.5, 0.75, 0.975])
         figure.add_trace(
-            go.Box(
+            trace(
+                "box",
                 x=[name], lowerfence=[low], q1=[first], median=[middle], q3=[third], upperfence=[high],
                 line={"color": ELASTIC, "width": 1.5}, fillcolor="rgba(0,0,0,0)", name=name,
             )
@@ -61,14 +64,13 @@ def level_distributions(levels: Sequence[tuple[str, np.ndarray]]) -> go.Figure:
     return figure
 
 
-def interval_coverage(
-    names: Sequence[str], share: np.ndarray, low: np.ndarray, high: np.ndarray
-) -> go.Figure:
+def interval_coverage(names: Sequence[str], share: np.ndarray, low: np.ndarray, high: np.ndarray) -> Figure:
     """Coverage (percent) of the 95 % intervals of every parameter, with the intervals of these shares, and the promised 95 %."""
     figure = canvas(60 + 16 * len(names), legend=False)
     places = np.arange(len(names))
     figure.add_trace(
-        go.Scatter(
+        trace(
+            "scatter",
             x=as_float32(100 * share), y=places, mode="markers", marker={"color": ELASTIC, "size": 7},
             error_x={
                 "type": "data", "symmetric": False, "array": as_float32(100 * (high - share)),

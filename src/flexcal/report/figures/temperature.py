@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import plotly.graph_objects as go
 
-from flexcal.report.layout import ELASTIC, INK, as_float32, panels
+from flexcal.report.layout import ELASTIC, INK, Figure, as_float32, panels, trace
 from flexcal.units import MILLIMETRE
 
 
-def residual_growth(temperature: np.ndarray, outward: Mapping[str, np.ndarray]) -> go.Figure:
+def residual_growth(temperature: np.ndarray, outward: Mapping[str, np.ndarray]) -> Figure:
     """Residuals (N,), m, in the direction away from the base, of several models by label, against temperatures (N,), with lines."""
     figure = panels(len(outward), 1, 60 + 190 * len(outward), list(outward), row_gap=0.12)
     ends = np.array([temperature.min(), temperature.max()])
@@ -19,13 +18,15 @@ def residual_growth(temperature: np.ndarray, outward: Mapping[str, np.ndarray]) 
     for row, own in enumerate(outward.values(), 1):
         slope, start = np.polyfit(temperature, own / MILLIMETRE, 1)
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=as_float32(temperature), y=as_float32(own / MILLIMETRE), mode="markers", name="residual", showlegend=row == 1,
                 legendgroup="a", marker={"color": ELASTIC, "size": 4, "opacity": 0.6}, hovertemplate="%{x:.1f} °C: %{y:+.3f} mm",
             ), row=row, col=1,
         )  # fmt: skip
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=as_float32(ends), y=as_float32(start + slope * ends), mode="lines", name="fitted line", showlegend=row == 1,
                 legendgroup="b", line={"color": INK, "width": 1.6}, hoverinfo="skip",
             ), row=row, col=1,

@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import plotly.graph_objects as go
 
 from flexcal.calibration.verification import MILLIRADIAN, MeasuredTilts
-from flexcal.report.layout import ELASTIC, INK, NOMINAL, RIGID, as_float32, panels
+from flexcal.report.layout import ELASTIC, INK, NOMINAL, RIGID, Figure, as_float32, panels, trace
 from flexcal.units import DEGREE, MILLIMETRE
 
 _COLUMNS = 3
 _COLOURS = (ELASTIC, RIGID, INK)
 
 
-def tilt_order(tilts: MeasuredTilts) -> go.Figure:
+def tilt_order(tilts: MeasuredTilts) -> Figure:
     """Measured minus predicted readings (mrad) in measuring order, one panel an inclinometer, before and as calibrated."""
     sensors = tilts.sensors
     figure = panels(
@@ -33,7 +32,7 @@ def tilt_order(tilts: MeasuredTilts) -> go.Figure:
     return figure
 
 
-def tilt_joints(joints: Mapping[str, str], tilts: MeasuredTilts) -> go.Figure:
+def tilt_joints(joints: Mapping[str, str], tilts: MeasuredTilts) -> Figure:
     """Measured minus predicted readings (mrad) of the calibrated robot against each joint (degrees, or mm where prismatic)."""
     rows = -(-len(joints) // _COLUMNS)
     figure = panels(rows, _COLUMNS, 230 * rows + 70, list(joints), row_gap=0.3 / rows)
@@ -56,16 +55,15 @@ def tilt_joints(joints: Mapping[str, str], tilts: MeasuredTilts) -> go.Figure:
     return figure
 
 
-def _axes(
-    figure: go.Figure, x: np.ndarray, errors: np.ndarray, row: int, column: int, *, legend: bool
-) -> None:
+def _axes(figure: Figure, x: np.ndarray, errors: np.ndarray, row: int, column: int, *, legend: bool) -> None:
     """Markers of every axis that was read."""
     figure.update_yaxes(zeroline=True, zerolinecolor=NOMINAL, row=row, col=column)
     for k, axis in enumerate("xyz"):
         read = np.isfinite(errors[:, k])
         if read.any():
             figure.add_trace(
-                go.Scatter(
+                trace(
+                    "scatter",
                     x=as_float32(x[read]), y=as_float32(errors[read, k] / MILLIRADIAN), mode="markers", name=f"axis {axis}",
                     legendgroup=axis, showlegend=legend, marker={"color": _COLOURS[k], "size": 4, "opacity": 0.7},
                     hovertemplate="%{x:.1f}: %{y:+.3f} mrad",

@@ -5,21 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import plotly.graph_objects as go
 
 from flexcal.report.figures.robot_arm import arrows, polyline, space_axes
-from flexcal.report.layout import ELASTIC, NOMINAL, RIGID, as_float32, canvas
+from flexcal.report.layout import ELASTIC, NOMINAL, RIGID, Figure, Trace, as_float32, canvas, trace
 from flexcal.units import MILLIMETRE
 
 
 def program_path(
-    links: go.Mesh3d,
+    links: Trace,
     nominal: np.ndarray,
     corrected: np.ndarray,
     lines: Sequence[int],
     label: str,
     factor: float,
-) -> go.Figure:
+) -> Figure:
     """Paths `nominal` and `corrected` (N, 3), m, NaN where there is none, and arrows from one to the other, `factor` times longer.
 
     The `lines` of the program name the targets. The arrows carry `meta = {"arrows": label, "exaggeration": factor}`, by which the page
@@ -34,13 +33,14 @@ def program_path(
     sizes = np.linalg.norm(shift, axis=1) / MILLIMETRE
     texts = [f"line {lines[k]}: {size:.3f} mm" for k, size in zip(known.tolist(), sizes, strict=True)]
     figure.add_trace(
-        go.Scatter3d(
+        trace(
+            "scatter3d",
             x=as_float32(at[:, 0]), y=as_float32(at[:, 1]), z=as_float32(at[:, 2]), mode="markers", name="target",
             marker={"size": 3, "color": NOMINAL}, text=texts, hovertemplate="%{text}<extra></extra>",
         )
     )  # fmt: skip
-    for trace in arrows(at, factor * shift, "shift", RIGID, texts):
-        figure.add_trace(trace.update({"meta": {"arrows": label, "exaggeration": factor}}))
+    for part in arrows(at, factor * shift, "shift", RIGID, texts):
+        figure.add_trace(part | {"meta": {"arrows": label, "exaggeration": factor}})
     scene = space_axes()
     drawn = np.concatenate(
         [at, at + factor * shift, np.stack([np.asarray(links[axis]) for axis in "xyz"], axis=1)]

@@ -5,16 +5,25 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import plotly.graph_objects as go
 
 from flexcal.dynamics.diagnostics import TorquePrediction
-from flexcal.report.layout import ELASTIC, NOMINAL, RIGID, as_float32, log_ticks, panels, positive
+from flexcal.report.layout import (
+    ELASTIC,
+    NOMINAL,
+    RIGID,
+    Figure,
+    as_float32,
+    log_ticks,
+    panels,
+    positive,
+    trace,
+)
 
 _APART = 1.5
 """Steps between rows above which there is a gap."""
 
 
-def torque_traces(units: Mapping[str, str], logs: Mapping[str, TorquePrediction]) -> go.Figure:
+def torque_traces(units: Mapping[str, str], logs: Mapping[str, TorquePrediction]) -> Figure:
     """Measured and predicted torque of every joint against time (s), one log shown at a time; `units` are N m, or N, by joint.
 
     What the fit never saw is predicted in a colour of its own; lines end at
@@ -35,7 +44,8 @@ def torque_traces(units: Mapping[str, str], logs: Mapping[str, TorquePrediction]
             time, values = _interrupted(log.time[part], torque[part])
             for joint, unit in enumerate(units.values()):
                 figure.add_trace(
-                    go.Scatter(
+                    trace(
+                        "scatter",
                         x=as_float32(time),
                         y=as_float32(values[:, joint]),
                         name=kind,
@@ -79,7 +89,7 @@ def axis_title(units: Mapping[str, str]) -> str:
 _COLUMNS = 3
 
 
-def torque_spectra(units: Mapping[str, str], logs: Mapping[str, TorquePrediction]) -> go.Figure:
+def torque_spectra(units: Mapping[str, str], logs: Mapping[str, TorquePrediction]) -> Figure:
     """Amplitude density of the measured torque and of the residual of every joint, one log shown at a time.
 
     `units` are N m, or N, by joint; densities are these per √Hz.
@@ -96,7 +106,8 @@ def torque_spectra(units: Mapping[str, str], logs: Mapping[str, TorquePrediction
         for kind, density, colour in curves:
             for joint, unit in enumerate(units.values()):
                 figure.add_trace(
-                    go.Scatter(
+                    trace(
+                        "scatter",
                         x=as_float32(log.frequencies_hz),
                         y=positive(np.sqrt(density[:, joint])),
                         name=kind,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import plotly.graph_objects as go
 
 from flexcal.report.figures.robot_arm import space_axes
 from flexcal.report.layout import (
@@ -14,11 +13,14 @@ from flexcal.report.layout import (
     INK,
     NOMINAL,
     RIGID,
+    Figure,
+    Trace,
     as_float32,
     canvas,
     log_ticks,
     panels,
     positive,
+    trace,
 )
 
 _DASHES = ("solid", "dot", "dash", "dashdot")
@@ -27,7 +29,7 @@ _COLOURS = (ELASTIC, RIGID, NOMINAL, INK)
 
 def limit_shares(
     time: np.ndarray, joints: Sequence[str], motions: Mapping[str, Mapping[str, np.ndarray]]
-) -> go.Figure:
+) -> Figure:
     """Shares (N, n) of the limits against time (N,), s, one panel a quantity, one motion shown at a time.
 
     Traces carry `meta = {"trajectory": label}`, by which the page chooses. Lines at ±100 % are the limits.
@@ -38,7 +40,8 @@ def limit_shares(
         for row, quantity in enumerate(quantities, start=1):
             for joint, name in enumerate(joints):
                 figure.add_trace(
-                    go.Scatter(
+                    trace(
+                        "scatter",
                         x=as_float32(time),
                         y=as_float32(100 * shares[quantity][:, joint]),
                         name=name,
@@ -66,12 +69,13 @@ def limit_shares(
     return figure
 
 
-def prior_gains(names: Sequence[str], after: np.ndarray) -> go.Figure:
+def prior_gains(names: Sequence[str], after: np.ndarray) -> Figure:
     """Standard deviation (p,) after the measurements relative to that before, logarithmic; the lower, the more was learned."""
     order = np.argsort(after)[::-1]
     figure = canvas(80 + 17 * len(names), legend=False)
     figure.add_trace(
-        go.Scatter(
+        trace(
+            "scatter",
             x=positive(after[order]),
             y=[names[k] for k in order],
             mode="markers",
@@ -88,7 +92,7 @@ def prior_gains(names: Sequence[str], after: np.ndarray) -> go.Figure:
 _ARMS = 6
 
 
-def swept_paths(chains: Mapping[str, np.ndarray], links: Mapping[str, go.Mesh3d]) -> go.Figure:
+def swept_paths(chains: Mapping[str, np.ndarray], links: Mapping[str, Trace]) -> Figure:
     """Path of the arm's last corner in each motion, from corners (N, corners, 3), m, and the `links` at its beginning, one motion shown
     at a time.
 
@@ -100,13 +104,13 @@ def swept_paths(chains: Mapping[str, np.ndarray], links: Mapping[str, go.Mesh3d]
         path = np.concatenate([corners[:, -1], corners[:1, -1]])
         arms = corners[:: max(1, len(corners) // _ARMS)]
         parted = np.concatenate([arms, np.full((len(arms), 1, 3), np.nan)], axis=1).reshape(-1, 3)
-        figure.add_trace(links[label].update(meta=shown["meta"], visible=shown["visible"]))
+        figure.add_trace(links[label] | {"meta": shown["meta"], "visible": shown["visible"]})
         for points, name, colour, width in (
             (parted, "the arm on its path", NOMINAL, 3.0),
             (path, "path of the point", ELASTIC, 4.0),
         ):
             x, y, z = (as_float32(points[:, axis]) for axis in range(3))
             line = {"color": colour, "width": width}
-            figure.add_trace(go.Scatter3d(x=x, y=y, z=z, mode="lines", name=name, line=line, **shown))
+            figure.add_trace(trace("scatter3d", x=x, y=y, z=z, mode="lines", name=name, line=line, **shown))
     figure.update_layout(scene=space_axes(), margin={"l": 0, "r": 0, "t": 40, "b": 0})
     return figure

@@ -16,6 +16,7 @@ from .blocks import (
     tally,
     worst,
 )
+from .figure import Figure, Trace, trace
 from .figure_style import as_float32, canvas, log_ticks, millimetre_axis, panels, positive
 from .notation import (
     NOTHING,
@@ -53,6 +54,7 @@ __all__ = [
     "Check",
     "ErrorRange",
     "Fact",
+    "Figure",
     "FigureBlock",
     "Page",
     "Section",
@@ -61,6 +63,7 @@ __all__ = [
     "Status",
     "Table",
     "Text",
+    "Trace",
     "Verdict",
     "as_float32",
     "canvas",
@@ -84,6 +87,7 @@ __all__ = [
     "tally",
     "templates",
     "to_half_width",
+    "trace",
     "worst",
     "write_page",
 ]

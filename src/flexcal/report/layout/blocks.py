@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
-if TYPE_CHECKING:
-    import plotly.graph_objects as go
+from flexcal.report.layout.figure import Figure
 
 Status = Literal["good", "care", "bad", "unknown"]
 """A judgement; "unknown" where the data do not allow one, which counts neither way."""
@@ -133,7 +132,7 @@ class FigureBlock:
 
     id: str
     title: str
-    figure: go.Figure
+    figure: Figure
     caption: str
     description: str
     selectors: tuple[Selector, ...] = ()

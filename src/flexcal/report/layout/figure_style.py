@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
+from flexcal.report.layout.figure import Figure
 from flexcal.report.layout.palette import AXIS, GRID, INK, PAGE, QUIET
 
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', sans-serif"
 
 
-def canvas(height: int, *, legend: bool = True) -> go.Figure:
+def canvas(height: int, *, legend: bool = True) -> Figure:
     """An empty figure in the report's look; `height` in pixels."""
-    return _styled(go.Figure(), height, legend)
+    return _styled(Figure(), height, legend)
 
 
 def panels(
@@ -27,15 +26,23 @@ def panels(
     legend: bool = True,
     row_gap: float | None = None,
     column_gap: float = 0.045,
-) -> go.Figure:
+) -> Figure:
     """A grid of small panels with one title each, in the report's look; gaps are shares of the figure."""
-    figure = make_subplots(
-        rows,
-        columns,
-        subplot_titles=tuple(titles) or None,
-        horizontal_spacing=column_gap if columns > 1 else 0.0,
-        vertical_spacing=(0.26 / rows if row_gap is None else row_gap) if rows > 1 else 0.0,
-    )
+    figure = Figure(rows, columns)
+    gap = 0.26 / rows if row_gap is None else row_gap
+    width, height_of_panel = (1 - column_gap * (columns - 1)) / columns, (1 - gap * (rows - 1)) / rows
+    for number in range(rows * columns):
+        row, column = divmod(number, columns)
+        left, bottom = column * (width + column_gap), (rows - 1 - row) * (height_of_panel + gap)
+        across, up = [left, min(left + width, 1.0)], [bottom, min(bottom + height_of_panel, 1.0)]
+        suffix = str(number + 1) if number else ""
+        figure.layout[f"xaxis{suffix}"] = {"anchor": f"y{suffix}", "domain": across}
+        figure.layout[f"yaxis{suffix}"] = {"anchor": f"x{suffix}", "domain": up}
+        if number < len(titles) and titles[number]:
+            figure.add_annotation(
+                x=sum(across) / 2, y=up[1], xref="paper", yref="paper", xanchor="center", yanchor="bottom", yshift=-2,
+                text=titles[number], showarrow=False, font={"size": 12, "color": QUIET},
+            )  # fmt: skip
     return _styled(figure, height, legend)
 
 
@@ -61,7 +68,7 @@ def log_ticks(low: int, high: int, step: int = 1) -> dict[str, list]:
     }
 
 
-def _styled(figure: go.Figure, height: int, legend: bool) -> go.Figure:
+def _styled(figure: Figure, height: int, legend: bool) -> Figure:
     axis = {
         "gridcolor": GRID,
         "linecolor": AXIS,
@@ -73,14 +80,9 @@ def _styled(figure: go.Figure, height: int, legend: bool) -> go.Figure:
         "title": {"font": {"size": 12, "color": QUIET}, "standoff": 6},
         "automargin": True,
     }
-    layout = figure.layout.to_plotly_json()
-    for key in dict.fromkeys((*layout, "xaxis", "yaxis")):
-        if key.startswith(("xaxis", "yaxis")):
-            layout[key] = layout.get(key, {}) | axis | ({"zeroline": False} if key[0] == "x" else {})
-    for title in layout.get("annotations", ()):
-        title |= {"font": {"size": 12, "color": QUIET}, "yshift": -2}
-    figure.layout = layout | dict(
-        template="none",
+    figure.update_xaxes(axis, zeroline=False)
+    figure.update_yaxes(axis)
+    figure.update_layout(
         height=height,
         font={"family": FONT, "size": 12, "color": INK},
         paper_bgcolor="rgba(0,0,0,0)",
@@ -105,7 +107,7 @@ def _styled(figure: go.Figure, height: int, legend: bool) -> go.Figure:
     return figure
 
 
-def millimetre_axis(figure: go.Figure, axis: str = "y", title: str = "error / mm") -> None:
+def millimetre_axis(figure: Figure, axis: str = "y", title: str = "error / mm") -> None:
     """A logarithmic axis in millimetres with plain numbers at 1, 2 and 5."""
     ticks = [m * 10.0**e for e in range(-4, 3) for m in (1, 2, 5)]
     update = figure.update_yaxes if axis == "y" else figure.update_xaxes

@@ -68,9 +68,8 @@ def templates() -> Environment:
 
 
 def figure_json(block: FigureBlock) -> str:
-    """Data and layout of a figure, arrays in base64, safe inside a script element; the template that Plotly adds left out."""
-    specification = json.loads(str(block.figure.to_json()))
-    specification["layout"].pop("template", None)
+    """Data and layout of a figure, arrays in base64, safe inside a script element."""
+    specification = block.figure.specification()
     selectors = {selector.key: selector.options[0] for selector in block.selectors}
     if block.slider is not None:
         specification |= {"stretched_by": block.slider.key, "factors": dict(block.slider.start)}

@@ -86,13 +86,13 @@ def _figure(block: FigureBlock, chosen: Mapping[str, str], dark: bool) -> go.Fig
     from flexcal.report.layout import dark_colours
 
     shown = []
-    for trace in cast("Any", go.Figure(block.figure)).data:
+    for trace in cast("Any", block.figure.plotly()).data:
         meta = trace.meta or {}
         if chosen and any(key in meta for key in chosen):
             trace.visible = all(meta.get(key, option) == option for key, option in chosen.items())
         if trace.visible is not False:
             shown.append(_decimated(trace))
-    figure = go.Figure(shown, block.figure.layout)
+    figure = go.Figure(shown, {**block.figure.layout, "template": "none"})
     if not dark:
         return figure
     text = str(figure.to_json())
