@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -43,14 +44,18 @@ def no_waiting_for_the_disk() -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def figures_are_plotly_s() -> Iterator[None]:
-    """Plotly knows each property of each figure of the pages that this process writes: flexcal itself does not ask it."""
+    """Each figure of the pages that this process writes is what Plotly makes of it, which knows each property: flexcal does not ask it."""
     from flexcal.report.layout import rendering
 
     written = rendering.figure_json
 
     def checked(block: FigureBlock) -> str:
-        block.figure.plotly()
-        return written(block)
+        plotly = json.loads(str(block.figure.plotly().to_json()))
+        del plotly["layout"]["template"]
+        text = written(block)
+        ours = json.loads(text)
+        assert {"data": ours["data"], "layout": ours["layout"]} == plotly
+        return text
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(rendering, "figure_json", checked)

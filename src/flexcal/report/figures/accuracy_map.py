@@ -26,7 +26,7 @@ def accuracy_space(accuracy: PredictedAccuracy) -> Figure:
             at,
             error,
             "95 % / mm",
-            as_float32(error),
+            error,
             "95 % within %{text:.3f} mm",
             largest=float(np.quantile(error, 0.995)),
         )

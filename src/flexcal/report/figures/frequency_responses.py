@@ -243,7 +243,7 @@ def bode(
     ticks = [v * 10.0**p for p in range(-3, 4) for v in (1, 2, 5)]
     figure.update_xaxes(type="log", tickvals=ticks, ticktext=[f"{v:g}" for v in ticks])
     figure.update_xaxes(title_text="Hz", row=3, col=1)
-    figure.update_yaxes({"type": "log", "title_text": unit} | log_ticks(-9, 9), row=1, col=1)
+    figure.update_yaxes({"type": "log"} | log_ticks(-9, 9), title_text=unit, row=1, col=1)
     figure.update_yaxes(title_text="°", tickvals=[-90, 0, 90, 180, 270], row=2, col=1)
     figure.update_yaxes(range=[0, 1.05], row=3, col=1)
     return figure
