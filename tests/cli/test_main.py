@@ -50,6 +50,22 @@ def test_help_imports_nothing_heavy() -> None:
     assert done.stderr.split() == []
 
 
+def test_a_calibration_loads_what_it_needs(examples: Path, tmp_path: Path) -> None:
+    """Neither half of SciPy, nor Plotly's objects, nor the parts of other verbs."""
+    spared = (
+        "scipy.optimize", "scipy.signal", "scipy.stats", "plotly.graph_objs", "flexcal.data.camera.board", "flexcal.dynamics",
+        "flexcal.elasticity", "flexcal.fleet", "flexcal.frequency", "flexcal.jobs.fleet_prior.member", "flexcal.report.pages.study",
+    )  # fmt: skip
+    folder = examples / "ur5_tracker"
+    program = (
+        "import sys\nfrom flexcal.cli.main import main\n"
+        f"main(['calibrate', {str(folder / 'robot.yaml')!r}, {str(folder / 'random.csv')!r}, '--out', {str(tmp_path / 'out')!r}])\n"
+        f"print(*(name for name in {spared!r} if name in sys.modules), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stderr.splitlines()[-1].split() == []
+
+
 def test_no_argument_needs_a_type_checker() -> None:
     program = (
         "import contextlib, io, sys\nfrom flexcal.cli.main import main\n"

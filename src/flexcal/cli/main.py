@@ -36,8 +36,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     # matrices here are small: threads of the linear algebra library cost more than they give
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    # what a verb imports and reads stays until its end: looking through it for cycles every 700 objects finds none
-    gc.set_threshold(100_000)
+    # what a verb imports and reads stays until its end: looking through it for cycles every 700 objects finds none; loading makes 200 000
+    gc.set_threshold(300_000)
     atexit.register(gc.freeze)  # nor does it at exit, which took a tenth of a second
     substitute_unencodable()
     with raise_on_stop_signals() as stopping:

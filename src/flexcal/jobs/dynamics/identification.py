@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from flexcal.dynamics.diagnostics import ExternalExcess, essential_parameters, external_share, weight_shares
 from flexcal.dynamics.drives import with_backlash, with_nominal_uncertainty
@@ -11,12 +12,10 @@ from flexcal.dynamics.estimators import WLS, Estimator
 from flexcal.dynamics.friction import select_friction
 from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation, SensorOffset
 from flexcal.dynamics.regression import RegressionData
-from flexcal.dynamics.residual import require_scikit_learn
 from flexcal.errors import InputError
+from flexcal.jobs import fleet_prior  # loaded where a prior is given
 from flexcal.jobs.dynamics.flexible_model import require_flexible_bearings, require_flexible_drives
-from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
 from flexcal.jobs.dynamics.result import DynamicsIdentification
-from flexcal.jobs.fleet_prior import ModelPrior, with_friction
 from flexcal.jobs.inputs import require_distinct_files
 from flexcal.jobs.logs import (
     HoldOutLogs,
@@ -33,6 +32,9 @@ from flexcal.jobs.logs import (
 from flexcal.model.robot import DynamicsConfig, RobotModel
 from flexcal.parallel import open_workers
 from flexcal.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from flexcal.jobs.fleet_prior import ModelPrior
 
 _DEFAULT = WLS()
 _FACTORS_SUFFICE = ("wls", "ols", "sdp")
@@ -155,13 +157,15 @@ def identify_dynamics(
             estimate = selection.uncertainty.widened(estimate)
         use = None
         if prior is not None:
-            estimate, use = with_friction(estimate, prior, ", ".join(selection.labels))
+            estimate, use = fleet_prior.with_friction(estimate, prior, ", ".join(selection.labels))
         external = None
         if model.force_sensor is not None:
             wide = replace(observation, terms=(*observation.terms, ExternalExcess()))
             external = external_share(RegressionData.of(wide, base, divided.equations(wide)))
         learned = None
         if learn_residual:
+            from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
+
             unseen = divided.unseen_rows(observation, base)
             learned = LearnedDynamics.of(rows, systems, unseen, estimate, progress)
         plain = observation if terms == CLASSIC else replace(observation, terms=CLASSIC)
@@ -190,6 +194,8 @@ def identify_dynamics(
 
 
 def _require_rigid_and_learnable(flexible: bool) -> None:
+    from flexcal.dynamics.residual import require_scikit_learn
+
     require_scikit_learn()
     if flexible:
         raise InputError(

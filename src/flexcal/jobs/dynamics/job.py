@@ -9,10 +9,9 @@ from pathlib import Path
 from flexcal.dynamics.estimators import ESTIMATORS, EstimatorName
 from flexcal.dynamics.torque_model import velocity_options
 from flexcal.files.formats import provenance, read_estimates, sha256_of
+from flexcal.jobs import fleet_prior  # loaded where a prior is given
 from flexcal.jobs.dynamics.identification import identify_dynamics
-from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
 from flexcal.jobs.dynamics.result import DynamicsIdentification
-from flexcal.jobs.fleet_prior import FLEET, read_model_prior
 from flexcal.jobs.result_files import RunRecord, estimates_target
 from flexcal.model.robot import RobotModel, with_blocks
 from flexcal.progress import Progress, silent
@@ -47,6 +46,8 @@ def identify_robot_dynamics(
     blocks = read_estimates(source, without="dynamics") if source.exists() else {}
     target = estimates_target(source, out, "dynamics")
     if learn_residual:
+        from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
+
         LearnedDynamics.require_place(target)
     identified = identify_dynamics(
         with_blocks(bare, blocks, source),
@@ -57,7 +58,7 @@ def identify_robot_dynamics(
         flexible=flexible,
         learn_residual=learn_residual,
         accept_weight=accept_weight,
-        prior=None if prior is None else read_model_prior(prior, bare),
+        prior=None if prior is None else fleet_prior.read_model_prior(prior, bare),
         jobs=jobs,
         on=on,
         progress=progress,
@@ -75,8 +76,8 @@ def identify_robot_dynamics(
     if validate:
         everything = provenance([robot_file, bare.urdf, *logs, *validate], options, used, tuple(blocks))
     if prior is not None and identified.pooled is not None and identified.pooled.used:
-        origin = {**origin, f"input.{FLEET}": sha256_of(prior)}
-        everything = {**everything, f"input.{FLEET}": origin[f"input.{FLEET}"]}
+        origin = {**origin, f"input.{fleet_prior.FLEET}": sha256_of(prior)}
+        everything = {**everything, f"input.{fleet_prior.FLEET}": origin[f"input.{fleet_prior.FLEET}"]}
     result = replace(
         identified,
         estimate=replace(identified.estimate, provenance=origin),

@@ -6,22 +6,20 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from flexcal.dynamics import residual  # loaded where one was learned
 from flexcal.dynamics.diagnostics import EssentialParameters, ExternalShare, GravityRatio
 from flexcal.dynamics.estimators import EstimatorName
 from flexcal.dynamics.friction import FrictionSelection
 from flexcal.dynamics.inverse_model import Observation
 from flexcal.dynamics.regression import RegressionData
-from flexcal.dynamics.residual import LEARNED
 from flexcal.dynamics.signals import Motion
 from flexcal.errors import FlexcalError
 from flexcal.files.formats import Block
-from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
 from flexcal.jobs.dynamics.remarks import dynamics_notes, dynamics_remarks, selection_remark
-from flexcal.jobs.fleet_prior import PooledUse
 from flexcal.jobs.logs import Preprocessing
 from flexcal.jobs.pages import TorqueIdentification, summary_row
 from flexcal.jobs.result_files import (
@@ -36,6 +34,10 @@ from flexcal.model.parts import is_physically_consistent
 from flexcal.model.robot import torque_units
 from flexcal.model.torques import motion_batch
 from flexcal.report.checks import Trust, dynamics_checks
+
+if TYPE_CHECKING:
+    from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
+    from flexcal.jobs.fleet_prior import PooledUse
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -239,7 +241,7 @@ class DynamicsIdentification(TorqueIdentification):
             "dropped": dropped_parameters(self.estimate.dropped),
             "learned_residual": None
             if self.learned is None
-            else self.learned.document(self.estimates or Path(LEARNED)),
+            else self.learned.document(self.estimates or Path(residual.LEARNED)),
             "seconds": self.seconds,
             "estimates": self.estimates,
             **self.record.document(),

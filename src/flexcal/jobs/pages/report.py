@@ -1,4 +1,7 @@
-"""Report of a folder written by a verb."""
+"""Report of a folder written by a verb.
+
+Parts of `pages` and `result_files` are loaded where they are named, so that a page loads its own alone.
+"""
 
 from __future__ import annotations
 
@@ -6,21 +9,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexcal.calibration.verification import MeasuredTilts
 from flexcal.data.poses import DEFAULT_SIGMA
 from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, read_estimates
 from flexcal.files.transaction import current_path
-from flexcal.jobs import (
-    result_files,
-)  # as `pages`: its parts are loaded where they are named, those of one page
-from flexcal.jobs.result_files import ESTIMATES, RESULTS, VERIFICATION, Kind, read_results
+from flexcal.jobs import result_files
+from flexcal.jobs.result_files import ESTIMATES, RESULTS, Kind, read_results
 from flexcal.report import pages
 from flexcal.report.layout import Page, write_page
 from flexcal.units import MILLIMETRE
 
 if TYPE_CHECKING:
+    from flexcal.calibration.verification import MeasuredTilts
     from flexcal.frequency.periodic import FrequencyResponse
     from flexcal.report.results import TwoStageStudy
 
@@ -130,7 +131,7 @@ def two_stage_study(folder: Path) -> TwoStageStudy:
     from flexcal.report.results import TX90L_PAPER, TwoStageStudy
 
     results = read_results(folder)
-    fresh, exact = result_files.read_verification(folder / VERIFICATION)
+    fresh, exact = result_files.read_verification(folder / result_files.VERIFICATION)
     return TwoStageStudy(
         results=results,
         estimates=read_estimates(folder / ESTIMATES),

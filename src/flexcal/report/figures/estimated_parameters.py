@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.calibration.fit import TOLERANCE
-from flexcal.calibration.term_selection import TermComparison
+from flexcal.calibration import fit
 from flexcal.estimation import Estimate
 from flexcal.report.layout import (
     AXIS,
@@ -27,6 +27,9 @@ from flexcal.report.layout import (
 )
 from flexcal.units import MILLIMETRE
 
+if TYPE_CHECKING:
+    from flexcal.calibration.term_selection import TermComparison
+
 
 def shown_parameters(estimate: Estimate, names: Sequence[str]) -> list[str]:
     """The named parameters that have an interval and a tolerance, without the place of the instrument."""
@@ -34,7 +37,7 @@ def shown_parameters(estimate: Estimate, names: Sequence[str]) -> list[str]:
         name
         for name in names
         if not name.startswith("station.")
-        and estimate.parameters[name].unit in TOLERANCE
+        and estimate.parameters[name].unit in fit.TOLERANCE
         and estimate.interval(name) is not None
     ]
 
@@ -42,7 +45,7 @@ def shown_parameters(estimate: Estimate, names: Sequence[str]) -> list[str]:
 def parameter_bars(estimate: Estimate, names: Sequence[str], axis: str) -> Figure:
     """Estimates and 95 % intervals of `shown_parameters`, over 0.3 mm, 0.5 mrad or 1 µrad/(N m) by unit; `axis` is the axis title."""
     chosen = shown_parameters(estimate, names)
-    tolerance = np.array([TOLERANCE[estimate.parameters[name].unit] for name in chosen])
+    tolerance = np.array([fit.TOLERANCE[estimate.parameters[name].unit] for name in chosen])
     value = np.array([estimate.values[name] for name in chosen]) / tolerance
     ends = (
         np.array([estimate.interval(name) for name in chosen], dtype=float).reshape(-1, 2)
