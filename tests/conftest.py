@@ -74,9 +74,12 @@ def examples() -> Path:
     return ROOT / "examples"
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def dask_cluster() -> Iterator[Any]:
-    """A Dask scheduler with two worker processes, which are started again where they are killed."""
+    """A Dask scheduler with two worker processes, which are started again where they are killed.
+
+    It ends with the module: at rest it takes a tenth of a processor.
+    """
     import distributed
 
     started: Any = distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0")

@@ -23,13 +23,13 @@ from worker_tasks import failing, killing, least_squares
 from flexcal.parallel import TaskError, ThisProcess, Workers, open_workers
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def processes() -> Iterator[Workers]:
     with open_workers(None, 2) as workers:
         yield workers
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def on_dask(dask_cluster: distributed.LocalCluster) -> Iterator[Workers]:
     with open_workers(dask_cluster.scheduler_address.replace("tcp://", "dask://"), 1) as workers:
         yield workers

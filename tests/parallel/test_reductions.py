@@ -12,7 +12,7 @@ from worker_tasks import failing, letter, paired, process, unpaired
 from flexcal.parallel import ThisProcess, Workers, consecutive_groups, open_workers
 
 
-@pytest.fixture(params=["this process", "processes", "Dask"], scope="session")
+@pytest.fixture(params=["this process", "processes", "Dask"], scope="module")
 def workers(request: pytest.FixtureRequest, dask_cluster: distributed.LocalCluster) -> Iterator[Workers]:
     address = dask_cluster.scheduler_address.replace("tcp://", "dask://")
     with open_workers(
