@@ -112,18 +112,19 @@ def _links(
     """Rows of the arm's torques (2 K + 1, n), and their derivatives (2 K + 1, n, p)."""
     states = motion.states(SAMPLES_PER_LINE * motion.lines)
     moved = [k for k, name in enumerate(parameters.names) if name in model.values and not _of_drive(name)]
-    names = [parameters.names[k] for k in moved]
-    arm = ElasticArm(model, payload)
+    about = model.with_values({parameters.names[k]: parameters[k].natural(x[k]) for k in moved})
+    arm = ElasticArm(about, payload)
 
-    def rows(at: np.ndarray) -> np.ndarray:
-        robot = model.with_values(dict(zip(names, parameters.natural(at)[moved], strict=True)))
+    def rows(robot: RobotModel) -> np.ndarray:
         return motion.rows(periodic_torque(robot, *states, 1 / motion.base_frequency_hz, payload, like=arm))
 
-    torque = rows(x)
+    def beside(k: int, step: float) -> np.ndarray:
+        return rows(about.with_values({parameters.names[k]: parameters[k].natural(x[k] + step)}))
+
+    torque = rows(about)
     jacobian = np.zeros((*torque.shape, len(parameters)))
     for k in moved:
-        step = _STEP * (np.arange(len(x)) == k)
-        jacobian[:, :, k] = (rows(x + step) - rows(x - step)) / (2 * _STEP)
+        jacobian[:, :, k] = (beside(k, _STEP) - beside(k, -_STEP)) / (2 * _STEP)
     return torque, jacobian
 
 
