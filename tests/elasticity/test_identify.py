@@ -286,7 +286,7 @@ def test_half_gap_is_found(tx90l, poses, synthesise, rng):
 
 def test_masses_that_take_up_a_misfit_have_no_intervals(stiff, synthesise, shaken, poses, rng):
     """A resonance that the model lacks moves masses by more than is known of them; without it none moves so far."""
-    clean = synthesise(stiff, poses["default"][:3], noise=0.003, rng=rng, step=12)
+    clean = synthesise(stiff, poses["default"][:2], noise=0.003, rng=rng, step=16)
     calm = fit_springs(stiff, clean, rng=rng, search=ONE_START).estimate
     moved = fit_springs(stiff, [shaken(r, 0.3) for r in clean], rng=rng, search=ONE_START).estimate
     assert calm.misfit is None and calm.std("link_3.mass") is not None
@@ -298,7 +298,7 @@ def test_torque_constants_are_in_the_intervals(stiff, synthesise, poses, rng):
     """Believed torques of all motors 2 % too small: the springs of a robot whose inertias follow are as wrong, and say so."""
     responses = [
         replace(r, response=r.response * 1.02)
-        for r in synthesise(stiff, poses["default"][:3], noise=0.003, rng=rng, step=8)
+        for r in synthesise(stiff, poses["default"][:2], noise=0.003, rng=rng, step=16)
     ]
     names = [f"joint_{j}.drive.stiffness" for j in (1, 2, 3)]
     squares = []

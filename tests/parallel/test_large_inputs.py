@@ -106,7 +106,7 @@ def test_candidates_in_blocks(
     ur5: Path, dask_address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """On Dask as here; better than one block alone, at most 1 % worse than all candidates at once; and the bound is below all."""
-    total, count, block = 12_000, 20, 2000
+    total, count, block = 6000, 20, 1000
     monkeypatch.setattr(candidate_poses, "BLOCK", block)
     request, nothing = PoseRequest(count=count, candidates=total), PoseRequestFiles()
     here = plan_calibration_poses(ur5, tmp_path / "here.yaml", request, nothing)
