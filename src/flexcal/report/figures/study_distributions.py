@@ -67,7 +67,7 @@ def level_distributions(levels: Sequence[tuple[str, np.ndarray]]) -> Figure:
 def interval_coverage(names: Sequence[str], share: np.ndarray, low: np.ndarray, high: np.ndarray) -> Figure:
     """Coverage (percent) of the 95 % intervals of every parameter, with the intervals of these shares, and the promised 95 %."""
     figure = canvas(60 + 16 * len(names), legend=False)
-    places = np.arange(len(names))
+    places = list(range(len(names)))
     figure.add_trace(
         trace(
             "scatter",
