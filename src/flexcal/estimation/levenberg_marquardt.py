@@ -88,11 +88,11 @@ def minimise(
         if offset <= tolerance:
             status, message = "converged", f"relative offset {offset:.1e}"
             break
-        if polishing and offset >= 0.5 * best_offset and acceleration.extrapolates:
+        if polishing and offset >= 0.5 * best_offset:
+            if not acceleration.extrapolates:
+                status, message = "converged", "the cost no longer changes beyond rounding"
+                break
             acceleration.forget()
-        elif polishing and offset >= 0.5 * best_offset:
-            status, message = "converged", "the cost no longer changes beyond rounding"
-            break
         best_offset = min(best_offset, offset)
         if iteration >= max_iterations:
             message = f"not converged after {iteration} iterations (relative offset {offset:.1e}); allow more"
@@ -116,11 +116,7 @@ def minimise(
                 status, message = _CANNOT_STEP[negligible]
                 break
             # an extrapolated step is one of Newton's, whose Hessian is not that of the linearisation
-            bend = (
-                -gradient @ step
-                if accelerated and acceleration.extrapolates
-                else np.sum((factor @ step) ** 2)
-            )
+            bend = -gradient @ step if acceleration.extrapolates else np.sum((factor @ step) ** 2)
             predicted = -float(gradient @ step) - 0.5 * float(bend)
             trial_cost, linearised = objective.trial(trial)
             actual = cost - trial_cost
@@ -132,12 +128,11 @@ def minimise(
                 damping, growth = max(damping, _SMALLEST_DAMPING), 2.0
                 fall = fall / 3.0 if close else 1.0 / 3.0
                 break
-            if accelerated and acceleration.extrapolates:
-                acceleration.forget()
-                accelerated = False
-                continue
-            damping, growth = damping * growth, growth * 2.0
-            rejected = True
+            if not acceleration.extrapolates:
+                damping, growth, rejected = damping * growth, growth * 2.0, True
+            # the same point again with another step is no point of the iteration
+            acceleration.forget()
+            accelerated = False
         if status != "iteration limit":
             break
         x = trial

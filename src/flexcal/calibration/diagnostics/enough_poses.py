@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration.fit import FleetPrior, GeometricFit, plausible_size
+from flexcal.calibration.fit import OF_THE_CELL, FleetPrior, GeometricFit, plausible_size
 from flexcal.calibration.measurement import predict_measurements, random_poses
 from flexcal.estimation import Parameters
 from flexcal.units import MILLIMETRE
@@ -19,7 +19,6 @@ _SETS = 6
 _ELSEWHERE = 100
 """Poses at which errors are predicted."""
 _FEWEST = 3
-_OF_THE_CELL = ("tool.", "point.", "station.")
 _COMMON = 0.5
 """Largest error common to several poses, over their own, that is taken for one of each: more poses average it less."""
 
@@ -87,4 +86,4 @@ class EnoughPoses:
 def _free(fit: GeometricFit, fleet: FleetPrior) -> Parameters:
     """Parameters of the prior, and the place of instrument and target: further errors of joints look like these."""
     own = set(fleet.names)
-    return Parameters(p for p in fit.estimate.parameters if p.name in own or p.name.startswith(_OF_THE_CELL))
+    return Parameters(p for p in fit.estimate.parameters if p.name in own or p.name.startswith(OF_THE_CELL))

@@ -98,19 +98,18 @@ class PointSums:
             diagonal += scatter.command**2 * self.commands.once
         return whole
 
-    def gram(self, whitening: np.ndarray, *, commands: bool) -> Arrowhead:
-        """Gram matrix CᵀQC of all columns C with Q = WᵀW given by the blocks W, the `whitening` (G, 3 T, 3 T).
+    def gram(self, whitening: np.ndarray, inverse: np.ndarray, *, commands: bool) -> Arrowhead:
+        """Gram matrix CᵀQC of all columns C with Q = WᵀW given by the blocks W, the `whitening`, and Q, the `inverse` (G, 3 T, 3 T).
 
         The corner is of `columns` and of the cells and stretches (three columns each, 1 where a point belongs to it); the blocks are of
         the commands, where they are asked for.
         """
         size, count = self.columns.shape[2], self.count
-        turned = np.swapaxes(whitening, 1, 2)
         white = np.matmul(whitening, self.columns)
-        moved, flat = np.matmul(turned, white), white.reshape(-1, size)
+        moved, flat = np.matmul(np.swapaxes(whitening, 1, 2), white), white.reshape(-1, size)
         corner = np.empty((size + 3 * count, size + 3 * count))
         corner[:size, :size] = flat.T @ flat
-        entries = by_axes(turned @ whitening)
+        entries = by_axes(inverse)
         if count:
             corner[size:, :size] = added(self.sums, moved)
             corner[:size, size:] = corner[size:, :size].T

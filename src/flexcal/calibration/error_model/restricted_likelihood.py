@@ -40,7 +40,7 @@ class RestrictedLikelihood:
         """Likelihood at a scatter, with derivatives by the variances of the components `names`."""
         whitening = cholesky_inverses(sums.covariance(scatter, commands=COMMAND in names))
         inverse = np.swapaxes(whitening, 1, 2) @ whitening
-        gram = sums.gram(whitening, commands=COMMAND in names)
+        gram = sums.gram(whitening, inverse, commands=COMMAND in names)
         sizes, outer = np.zeros(len(gram.corner)), scatter.command
         sizes[: sums.fixed] = 1.0
         for name in _shared(names, sums):

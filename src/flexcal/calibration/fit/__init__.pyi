@@ -1,6 +1,6 @@
 from .base_placement import base_errors
 from .elastic_prior import ElasticPrior
-from .fleet_prior import FleetPrior
+from .fleet_prior import OF_THE_CELL, FleetPrior
 from .gauge_freedom import (
     KNOWN_POINT_STD,
     point_uncertainty,
@@ -33,6 +33,7 @@ __all__ = [
     "KNOWN_POINT_STD",
     "LEAST_POSES",
     "LEVELS",
+    "OF_THE_CELL",
     "PER_JOINT",
     "THERMAL",
     "TOLERANCE",

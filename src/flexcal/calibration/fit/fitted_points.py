@@ -36,17 +36,21 @@ _FREE_STIFFNESS = 0.3
 
 @dataclass(frozen=True, eq=False)
 class FittedPoints:
-    """Solution of a fit: `estimate` of the fitted parameters, the robot `model`, its prediction `at` the poses on `flank` (N, n)."""
+    """Solution of a fit: `estimate` of the fitted parameters, the prediction `at` the poses on `flank` (N, n)."""
 
     fit: PointFit
     scatter: ErrorComponents
     spread: dict[str, float]
     fixed: tuple[Undetermined, ...]
     estimate: Estimate
-    model: RobotModel
     at: PredictedMeasurements
     flank: np.ndarray
     task: GeometryProblem
+
+    @property
+    def model(self) -> RobotModel:
+        """The fitted robot."""
+        return self.at.model
 
     @cached_property
     def turns(self) -> np.ndarray:

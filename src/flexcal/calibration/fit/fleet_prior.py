@@ -9,6 +9,9 @@ import numpy as np
 
 from flexcal.estimation import Parameters
 
+OF_THE_CELL = ("tool.", "point.", "station.", "sockets.", "board.", "camera.")
+"""Beginnings of the names of parameters of tool, targets and instruments, of which another cell tells nothing."""
+
 
 @dataclass(frozen=True, eq=False)
 class FleetPrior:

@@ -325,4 +325,4 @@ class PointFit:
                 require_both_flanks(self.start, flank)
             if passes == _FLANK_PASSES:
                 break
-        return FittedPoints(self, scatter, spread or {}, fixed, estimate, after.model, after, flank, task)
+        return FittedPoints(self, scatter, spread or {}, fixed, estimate, after, flank, task)

@@ -137,9 +137,7 @@ def chance_of_squares(statistic: float | np.ndarray, count: int, freedom: float)
 
 def misfit_of(values: np.ndarray, columns: np.ndarray) -> tuple[float, int]:
     """Sum of squares of `values` (m,) that `columns` (m, k) do not explain, and their rank."""
-    sizes = np.linalg.norm(columns, axis=0)
-    left, singular, _ = np.linalg.svd(columns / np.where(sizes > 0, sizes, 1.0), full_matrices=False)
-    span = left[:, singular > 1e-6]
+    span = _basis(columns)
     rest = values - span @ (span.T @ values)
     return float(rest @ rest), span.shape[1]
 

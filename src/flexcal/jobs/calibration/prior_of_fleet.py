@@ -21,9 +21,10 @@ def fleet_document(fit: GeometricFit) -> dict[str, Any] | None:
     `from_fleet` are the parameters of which these measurements tell so little that their standard deviation is at least 0.8 times the
     prior's, and which the other robots tell; `enough` is how many poses with the prior reach what many do without it.
     """
-    fleet, conflict, enough = fit.fleet, FleetConflict.of(fit), EnoughPoses.of(fit)
+    fleet, conflict = fit.fleet, FleetConflict.of(fit)
     if fleet is None or conflict is None:
         return None
+    enough = None if conflict.contradicted else EnoughPoses.of(fit)
     before = np.sqrt(np.diag(fleet.covariance))
     std = [fit.estimate.std(name) for name in fleet.names]
     known = [
@@ -37,7 +38,7 @@ def fleet_document(fit: GeometricFit) -> dict[str, Any] | None:
         "parameters": len(fleet.names),
         "from_fleet": known,
         "conflict": conflict.document(),
-        "enough": None if enough is None or conflict.contradicted else enough.document(),
+        "enough": None if enough is None else enough.document(),
     }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Set
 
-from flexcal.jobs.fleet_prior import OF_THE_CELL
+from flexcal.calibration.fit import OF_THE_CELL
 
 _OF_THE_SETUP = (*OF_THE_CELL, "sensor.", "scatter.", "payload.", "force_sensor.")
 """Beginnings of parameters that say how was measured, or what was mounted, and nothing of the robot."""

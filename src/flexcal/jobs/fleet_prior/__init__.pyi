@@ -1,6 +1,5 @@
 from .fleet_pooling import pool_fleet
 from .friction_prior import with_friction
-from .geometry_information import OF_THE_CELL
 from .geometry_pooling import alike, pooled_prior
 from .kinematics import difference
 from .member import FEWEST, FLEET, POOLED, Member, comparable_terms
@@ -14,7 +13,6 @@ from .value_pooling import pool_friction, pool_springs
 __all__ = [
     "FEWEST",
     "FLEET",
-    "OF_THE_CELL",
     "POOLED",
     "Member",
     "ModelPrior",

@@ -14,8 +14,6 @@ _RANK = 1e-11
 """Relative eigenvalue of information, in plausible sizes, below which it is a rounding error."""
 _TOLD = 1e-6
 """Least information on a combination, in plausible sizes, that counts."""
-OF_THE_CELL = ("tool.", "point.", "station.", "sockets.", "board.", "camera.")
-"""Beginnings of the names of parameters of tool, targets and instruments, of which another cell tells nothing."""
 _OF_ROBOT = (*GEOMETRY, *ORIGIN, *LOOP, *LATERAL, "gravity_compliance", "backlash")
 
 

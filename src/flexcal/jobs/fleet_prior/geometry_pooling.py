@@ -8,14 +8,10 @@ from itertools import combinations
 import numpy as np
 
 from flexcal.calibration.error_model import TRANSMISSION
-from flexcal.calibration.fit import FleetPrior, base_errors, plausible_size
+from flexcal.calibration.fit import OF_THE_CELL, FleetPrior, base_errors, plausible_size
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Measured, population
-from flexcal.jobs.fleet_prior.geometry_information import (
-    OF_THE_CELL,
-    geometry_information,
-    is_geometric_error,
-)
+from flexcal.jobs.fleet_prior.geometry_information import geometry_information, is_geometric_error
 from flexcal.jobs.fleet_prior.member import FEWEST, Member
 from flexcal.model.robot import RobotModel, unit_in
 

@@ -110,7 +110,7 @@ class Figure:
         for number in range(1, self._rows * self._columns + 1):
             at_row, at_column = divmod(number - 1, self._columns)
             if row in (None, at_row + 1) and col in (None, at_column + 1):
-                _update(self.layout.setdefault(f"{kind}{_suffix(number)}", {}), changes)
+                _update(self.layout.setdefault(f"{kind}{axis_suffix(number)}", {}), changes)
 
     def _add_lines(self, ends: Mapping[str, float], line: Mapping[str, Any], across: str) -> None:
         panels = [_axes_of(1)]
@@ -130,12 +130,13 @@ _TYPED = {"float32": "f4", "float64": "f8", "int32": "i4"}
 """Arrays that plotly.js reads from base64, by the name of their type in NumPy."""
 
 
-def _suffix(number: int) -> str:
+def axis_suffix(number: int) -> str:
+    """What follows the name of an axis of a panel, counted from 1."""
     return "" if number == 1 else str(number)
 
 
 def _axes_of(number: int) -> dict[str, str]:
-    return {"xaxis": f"x{_suffix(number)}", "yaxis": f"y{_suffix(number)}"}
+    return {"xaxis": f"x{axis_suffix(number)}", "yaxis": f"y{axis_suffix(number)}"}
 
 
 def _update(old: dict[str, Any], changes: Mapping[str, Any]) -> None:

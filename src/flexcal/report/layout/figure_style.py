@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexcal.report.layout.figure import Figure
+from flexcal.report.layout.figure import Figure, axis_suffix
 from flexcal.report.layout.palette import AXIS, GRID, INK, PAGE, QUIET
 
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', sans-serif"
@@ -35,7 +35,7 @@ def panels(
         row, column = divmod(number, columns)
         left, bottom = column * (width + column_gap), (rows - 1 - row) * (height_of_panel + gap)
         across, up = [left, min(left + width, 1.0)], [bottom, min(bottom + height_of_panel, 1.0)]
-        suffix = str(number + 1) if number else ""
+        suffix = axis_suffix(number + 1)
         figure.layout[f"xaxis{suffix}"] = {"anchor": f"y{suffix}", "domain": across}
         figure.layout[f"yaxis{suffix}"] = {"anchor": f"x{suffix}", "domain": up}
         if number < len(titles) and titles[number]:
