@@ -1,6 +1,8 @@
+from .chi_square import chi_square_limit
 from .conic_constraint import Cone
 from .conic_least_squares import ConicFit
 from .estimate import Dropped, Estimate
+from .f_distribution import f_tail
 from .gaussian_distance import distance_probability, distance_quantile, mean_distance, principal_variances
 from .hierarchical_model import Measured, Population, individuals, population
 from .identifiability import RANK_TOLERANCE, Identifiability, analyse, name_direction
@@ -40,10 +42,12 @@ __all__ = [
     "Squares",
     "TwoVarianceFit",
     "analyse",
+    "chi_square_limit",
     "consistent_groups",
     "core_size",
     "distance_probability",
     "distance_quantile",
+    "f_tail",
     "fit_two_variances",
     "individuals",
     "is_log_identified",

@@ -193,9 +193,7 @@ def _select(
 
     Modified Gram-Schmidt, each direction projected out twice, which is as accurate as reflections.
     """
-    from scipy.linalg.blas import dger  # pyright: ignore[reportAttributeAccessIssue]
-
-    remainder = np.array(scaled, order="F")
+    remainder = np.array(scaled)
     limit = tolerance * np.max(np.linalg.norm(scaled, axis=0), initial=0.0)
     kept: list[int] = []
     sizes: list[float] = []
@@ -204,7 +202,7 @@ def _select(
         sizes.append(float(np.linalg.norm(remainder[:, column])))
         direction = remainder[:, column] / sizes[-1]
         for _ in range(2):
-            dger(-1.0, direction, direction @ remainder, a=remainder, overwrite_x=0, overwrite_a=1)
+            remainder[...] -= direction[:, None] * (direction @ remainder)
         remainder[:, column] = 0.0
 
     for column in preferred:

@@ -34,8 +34,6 @@ def uncertainty(
     objective: Objective, optimum: Optimum, prefer: Sequence[str], tolerance: float
 ) -> Uncertainty:
     """Uncertainty from the weighted rows and the prior's, by pivoted QR; the kept parameters' covariance is R₁₁⁻¹R₁₁⁻ᵀ, the rest zero."""
-    from scipy.linalg import solve_triangular
-
     names = objective.problem.parameters.names
     factor = objective.triangular(optimum.x, optimum.residual, optimum.jacobian, optimum.weights)[0]
     identifiability = analyse(factor, names, prefer=prefer, tolerance=tolerance)
@@ -43,7 +41,7 @@ def uncertainty(
     scale = 1.0 / np.linalg.norm(factor[:, kept], axis=0)
     triangle = np.linalg.qr(factor[:, kept] * scale, mode="r")
     root = np.zeros((len(names), len(kept)))
-    root[kept] = scale[:, None] * solve_triangular(triangle, np.eye(len(kept)))
+    root[kept] = scale[:, None] * np.linalg.inv(triangle)
     weights = optimum.weights[objective.grouping.number]
     return Uncertainty(
         identifiability=identifiability,

@@ -8,6 +8,7 @@ import numpy as np
 
 from flexcal.calibration.diagnostics.further_columns import columns_of_drift, ramp
 from flexcal.calibration.fit import GeometricFit
+from flexcal.estimation import f_tail
 from flexcal.units import MILLIMETRE
 
 _CHANCE = 0.0027
@@ -40,11 +41,9 @@ class Drift:
     @property
     def probability(self) -> float:
         """p-value of the F test for no drift."""
-        from scipy.special import fdtrc
-
         size = len(self.travel)
         statistic = self.travel @ np.linalg.solve(self.covariance, self.travel) / size
-        return float(fdtrc(size, max(self.freedom, 1), statistic))
+        return f_tail(size, max(self.freedom, 1), float(statistic))
 
     @property
     def certain(self) -> bool:

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from flexcal.data.poses import PoseSet
+from flexcal.estimation import f_tail
 
 _CHANCE = 1e-6
 """Significance level of a lag: what else goes with the order of measuring must not be called one."""
@@ -54,8 +55,6 @@ class Lag:
         """By scalar products of columns, the effect of a unit lag first, those of its `rival`, and, last, the residuals with `freedom`
         degrees of freedom beside the lag, whose variance is `least` or larger; None where they tell nothing.
         """
-        from scipy.special import fdtrc
-
         total, own, along = products[-1, -1], products[0, 0], products[0, -1]
         if freedom < 1 or own <= 0 or total <= 0:
             return None
@@ -67,7 +66,7 @@ class Lag:
             float(np.sqrt(variance / own)),
             float(explained / total),
             float(by_rival @ products[rival, -1] / total),
-            float(fdtrc(1, freedom, explained / variance)),
+            f_tail(1, freedom, float(explained / variance)),
             timed,
         )
 

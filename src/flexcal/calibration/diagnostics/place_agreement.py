@@ -12,6 +12,7 @@ import numpy as np
 from flexcal.calibration.diagnostics.linearised_places import LinearisedPlaces
 from flexcal.calibration.fit import GeometricFit
 from flexcal.data.poses import PoseSet
+from flexcal.estimation import f_tail
 from flexcal.units import MILLIMETRE
 
 FEWEST_PLACES = 4
@@ -131,8 +132,6 @@ def place_errors(fit: GeometricFit) -> tuple[PlaceErrors, ...]:
 
     Outliers do not count in the fit. Stiffness and inertia keep their estimates, as the error model does.
     """
-    from scipy.special import fdtrc
-
     poses, linear, result = fit.poses, LinearisedPlaces.of(fit), []
     _, whole, freedom = linear.solved(linear.inside)
     inside = ~np.isin(np.arange(len(poses)), fit.estimate.outliers)
@@ -142,7 +141,7 @@ def place_errors(fit: GeometricFit) -> tuple[PlaceErrors, ...]:
         ball = linear.ball(fixture, change)
         added = max(freedom - degrees, 1)
         ratio = max(whole - others, 0.0) / added * degrees / others if degrees > 0 and others > 0 else 0.0
-        p = float(fdtrc(added, max(degrees, 1), ratio))
+        p = f_tail(added, max(degrees, 1), float(ratio))
         result.append(_errors(poses.subset(own), ball, inside[own], ratio, p, several=len(poses.holders) > 1))
     return tuple(result)
 

@@ -45,13 +45,15 @@ class Arrowhead:
         """Cholesky factor, with B eliminated first; raises `LinAlgError` if M is not positive definite."""
         inverses = tuple(cholesky_inverses(values) for values in self.blocks)
         border = _by_blocks(inverses, self.border)
-        return ArrowheadFactor(inverses, border, np.linalg.cholesky(self.corner - border.T @ border))
+        factor = np.linalg.cholesky(self.corner - border.T @ border)
+        # of an upper triangle elimination leaves back substitution
+        return ArrowheadFactor(inverses, border, np.linalg.inv(factor.T).T)
 
 
 @dataclass(frozen=True, eq=False)
 class ArrowheadFactor:
-    """Cholesky factor L with L Lᵀ = M: `inverses` of the blocks' factors L_B, `border` L_B⁻¹ F (b, d), and `corner` L_S of S = D - Fᵀ
-    B⁻¹ F (d, d).
+    """Cholesky factor L with L Lᵀ = M: `inverses` of the blocks' factors L_B, `border` L_B⁻¹ F (b, d), and `corner` L_S⁻¹ (d, d), the
+    inverse of the factor of S = D - Fᵀ B⁻¹ F.
     """
 
     inverses: tuple[np.ndarray, ...]
@@ -61,24 +63,20 @@ class ArrowheadFactor:
     @property
     def log_determinant(self) -> float:
         """Logarithm of the determinant, ln det M."""
-        diagonals = [1 / np.diagonal(values, axis1=1, axis2=2).ravel() for values in self.inverses]
-        return 2 * float(np.log(np.concatenate([*diagonals, np.diag(self.corner)])).sum())
+        diagonals = [np.diagonal(values, axis1=1, axis2=2).ravel() for values in self.inverses]
+        return -2 * float(np.log(np.concatenate([*diagonals, np.diag(self.corner)])).sum())
 
     def half(self, columns: np.ndarray) -> np.ndarray:
         """Forward substitution L⁻¹ C of columns (b + d, k)."""
-        from scipy.linalg.lapack import dtrtrs  # pyright: ignore[reportAttributeAccessIssue]
-
         count = len(self.border)
         upper = _by_blocks(self.inverses, columns[:count])
-        lower = dtrtrs(self.corner.T, columns[count:] - self.border.T @ upper, trans=1)[0]
+        lower = self.corner @ (columns[count:] - self.border.T @ upper)
         return np.concatenate([upper, lower])
 
     def other_half(self, columns: np.ndarray) -> np.ndarray:
         """Back substitution L⁻ᵀ C of columns (b + d, k)."""
-        from scipy.linalg.lapack import dtrtrs  # pyright: ignore[reportAttributeAccessIssue]
-
         count = len(self.border)
-        lower = dtrtrs(self.corner.T, columns[count:])[0]
+        lower = self.corner.T @ columns[count:]
         return np.concatenate([_by_blocks(self._turned, columns[:count] - self.border @ lower), lower])
 
     @cached_property
@@ -112,10 +110,7 @@ class ArrowheadFactor:
     @cached_property
     def _corner_inverse(self) -> np.ndarray:
         """Inverse S⁻¹ (d, d) of the Schur complement."""
-        from scipy.linalg.lapack import dpotri  # pyright: ignore[reportAttributeAccessIssue]
-
-        upper = dpotri(self.corner.T)[0]
-        return np.triu(upper) + np.triu(upper, 1).T
+        return self.corner.T @ self.corner
 
     @cached_property
     def _eliminated(self) -> np.ndarray:

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexcal.calibration.error_model.groups import ErrorGroups
-from flexcal.calibration.error_model.incidence_matrices import incidence, pairs_of
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_matrix
+from flexcal.calibration.error_model.incidence_matrices import Incidence, incidence, pairs_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,10 +21,10 @@ class CommandSums:
     """
 
     once: np.ndarray
-    sums: csr_matrix
-    cells: csr_matrix
+    sums: Incidence
+    cells: Incidence
     count: int
-    groups: tuple[tuple[int, csr_matrix], ...]
+    groups: tuple[tuple[int, Incidence], ...]
 
     @classmethod
     def of(cls, points: ErrorGroups, cell: np.ndarray, cells: int) -> CommandSums:
@@ -60,7 +56,7 @@ class CommandSums:
 
     def crossed(self, entries: np.ndarray) -> np.ndarray:
         """Scalar products (3 K, 3 c) of commands and cells, from the 3 × 3 `entries` (G T T, 9) of all visits' blocks."""
-        commands = len(self.sums.indptr) - 1
+        commands = self.sums.shape[0]
         own = (self.cells @ entries).reshape(commands, self.count, 3, 3)
         return own.transpose(0, 2, 1, 3).reshape(3 * commands, 3 * self.count)
 
@@ -87,14 +83,16 @@ class CommandSums:
 
     def placed(self, values: np.ndarray) -> np.ndarray:
         """Rows (G T, 3 k) of all points from the `values` (3 K, k) of the commands."""
-        return self.sums.T @ values.reshape(len(self.sums.indptr) - 1, 3 * values.shape[1])
+        return self.sums.T @ values.reshape(self.sums.shape[0], 3 * values.shape[1])
 
 
 def _tied(command: np.ndarray, count: int) -> np.ndarray:
     """Group number (count,) of every command; `command` (G, T) are those of the visits, or -1."""
-    from scipy.sparse.csgraph import connected_components
-
     if not count:
         return np.zeros(0, dtype=int)
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import connected_components
+
     visit = incidence(command, np.arange(len(command))[:, None], (count, len(command)))
-    return connected_components(visit @ visit.T, directed=False)[1]
+    one = csr_matrix((np.ones(len(visit.rows)), (visit.rows, visit.columns)), shape=visit.shape)
+    return connected_components(one @ one.T, directed=False)[1]

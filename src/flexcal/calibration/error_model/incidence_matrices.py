@@ -2,24 +2,48 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from scipy.sparse import csr_matrix
+
+@dataclass(frozen=True, eq=False)
+class Incidence:
+    """Sparse matrix of ones, of a `shape`: the `rows` (E,) of its entries in ascending order, and their `columns` (E,)."""
+
+    rows: np.ndarray
+    columns: np.ndarray
+    shape: tuple[int, int]
+
+    @classmethod
+    def of(cls, rows: np.ndarray, columns: np.ndarray, shape: tuple[int, int]) -> Incidence:
+        """Matrix of ones at `rows` and `columns` (E,) in any order."""
+        order = np.argsort(rows, kind="stable")
+        return cls(rows[order], columns[order], shape)
+
+    @cached_property
+    def T(self) -> Incidence:
+        """The transpose."""
+        return Incidence.of(self.columns, self.rows, (self.shape[1], self.shape[0]))
+
+    def __matmul__(self, values: np.ndarray) -> np.ndarray:
+        """Sums (shape[0], k) of rows of `values` (shape[1], k)."""
+        result = np.zeros((self.shape[0], values.shape[1]))
+        if len(self.rows):
+            firsts = np.flatnonzero(np.diff(self.rows, prepend=-1))
+            result[self.rows[firsts]] = np.add.reduceat(values[self.columns], firsts, axis=0)
+        return result
 
 
-def incidence(labels: np.ndarray, columns: np.ndarray, shape: tuple[int, int]) -> csr_matrix:
+def incidence(labels: np.ndarray, columns: np.ndarray, shape: tuple[int, int]) -> Incidence:
     """Sparse matrix of ones at rows `labels` and columns `columns`, of broadcastable shapes; none where a label is negative."""
-    from scipy.sparse import csr_matrix
-
     labels, columns = np.broadcast_arrays(labels, columns)
     known = labels >= 0
-    return csr_matrix((np.ones(int(known.sum())), (labels[known], columns[known])), shape=shape)
+    return Incidence.of(labels[known], columns[known], shape)
 
 
-def pairs_of(first: np.ndarray, second: np.ndarray, rows: int, columns: int) -> csr_matrix:
+def pairs_of(first: np.ndarray, second: np.ndarray, rows: int, columns: int) -> Incidence:
     """Incidence matrix (rows columns, G T T) of pairs of rows of a visit, one label (G, T, kinds) out of `first` and one out of `second`.
 
     Negative labels are of no row.
@@ -43,7 +67,7 @@ def by_visits(entries: np.ndarray, places: int) -> np.ndarray:
     return blocks.reshape(-1, 3 * places, 3 * places)
 
 
-def added(sums: csr_matrix, rows: np.ndarray) -> np.ndarray:
+def added(sums: Incidence, rows: np.ndarray) -> np.ndarray:
     """Sums (3 K, k) of `rows` (G, 3 T, k) over K blocks."""
     width = rows.shape[2]
     return (sums @ rows.reshape(-1, 3 * width)).reshape(-1, width)

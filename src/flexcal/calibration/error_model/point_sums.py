@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +12,7 @@ from flexcal.calibration.error_model.command_sums import CommandSums
 from flexcal.calibration.error_model.error_components import ErrorComponents, stated_covariance, translations
 from flexcal.calibration.error_model.groups import COMMAND
 from flexcal.calibration.error_model.incidence_matrices import (
+    Incidence,
     added,
     by_axes,
     by_visits,
@@ -22,8 +22,6 @@ from flexcal.calibration.error_model.incidence_matrices import (
 from flexcal.calibration.measurement import RADIANS, ROBOT
 
 if TYPE_CHECKING:
-    from scipy.sparse import csr_matrix
-
     from flexcal.calibration.error_model.variance_components import LinearFit
 
 
@@ -43,8 +41,8 @@ class PointSums:
     least: np.ndarray
     structures: dict[str, np.ndarray]
     blocks: dict[str, np.ndarray]
-    sums: csr_matrix
-    pairs: csr_matrix
+    sums: Incidence
+    pairs: Incidence
     commands: CommandSums | None
 
     @classmethod
@@ -127,7 +125,7 @@ class PointSums:
         half = (self.columns.reshape(-1, size) @ corner[:size, :size]).reshape(visits, coordinates, size)
         entries = np.zeros((visits * (coordinates // 3) ** 2, 9))
         if count:
-            half += 2 * (self._placing @ corner[size:, :size].reshape(count, -1)).reshape(half.shape)
+            half += 2 * (self.sums.T @ corner[size:, :size].reshape(count, -1)).reshape(half.shape)
             own = corner[size:, size:].reshape(count, 3, count, 3).transpose(0, 2, 1, 3)
             entries += self.pairs.T @ own.reshape(-1, 9)
         if self.commands is not None and weights.blocks:
@@ -142,12 +140,7 @@ class PointSums:
 
     def spread(self, values: np.ndarray) -> np.ndarray:
         """Errors (G, 3 T) of all points from the errors (3 K,) of each cell and stretch."""
-        return (self._placing @ values.reshape(-1, 3)).reshape(len(self.columns), -1)
-
-    @cached_property
-    def _placing(self) -> csr_matrix:
-        """The transpose of `sums`."""
-        return self.sums.T.tocsr()
+        return (self.sums.T @ values.reshape(-1, 3)).reshape(len(self.columns), -1)
 
     @property
     def fixed(self) -> int:

@@ -16,7 +16,7 @@ from flexcal.calibration.fit.terms import plausible_size
 from flexcal.calibration.fit.thermal_terms import is_thermal
 from flexcal.calibration.measurement import RADIANS, ROBOT, PredictedMeasurements, stated_sigma
 from flexcal.data.poses import PoseSet
-from flexcal.estimation import RANK_TOLERANCE, Estimate, Parameter, Parameters
+from flexcal.estimation import RANK_TOLERANCE, Estimate, Parameter, Parameters, chi_square_limit
 from flexcal.model.robot import REFERENCE, SCATTER, RobotModel, unit_of
 
 if TYPE_CHECKING:
@@ -139,13 +139,12 @@ class FittedPoints:
     @property
     def suspects_outliers(self) -> bool:
         """Whether single points deviate by more than the scatter of most others allows."""
-        from scipy.special import chdtri
-
         whitening = self.scatter.whitening(self.at.readings, self.turns)
         there = self.at.readings.present.any(axis=1)
         squares = (whitening(self.at.residual).reshape(-1, 3) ** 2).sum(axis=1)[there]
         freedom = self.at.readings.present.sum(axis=1)[there]
-        limits = chdtri(freedom, _SUSPICION / len(squares)) * _SLACK
+        chance = _SUSPICION / len(squares)
+        limits = np.array([0.0, *(chi_square_limit(n, chance) for n in (1, 2, 3))])[freedom] * _SLACK
         return bool((squares > limits * np.median(squares / _CHI_MEDIAN[freedom])).any())
 
     @property

@@ -10,6 +10,7 @@ import numpy as np
 from flexcal.calibration.fit.thermal_terms import is_thermal, plausible_thermal_size
 from flexcal.calibration.measurement import PredictedMeasurements
 from flexcal.data.poses import PoseSet
+from flexcal.estimation import f_tail
 
 _SMOOTH = 0.5
 """Share of the scatter of the temperatures below which that from one measurement to the next is the sensor's."""
@@ -157,8 +158,6 @@ def _time(poses: PoseSet) -> np.ndarray:
 
 def _probability(products: np.ndarray, sizes: np.ndarray, freedom: int) -> float:
     """p-value of no change in time, over the directions that temperature leaves visible."""
-    from scipy.special import fdtrc
-
     scale = np.append(sizes, 1.0)
     scaled = products * np.outer(scale, scale)
     values, vectors = np.linalg.eigh(scaled[:-1, :-1])
@@ -169,4 +168,4 @@ def _probability(products: np.ndarray, sizes: np.ndarray, freedom: int) -> float
     count = int(seen.sum())
     left = max(freedom - count, 1)
     variance = max(1.0, (float(products[-1, -1]) - explained) / left)
-    return float(fdtrc(count, left, explained / variance / count))
+    return f_tail(count, left, float(explained / variance / count))
