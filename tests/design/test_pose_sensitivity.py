@@ -85,7 +85,7 @@ def test_base_parameters_predict_what_all_47_with_their_tolerances_do(tx90l, rng
     full = pose_sensitivity(tx90l, rng.uniform(-2, 2, (60, 6)))
     base = base_sensitivity(full)
     working = rng.uniform(-2, 2, (30, 6))
-    weight = tool_error_weight(base, geometry_jacobian(tx90l, working)[1])
+    weight = tool_error_weight(base.columns(geometry_jacobian(tx90l, working)[1]))
     rows = geometry_jacobian(tx90l, working)[1].reshape(-1, 47)
     for chosen in (np.arange(12), np.arange(40)):
         factor = full.factor(chosen)

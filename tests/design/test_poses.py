@@ -58,7 +58,9 @@ def test_29_directions_are_kept(design):
 def test_c_optimal_predicts_a_smaller_error_at_poses_it_never_saw(tx90l, design, rng):
     from flexcal.design.poses.feasibility import tool_error_weight
 
-    fresh = tool_error_weight(design.base, geometry_jacobian(tx90l, random_poses(tx90l, 400, rng).q)[1])
+    fresh = tool_error_weight(
+        design.base.columns(geometry_jacobian(tx90l, random_poses(tx90l, 400, rng).q)[1])
+    )
     chosen = tool_error(design.base, fresh, design.selection.chosen)
     drawn = [tool_error(design.base, fresh, rng.choice(800, 40, replace=False)) for _ in range(100)]
     assert chosen < 0.95 * min(drawn)

@@ -53,7 +53,7 @@ def test_the_criterion_is_the_directly_predicted_error_in_the_volume(tx90l, box,
         _, jacobian = geometry_jacobian(tx90l, pose[None])
         kept = jacobian[0][:, list(base.identifiability.kept)] * base.scale
         squares.append(np.trace(kept @ covariance @ kept.T))
-    weight = tool_error_weight(base, geometry_jacobian(tx90l, box.q[:40])[1])
+    weight = tool_error_weight(base.columns(geometry_jacobian(tx90l, box.q[:40])[1]))
     assert tool_error(base, weight, chosen) == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-6)
 
 

@@ -1,5 +1,7 @@
 """The prior of a robot model from calibrated robots, of an arm that was simulated without the library's kinematics."""
 
+import json
+import re
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,7 +27,9 @@ from flexcal.calibration.diagnostics import EnoughPoses
 from flexcal.calibration.fit import FleetPrior, GeometricFit, base_errors
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.cli.main import main
-from flexcal.data.poses import PoseSet
+from flexcal.data.poses import PosePool, PoseSet
+from flexcal.design.poses import choose_poses, pose_candidates
+from flexcal.design.scene import MeasuringSetup, TrackerNoise
 from flexcal.estimation import Parameters
 from flexcal.files.formats import write_estimates
 from flexcal.jobs.calibration import calibrate_robot
@@ -209,7 +213,9 @@ def test_a_robot_of_another_type_is_told_and_one_of_the_type_is_not(six: Pooled)
         assert test.shifts
 
 
-def test_the_file_has_the_prior_and_refuses_other_robots(six: Pooled, tmp_path: Path) -> None:
+def test_the_file_has_the_prior_and_refuses_other_robots(
+    six: Pooled, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     files = []
     rng = np.random.default_rng(70)
     for k in range(3):
@@ -247,6 +253,38 @@ def test_the_file_has_the_prior_and_refuses_other_robots(six: Pooled, tmp_path: 
     with refused("E-PRIOR-011", "kinematic", "offsets"):
         calibrate_robot(new, [few], terms=["offsets"], prior=out)
 
+    plan = tmp_path / "plan.csv"
+    arguments = ["design", "poses", str(new), "--candidates", "200", "--out", str(plan), "--prior"]
+    assert main([*arguments, str(out), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["prior"]["robots"] == list(prior.robots) and document["enough_poses"] is None
+    assert 6 < document["prior"]["enough"]["poses"] == document["poses"] <= 40
+    assert document["tool_error_mm"] < document["tool_error_p90_mm"] < 2 * document["tool_error_mm"]
+    assert "prior of 3 other robots" in plan.with_suffix(".html").read_text()
+    assert main([*arguments, str(out), "--count", "6"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert (
+        "prior from 3 other robots" in said and "6 poses" in said and "chosen poses with this prior" in said
+    )
+    nothing, wrong = tmp_path / "nothing.yaml", tmp_path / "wrong.yaml"
+    text = out.read_text()
+    wrong.write_text(text.replace("  joint_2.offset:", "  joint_9.offset:"))
+    nothing.write_text(
+        re.sub(
+            r"(?ms)^parameters:.*?(?=^\w)",
+            "parameters: {}\n",
+            re.sub(r"(?ms)^correlation:.*?(?=^\w)", "correlation: []\n", text),
+        )
+    )
+    for given, options, code in (
+        (wrong, [], "E-PRIOR-019"),
+        (nothing, [], "E-PRIOR-018"),
+        (out, ["--criterion", "E"], "E-DESIGN-058"),
+        (out, ["--random"], "E-CLI-048"),
+    ):
+        assert main([*arguments, str(given), *options]) == 2
+        assert code in capsys.readouterr().err
+
     stranger = Fleet.drawn(rng).robot(rng)
     unlike = write_poses(tmp_path / "unlike.csv", q, stranger.measured(q, NOISE, rng))
     told = calibrate_robot(new, [unlike], prior=out, out=tmp_path / "unlike")
@@ -264,6 +302,8 @@ def test_the_file_has_the_prior_and_refuses_other_robots(six: Pooled, tmp_path: 
     urdf.write_text(urdf.read_text().replace('xyz="0.42', 'xyz="0.43'))
     with refused("E-PRIOR-007", "joint_3", "10 mm"):
         read_model_prior(out, RobotModel.from_yaml(odd))
+    assert main(["design", "poses", str(odd), "--prior", str(out), "--out", str(plan)]) == 2
+    assert "E-PRIOR-007" in capsys.readouterr().err
     # a robot with this prior would count the others twice
     calibrate_robot(new, [few], prior=out)
     with refused("E-PRIOR-005", "new"):
@@ -434,22 +474,49 @@ def test_robots_with_other_terms_are_refused(six: Pooled) -> None:
         pooled_prior([*six.members, replace(member, name="odd", estimate=other)])
 
 
-def next_robot(number: int, batch: Pooled, terms: Sequence[str]) -> tuple[float, float, float]:
-    """90th percentile, m, of a robot's errors after 40 poses without the others, after 15 with them, and share in their intervals."""
+def chosen_poses(batch: Pooled, count: int) -> np.ndarray:
+    """Joint positions (N, 6) that are chosen for the prior of a fleet, from those that random poses are of."""
+    rng = np.random.default_rng(77)
+    q = random_poses(2000, rng)
+    candidates = pose_candidates(
+        batch.model,
+        rng=rng,
+        candidates=PosePool(q, np.arange(1, len(q) + 1)),
+        setup=MeasuringSetup(noise=TrackerNoise(NOISE, 0.0)),
+        working=random_poses(300, rng),
+        fleet=batch.prior,
+    )
+    return choose_poses(candidates, count, rng=rng).plan.q
+
+
+def next_robot(
+    number: int, batch: Pooled, terms: Sequence[str], plan: np.ndarray
+) -> tuple[float, float, float, float, float]:
+    """90th percentile, m, of a robot's errors after 40 poses without the others; after 15 with them, and share in their intervals; and so
+    with the poses of a plan.
+    """
     rng = np.random.default_rng([124, number])
     robot = batch.fleet.robot(rng)
     alone = errors_elsewhere(fitted(batch.model, robot, 40, rng, None, terms), robot, rng)[0]
-    return alone, *errors_elsewhere(fitted(batch.model, robot, 15, rng, batch.prior, terms), robot, rng)
+    few = errors_elsewhere(fitted(batch.model, robot, 15, rng, batch.prior, terms), robot, rng)
+    poses = poses_of(plan, robot.measured(plan, NOISE, rng))
+    fit = fit_geometry(batch.model, poses, terms=terms, loss="squares", fleet=batch.prior)
+    return alone, *few, *errors_elsewhere(fit, robot, rng)
 
 
 @pytest.mark.slow
 def test_a_fleet_of_thirty_tells_the_next_robot(tmp_path: Path) -> None:
-    """Of soft robots that differ by 5 % of what their type is off, 15 poses are about as good as 40 without the others."""
+    """Of soft robots that differ by 5 % of what their type is off, 15 poses are about as good as 40 without the others; 15 chosen ones
+    are as good.
+    """
     soft = ["kinematic", "gravity_compliance", "lateral_compliance"]
     batch = pooled(tmp_path, robots=30, poses=40, seed=24, spread=0.05, terms=soft)
-    alone, few, inside = np.transpose(over_seeds(next_robot, range(8), batch, soft))
+    plan = chosen_poses(batch, 15)
+    alone, few, inside, chosen, within = np.transpose(over_seeds(next_robot, range(8), batch, soft, plan))
     print(
-        f"{1e3 * np.mean(few):.4f} mm, {1e3 * np.mean(alone):.4f} mm alone, {100 * np.mean(inside):.1f} % inside"
+        f"{1e3 * np.mean(few):.4f} mm, {1e3 * np.mean(chosen):.4f} mm chosen, {1e3 * np.mean(alone):.4f} mm alone, "
+        f"{100 * np.mean(inside):.1f} %, {100 * np.mean(within):.1f} % inside"
     )
     assert np.mean(few) < 1.25 * np.mean(alone)
-    assert 0.92 < np.mean(inside) < 0.99
+    assert np.mean(chosen) < 1.1 * np.mean(alone)
+    assert 0.92 < np.mean(inside) < 0.99 and 0.92 < np.mean(within) < 0.99

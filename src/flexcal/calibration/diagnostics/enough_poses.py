@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -12,13 +13,10 @@ from flexcal.calibration.measurement import predict_measurements, random_poses
 from flexcal.estimation import Parameters
 from flexcal.units import MILLIMETRE
 
-_ALONE = 40
-"""Poses without a prior, with which those with it are compared."""
-_SETS = 6
-"""Sets of random poses over which errors are averaged."""
 _ELSEWHERE = 100
 """Poses at which errors are predicted."""
 _FEWEST = 3
+"""Poses that tell the place of an instrument and a target, nine numbers."""
 _COMMON = 0.5
 """Largest error common to several poses, over their own, that is taken for one of each: more poses average it less."""
 
@@ -27,6 +25,11 @@ _COMMON = 0.5
 class EnoughPoses:
     """The least number of `poses` that with the prior reach the predicted `error`, m (root mean square), of `alone` poses without it."""
 
+    ALONE: ClassVar[int] = 40
+    """Poses without a prior, with which those with it are compared."""
+    SETS: ClassVar[int] = 6
+    """Sets of random poses over which errors are averaged."""
+
     poses: int
     alone: int
     error: float
@@ -34,6 +37,12 @@ class EnoughPoses:
     def document(self) -> dict[str, Any]:
         """Entry of results.json."""
         return {"poses": self.poses, "alone": self.alone, "rms_mm": self.error / MILLIMETRE}
+
+    @classmethod
+    def least(cls, goal: float, alone: int, error: Callable[[int], float]) -> EnoughPoses:
+        """Least number of poses with an `error` (m) of at most the `goal`, that of `alone` without a prior; as many if none does."""
+        enough = next((k for k in range(_FEWEST, alone) if error(k) <= goal), alone)
+        return cls(enough, alone, goal)
 
     @classmethod
     def of(cls, fit: GeometricFit) -> EnoughPoses | None:
@@ -58,13 +67,13 @@ class EnoughPoses:
         noise = float(np.hypot(noise, scatter.model))
         parameters = _free(fit, fleet)
         limits = np.stack([poses.q.min(axis=0), poses.q.max(axis=0)])
-        drawn = random_poses(fit.model, limits, [str(poses.target[0])], _SETS * _ALONE + _ELSEWHERE)
+        drawn = random_poses(fit.model, limits, [str(poses.target[0])], cls.SETS * cls.ALONE + _ELSEWHERE)
         columns = predict_measurements(fit.model, drawn, elastic=False, jacobians=True).jacobian(
             parameters.names
         )
         sizes = np.array([plausible_size(fit.model, name) for name in parameters.names])
         columns = columns * sizes
-        sets = columns[_ELSEWHERE:].reshape(_SETS, _ALONE, 3, -1) / noise
+        sets = columns[_ELSEWHERE:].reshape(cls.SETS, cls.ALONE, 3, -1) / noise
         elsewhere = np.einsum("nip,niq->pq", columns[:_ELSEWHERE], columns[:_ELSEWHERE]) / _ELSEWHERE
         before = np.diag((sizes / np.minimum(parameters.prior_std(), sizes)) ** 2)
         own = fleet.among(parameters.names)
@@ -78,9 +87,7 @@ class EnoughPoses:
             variances = np.trace(np.linalg.solve(informations, elsewhere[None]), axis1=1, axis2=2)
             return float(np.sqrt(variances).mean())
 
-        goal = error(_ALONE, before)
-        enough = next((k for k in range(_FEWEST, _ALONE) if error(k, known) <= goal), _ALONE)
-        return cls(enough, _ALONE, goal)
+        return cls.least(error(cls.ALONE, before), cls.ALONE, lambda count: error(count, known))
 
 
 def _free(fit: GeometricFit, fleet: FleetPrior) -> Parameters:

@@ -1,6 +1,6 @@
 from .base_placement import base_errors
 from .elastic_prior import ElasticPrior
-from .fleet_prior import OF_THE_CELL, FleetPrior
+from .fleet_prior import OF_THE_CELL, FleetPrior, prior_covariance
 from .gauge_freedom import (
     KNOWN_POINT_STD,
     point_uncertainty,
@@ -55,6 +55,7 @@ __all__ = [
     "moving_joints",
     "plausible_size",
     "point_uncertainty",
+    "prior_covariance",
     "probable_robot",
     "probable_robots",
     "sensor_scatter",

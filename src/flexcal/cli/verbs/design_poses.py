@@ -44,7 +44,7 @@ class DesignPoses:
 
     robot: Robot
     count: Annotated[int, arg(metavar="N")] = 40
-    """Number of poses; with --wanted or --measured the maximum."""
+    """Number of poses; with --wanted, --measured or --prior the maximum."""
     out: Annotated[Path, arg(metavar="FILE")] = Path("poses.yaml")
     """File for the plan, YAML or CSV."""
     working: Annotated[
@@ -80,6 +80,11 @@ class DesignPoses:
         MaybeText, arg(metavar="NAME", help_behavior_hint="(default: a tracker of points)")
     ] = None
     """What will measure: a name under measurements: of robot.yaml that says where it stands, or pose for a tracker of orientations too."""
+    prior: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="(default: typical tolerances)")] = (
+        None
+    )
+    """Prior from other robots, as 'flexcal fleet --prior' writes it, for 'calibrate --prior': poses that tell what it does not, as
+    many as reach what 40 random ones do without it."""
     seed: Annotated[int, arg(metavar="N")] = 0
     """Seed of the random poses."""
     jobs: Processes = 1
@@ -97,6 +102,8 @@ class DesignPoses:
             raise InputError("E-CLI-023", "--random and --from exclude each other; give one of them.")
         if self.measure is not None and (self.random or self.measured or self.pool is not None):
             raise InputError("E-CLI-042", "--measure goes with none of --random, --measured and --from.")
+        if self.prior is not None and (self.random or self.measured or self.measure is not None):
+            raise InputError("E-CLI-048", "--prior goes with none of --random, --measured and --measure.")
         if (self.on is not None or self.jobs > 1) and (self.random or self.measured or self.pool is not None):
             raise InputError(
                 "E-CLI-046",
@@ -141,7 +148,7 @@ class DesignPoses:
             seed=self.seed,
             measure=self.measure,
         )
-        files = PoseRequestFiles(self.pool, self.working)
+        files = PoseRequestFiles(self.pool, self.working, self.prior)
         with console.progress() as progress:
             return plan(self.robot, self.out, request, files, command=command_line(), progress=progress)
 
@@ -151,19 +158,23 @@ class DesignPoses:
         design = self._planned(console, partial(plan_calibration_poses, on=self.on, jobs=self.jobs))
         document = design.document()
         seen = document["identifiability"]
-        console.say(
-            f"{seen['rank']} of {seen['parameters']} parameters are identifiable from "
-            + (
+        prior = document["prior"]
+        if prior is None:
+            what = (
                 "position measurements"
                 if self.measure is None
                 else f"the readings of {document['instrument']}"
             )
-        )
+            console.say(f"{seen['rank']} of {seen['parameters']} parameters are identifiable from {what}")
+        else:
+            console.say(
+                f"{prior['parameters']} parameters have a prior from {len(prior['robots'])} other robots ({prior['file']}); the place of "
+                "the instrument and of the target, nine numbers, are this robot's own"
+            )
         console.say(
             f"predicted tool error from the noise of {document['instrument']} alone: {document['tool_error_mm']:.4f} mm "
-            f"(rms over {_where(document)}); "
-            f"lower bound for this number of poses: {document['least_possible_mm']:.4f} mm; from "
-            f"{document['enough_poses']} poses on further ones only average noise"
+            f"(rms over {_where(document)}; 90 % below {document['tool_error_p90_mm']:.4f} mm); "
+            f"lower bound for this number of poses: {document['least_possible_mm']:.4f} mm; {design.number_sentence}"
         )
         if self.measure is not None:
             unseen, tracked = document["unseen_mm"], document["with_tracker_mm"]
@@ -184,9 +195,10 @@ class DesignPoses:
             + (f"; the straight joint motion from {ways} collides: add via points" if blocked else "")
         )
         console.say(f"wrote {self.out}: {document['poses']} poses")
+        then = "" if prior is None else f"; then flexcal calibrate with --prior {prior['file']}"
         console.finish(
             document,
-            f"{measure_command(self.out, self.robot, 'measured')}{import_command(self.robot, 'measured.csv')}",
+            f"{measure_command(self.out, self.robot, 'measured')}{import_command(self.robot, 'measured.csv')}{then}",
         )
 
     def _continue(self, console: Console) -> None:

@@ -11,6 +11,7 @@ from .geometry_sensitivity import (
 )
 from .gravity_preload import preloaded
 from .ordering import MeasurementOrder, measurement_order
+from .poses_with_prior import enough_with_prior
 from .selection import (
     CriterionName,
     PoseDesign,
@@ -41,6 +42,7 @@ __all__ = [
     "base_sensitivity",
     "choose_poses",
     "criterion_named",
+    "enough_with_prior",
     "fewest_poses",
     "geometry_jacobian",
     "measurement_order",

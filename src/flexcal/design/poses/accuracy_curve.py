@@ -49,11 +49,9 @@ def pose_curve(
     """
     sensitivity = design.base.sensitivity
     total = design.sample
-    _, rows, size = sensitivity.jacobian.shape
-    least = -(-size // rows)
     if not len(counts):
         most = min(total, 4 * len(design.plan))
-        counts = np.unique(np.geomspace(least, most, 16).round().astype(int)).tolist()
+        counts = np.unique(np.geomspace(design.fewest, most, 16).round().astype(int)).tolist()
     if min(counts) < 1 or max(counts) > total:
         raise FlexcalError("E-DESIGN-020", f"counts must lie between 1 and the {total} candidates.")
     progress("how many", 0.0)

@@ -88,7 +88,7 @@ class BlockedCandidates:
     def rows(self, q: np.ndarray) -> Sensitivity:
         """Rows of poses `q` (N, n) in the first block's combinations."""
         base = self.first.base
-        full = full_sensitivity(self.first.model, q, self.first.setup)
+        full = full_sensitivity(self.first.model, q, self.first.setup, self.first.fleet)
         known = [name for name in base.identifiability.kept_names if name in full.parameters.names]
         places = [base.identifiability.kept_names.index(name) for name in known]
         jacobian = np.zeros((*full.jacobian.shape[:2], len(base.scale)))

@@ -7,10 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from flexcal.calibration.fit import FleetPrior, prior_covariance
 from flexcal.data.poses import PosePool
 from flexcal.design.optimality import TraceBound, TraceOptimal, trace_lower_bound
 from flexcal.design.poses.camera_setup import CameraSetup
 from flexcal.design.poses.candidates import random_candidates
+from flexcal.design.poses.fleet_sensitivity import fleet_jacobian, fleet_sensitivity
 from flexcal.design.poses.geometry_sensitivity import (
     BaseSensitivity,
     as_drawn,
@@ -38,9 +40,11 @@ WORKING_POSES = 300
 class PoseCandidates:
     """Candidate poses that can be measured with `setup`.
 
-    `base` holds the rows of all poses of the `pool`; `tool_error_weight` (rank, rank), m², turns a covariance into the mean square of the
-    tool error over the working poses. `hidden` are the numbers of a given pool's poses that the instrument does not see; `unseen`, m, is
-    the root mean square of the tool error due to what no pose tells, as the size of the robot at contacts, by the tolerances.
+    `base` holds the rows of all poses of the `pool`; `tool_motions` (W, 3, rank), m, are those of the tool at the working poses, and
+    `tool_error_weight` (rank, rank), m², turns a covariance into the mean square of the tool error over them. `hidden` are the numbers of a
+    given pool's poses that the instrument does not see; `unseen`, m, is the root mean square of the tool error due to what no pose tells,
+    as the size of the robot at contacts, by the tolerances. With `fleet`, a prior from other robots of the model, the parameters are those
+    that a calibration with it estimates.
 
     The pool may be what is left of `looked_at` candidates (None: of no more than these): its first `sample` poses are then a random sample
     of them, `start` the numbers of a good set, and `bound` with `largest` holds for all of them.
@@ -50,6 +54,7 @@ class PoseCandidates:
     setup: MeasuringSetup
     pool: PosePool
     base: BaseSensitivity
+    tool_motions: np.ndarray
     tool_error_weight: np.ndarray
     hidden: np.ndarray
     unseen: float = 0.0
@@ -58,6 +63,14 @@ class PoseCandidates:
     start: np.ndarray | None = None
     bound: TraceBound | None = None
     largest: float = 0.0
+    fleet: FleetPrior | None = None
+
+    @property
+    def fewest(self) -> int:
+        """Fewest poses that determine what no prior tells: all parameters, or with a `fleet` the place of instrument and target."""
+        known = 0 if self.fleet is None else len(self.fleet.names)
+        unknown = self.base.identifiability.rank if known == 0 else len(self.base.tolerance) - known
+        return -(-unknown // self.base.sensitivity.jacobian.shape[1])
 
     def least_errors(self, counts: np.ndarray) -> np.ndarray:
         """Lower bounds (K,) of the tool error, m, of any choice of `counts` (K,) candidates (see `TraceBound`)."""
@@ -76,6 +89,7 @@ def pose_candidates(
     setup: MeasuringSetup = STANDARD,
     working: np.ndarray | None = None,
     checker: CollisionChecker | None = None,
+    fleet: FleetPrior | None = None,
     progress: Progress = silent,
 ) -> PoseCandidates:
     """Random poses, or those of a pool, with gravity surely preloading every backlash; at least `least` of them.
@@ -83,7 +97,8 @@ def pose_candidates(
     Random ones keep to the joint limits, collide with nothing (`checker`, by default with 10 mm of margin and a floor at the base of
     a robot that stands) and show the target to the instrument. Those of a pool are taken to be free of collision; in those left out
     the flank is not sure, or the instrument does not see the target. The tool error counts over the `working` poses (W, n), by
-    default random ones over the whole workspace. A pool's payload counts for it where `setup` has none.
+    default random ones over the whole workspace. A pool's payload counts for it where `setup` has none. With `fleet` the prior are not the
+    tolerances but other robots of the model; what measures is then a tracker of points.
 
     Raises `FlexcalError` where too few poses pass the checks, and where all of them press a backlash onto one flank.
     """
@@ -101,15 +116,22 @@ def pose_candidates(
             _require_reached(checker.model, q, least, setup.measure)
         pool, hidden = PosePool(q, np.arange(1, len(q) + 1)), np.zeros(0, dtype=int)
     _check_flanks(model, pool.q, setup.payload)
-    full = full_sensitivity(model, pool.q, setup)
+    full = full_sensitivity(model, pool.q, setup, fleet)
     base = base_sensitivity(full)
+    if fleet is not None:
+        base = base.with_prior(prior_covariance(full.parameters, fleet))
     if working is None:
         anywhere = replace(setup, acceptance=None, measure=None)
         working = random_candidates(checker, WORKING_POSES, rng, anywhere)
-    rows = tool_motions(base.identifiability.names, model, working, setup)
-    weight = tool_error_weight(base, rows)
+    rows = (
+        tool_motions(base.identifiability.names, model, working, setup)
+        if fleet is None
+        else fleet_jacobian(model, working, setup, full.parameters.names)
+    )
+    motions = base.columns(rows)
+    unseen = unseen_error(base, rows, full.parameters.prior_std())
     return PoseCandidates(
-        model, setup, pool, base, weight, hidden, unseen_error(base, rows, full.parameters.prior_std())
+        model, setup, pool, base, motions, tool_error_weight(motions), hidden, unseen, fleet=fleet
     )
 
 
@@ -136,8 +158,14 @@ def drawn_configurations(
     return q
 
 
-def full_sensitivity(model: RobotModel, q: np.ndarray, setup: MeasuringSetup) -> Sensitivity:
-    """Rows of poses `q` (N, n) in all geometric errors, as the instrument that is to measure reads them."""
+def full_sensitivity(
+    model: RobotModel, q: np.ndarray, setup: MeasuringSetup, fleet: FleetPrior | None = None
+) -> Sensitivity:
+    """Rows of poses `q` (N, n) in all geometric errors, as the instrument that is to measure reads them; with `fleet` as in
+    `fleet_sensitivity`.
+    """
+    if fleet is not None:
+        return fleet_sensitivity(model, q, setup, fleet)
     sensitivity = pose_sensitivity if setup.measure is None else instrument_sensitivity
     return sensitivity(model, q, setup)
 
@@ -186,9 +214,11 @@ def tool_motions(
     return _wherever_the_base_is(model, working, every, setup.point)
 
 
-def tool_error_weight(base: BaseSensitivity, motions: np.ndarray) -> np.ndarray:
-    """W = mean over the working poses of JᵀJ (rank, rank), m²: tr(W Σ) is the mean square error of the tool position."""
-    rows = base.columns(motions).reshape(-1, len(base.scale))
+def tool_error_weight(motions: np.ndarray) -> np.ndarray:
+    """W = mean over the working poses of JᵀJ (rank, rank), m², with J their `motions` (W, 3, rank): tr(W Σ) is the mean square error of the
+    tool position.
+    """
+    rows = motions.reshape(-1, motions.shape[2])
     return rows.T @ rows / len(motions)
 
 

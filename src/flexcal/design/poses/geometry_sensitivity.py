@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -111,6 +111,14 @@ class BaseSensitivity:
     scale: np.ndarray
     tolerance: np.ndarray
 
+    def with_prior(self, covariance: np.ndarray) -> BaseSensitivity:
+        """The same combinations with another prior, of `covariance` (p, p) of the parameters before the reduction."""
+        size = np.sqrt(np.diag(covariance))
+        root = size[:, None] * np.linalg.cholesky(covariance / np.outer(size, size))
+        information = _prior_information(self.identifiability.regrouping @ root / self.scale[:, None])
+        known = Sensitivity(self.sensitivity.jacobian, self.sensitivity.parameters, information)
+        return replace(self, sensitivity=known)
+
     def columns(self, jacobian: np.ndarray) -> np.ndarray:
         """Columns (..., rank) of a `jacobian` (..., p) by all parameters for these combinations, with the same scales."""
         return jacobian[..., list(self.identifiability.kept)] * self.scale
@@ -133,12 +141,17 @@ def base_sensitivity(full: Sensitivity) -> BaseSensitivity:
     scale = np.where([p.unit == "m" for p in full.parameters], _length_scale(full.parameters), tolerance)
     identifiability = analyse(_triangle(full.jacobian), full.parameters.names, scale=scale)
     kept = list(identifiability.kept)
-    spread = identifiability.regrouping * tolerance / scale[kept][:, None]
-    factor = np.linalg.qr(spread.T, mode="r")
-    root = np.linalg.solve(factor, np.eye(len(kept)))
+    information = _prior_information(identifiability.regrouping * tolerance / scale[kept][:, None])
     parameters = Parameters(Parameter(name, "1", 0.0) for name in identifiability.kept_names)
-    sensitivity = Sensitivity(full.jacobian[:, :, kept] * scale[kept], parameters, root @ root.T)
+    sensitivity = Sensitivity(full.jacobian[:, :, kept] * scale[kept], parameters, information)
     return BaseSensitivity(sensitivity, identifiability, scale[kept], tolerance)
+
+
+def _prior_information(spread: np.ndarray) -> np.ndarray:
+    """Information (rank, rank) of combinations whose prior covariance is spread · spreadᵀ, with `spread` (rank, p)."""
+    factor = np.linalg.qr(spread.T, mode="r")
+    root = np.linalg.solve(factor, np.eye(len(spread)))
+    return root @ root.T
 
 
 def _triangle(jacobian: np.ndarray) -> np.ndarray:
@@ -153,5 +166,5 @@ def _triangle(jacobian: np.ndarray) -> np.ndarray:
 
 
 def _length_scale(parameters: Parameters) -> float:
-    lengths = [p.prior_std for p in parameters if p.unit != "rad" and not p.name.startswith("station.")]
+    lengths = [p.prior_std for p in parameters if p.unit == "m" and not p.name.startswith("station.")]
     return min(lengths, default=TYPICAL.length)

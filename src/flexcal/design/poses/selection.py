@@ -25,7 +25,7 @@ from flexcal.design.poses.geometry_sensitivity import BaseSensitivity
 from flexcal.design.poses.gravity_preload import preload_joints
 from flexcal.design.scene import STANDARD, CollisionChecker, MeasuringSetup
 from flexcal.errors import FlexcalError
-from flexcal.estimation import Identifiability
+from flexcal.estimation import Identifiability, distance_probability, principal_variances
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import gravity_torque
 from flexcal.progress import Progress, silent
@@ -39,7 +39,8 @@ class PoseDesign:
     """A plan of N poses, with candidates, criterion and predicted errors.
 
     `candidates` are what there was to choose from, `selection` what was chosen by `criterion`; `base` holds the rows of all candidates;
-    `tool_error_weight` (rank, rank), m², turns a covariance into the mean square of the tool error over the working poses; `flank`
+    `tool_motions` (W, 3, rank), m, are those of the tool at the working poses, `tool_error_weight` (rank, rank), m², turns a covariance
+    into the mean square of the tool error over them; `fewest` is the least number of poses that determine what no prior tells; `flank`
     (N, joints with backlash) is the sign of the gravity torque at `flank_joints`; `hidden` are the numbers of given poses that the
     instrument does not see; `unseen`, m, is the tool error due to what no pose tells; `least_possible`, m, is a lower bound of the tool
     error for any choice of as many candidates. The candidates may be what is left of `looked_at` ones; their first `sample` are then
@@ -51,6 +52,7 @@ class PoseDesign:
     candidates: PosePool
     selection: Selection
     base: BaseSensitivity
+    tool_motions: np.ndarray
     tool_error_weight: np.ndarray
     flank_joints: tuple[str, ...]
     flank: np.ndarray
@@ -59,6 +61,7 @@ class PoseDesign:
     least_possible: float
     looked_at: int
     sample: int
+    fewest: int
 
     @classmethod
     def of(
@@ -73,6 +76,7 @@ class PoseDesign:
             candidates=candidates.pool,
             selection=selection,
             base=candidates.base,
+            tool_motions=candidates.tool_motions,
             tool_error_weight=candidates.tool_error_weight,
             flank_joints=tuple(candidates.model.joint_names[i] for i in loose),
             flank=np.sign(gravity_torque(candidates.model, chosen, candidates.setup.payload))[:, loose],
@@ -81,6 +85,7 @@ class PoseDesign:
             least_possible=float(candidates.least_errors(np.array([len(chosen)]))[0]),
             looked_at=candidates.looked_at or len(candidates.pool),
             sample=candidates.sample or len(candidates.pool),
+            fewest=candidates.fewest,
         )
 
     def in_order(self, order: np.ndarray) -> PoseDesign:
@@ -111,20 +116,40 @@ class PoseDesign:
         return tool_error(self.base, self.tool_error_weight, self.selection.chosen)
 
     @property
+    def tool_error_p90(self) -> float:
+        """90th percentile of that error, m, over working poses and robots."""
+        from scipy.optimize import root_scalar
+
+        factor = self.base.sensitivity.factor(self.selection.chosen)
+        moved = np.linalg.solve(factor.T, self.tool_motions.swapaxes(1, 2))
+        variances = principal_variances(np.matmul(moved.swapaxes(1, 2), moved))
+        largest = 4 * float(np.sqrt(variances[:, 0].max()))
+
+        def excess(distance: float) -> float:
+            return float(distance_probability(np.full(len(variances), distance), variances).mean()) - 0.9
+
+        return float(root_scalar(excess, bracket=(0.0, largest)).root)
+
+    @property
     def criteria(self) -> dict[CriterionName, float]:
         """Values of all criteria for the chosen poses.
 
         `c` is the tool error (m); `A` the sum of the parameters' variances in units of their tolerances and `D` log det M / p, both with
-        the tolerances as prior; `E` (σ_min of ΘᵀΘ) and O1-O5 are of the measurements alone.
+        the tolerances as prior; `E` (σ_min of ΘᵀΘ) and O1-O5 are of the measurements alone, and absent where these do not determine all
+        parameters.
         """
         sensitivity, chosen = self.base.sensitivity, self.selection.chosen
         factor = sensitivity.factor(chosen)
         information = factor.T @ factor
-        seen = observability(sensitivity, chosen)
-        return {
+        values: dict[CriterionName, float] = {
             "c": self.tool_error,
             "A": TraceOptimal(np.eye(len(information)), "A").trace(information),
             "D": DOptimal().merit(information),
+        }
+        if len(chosen) * sensitivity.jacobian.shape[1] < len(information):
+            return values
+        seen = observability(sensitivity, chosen)
+        values |= {
             "E": seen.sigma_min,
             "O1": seen.o1,
             "O2": seen.o2,
@@ -132,6 +157,7 @@ class PoseDesign:
             "O4": seen.o4,
             "O5": seen.o5,
         }
+        return values
 
 
 def tool_error(base: BaseSensitivity, tool_error_weight: np.ndarray, chosen: np.ndarray) -> float:
@@ -183,14 +209,22 @@ def choose_poses(
     progress: Progress = silent,
 ) -> PoseDesign:
     """As `select_poses`, from given candidates; `rng` draws the plan's seed."""
-    rank, rows = candidates.base.identifiability.rank, candidates.base.sensitivity.jacobian.shape[1]
-    if rows * count < rank:
+    if count < candidates.fewest:
+        what = (
+            f"{candidates.base.identifiability.rank} parameters of {candidates.model.name} and the instrument"
+            if candidates.fleet is None
+            else "the place of the instrument and the target, which no prior tells"
+        )
         raise FlexcalError(
             "E-DESIGN-026",
-            f"{count} poses cannot determine {rank} parameters of {candidates.model.name} and the instrument; "
-            f"choose at least {-(-rank // rows)}, better twice as many.",
+            f"{count} poses cannot determine {what}; choose at least {candidates.fewest}, better twice as many.",
         )
     optimality = criterion_named(criterion, candidates.tool_error_weight)
+    if candidates.fleet is not None and not optimality.uses_prior:
+        raise FlexcalError(
+            "E-DESIGN-058",
+            f"the criterion {criterion} judges the measurements alone, without any prior; choose c, A or D with --prior.",
+        )
     start = candidates.start if candidates.start is not None and len(candidates.start) == count else None
     selection = exchange_on_shortlist(
         candidates.base.sensitivity, count, optimality, start=start, progress=progress
@@ -204,8 +238,7 @@ def fewest_poses(candidates: PoseCandidates, most: int, desired_error: float) ->
     """
     weight, sensitivity = candidates.tool_error_weight, candidates.base.sensitivity
     order = greedy(sensitivity, most, TraceOptimal(weight, "c")).chosen
-    least = -(-candidates.base.identifiability.rank // sensitivity.jacobian.shape[1])
-    for count in range(least, most + 1):
+    for count in range(candidates.fewest, most + 1):
         if tool_error(candidates.base, weight, order[:count]) <= desired_error:
             return count
     reached = tool_error(candidates.base, weight, order)

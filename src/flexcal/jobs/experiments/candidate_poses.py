@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from flexcal.calibration.fit import FleetPrior
 from flexcal.data.poses import PosePool, read_pose_pool, read_working
 from flexcal.design.poses import (
     BLOCK,
@@ -22,6 +23,7 @@ from flexcal.design.poses import (
 )
 from flexcal.design.scene import CollisionChecker, MeasuringSetup
 from flexcal.errors import InputError
+from flexcal.jobs.fleet_prior import read_model_prior
 from flexcal.jobs.logs import worker_robot
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.robot import RobotModel
@@ -57,6 +59,9 @@ class PoseRequest:
         Seed of the random poses.
     measure : str, optional
         What will measure: a name under `measurements:`, or "pose" for a tracker of orientations too; by default a tracker of points.
+    prior : FleetPrior, optional
+        Prior from other robots of the model, with which the robot will be calibrated: `count` is then the largest number, and poses end
+        where they reach the predicted error of 40 random ones without it, or the desired one. What measures is a tracker of points.
     """
 
     count: int = 40
@@ -67,6 +72,7 @@ class PoseRequest:
     payload: float | None = None
     seed: int = 0
     measure: str | None = None
+    prior: FleetPrior | None = None
 
     def volume(self, checker: CollisionChecker) -> WorkingVolume | None:
         """Working volume of the robot; None for anywhere. Raises `FlexcalError` for a box that it does not reach."""
@@ -150,6 +156,7 @@ class CandidatePoses:
             setup=MeasuringSetup.declared(model, request.payload, request.measure),
             working=None if place is None else place.q,
             checker=checker,
+            fleet=request.prior,
             progress=progress,
         )
         return cls(checker, candidates, given if isinstance(given, PosePool) else None, place)
@@ -161,20 +168,32 @@ def _chosen_of_block(number: int, blocked: BlockedCandidates) -> ChosenOfBlock:
 
 @dataclass(frozen=True)
 class PoseRequestFiles:
-    """Files of a `PoseRequest`: a `pool` of poses to choose from, and the `working` volume, a box "x:X,y:Y,z:Z" (m, base frame) or a
-    file of points or poses.
+    """Files of a `PoseRequest`: a `pool` of poses to choose from, the `working` volume, a box "x:X,y:Y,z:Z" (m, base frame) or a file of
+    points or poses, and the `prior` from other robots, as `flexcal fleet --prior` writes it.
     """
 
     pool: Path | None = None
     working: str | None = None
+    prior: Path | None = None
 
     @property
     def paths(self) -> tuple[Path, ...]:
         """Options that are paths of files."""
-        return tuple(file for file in (self.pool, working_file(self.working)) if file is not None)
+        return tuple(file for file in (self.pool, working_file(self.working), self.prior) if file is not None)
 
     def read(self, model: RobotModel, request: PoseRequest) -> PoseRequest:
-        """Request with the contents of the files; raises `FlexcalError` as `read_pose_pool`, `read_working` and `working_box` do."""
+        """Request with the contents of the files; raises `FlexcalError` as `read_pose_pool`, `read_working`, `working_box` and
+        `read_model_prior` do, and for a prior that tells no geometry.
+        """
+        if self.prior is not None:
+            geometry = read_model_prior(self.prior, model).geometry
+            if geometry is None:
+                raise InputError(
+                    "E-PRIOR-018",
+                    f"{self.prior} tells nothing of the geometry, for which poses are chosen; choose them without it, or make a prior from "
+                    "calibrated robots.",
+                )
+            request = replace(request, prior=geometry)
         if self.working is not None:
             place = working_volume(CollisionChecker(model), self.working, request.seed)
             request = replace(request, working=place)

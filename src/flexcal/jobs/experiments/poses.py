@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from flexcal.calibration.diagnostics import EnoughPoses
+from flexcal.calibration.fit import FleetPrior
 from flexcal.data.plans import PosePlan, page_beside, write_plan
 from flexcal.data.poses import PosePool
 from flexcal.design.optimality import TraceOptimal, greedy
@@ -19,6 +21,7 @@ from flexcal.design.poses import (
     PoseDesign,
     WorkingVolume,
     choose_poses,
+    enough_with_prior,
     fewest_poses,
     measurement_order,
     pose_curve,
@@ -101,6 +104,10 @@ class DesignedPoses(PlottedResult):
         Predicted tool error, m, of as many poses with a tracker of points, where something else is to measure.
     tracker_zeros : mapping of float
         Predicted standard deviations of the joint zeros, rad or m, with that tracker.
+    prior : FleetPrior or None
+        Prior from other robots of the model, with which the robot will be calibrated.
+    enough : EnoughPoses or None
+        How many chosen poses with this prior reach what many random ones do without it.
     """
 
     plan: PosePlan
@@ -115,6 +122,8 @@ class DesignedPoses(PlottedResult):
     measure: str | None = None
     with_tracker: float | None = None
     tracker_zeros: Mapping[str, float] = field(default_factory=dict)
+    prior: FleetPrior | None = None
+    enough: EnoughPoses | None = None
 
     @property
     def headline(self) -> str:
@@ -136,9 +145,16 @@ class DesignedPoses(PlottedResult):
             [
                 self.headline,
                 f"{seen.rank} of {len(seen.names)} parameters are identifiable",
-                f"from {self.curve.enough()} poses on further ones only average noise",
+                self.number_sentence,
             ]
         )
+
+    @property
+    def number_sentence(self) -> str:
+        """How many poses are enough."""
+        if self.enough is None:
+            return f"from {self.curve.enough()} poses on further ones only average noise"
+        return enough_sentence(self.enough.document())
 
     def _page(self) -> Page:
         return plan_page(self.model, self.plan, self.document(), self.working)
@@ -156,6 +172,7 @@ class DesignedPoses(PlottedResult):
                 "criterion": design.criterion.name,
                 "candidates": design.looked_at,
                 "tool_error_mm": design.tool_error / MILLIMETRE,
+                "tool_error_p90_mm": design.tool_error_p90 / MILLIMETRE,
                 "least_possible_mm": design.least_possible / MILLIMETRE,
                 "measure": self.measure,
                 "instrument": self.instrument,
@@ -168,7 +185,8 @@ class DesignedPoses(PlottedResult):
                 "flanks": flank_block(design),
                 "moves_s": float(self.way.seconds.sum()),
                 "blocked_moves": [[int(i) + 1, int(i) + 2] for i in np.flatnonzero(self.way.blocked)],
-                "enough_poses": curve.enough(),
+                "prior": self._prior(),
+                "enough_poses": curve.enough() if self.enough is None else None,
                 "curve": [
                     {
                         "poses": int(n),
@@ -181,10 +199,29 @@ class DesignedPoses(PlottedResult):
             }
         )
 
+    def _prior(self) -> dict[str, Any] | None:
+        if self.prior is None or self.enough is None:
+            return None
+        return {
+            "file": self.prior.source,
+            "robots": list(self.prior.robots),
+            "parameters": len(self.prior.names),
+            "enough": self.enough.document(),
+            "sentence": self.number_sentence,
+        }
+
     def _zeros(self) -> dict[str, dict[str, float | None]]:
         """Predicted standard deviations of the joint zeros, rad or m, with this instrument and with a tracker."""
         stds = zero_stds(self.design.base, self.design.selection.chosen)
         return {n: {"std": std, "with_tracker": self.tracker_zeros.get(n)} for n, std in stds.items()}
+
+
+def enough_sentence(enough: Mapping[str, Any]) -> str:
+    """How many chosen poses with a prior are enough; `enough` as in the document."""
+    reached = f"{enough['alone']} random ones without it ({enough['rms_mm']:.2g} mm rms, from noise alone)"
+    if enough["poses"] < enough["alone"]:
+        return f"about {enough['poses']} chosen poses with this prior reach the accuracy of {reached}"
+    return f"robots differ so much that no fewer chosen poses with this prior reach the accuracy of {reached}"
 
 
 def pool_block(design: PoseDesign, pool: PosePool | None, seed: int) -> dict[str, Any]:
@@ -257,9 +294,12 @@ def design_poses(
 def _designed(
     choice: CandidatePoses, request: PoseRequest, rng: np.random.Generator, progress: Progress
 ) -> DesignedPoses:
-    count = request.count
+    count, enough = request.count, None
+    if request.prior is not None:
+        enough = enough_with_prior(choice.candidates, np.random.default_rng([request.seed, 9]))
+        count = min(count, enough.poses)
     if request.desired_error is not None:
-        count = fewest_poses(choice.candidates, count, request.desired_error)
+        count = fewest_poses(choice.candidates, request.count, request.desired_error)
     design = choose_poses(choice.candidates, count, rng=rng, criterion=request.criterion, progress=progress)
     way = measurement_order(choice.checker, design.plan.q)
     design = design.in_order(way.order)
@@ -268,6 +308,7 @@ def _designed(
     designed = DesignedPoses(
         choice.checker.model, plan, design, curve, way, request.seed, choice.working, choice.pool
     )
+    designed = replace(designed, prior=request.prior, enough=enough)
     if request.measure is None:
         return designed
     error, zeros = _with_tracker(choice, request, len(plan), progress)

@@ -12,6 +12,7 @@ import numpy as np
 from flexcal.calibration.fit import FleetPrior
 from flexcal.errors import FlexcalError
 from flexcal.files.formats import provenance, read_yaml_file, write_yaml
+from flexcal.jobs.fleet_prior.geometry_information import is_geometric_error
 from flexcal.jobs.fleet_prior.kinematics import NominalJoint, difference_of, nominal_joints
 from flexcal.jobs.fleet_prior.model_prior import ModelPrior
 from flexcal.jobs.fleet_prior.pooled_values import PooledValues
@@ -175,6 +176,13 @@ def read_model_prior(path: Path, model: RobotModel) -> ModelPrior:
             f"the robot of {model.path} is not of the model of {path} ({stored.model}): {unlike}; give the prior of robots with the same "
             "URDF geometry.",
         )
+    for name in stored.parameters:
+        if not is_geometric_error(model, name):
+            raise file.error(
+                "E-PRIOR-019",
+                ("parameters", name),
+                f"{name} is no geometric error of {model.name}; make the prior again with 'flexcal fleet'.",
+            )
     items, size = list(stored.parameters.values()), len(stored.parameters)
     if [len(row) for row in stored.correlation] != list(range(1, size)):
         raise file.error(

@@ -115,9 +115,15 @@ def _random_sentence(model: RobotModel) -> str:
 
 def _sentence(results: Mapping[str, Any]) -> str:
     if "measured" not in results:
+        prior = results.get("prior")
+        with_prior = (
+            ""
+            if prior is None
+            else f" To be calibrated with the prior of {len(prior['robots'])} other robots, {prior['file']}: {prior['sentence']}."
+        )
         return (
             f"Measured with {results['instrument']}, they predict a tool error of {significant(results['tool_error_mm'], 3)} mm from its "
-            f"noise alone; no choice of as many reaches less than {significant(results['least_possible_mm'], 3)} mm."
+            f"noise alone; no choice of as many reaches less than {significant(results['least_possible_mm'], 3)} mm.{with_prior}"
         )
     errors, poses = results["tool_error_mm"], results["poses"]
     end = "then stop" if results["stop_after"] is not None else "go on after them"

@@ -53,8 +53,9 @@ class PosePlanView(PlanView):
                     "faint",
                 )
             )
-        if "enough_poses" in self._results and self._page is not None:
-            gui.add_html(paragraph(_enough(len(self.plan), int(self._results["enough_poses"]))))
+        enough = self._results.get("enough_poses")
+        if enough is not None and self._page is not None:
+            gui.add_html(paragraph(_enough(len(self.plan), int(enough))))
         for sentence, tone in self._checks.sentences():
             gui.add_html(paragraph(sentence, tone))
         self._selected = gui.add_html("")
