@@ -452,6 +452,32 @@ def test_a_robot_in_two_folders_is_said_and_counts_once(six: Pooled, tmp_path: P
     assert max(len(spread.robots) for spread in fleet.spreads) == 7
 
 
+def test_robots_of_two_batches_are_told_apart(six: Pooled, tmp_path: Path) -> None:
+    """Four robots of another type under the same URDF; with one of them alone there is nothing to say of groups."""
+    rng = np.random.default_rng(90)
+    other = Fleet.drawn(rng)
+    odd = [fitted(six.model, other.robot(rng), 30, rng, None).estimate for _ in range(4)]
+    fleets = {"outlying": 1, "two": 4}
+    for name, others in fleets.items():
+        for k, estimate in enumerate([*(m.estimate for m in six.members), *odd[:others]]):
+            file = write_robot(tmp_path / name / f"cell_{k}")
+            data = {"input.poses.csv": f"{k:064d}", "option.terms": "kinematic"}
+            own = replace(estimate, provenance={**estimate.provenance, **data})
+            write_estimates(file.parent / "estimates.yaml", "calibration", own)
+    assert review_fleet(tmp_path / "outlying").document()["batches"] == []
+    fleet = review_fleet(tmp_path / "two")
+    (entry,) = fleet.document()["batches"]
+    assert entry["robots"] == [[f"cell_{k}" for k in range(6)], [f"cell_{k}" for k in range(6, 10)]]
+    assert entry["adjusted_probability"] < 0.05 and entry["separation"] > 10
+    assert set(entry["differing"]) <= set(six.prior.names) and len(entry["differing"]) == 3
+    assert entry["sentence"] in fleet.document()["remarks"]
+    assert "cell_6, cell_7, cell_8, cell_9 (4)" in entry["sentence"]
+    written = write_prior(tmp_path / "two", tmp_path / "prior.yaml", fleet)
+    assert any("the prior is of two groups of robots" in remark for remark in written.remarks)
+    fleet.write(tmp_path / "t.parquet")
+    assert "is of two groups of robots" in (tmp_path / "t.html").read_text().lower()
+
+
 def test_other_temperatures_are_said(six: Pooled, tmp_path: Path) -> None:
     at = [(19.0, 21.0), (30.0, 32.0), None, (20.0, 20.0)]
     members = [

@@ -6,6 +6,7 @@ from .f_distribution import f_tail
 from .gaussian_distance import distance_probability, distance_quantile, mean_distance, principal_variances
 from .hierarchical_model import Measured, Population, individuals, population
 from .identifiability import RANK_TOLERANCE, Identifiability, analyse, name_direction
+from .individual_deviations import deviations
 from .loss import Cauchy, Huber, Loss, Squares, loss_named
 from .misfit import Misfit
 from .objective import NotFinite
@@ -45,6 +46,7 @@ __all__ = [
     "chi_square_limit",
     "consistent_groups",
     "core_size",
+    "deviations",
     "distance_probability",
     "distance_quantile",
     "f_tail",

@@ -1,4 +1,5 @@
 from .between_units import RandomEffects, random_effects
+from .grouping import TwoGroups, two_groups
 from .joint_trends import JointLine, JointTest, joint_tests
 from .limit_crossing import Crossing, crossing
 from .multiplicity import holm
@@ -14,10 +15,12 @@ __all__ = [
     "Outlying",
     "RandomEffects",
     "Trend",
+    "TwoGroups",
     "crossing",
     "holm",
     "joint_tests",
     "moderated_trends",
     "outlying",
     "random_effects",
+    "two_groups",
 ]

@@ -110,6 +110,7 @@ def fleet_document(
         "geometry_drifts": entries,
         "parameters": [_spread(spread) for spread in spreads],
         "problems": [{"place": p.place, "sentence": p.sentence} for p in gathered.problems],
+        "batches": [item.document() for item in gathered.batches],
         "remarks": _remarks(gathered, accuracies, spreads),
         "command": command,
     }
@@ -263,6 +264,7 @@ def _remarks(
         "robot.yaml"
         for twin in gathered.twins
     ]
+    remarks += [item.sentence for item in gathered.batches]
     if bare := sorted(without - set(copies)):
         folders = "the folder" if len(bare) == 1 else "the folders"
         remarks.append(

@@ -15,6 +15,7 @@ import numpy as np
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, read_estimates, sha256_of
+from flexcal.jobs.fleet.batches import Batches, batches_of
 from flexcal.jobs.fleet.geometry_drifts import GeometryCourse, geometry_courses
 from flexcal.jobs.fleet.members import Twin, latest_members, twins_of
 from flexcal.jobs.fleet.parameter_owners import is_of_robot
@@ -34,7 +35,8 @@ _DIGITS = 12
 class GatheredFleet:
     """The table of a fleet, its `projects`, its `problems`, and `repeated`: how many results stand in several folders; `courses` of the
     geometry of robots that were calibrated several times, `untested`: why others have none; `copied`: robots whose folders have results
-    of another, by that one; `twins` probably are another robot of the fleet, measured anew.
+    of another, by that one; `twins` probably are another robot of the fleet, measured anew; `batches` are models of which
+    the robots are of two groups.
     """
 
     table: FleetTable
@@ -45,6 +47,7 @@ class GatheredFleet:
     untested: Mapping[str, str]
     copied: Mapping[str, str]
     twins: Sequence[Twin]
+    batches: Sequence[Batches]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,9 +113,13 @@ def gather_fleet(place: str | Path, progress: Progress = silent) -> GatheredFlee
         courses, refused, untested = geometry_courses(
             root, [result.first for result in kept], projects, progress
         )
-        twins = twins_of(latest_members(folders, ("calibration",))[0]["calibration"])
+        calibrated = latest_members(folders, ("calibration",))[0]["calibration"]
+        twins = twins_of(calibrated)
+        batches = batches_of(calibrated, twins)
     table = FleetTable.of(row for result in kept for row in result.rows)
-    return GatheredFleet(table, projects, [*problems, *refused], repeated, courses, untested, copied, twins)
+    return GatheredFleet(
+        table, projects, [*problems, *refused], repeated, courses, untested, copied, twins, batches
+    )
 
 
 def _results(root: Path, folder: ResultFolder, problems: list[Problem]) -> Iterator[_Result]:

@@ -106,12 +106,21 @@ def twins_of(calibrated: Sequence[Member]) -> list[Twin]:
     none in groups of more than 300.
     """
     found: list[Twin] = []
+    for own in groups_to_compare(calibrated):
+        if len(own) <= _MOST:
+            found += [Twin(other, one, times) for one, other, times in alike(own)]
+    return found
+
+
+def groups_to_compare(calibrated: Sequence[Member]) -> list[list[Member]]:
+    """Calibrated robots that can be compared, three or more each: of one geometry with points, with the same terms, without copies and
+    those that had a prior of others.
+    """
+    groups: list[list[Member]] = []
     for group in by_geometry({"calibration": distinct(calibrated)[0]}):
         by_terms: dict[tuple[str, ...], list[Member]] = defaultdict(list)
         for member in group["calibration"]:
             if member.model.points and not member.has_prior:
                 by_terms[member.terms].append(member)
-        for own in by_terms.values():
-            if FEWEST <= len(own) <= _MOST:
-                found += [Twin(other, one, times) for one, other, times in alike(own)]
-    return found
+        groups += [own for own in by_terms.values() if len(own) >= FEWEST]
+    return groups

@@ -145,6 +145,8 @@ def write_prior(place: str | Path, out: Path, reviewed: Fleet | None = None) -> 
         remarks += apart
         prior, more = pool_fleet(own, out, remarks)
         remarks += more
+    pooled = {member.name for member in own["calibration"]}
+    remarks += [batches.of_prior for batches in reviewed.gathered.batches if batches.are_among(pooled)]
     twins = twins_of(own["calibration"])
     remarks += [
         f"{twin.sentence}: if they are one robot, the prior is too narrow; give both one `serial:` in robot.yaml"

@@ -1,6 +1,6 @@
 from .fleet_pooling import pool_fleet
 from .friction_prior import with_friction
-from .geometry_pooling import alike, pooled_prior
+from .geometry_pooling import alike, geometry_deviations, pooled_prior
 from .kinematics import difference
 from .member import FEWEST, FLEET, POOLED, Member, comparable_terms
 from .model_prior import ModelPrior
@@ -24,6 +24,7 @@ __all__ = [
     "conflict",
     "conflict_after",
     "difference",
+    "geometry_deviations",
     "pool_fleet",
     "pool_friction",
     "pool_springs",

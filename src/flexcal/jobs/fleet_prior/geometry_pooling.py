@@ -10,7 +10,7 @@ import numpy as np
 from flexcal.calibration.error_model import TRANSMISSION
 from flexcal.calibration.fit import OF_THE_CELL, FleetPrior, base_errors, plausible_size
 from flexcal.errors import FlexcalError
-from flexcal.estimation import Measured, population
+from flexcal.estimation import Measured, deviations, population
 from flexcal.jobs.fleet_prior.geometry_information import geometry_information, is_geometric_error
 from flexcal.jobs.fleet_prior.member import FEWEST, Member
 from flexcal.model.robot import RobotModel, unit_in
@@ -78,6 +78,12 @@ def alike(members: Sequence[Member]) -> list[tuple[str, str, float]]:
         for (i, k), chi2 in found.items()
         if chi2 < _ALIKE and middle > _FAR_APART * max(chi2, 1.0)
     ]
+
+
+def geometry_deviations(members: Sequence[Member]) -> tuple[list[str], np.ndarray]:
+    """Geometric errors of the robots, p names, and their deviations (N, p) from the mean over robots, as `estimation.deviations`."""
+    names, sizes, measured = _measured(members)
+    return names, deviations(measured, sizes)
 
 
 def _measured(members: Sequence[Member]) -> tuple[list[str], np.ndarray, list[Measured]]:
