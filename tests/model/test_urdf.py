@@ -1,14 +1,16 @@
-"""URDFs with a mistake: one sentence with line, link or joint; nothing is dropped that the parser cannot read."""
+"""URDFs against Pinocchio, and with a mistake: one sentence with line, link or joint."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from refusals import refused
 
-from flexcal.model.urdf import read_urdf
+from flexcal.model.parts import axis_rotation
+from flexcal.model.urdf import locked_joints, read_urdf
 
 ARM = """<?xml version="1.0"?>
 <robot name="arm">
@@ -99,17 +101,87 @@ def test_the_sound_file(tmp_path: Path) -> None:
     assert found.inertias[0].mass == 4.0 and set(found.frames) >= {"boom", "tip", "mount"}
 
 
-def test_what_only_the_parser_sees_is_said_in_its_words(tmp_path: Path) -> None:
+def test_a_robot_without_a_name(tmp_path: Path) -> None:
     (tmp_path / "arm.urdf").write_text(ARM.replace('<robot name="arm">', "<robot>"))
-    with refused("E-URDF-022", "No name given for the robot") as caught:
+    with refused("E-URDF-022", "line 2", "no name"):
         read_urdf(tmp_path / "arm.urdf", {})
-    assert "\n" not in str(caught.value)
 
 
 def test_a_joint_and_a_link_of_one_name(tmp_path: Path) -> None:
     (tmp_path / "arm.urdf").write_text(ARM.replace('name="shoulder"', 'name="base"'))
     with refused("E-URDF-023", "arm.urdf", "base"):
         read_urdf(tmp_path / "arm.urdf", {})
+
+
+def test_a_fixed_joint_of_the_name_of_its_link(tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf").write_text(ARM.replace('name="mount"', 'name="tip"'))
+    assert read_urdf(tmp_path / "arm.urdf", {}).frames["tip"].joint == 0
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_any_tree_is_that_of_pinocchio(tmp_path: Path, seed: int) -> None:
+    """Placements, inertias and limits of trees with skew joints, some of them locked, against Pinocchio's reduced model."""
+    draw = np.random.default_rng(seed)
+    urdf, locked = _tree(draw)
+    (tmp_path / "tree.urdf").write_text(urdf)
+    found = read_urdf(tmp_path / "tree.urdf", locked)
+    whole = pin.buildModelFromXML(urdf)
+    other = pin.buildReducedModel(whole, *locked_joints(whole, locked))
+    assert set(other.names[1:]) == {joint.name for joint in found.joints}
+    data = other.createData()
+    pin.framesForwardKinematics(other, data, pin.neutral(other))
+    placed: list[pin.SE3] = []
+    for joint, inertia in zip(found.joints, found.inertias, strict=True):
+        number = other.getJointId(joint.name)
+        own = pin.SE3(joint.rotation, joint.translation)
+        placed.append(placed[joint.parent] * own if joint.parent >= 0 else own)
+        np.testing.assert_allclose(placed[-1].homogeneous, data.oMi[number].homogeneous, rtol=0, atol=1e-13)
+        theirs = other.inertias[number]
+        assert inertia.mass == pytest.approx(theirs.mass, rel=1e-14)
+        np.testing.assert_allclose(inertia.com, theirs.lever, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(inertia.inertia, theirs.inertia, rtol=0, atol=1e-12)
+        if other.joints[number].nq == 1:
+            at = other.joints[number].idx_q
+            assert (joint.lower, joint.upper) == (other.lowerPositionLimit[at], other.upperPositionLimit[at])
+        else:
+            assert np.isinf([joint.lower, joint.upper]).all()
+        moved = pin.integrate(other, pin.neutral(other), np.eye(other.nv)[other.joints[number].idx_v])
+        pin.forwardKinematics(other, data, moved)
+        turn = axis_rotation(joint.axis, 1.0) if joint.kind == "revolute" else np.eye(3)
+        shift = joint.axis if joint.kind == "prismatic" else np.zeros(3)
+        np.testing.assert_allclose(
+            (placed[-1] * pin.SE3(turn, shift)).homogeneous, data.oMi[number].homogeneous, rtol=0, atol=1e-13
+        )
+        pin.forwardKinematics(other, data, pin.neutral(other))
+    for name, frame in found.frames.items():
+        own = pin.SE3(frame.rotation, frame.translation)
+        own = placed[frame.joint] * own if frame.joint >= 0 else own
+        theirs = data.oMf[other.getFrameId(name)]
+        np.testing.assert_allclose(own.homogeneous, theirs.homogeneous, rtol=0, atol=1e-13)
+
+
+def _tree(draw: np.random.Generator) -> tuple[str, dict[str, float]]:
+    """URDF of a random tree of eight links with one moving joint or more, and the joints to lock."""
+
+    def three(size: float = 1.0) -> str:
+        return " ".join(map(str, draw.uniform(-size, size, 3)))
+
+    links, joints, locked = ['<link name="l0"/>'], [], {}
+    kinds = ["revolute", *draw.choice(["revolute", "continuous", "prismatic", "fixed"], 6)]
+    for k, kind in enumerate(kinds, 1):
+        links.append(
+            f'<link name="l{k}"><inertial><origin xyz="{three()}" rpy="{three(3)}"/><mass value="{draw.uniform(0, 5)}"/>'
+            '<inertia ixx="0.3" ixy="0.02" ixz="-0.03" iyy="0.2" iyz="0.01" izz="0.25"/></inertial></link>'
+        )
+        limit = '<limit lower="-1" upper="2" effort="9" velocity="3"/>' if kind != "fixed" else ""
+        joints.append(
+            f'<joint name="j{draw.integers(1000)}_{k}" type="{kind}"><parent link="l{draw.integers(k)}"/><child link="l{k}"/>'
+            f'<origin xyz="{three()}" rpy="{three(3)}"/><axis xyz="{three()}"/>{limit}</joint>'
+        )
+        if kind != "fixed" and k > 1 and draw.random() < 0.4:
+            locked[joints[-1].split('"')[1]] = float(draw.uniform(-1, 2))
+    draw.shuffle(joints)
+    return f'<robot name="tree">{"".join(links)}{"".join(joints)}</robot>', locked
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from flexcal.model.kinematics import (
     point_kinematics,
 )
 from flexcal.model.robot import RobotModel
-from flexcal.model.urdf import locked_joints, read_elements
+from flexcal.model.urdf import locked_joints, pinocchio_model, read_elements
 
 _SAMPLES = 200
 _FLOOR = "floor"
@@ -57,7 +57,7 @@ class CollisionChecker:
         self.model = model
         self.margin = margin
         self.floor = None if floor is None or is_hanging(model, floor) else floor
-        whole = pin.buildModelFromXML(read_elements(model.urdf).text())
+        _, whole = pinocchio_model(model.urdf)
         shapes = _shapes(whole, model.urdf)
         self.kinematics: Any
         self.kinematics, self.geometry = pin.buildReducedModel(

@@ -7,16 +7,18 @@ from typing import Any
 
 import numpy as np
 
+from flexcal.errors import InputError
 from flexcal.model.kinematics.link_poses import link_frames
 from flexcal.model.kinematics.placements import joint_placement, point_placement
 from flexcal.model.kinematics.triangle_meshes import box, capsule, cylinder, decimated, ellipsoid
 from flexcal.model.robot import RobotModel
-from flexcal.model.urdf import locked_joints, read_elements
+from flexcal.model.urdf import locked_joints, pinocchio_model, read_elements
 
 _MOST = 6000
 """Largest number of triangles of the whole arm."""
 _SLENDER = 0.045
 """Ratio of a capsule's radius to the length of the arm."""
+_SHAPES = ("visual", "collision")
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,10 +59,14 @@ class LinkSurface:
 
 def _urdf_shapes(model: RobotModel) -> list[tuple[int, np.ndarray, np.ndarray]]:
     """(joint, vertices in its link, triangles) of every shape; empty where the URDF has none that can be read."""
+    if not any(link.find(shape) for link in read_elements(model.urdf).all("link") for shape in _SHAPES):
+        return []
+    try:
+        urdf, whole = pinocchio_model(model.urdf)
+    except InputError:
+        return []
     import pinocchio as pin
 
-    urdf = read_elements(model.urdf).text()
-    whole = pin.buildModelFromXML(urdf)
     folders = [str(above) for above in model.urdf.absolute().parents]
     for kind in (pin.GeometryType.VISUAL, pin.GeometryType.COLLISION):
         try:

@@ -1,5 +1,6 @@
-from .description import Description, Frame, locked_joints, read_urdf
+from .description import Description, Frame, read_urdf
 from .elements import Element, read_elements
+from .pinocchio_model import locked_joints, pinocchio_model
 from .serial_arm import AmbiguousArm, Arm, find_arm
 
 __all__ = [
@@ -10,6 +11,7 @@ __all__ = [
     "Frame",
     "find_arm",
     "locked_joints",
+    "pinocchio_model",
     "read_elements",
     "read_urdf",
 ]
