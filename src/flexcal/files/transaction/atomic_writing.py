@@ -56,10 +56,11 @@ def _written(publication: FileTransaction, places: list[Path]) -> Iterator[tuple
         publication.drop(temporaries)
 
 
-def write_text(path: str | Path, text: str) -> None:
-    """Write UTF-8 text with newlines as given, atomically; bytes of a file name that are not UTF-8 as \\udc and hex."""
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(text.encode("utf-8", "backslashreplace"))
+def write_text(path: str | Path, text: str | Iterator[str]) -> None:
+    """Write UTF-8 text, whole or in parts, with newlines as given, atomically; bytes of a file name that are not UTF-8 as \\udc and hex."""
+    parts = (text,) if isinstance(text, str) else text
+    with atomic_path(path) as temporary, temporary.open("wb") as stream:
+        stream.writelines(part.encode("utf-8", "backslashreplace") for part in parts)
 
 
 def _temporary(publication: FileTransaction, path: Path) -> Path:

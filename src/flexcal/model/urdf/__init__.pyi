@@ -1,6 +1,6 @@
 from .description import Description, Frame, read_urdf
 from .elements import Element, read_elements
-from .pinocchio_model import locked_joints, pinocchio_model
+from .in_pinocchio import locked_joints, pinocchio_model
 from .serial_arm import AmbiguousArm, Arm, find_arm
 
 __all__ = [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -24,11 +25,16 @@ _WORDS = {"good": "good", "care": "take care", "bad": "not good", "unknown": "no
 
 def write_page(path: str | Path, page: Page) -> None:
     """Write `page` atomically; raises `InputError` where it cannot be written."""
-    write_text(path, page_html(page))
+    write_text(path, _parts(page))
 
 
 def page_html(page: Page) -> str:
     """The whole document. Nothing in it is loaded from elsewhere."""
+    return "".join(_parts(page))
+
+
+def _parts(page: Page) -> Iterator[str]:
+    """The document in parts: that of Plotly's script, 5 MB, is copied into no other."""
     from plotly.offline import get_plotlyjs
 
     folder = files("flexcal.report") / "templates"
@@ -36,7 +42,7 @@ def page_html(page: Page) -> str:
     return (
         templates()
         .get_template("report.html.j2")
-        .render(
+        .generate(
             page=page,
             error_axis=place_ranges(page.verdict.error_ranges),
             marks=_MARKS,
