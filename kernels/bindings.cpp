@@ -11,6 +11,7 @@ NB_MODULE(KERNELS, m) {
     bind_closed_loop(m);
     bind_frequency(m);
     bind_geared_loop(m);
+    bind_linear_algebra(m);
     bind_runtime(m);
     bind_tree(m);
     bind_triangle(m);

@@ -172,8 +172,14 @@ _SHAPES = {
     "right": (5, 2, 2, 2),
     "left": (5, 3, 3, 2),
     "covariance": (5, 6, 6, 2),
+    "lower": (3, 3),
+    "inverse": (3, 3),
+    "to": (4,),
+    "from": (4,),
+    "values": (5, 2),
+    "sums": (6, 2),
 }
-_INDICES = {"places", "motors", "twists"}
+_INDICES = {"places", "motors", "twists", "to", "from"}
 _WRITTEN = {
     "out",
     "triangle",
@@ -184,7 +190,7 @@ _WRITTEN = {
     "torque_log",
     "arm_log",
 }
-_WRITTEN |= {"angle", "applied", "angle_log", "covariance"}
+_WRITTEN |= {"angle", "applied", "angle_log", "covariance", "inverse", "sums"}
 _POINT = ("placement", "translation", "target", "geometry", "tool", "q", "deflection")
 _REST = ("stiffness", "geometry", "mass", "first_moment", "payload", "payload_point", "gravity", "q")
 _MOTION = ("geometry", "gravity", "q", "dq", "ddq", "places")
@@ -221,6 +227,8 @@ _KERNELS = [
     ("build", ("placements", "translations", "normals", "bearings"), {"parents": [-1, 0, 1], "prismatic": [False] * 3}),
     ("update", ("triangle", "rows"), {}),
     ("scatter_covariance", ("white", "right", "left", "covariance"), {"window": 3, "freedom": 9.0}),
+    ("triangular_inverse", ("lower", "inverse"), {}),
+    ("add_selected", ("to", "from", "values", "sums"), {}),
     ("closed_loop", (*_LOOP, *_SIGNALS), {**_PLANT, "encoder_resolution": 0.0, "rate_filter": 1.0}),
     ("geared_loop", (*_GEARED, *_SIGNALS[1:3], "angle_log", "torque_log"), {**_PLANT, "count": 0.0, "filter": 1.0}),
 ]  # fmt: skip
@@ -239,6 +247,24 @@ def _called(tree, kernel: str, changed: dict[str, object]) -> object:
         arrays["stiffness"] = np.full(2, 1e9)
     owner = tree if hasattr(tree, kernel) else _kernels
     return getattr(owner, kernel)(**others, **(arrays | changed))
+
+
+@pytest.mark.parametrize("size", [0, 1, 2, 5, 64, 151])
+def test_the_inverse_of_a_triangle_is_that_of_numpy(size: int, rng: np.random.Generator) -> None:
+    lower = np.tril(rng.standard_normal((size, size))) + 3 * np.sqrt(size) * np.eye(size)
+    inverse = np.full((size, size), np.nan)
+    _kernels.triangular_inverse(lower + np.triu(rng.standard_normal((size, size)), 1), inverse)
+    np.testing.assert_allclose(inverse @ lower, np.eye(size), rtol=0, atol=1e-14)
+    assert not np.triu(inverse, 1).any()
+
+
+def test_selected_rows_are_added_as_by_numpy(rng: np.random.Generator) -> None:
+    to, rows = rng.integers(0, 7, 300), rng.integers(0, 11, 300)
+    values, sums = rng.standard_normal((11, 5)), rng.standard_normal((7, 5))
+    expected = sums.copy()
+    np.add.at(expected, to, values[rows])
+    _kernels.add_selected(to, rows, values, sums)
+    np.testing.assert_allclose(sums, expected, rtol=1e-13)
 
 
 @pytest.mark.parametrize(("kernel", "name"), _EVERY, ids=[f"{kernel}-{name}" for kernel, name in _EVERY])
@@ -306,6 +332,9 @@ def test_what_is_read_is_converted(tx90l: RobotModel, rng: np.random.Generator) 
         ("geared_loop", {"motors": np.array([0, 4])}, "outside"),
         ("scatter_covariance", {"window": 0}, "between one"),
         ("scatter_covariance", {"window": 6}, "between one"),
+        ("add_selected", {"to": np.full(4, 6), "from": np.zeros(4, int)}, "outside its array"),
+        ("add_selected", {"to": np.zeros(4, int), "from": np.array([0, 1, 5, 2])}, "outside its array"),
+        ("add_selected", {"to": np.zeros(4, int), "from": np.array([0, 1, -1, 2])}, "outside its array"),
     ],
 )
 def test_indices_and_numbers_are_checked(tx90l: RobotModel, kernel: str, changed: dict, words: str) -> None:

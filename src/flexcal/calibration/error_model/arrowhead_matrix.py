@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from flexcal.calibration.error_model.whitening import cholesky_inverses
+from flexcal.kernels import triangular_inverse
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +47,9 @@ class Arrowhead:
         inverses = tuple(cholesky_inverses(values) for values in self.blocks)
         border = _by_blocks(inverses, self.border)
         factor = np.linalg.cholesky(self.corner - border.T @ border)
-        # of an upper triangle elimination leaves back substitution
-        return ArrowheadFactor(inverses, border, np.linalg.inv(factor.T).T)
+        corner = np.empty_like(factor)
+        triangular_inverse(factor, corner)
+        return ArrowheadFactor(inverses, border, corner)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,36 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
+
+from flexcal.kernels import add_selected
 
 
 @dataclass(frozen=True, eq=False)
 class Incidence:
-    """Sparse matrix of ones, of a `shape`: the `rows` (E,) of its entries in ascending order, and their `columns` (E,)."""
+    """Sparse matrix of ones, of a `shape`, at `rows` (E,) and `columns` (E,)."""
 
     rows: np.ndarray
     columns: np.ndarray
     shape: tuple[int, int]
 
-    @classmethod
-    def of(cls, rows: np.ndarray, columns: np.ndarray, shape: tuple[int, int]) -> Incidence:
-        """Matrix of ones at `rows` and `columns` (E,) in any order."""
-        order = np.argsort(rows, kind="stable")
-        return cls(rows[order], columns[order], shape)
-
-    @cached_property
+    @property
     def T(self) -> Incidence:
         """The transpose."""
-        return Incidence.of(self.columns, self.rows, (self.shape[1], self.shape[0]))
+        return Incidence(self.columns, self.rows, (self.shape[1], self.shape[0]))
 
     def __matmul__(self, values: np.ndarray) -> np.ndarray:
         """Sums (shape[0], k) of rows of `values` (shape[1], k)."""
         result = np.zeros((self.shape[0], values.shape[1]))
-        if len(self.rows):
-            firsts = np.flatnonzero(np.diff(self.rows, prepend=-1))
-            result[self.rows[firsts]] = np.add.reduceat(values[self.columns], firsts, axis=0)
+        add_selected(self.rows, self.columns, values, result)
         return result
 
 
@@ -40,7 +33,7 @@ def incidence(labels: np.ndarray, columns: np.ndarray, shape: tuple[int, int]) -
     """Sparse matrix of ones at rows `labels` and columns `columns`, of broadcastable shapes; none where a label is negative."""
     labels, columns = np.broadcast_arrays(labels, columns)
     known = labels >= 0
-    return Incidence.of(labels[known], columns[known], shape)
+    return Incidence(labels[known], columns[known], shape)
 
 
 def pairs_of(first: np.ndarray, second: np.ndarray, rows: int, columns: int) -> Incidence:
