@@ -175,11 +175,11 @@ _SHAPES = {
     "lower": (3, 3),
     "inverse": (3, 3),
     "to": (4,),
-    "from": (4,),
+    "source": (4,),
     "values": (5, 2),
     "sums": (6, 2),
 }
-_INDICES = {"places", "motors", "twists", "to", "from"}
+_INDICES = {"places", "motors", "twists", "to", "source"}
 _WRITTEN = {
     "out",
     "triangle",
@@ -228,7 +228,7 @@ _KERNELS = [
     ("update", ("triangle", "rows"), {}),
     ("scatter_covariance", ("white", "right", "left", "covariance"), {"window": 3, "freedom": 9.0}),
     ("triangular_inverse", ("lower", "inverse"), {}),
-    ("add_selected", ("to", "from", "values", "sums"), {}),
+    ("add_selected", ("to", "source", "values", "sums"), {}),
     ("closed_loop", (*_LOOP, *_SIGNALS), {**_PLANT, "encoder_resolution": 0.0, "rate_filter": 1.0}),
     ("geared_loop", (*_GEARED, *_SIGNALS[1:3], "angle_log", "torque_log"), {**_PLANT, "count": 0.0, "filter": 1.0}),
 ]  # fmt: skip
@@ -332,9 +332,9 @@ def test_what_is_read_is_converted(tx90l: RobotModel, rng: np.random.Generator) 
         ("geared_loop", {"motors": np.array([0, 4])}, "outside"),
         ("scatter_covariance", {"window": 0}, "between one"),
         ("scatter_covariance", {"window": 6}, "between one"),
-        ("add_selected", {"to": np.full(4, 6), "from": np.zeros(4, int)}, "outside its array"),
-        ("add_selected", {"to": np.zeros(4, int), "from": np.array([0, 1, 5, 2])}, "outside its array"),
-        ("add_selected", {"to": np.zeros(4, int), "from": np.array([0, 1, -1, 2])}, "outside its array"),
+        ("add_selected", {"to": np.full(4, 6), "source": np.zeros(4, int)}, "outside its array"),
+        ("add_selected", {"to": np.zeros(4, int), "source": np.array([0, 1, 5, 2])}, "outside its array"),
+        ("add_selected", {"to": np.zeros(4, int), "source": np.array([0, 1, -1, 2])}, "outside its array"),
     ],
 )
 def test_indices_and_numbers_are_checked(tx90l: RobotModel, kernel: str, changed: dict, words: str) -> None:
