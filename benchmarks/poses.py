@@ -52,7 +52,7 @@ def many(model: RobotModel) -> list[tuple[str, float, str]]:
     drawing, q = timed(lambda: random_candidates(checker, CANDIDATES, np.random.default_rng(1), preload=True))
     rows, base = best(lambda: base_sensitivity(pose_sensitivity(model, q)))
     seen = random_poses(model, 300, np.random.default_rng(2)).q
-    weight = tool_error_weight(base, geometry_jacobian(model, seen)[1])
+    weight = tool_error_weight(base.columns(geometry_jacobian(model, seen)[1]))
     results = []
     for name in ("c", "D", "E"):
         choice, _ = best(
