@@ -21,16 +21,8 @@ ARGUMENTS = [
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--ignore-gpu-blocklist",
-    "--disable-features=WebUIOmniboxPopup,WebUIOmniboxAimPopup",
 ]
-"""So that WebGL is drawn without a graphics card, and as root, and no page of its own is made for the list under the address bar."""
-
-FEW_FRAMES = """{
-  const draw = requestAnimationFrame.bind(globalThis);
-  globalThis.requestAnimationFrame = (frame) => setTimeout(() => draw(frame), 200);
-  globalThis.cancelAnimationFrame = clearTimeout;
-}"""
-"""Script of a page that draws five times a second at most: without a graphics card, sixty times take a third of the tests' time."""
+"""So that WebGL is drawn without a graphics card, and as root."""
 
 
 def chromium() -> str | None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browser import ARGUMENTS, FEW_FRAMES, chromium, studio
+from browser import ARGUMENTS, chromium, studio
 from page_elements import WAIT
 
 
@@ -29,7 +29,6 @@ def page(browser: Any) -> Iterator[Any]:
     """A page of 1280 × 720 in a fresh profile."""
     context = browser.new_context(viewport={"width": 1280, "height": 720})
     context.set_default_timeout(WAIT)
-    context.add_init_script(FEW_FRAMES)
     yield context.new_page()
     context.close()
 
