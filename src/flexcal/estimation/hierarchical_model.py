@@ -44,6 +44,13 @@ class Population:
         return self.uncertainty + np.diag(self.spread**2)
 
 
+def normal_equations(measured: Sequence[Measured], sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Information (N, p, p) and right sides (N, p) of N individuals, with their parameters in units of `sizes` (p,)."""
+    rows = [item.rows * sizes for item in measured]
+    told = [own.T @ item.observed for own, item in zip(rows, measured, strict=True)]
+    return np.array([own.T @ own for own in rows]), np.array(told)
+
+
 def population(measured: Sequence[Measured], sizes: np.ndarray, kinds: Sequence[str]) -> Population:
     """Posterior of a normal hierarchical model, by a Gibbs sampler with a fixed seed.
 
@@ -69,9 +76,7 @@ def population(measured: Sequence[Measured], sizes: np.ndarray, kinds: Sequence[
     """
     rng = np.random.default_rng(0)
     count, size = len(measured), len(sizes)
-    rows = [item.rows * sizes for item in measured]
-    information = np.array([own.T @ own for own in rows])
-    told = np.array([own.T @ item.observed for own, item in zip(rows, measured, strict=True)])
+    information, told = normal_equations(measured, sizes)
     names, kind = np.unique(np.asarray(kinds), return_inverse=True)
     members = np.bincount(kind, minlength=len(names))
     variance, common, freedom = np.full(size, 0.1), np.full(len(names), 0.1), np.full(len(names), 4.0)

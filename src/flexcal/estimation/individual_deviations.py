@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexcal.estimation.hierarchical_model import Measured
+from flexcal.estimation.hierarchical_model import Measured, normal_equations
 
 _STEPS = 60
 
@@ -17,9 +17,7 @@ def deviations(measured: Sequence[Measured], sizes: np.ndarray) -> np.ndarray:
     Best linear prediction in the model of `population` (Robinson 1991), with the mean and the variances of largest likelihood, by
     expectation and maximisation. What was not measured of an individual deviates by nothing. `sizes` (p,) are plausible sizes.
     """
-    rows = [item.rows * sizes for item in measured]
-    information = np.array([own.T @ own for own in rows])
-    told = np.array([own.T @ item.observed for own, item in zip(rows, measured, strict=True)])
+    information, told = normal_equations(measured, sizes)
     count, size = told.shape
     variance, mean, predicted = np.full(size, 0.1), np.zeros(size), np.zeros((count, size))
     for _ in range(_STEPS):
