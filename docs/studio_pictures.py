@@ -21,7 +21,8 @@ from playwright.sync_api import sync_playwright
 ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT / "tests" / "studio"), str(ROOT / "tests")]
 
-from browser import ARGUMENTS, chromium, studio  # noqa: E402
+from browser import ARGUMENTS, studio  # noqa: E402
+from headless import CHROMIUM  # noqa: E402
 
 OUT = ROOT / "docs" / "_static" / "studio"
 SIZE = (1280, 720)
@@ -235,7 +236,7 @@ def main() -> None:
     with (
         tempfile.TemporaryDirectory() as place,
         sync_playwright() as playwright,
-        playwright.chromium.launch(executable_path=chromium(), args=ARGUMENTS) as browser,
+        playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS) as browser,
     ):
         folder = Path(place) / "cell"
         folder.mkdir()

@@ -24,7 +24,7 @@ def test_ctrl_c_ends_it(tmp_path: Path) -> None:
     with studio(tmp_path, "--json") as running:
         assert running.url.startswith("http://127.0.0.1:") and running.url.endswith("/")
         said = running.stop(signal.SIGINT)
-    assert running.process.returncode == 0 and json.loads(said) == {"folder": str(tmp_path)}
+    assert running.process.exitcode == 0 and json.loads(said) == {"folder": str(tmp_path)}
 
 
 def test_a_word_of_warning_where_others_are_let_in(tmp_path: Path) -> None:

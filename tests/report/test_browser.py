@@ -5,13 +5,13 @@ from __future__ import annotations
 import html
 import json
 import re
-import shutil
 import subprocess
 from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 import pytest
+from headless import CHROMIUM
 from outline import Outline
 from program_results import program_results
 from waiting import PATIENCE
@@ -20,7 +20,6 @@ from flexcal.model.robot import RobotModel
 from flexcal.report.layout.rendering import page_html
 from flexcal.report.pages import ProgramStudy, program_page
 
-CHROMIUM = next((p for p in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if p), None)
 pytestmark = pytest.mark.skipif(
     CHROMIUM is None, reason="no Chromium on this machine (apt-get install chromium)"
 )

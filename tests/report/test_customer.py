@@ -8,6 +8,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from headless import CHROMIUM
 from outline import Outline
 from waiting import PATIENCE
 
@@ -17,7 +18,6 @@ from flexcal.jobs.result_files import read_results
 from flexcal.report.pages.customer import uncertainty_rows
 from flexcal.report.results import MeasurementDetails
 
-CHROMIUM = next((p for p in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if p), None)
 GIVEN = MeasurementDetails(
     robot_serial="R-17", instrument="tracker T", instrument_serial="T-9", operator="A. Meier"
 )

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browser import ARGUMENTS, chromium, studio
+from browser import ARGUMENTS, studio
+from headless import CHROMIUM
 from page_elements import WAIT
 
 
@@ -15,11 +16,10 @@ from page_elements import WAIT
 def browser() -> Iterator[Any]:
     """Chromium without a window, one for all tests; they are skipped where it or Playwright is absent."""
     sync_api = pytest.importorskip("playwright.sync_api", reason="Playwright is absent")
-    path = chromium()
-    if path is None:
+    if CHROMIUM is None:
         pytest.skip("Chromium is absent: apt-get install chromium")
     with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
         yield browser
         browser.close()
 

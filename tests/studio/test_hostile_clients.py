@@ -113,7 +113,7 @@ def target(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Target]:
     (folder / "folder.html").mkdir()
     with studio(folder) as running:
         yield Target(running.url, folder)
-        assert running.process.poll() is None, "the server has died"
+        assert running.alive, "the server has died"
 
 
 UPGRADE = (

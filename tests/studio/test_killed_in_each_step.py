@@ -10,9 +10,9 @@ from typing import Any
 
 import calibrated_ur5
 import pytest
-from browser import Running, studio
+from browser import studio
 from page_elements import choose, count_rows, field, fill, go_to, open_step, press, see
-from waiting import PATIENCE, until
+from waiting import until
 
 from flexcal.data.plans import read_plan
 from flexcal.files.formats import read_yaml_file
@@ -20,11 +20,6 @@ from flexcal.files.transaction.staging_folder import PREFIX
 from flexcal.model.robot import RobotModel
 
 TX90L = Path(__file__).parents[2] / "examples" / "tx90l"
-
-
-def kill(running: Running) -> None:
-    running.process.kill()
-    running.process.wait(PATIENCE)
 
 
 def unfold(page: Any, title: str, button: str) -> None:
@@ -76,7 +71,7 @@ def test_killed_while_robot_poses_and_rows_are_made(page: Any, tmp_path: Path) -
         fill(page, "x / mm", "111.5")
         press(page, "Write to robot.yaml")
         until(lambda: robot_file.read_text() != before)
-        kill(running)
+        running.kill()
     require_whole(folder)
     written = robot_file.read_text()
     assert written.count("#") == before.count("#")
@@ -91,7 +86,7 @@ def test_killed_while_robot_poses_and_rows_are_made(page: Any, tmp_path: Path) -
         see(page, "--count 12 --out poses.yaml")
         press(page, "Plan poses")
         until(lambda: stages(folder) or (folder / "poses.yaml").exists())
-        kill(running)
+        running.kill()
     require_whole(folder)
 
     with studio(folder) as running:
@@ -116,7 +111,7 @@ def test_killed_while_robot_poses_and_rows_are_made(page: Any, tmp_path: Path) -
         see(page, "pose 2 is excluded: the door was opened")
         press(page, "Measure all that are left")
         until(lambda: count_rows(table) > 3)
-        kill(running)
+        running.kill()
     require_whole(folder)
     text = table.read_text()
     rows = list(csv.DictReader(text.splitlines()))
@@ -155,7 +150,7 @@ def test_killed_while_results_are_made(page: Any, tmp_path: Path) -> None:
         see(page, "random.csv is not in it")
         press(page, "Calibrate again: geometry")
         see(page, "Cancel")  # it runs
-        kill(running)
+        running.kill()
     require_whole(folder)
 
     with studio(folder) as running:
@@ -170,7 +165,7 @@ def test_killed_while_results_are_made(page: Any, tmp_path: Path) -> None:
         choose(page, "Fresh poses", "second.csv")
         press(page, "Verify on these poses")
         until(lambda: stages(folder) or (folder / "verification").exists())
-        kill(running)
+        running.kill()
     require_whole(folder)
 
     with studio(folder) as running:
@@ -183,7 +178,7 @@ def test_killed_while_results_are_made(page: Any, tmp_path: Path) -> None:
         go_to(page, "Compare")
         press(page, "Keep a copy of the calibration")
         until(lambda: list(folder.glob("calibration-*")))
-        kill(running)
+        running.kill()
     require_whole(folder)
     (copy,) = folder.glob("calibration-*")
     for path in (folder / "calibration").iterdir():
@@ -202,7 +197,7 @@ def test_killed_while_results_are_made(page: Any, tmp_path: Path) -> None:
         choose(page, "Later", chosen[0])
         press(page, "Compare")
         see(page, "the same as a page:")
-        kill(running)
+        running.kill()
 
     with studio(folder) as running:
         page.goto(running.url)

@@ -62,7 +62,7 @@ def test_killed_again_and_again_while_a_file_grows(tmp_path: Path) -> None:
                 until(lambda before=before: _modified(table) != before)
             else:
                 time.sleep(float(rng.uniform(0.0, 0.8)))
-            running.process.kill()
+            running.kill()
         seen.append(_count(table))
     rounds.release()
     writer.join()
