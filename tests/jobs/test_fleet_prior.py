@@ -213,6 +213,30 @@ def test_a_robot_of_another_type_is_told_and_one_of_the_type_is_not(six: Pooled)
         assert test.shifts
 
 
+@pytest.mark.parametrize("size", [5e-3, 2e-2, 5e-2])
+@pytest.mark.parametrize("count", [14, 40])
+def test_a_zero_that_is_far_off_is_told_beside_waves_of_transmission_errors(
+    six: Pooled, size: float, count: int
+) -> None:
+    """Waves whose variance is estimated could take up any zero; with real waves of 0.3 mrad the zero is told, without it nothing is."""
+    from flexcal.calibration.diagnostics import FleetConflict
+
+    rng = np.random.default_rng([count, round(1e3 * size)])
+    robot, q, phase = six.fleet.robot(rng), random_poses(count, rng), rng.uniform(0, 6, 6)
+    waves, zero = 3e-4 * np.sin(q + phase), size * (np.arange(6) == 2)
+    tests = []
+    for own in (q + waves, q + waves + zero):
+        poses = poses_of(q, robot.measured(own, NOISE, rng))
+        fit = fit_geometry(
+            six.model, poses, terms=("kinematic", "transmission"), loss="squares", fleet=six.prior
+        )
+        tests.append(FleetConflict.of(fit))
+    usual, off = tests
+    assert usual is not None and not usual.contradicted
+    assert off is not None and off.contradicted and off.alone
+    assert "joint_3.offset" in dict(off.shifts)
+
+
 def test_the_file_has_the_prior_and_refuses_other_robots(
     six: Pooled, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -493,11 +517,22 @@ def test_other_temperatures_are_said(six: Pooled, tmp_path: Path) -> None:
     assert not pool_fleet({"calibration": six.members}, tmp_path / "prior.yaml")[1]
 
 
-def test_robots_with_other_terms_are_refused(six: Pooled) -> None:
-    member = six.members[0]
-    other = replace(member.estimate, provenance={"option.terms": "kinematic lateral_compliance transmission"})
-    with refused("E-PRIOR-004", "lateral_compliance", "--terms"):
-        pooled_prior([*six.members, replace(member, name="odd", estimate=other)])
+def test_robots_with_other_terms_are_left_out(six: Pooled, tmp_path: Path) -> None:
+    def with_terms(member: Member, terms: str) -> Member:
+        return replace(member, estimate=replace(member.estimate, provenance={"option.terms": terms}))
+
+    alike = [with_terms(member, "kinematic transmission") for member in six.members]
+    members = [with_terms(six.members[0], "kinematic lateral_compliance"), *alike[1:]]
+    prior, remarks = pool_fleet({"calibration": members}, tmp_path / "prior.yaml")
+    assert prior.geometry is not None
+    assert prior.geometry.robots == tuple(member.name for member in alike[1:])
+    assert prior.geometry.terms == ("kinematic",)
+    (said,) = (remark for remark in remarks if "terms" in remark)
+    assert said.startswith("without robot_0, calibrated with the terms kinematic lateral_compliance")
+    assert "--terms kinematic'" in said
+    few = [members[0], with_terms(six.members[1], "kinematic gravity_compliance"), *alike[2:4]]
+    with refused("E-PRIOR-004", "robot_0 with kinematic lateral_compliance", "--terms kinematic."):
+        pool_fleet({"calibration": few}, tmp_path / "prior.yaml")
 
 
 def chosen_poses(batch: Pooled, count: int) -> np.ndarray:

@@ -33,7 +33,8 @@ class RefittedVerification:
 
     `result` has errors by leave-one-out: each pose against the placement that the other poses give, so that they are honest for all poses.
     `covariance` is that of these errors; `parameters` how many were fitted; `model` is the robot with
-    the placement that all poses give.
+    the placement that all poses give. `probability` is that of a placement as far from the calibrated one where neither was moved, by the
+    covariance of the calibration and of the errors at these poses.
     """
 
     what: tuple[Refit, ...]
@@ -41,6 +42,7 @@ class RefittedVerification:
     parameters: int
     result: PredictionErrors
     covariance: ErrorCovariance
+    probability: float
 
 
 def verify_refitted(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) -> RefittedVerification:
@@ -89,7 +91,29 @@ def verify_refitted(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) ->
         ambiguous=standing.ambiguous,
     )
     left_out_covariance = replace(covariance, roots=roots, independent=independent, visit=None, common=None)
-    return RefittedVerification(tuple(what), placed, basis.shape[1], result, left_out_covariance)
+    before = (poses.position - predict_measurements(model, poses).position).ravel()
+    probability = _unmoved(basis, before, covariance, float(np.mean(errors**2)))
+    return RefittedVerification(tuple(what), placed, basis.shape[1], result, left_out_covariance, probability)
+
+
+def _unmoved(basis: np.ndarray, errors: np.ndarray, covariance: ErrorCovariance, square: float) -> float:
+    """Probability of `errors` (3 N,) m as large along the orthonormal `basis` (3 N, k) under their covariance (Hotelling 1931).
+
+    `square` m² is the variance of a coordinate where neither instrument nor repeatability is known.
+    """
+    from scipy.special import fdtrc
+
+    count = len(errors) // 3
+    independent = covariance.independent
+    if independent is None:
+        independent = np.broadcast_to(square * np.eye(3), (count, 3, 3))
+    blocks = basis.reshape(count, 3, -1)
+    along = basis.T @ covariance.roots.reshape(len(errors), -1)
+    variance = along @ along.T + np.einsum("nik,nij,njl->kl", blocks, independent, blocks, optimize=True)
+    moved = basis.T @ errors
+    size = len(moved)
+    statistic = float(moved @ np.linalg.lstsq(variance, moved, rcond=None)[0]) / size
+    return float(fdtrc(size, min(covariance.freedom, 1e9), statistic))
 
 
 _WORDS = {"station": "the instrument", "point": "the measured point"}

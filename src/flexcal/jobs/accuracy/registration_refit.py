@@ -16,6 +16,8 @@ from flexcal.units import MILLIMETRE
 _WORTH = 0.5
 """Fraction of the root mean square error below which a refit must bring it to be proposed."""
 _TENTH = 0.1
+_CHANCE = 1e-3
+"""Probability of a placement as far from the calibrated one, below which something was moved."""
 _MUCH = 1e-4
 """Mean error, m, below which no refit is proposed."""
 _CHANGED = {
@@ -40,7 +42,8 @@ def proposed_refit(
     """The refit that reduces the leave-one-out errors to less than half; None where there is none.
 
     The remaining errors have to be about as large as predicted, or a tenth of those before, because a refit also reduces errors of a
-    model that is wrong far from its calibration poses.
+    model that is wrong far from its calibration poses; and the placement has to be farther from the calibrated one than the calibration's
+    own uncertainty of it explains.
     """
     rms = _rms(verification)
     if verification.all.mean < _MUCH:
@@ -56,7 +59,7 @@ def proposed_refit(
         least = rms if best is None else _rms(best.result)
         if _rms(again.result) < (_WORTH if best is None or len(what) > len(best.what) else 1.0) * least:
             best = again
-    return best if best is not None and _explains(best, rms) else None
+    return best if best is not None and best.probability < _CHANCE and _explains(best, rms) else None
 
 
 def _explains(best: RefittedVerification, rms: float) -> bool:

@@ -76,12 +76,16 @@ def conflict_sentence(block: dict[str, Any]) -> str:
     conflict = block["conflict"]
     most = [f"{name} ({shift:+.1f} σ)" for name, shift in conflict["shifts"].items()]
     others = conflict["deviating"] - len(most)
-    more = f" and {others} more by over 3 σ" if others > 0 else ""
-    where = f", most in {', '.join(most)}{more}" if most else ""
+    if conflict["alone"]:
+        more = f" or one of {others} more" if others > 0 else ""
+        deviation = f"it deviates from the other robots as if {' or '.join(most)}{more} alone were off"
+    else:
+        more = f" and {others} more by over 3 σ" if others > 0 else ""
+        where = f", most in {', '.join(most)}{more}" if most else ""
+        deviation = f"it deviates from the other robots {conflict['size']:.2g} times as much as they differ among each other{where}"
     return (
-        f"the prior does not fit this robot (p {_probability(conflict['probability'])}): it deviates from the other robots "
-        f"{conflict['size']:.2g} times as much as they differ among each other{where}; is it of another model or batch, or was it "
-        "repaired? Calibrate it without --prior"
+        f"the prior does not fit this robot (p {_probability(conflict['probability'])}): {deviation}; is it of another model or batch, or "
+        "was it repaired? Calibrate it without --prior"
     )
 
 

@@ -427,6 +427,8 @@ def _noise(fit: GeometricFit, *, prior_misfits: bool) -> Sequence[str]:
         return ()
     remarks = []
     scatter = f"{robot:.{decimals(robot)}f} mm per coordinate"
+    if prior_misfits and instrument is not None and robot <= _UNDERSTATED * (stated or 0.0):
+        return []
     if prior_misfits:
         return [
             f"the points scatter by {scatter} about the fit (1σ), because the prior of other robots holds it where this robot is not: that "

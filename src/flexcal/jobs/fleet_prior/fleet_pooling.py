@@ -7,7 +7,7 @@ from pathlib import Path
 
 from flexcal.errors import FlexcalError
 from flexcal.files.formats import Block, block_sha256
-from flexcal.jobs.fleet_prior.geometry_pooling import pooled_prior
+from flexcal.jobs.fleet_prior.geometry_pooling import of_equal_terms, pooled_prior
 from flexcal.jobs.fleet_prior.member import FEWEST, Member
 from flexcal.jobs.fleet_prior.model_prior import ModelPrior
 from flexcal.jobs.fleet_prior.pooled_values import PooledValues
@@ -24,13 +24,12 @@ def pool_fleet(
     `left_out` are remarks on robots that are not among the members, for the message where too few are.
     Raises `FlexcalError` as `pooled_prior` does where there are as many calibrations as it needs, and where there is nothing to pool.
     """
-    remarks: list[str] = []
-    calibrated = members.get("calibration", ())
+    calibrated, remarks = of_equal_terms(members.get("calibration", ()))
     springs = _values(members.get("stiffness", ()), pool_springs, "stiffness", remarks)
     friction = _values(members.get("dynamics", ()), pool_friction, "friction", remarks)
     geometry = None
     if len(calibrated) >= FEWEST or (springs is None and friction is None):
-        geometry = pooled_prior(calibrated, left_out)
+        geometry = pooled_prior(calibrated, [*left_out, *remarks])
         remarks += temperature_remark(calibrated)
     else:
         remarks.append(

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
 
-from flexcal.calibration.error_model import TRANSMISSION
 from flexcal.calibration.fit import OF_THE_CELL, FleetPrior, base_errors, plausible_size
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Measured, deviations, population
@@ -27,9 +27,10 @@ _TOLD = 0.9
 
 
 def pooled_prior(members: Sequence[Member], left_out: Sequence[str] = ()) -> FleetPrior:
-    """Prior for a further robot of the model of some calibrated ones (`estimation.population`); `left_out` says why others are none.
+    """Prior for a further robot of the model of some calibrated ones with equal terms (`estimation.population`); `left_out` says why others
+    are none.
 
-    Raises `FlexcalError` for fewer than three robots, robots of other kinematics or with other terms, and those that were calibrated with
+    Raises `FlexcalError` for fewer than three robots, robots of other kinematics, and those that were calibrated with
     such a prior themselves, which would count the others twice.
     """
     _require_alike(members, left_out)
@@ -53,6 +54,32 @@ def pooled_prior(members: Sequence[Member], left_out: Sequence[str] = ()) -> Fle
     )
     told = np.diag(pooled.uncertainty) < _TOLD * sizes**2
     return prior.among(name for name, known in zip(names, told, strict=True) if known)
+
+
+def of_equal_terms(members: Sequence[Member]) -> tuple[list[Member], list[str]]:
+    """Robots with the terms that most were calibrated with, and remarks on the others, whose parameters mean different things.
+
+    Raises `FlexcalError` where there are as many robots as a prior needs, but none with equal terms.
+    """
+    counts = Counter(member.terms for member in members)
+    if not counts:
+        return [], []
+    terms, most = counts.most_common(1)[0]
+    named = {other: ", ".join(m.name for m in members if m.terms == other) for other in counts}
+    if most < FEWEST <= len(members):
+        listed = "; ".join(f"{names} with {' '.join(other)}" for other, names in named.items())
+        raise FlexcalError(
+            "E-PRIOR-004",
+            f"no {FEWEST} robots were calibrated with the same terms, so their parameters mean different things: {listed}; calibrate "
+            f"all with --terms {' '.join(terms)}.",
+        )
+    remarks = [
+        f"without {names}, calibrated with the terms {' '.join(other)} in place of {' '.join(terms)}, so that parameters mean different "
+        f"things; 'flexcal calibrate --terms {' '.join(terms)}' on the same poses includes {'it' if counts[other] == 1 else 'them'}"
+        for other, names in named.items()
+        if other != terms
+    ]
+    return [member for member in members if member.terms == terms], remarks
 
 
 def alike(members: Sequence[Member]) -> list[tuple[str, str, float]]:
@@ -109,13 +136,6 @@ def _require_alike(members: Sequence[Member], left_out: Sequence[str]) -> None:
     first = members[0]
     for member in members:
         member.require_model_of(first)
-        if member.terms != first.terms:
-            every = dict.fromkeys([*first.terms, *member.terms])
-            raise FlexcalError(
-                "E-PRIOR-004",
-                f"{first.name} was calibrated with the terms {' '.join(first.terms)}, and {member.name} with {' '.join(member.terms)}, so "
-                f"their parameters mean different things; calibrate all with --terms {' '.join(every)} {TRANSMISSION}.",
-            )
         if member.has_prior:
             raise FlexcalError(
                 "E-PRIOR-005",
