@@ -107,11 +107,12 @@ def _random_points(
 def _columns(model: RobotModel, at: PredictedMeasurements, suspect: Suspect) -> np.ndarray | None:
     if suspect.change.kind in OF_THE_MEASUREMENT:
         return None
-    return next(
-        change.columns
+    there = {
+        (change.kind, change.subject): change.columns
         for change in (*possible_changes(at.model, at), *worn_gears(at.model, at))
-        if (change.kind, change.subject) == (suspect.change.kind, suspect.change.subject)
-    )
+    }
+    parts = suspect.change.parts or (suspect.change,)
+    return np.hstack([there[part.kind, part.subject] for part in parts])
 
 
 def _concerned(suspect: Suspect, targets: Sequence[str]) -> Sequence[str]:
