@@ -15,6 +15,7 @@ from flexcal.calibration.measurement import (
 )
 from flexcal.model.parts import Payload
 from flexcal.model.robot import GEOMETRY, LATERAL, STATION, RobotModel
+from flexcal.model.statics import gravity_torque
 
 ChangeKind = Literal[
     "joint_shifted",
@@ -32,6 +33,8 @@ _NO_LOAD = 1e-4
 """Gravity torque, relative to the largest of the arm, that presses a gear to neither side."""
 _STEP = 0.1
 """Payload, kg, of the finite difference."""
+_NO_EFFECT = 1e-12
+"""Effect of a unit of a change, m, below which it moves no point."""
 _SHARE = 0.1
 """Step of a compliance, in its standard deviations, of the finite difference."""
 _ANYWHERE = 0.1
@@ -81,8 +84,7 @@ class PossibleChange:
 def possible_changes(model: RobotModel, at: PredictedMeasurements) -> list[PossibleChange]:
     """Changes of single joints, of the tool, of all lengths, of the load and of the instrument's place at predicted points.
 
-    Joints that move no point are left out, and so are a load on an arm that does not yield to it, and the compliance of joints without a
-    gravity torque.
+    Joints that move no point are left out, and so is the compliance of joints without a gravity torque.
     """
     changes = [
         PossibleChange(
@@ -114,7 +116,7 @@ def possible_changes(model: RobotModel, at: PredictedMeasurements) -> list[Possi
                 _flat(at.jacobian(names)),
             )
         )
-    return [change for change in changes if np.abs(change.columns).max(initial=0.0) > 1e-12]
+    return [change for change in changes if np.abs(change.columns).max(initial=0.0) > _NO_EFFECT]
 
 
 def wrong_readings(poses: int, numbers: np.ndarray) -> list[PossibleChange]:
@@ -206,8 +208,11 @@ def _places(model: RobotModel, at: PredictedMeasurements) -> np.ndarray:
 def _payload(model: RobotModel, at: PredictedMeasurements) -> PossibleChange:
     """Change of the mass, kg, of the declared payload, or else of a load at the first measured point."""
     told = model.payload is not None
+    subject = "payload" if told else at.poses.targets[0]
     robot = model if told else replace(model, payload=_load_at(model, at.poses.targets[0]))
     column = _by_mass(robot, at)
+    if np.abs(column).max() < _NO_EFFECT:
+        return _payload_of_rigid_arm(robot, at, subject)
     names = [n for n in moving_parameters(model) if n.rpartition(".")[2] in _YIELDING]
     roots = covariance_root(model, names) if names else np.zeros((0, 0))
     spread = [np.zeros((len(column), 0))]
@@ -223,9 +228,21 @@ def _payload(model: RobotModel, at: PredictedMeasurements) -> PossibleChange:
     if not told:
         # lever arms are linear in the place
         spread += [_by_mass(_displaced(robot, _ANYWHERE * axis), at) - column for axis in np.eye(3)]
-    subject = "payload" if told else at.poses.targets[0]
+    return PossibleChange("payload_changed", subject, ("payload.mass",), ("kg",), column, np.hstack(spread))
+
+
+def _payload_of_rigid_arm(model: RobotModel, at: PredictedMeasurements, subject: str) -> PossibleChange:
+    """Change of the load on an arm whose compliances are not calibrated: its mass times the compliance of the joints, by which each joint
+    yields in proportion to the torque of the load, known to 100 %.
+    """
+    torque = gravity_torque(model, at.poses.q, 1.0) - gravity_torque(model, at.poses.q, 0.0)
+    joints = [joint for joint in model.motor_joints if joint.kind == "revolute"]
+    each = _flat(at.jacobian([f"{joint.name}.offset" for joint in joints]))
+    yields = -torque[:, [model.joint_index(joint.name) for joint in joints]]
+    spread = 1e-6 * each * np.repeat(yields, 3, axis=0)
+    column = spread.sum(axis=1, keepdims=True)
     return PossibleChange(
-        "payload_changed", subject, ("payload.mass",), ("kg",), column, np.hstack(spread)
+        "payload_changed", subject, ("payload.sag",), ("kg µrad/(N m)",), column, spread
     )
 
 

@@ -65,6 +65,8 @@ class Suspect:
         Twice the negative log-likelihood alone.
     misfit : float
         Sum of squares that the change leaves, whitened.
+    parameters : float
+        Effective number of parameters, with those of an effect that is uncertain.
     same : bool
         Whether its effect at these points cannot be told from that of the best suspect, which is part of it.
     """
@@ -78,6 +80,7 @@ class Suspect:
     score: float
     cost: float
     misfit: float
+    parameters: float
     same: bool = False
 
 
@@ -298,8 +301,13 @@ def _suspects(found: list[tuple[SeenChange, Suspect]]) -> tuple[Suspect, ...]:
     # alike: as likely with all that the criterion adds; not told from the best by the errors themselves; or a change of more parameters
     # of which the best one is a part
     alike = [best]
-    for item, suspect in fitting:
+    for item, suspect in found:
         if suspect is best:
+            continue
+        if suspect.remainder <= FALSE_ALARM:
+            # what an uncertain effect explains may be that of another change, however little chance leaves of it
+            if best.change.spread is not None and _not_excluded(suspect, item, best, best_item, len(found)):
+                alike.append(suspect)
             continue
         same = _contains(item, best_item)
         if (
@@ -324,7 +332,7 @@ def _not_excluded(
     if suspect.change.kind == "wrong_reading" or item.basis.shape[1] > best_item.basis.shape[1]:
         return False
     gain = suspect.cost - best.cost
-    return gain < float(chdtri(best_item.basis.shape[1], FALSE_ALARM / alternatives))
+    return gain < float(chdtri(best.parameters, FALSE_ALARM / alternatives))
 
 
 def _contains(larger: SeenChange, smaller: SeenChange) -> bool:
@@ -366,6 +374,7 @@ def _suspect(test: GlobalTest, item: SeenChange, alternatives: int) -> Suspect:
         cost + rank * float(np.log(test.size)) + 2 * float(np.log(alternatives)),
         cost,
         misfit,
+        rank + test.size - float(np.sum(np.linalg.inv(root) ** 2)),
     )
 
 

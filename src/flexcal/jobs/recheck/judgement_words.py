@@ -226,6 +226,9 @@ def suspect_in_words(suspect: Suspect, model: RobotModel) -> str:
             for part, own in parts
         )
         return f"two changes together, as {told}"
+    if change.names == ("payload.sag",):
+        what = "another payload" if change.subject == "payload" else f"a load at {change.subject} that is not declared"
+        return f"{what}, whose mass is not known, as the calibrated robot is rigid"
     if change.kind == "payload_changed" and change.subject == "payload":
         return f"the payload changed by {amount(value, half, 'kg')}"
     if change.kind == "payload_changed":
