@@ -241,9 +241,7 @@ def _payload_of_rigid_arm(model: RobotModel, at: PredictedMeasurements, subject:
     yields = -torque[:, [model.joint_index(joint.name) for joint in joints]]
     spread = 1e-6 * each * np.repeat(yields, 3, axis=0)
     column = spread.sum(axis=1, keepdims=True)
-    return PossibleChange(
-        "payload_changed", subject, ("payload.sag",), ("kg µrad/(N m)",), column, spread
-    )
+    return PossibleChange("payload_changed", subject, ("payload.sag",), ("kg µrad/(N m)",), column, spread)
 
 
 def _load_at(model: RobotModel, target: str) -> Payload:

@@ -212,9 +212,7 @@ def _judge(errors: VisitErrors) -> JudgedVisit:
     explained = [(suspect.misfit, item.basis.shape[1]) for item, suspect in (*found, *worn, *pair)]
     other = for_another_geometry(test, explained)
     if other > CLEAR:
-        return JudgedVisit(
-            test, probability, (), together, shifts, geometry=True, rivals=two_changes(test)
-        )
+        return JudgedVisit(test, probability, (), together, shifts, geometry=True, rivals=two_changes(test))
     suspects = tuple(sorted((*suspects, *(suspect for _, suspect in pair)), key=lambda s: s.score))
     scatter = scatter_about(test, [suspect.remainder for _, suspect in (*found, *worn)], together)
     if scatter is None:
@@ -346,15 +344,15 @@ def _suspect(test: GlobalTest, item: SeenChange, alternatives: int) -> Suspect:
     with the covariance of the effect that is estimated (iterated generalised least squares).
     """
     change = item.change
-    estimate, left = np.zeros(item.columns.shape[1]), test.whitening @ test.errors.errors
-    uncertain = change.spread_at(np.ones_like(estimate)).size > 0
-    for step in range(1 + _STEPS):
-        root = _effect_root(test, change, estimate)
-        inverse = _inverse(np.linalg.solve(root, item.columns))
-        estimate = estimate + inverse @ np.linalg.solve(root, left)
-        left = _left(test, item, estimate)
-        if step == 0 and not (uncertain or _is_large(change, estimate)):
-            break
+    inverse = _inverse(item.columns)
+    estimate = inverse @ (test.whitening @ test.errors.errors)
+    if change.spread_at(np.ones_like(estimate)).size > 0 or _is_large(change, estimate):
+        for _ in range(_STEPS):
+            left = _left(test, item, estimate)
+            root = _effect_root(test, change, estimate)
+            inverse = _inverse(np.linalg.solve(root, item.columns))
+            estimate = estimate + inverse @ np.linalg.solve(root, left)
+    left = _left(test, item, estimate)
     root = _effect_root(test, change, estimate)
     misfit = float(np.sum(np.linalg.solve(root, left) ** 2))
     rank = item.basis.shape[1]
@@ -407,6 +405,8 @@ def _left(test: GlobalTest, item: SeenChange, estimate: np.ndarray) -> np.ndarra
     if not _is_large(item.change, estimate):
         return test.whitening @ errors.errors - item.columns @ estimate
     names = [item.change.names[k] for k in shifts]
-    moved = {name: errors.model.value(name) + float(estimate[k]) for name, k in zip(names, shifts, strict=True)}
+    moved = {
+        name: errors.model.value(name) + float(estimate[k]) for name, k in zip(names, shifts, strict=True)
+    }
     rest = np.delete(np.arange(len(estimate)), shifts)
     return test.whitening @ errors.with_values(moved) - item.columns[:, rest] @ estimate[rest]

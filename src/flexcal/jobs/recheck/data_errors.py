@@ -9,7 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.calibration.measurement import predict_measurements
-from flexcal.calibration.recheck import ALIKE, FALSE_ALARM, GlobalTest, JudgedVisit, misfit_of, single_deviation
+from flexcal.calibration.recheck import (
+    ALIKE,
+    FALSE_ALARM,
+    GlobalTest,
+    JudgedVisit,
+    misfit_of,
+    single_deviation,
+)
 from flexcal.data.poses import PoseSet
 from flexcal.jobs.inputs import misread_point, planned_pose
 from flexcal.model.robot import RobotModel

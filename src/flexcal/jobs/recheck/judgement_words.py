@@ -73,7 +73,11 @@ def judgement_sentence(judged: JudgedVisit, course: CourseOverVisits | None = No
         several = (
             f"{lead}recalibrate ({size}): no single change of a joint, of the tool, of all lengths, of the load or of the instrument "
             "explains the errors; "
-            + ("several together would" if judged.rivals is None else f"two together would, as {_together(judged.rivals)}")
+            + (
+                "several together would"
+                if judged.rivals is None
+                else f"two together would, as {_together(judged.rivals)}"
+            )
         )
         if judged.together > FALSE_ALARM:
             another = ", as after a crash, and so would the geometry of another robot: is this the one that was calibrated?"
@@ -227,7 +231,11 @@ def suspect_in_words(suspect: Suspect, model: RobotModel) -> str:
         )
         return f"two changes together, as {told}"
     if change.names == ("payload.sag",):
-        what = "another payload" if change.subject == "payload" else f"a load at {change.subject} that is not declared"
+        what = (
+            "another payload"
+            if change.subject == "payload"
+            else f"a load at {change.subject} that is not declared"
+        )
         return f"{what}, whose mass is not known, as the calibrated robot is rigid"
     if change.kind == "payload_changed" and change.subject == "payload":
         return f"the payload changed by {amount(value, half, 'kg')}"
