@@ -1,4 +1,4 @@
-"""Loads that nobody declared, joints that yield more and two shifts at once, on arms that yield to gravity moments found by plain vectors."""
+"""Loads that nobody declared, joints that yield more and two shifts at once, on arms that yield to gravity moments by plain vectors."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def _named(judged: JudgedVisit) -> list[tuple[str, str]]:
 
 def test_a_load_that_was_not_declared_is_named_with_its_mass(cell: Cell) -> None:
     robot = cell.changed()
-    robot.loaded(3.0, REFLECTOR + (0.0, 0.03, 0.04))
+    robot.loaded(3.0, REFLECTOR + np.array([0.0, 0.03, 0.04]))
     found = cell.found(robot)
     (item,) = [s for s in found.judged.suspects if s.change.kind == "payload_changed"]
     assert item.change.subject in cell.calibrated.measured
