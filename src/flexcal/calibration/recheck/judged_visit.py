@@ -265,7 +265,7 @@ def _pair(
 ) -> list[tuple[SeenChange, Suspect]]:
     """Two changes at once, where they are likelier than the best single one beyond chance; empty where they are not.
 
-    Were a single change the true one, the best of all pairs would gain more over it than this limit in at most 5 % of visits (χ², Bonferroni's
+    Were a single change the true one, the best pair would gain more over it than this limit in at most 5 % of visits (χ², Bonferroni's
     inequality over the pairs).
     """
     from scipy.special import chdtri
