@@ -26,11 +26,7 @@ def for_another_geometry(test: GlobalTest, fitted: Sequence[tuple[float, int]]) 
     of one other robot do.
     """
     errors, whitening = test.errors, test.whitening
-    names = [f"{joint.name}.{key}" for joint in errors.model.motor_joints for key in GEOMETRY]
-    names += [f"tool.{key}" for key in GEOMETRY if key.startswith("length")]
-    sizes = np.array([_LENGTH if name.rpartition(".")[2].startswith("length") else _ANGLE for name in names])
-    jacobian = errors.at.jacobian(names)
-    effects = whitening @ (jacobian.reshape(-1, jacobian.shape[2]) * sizes)
+    effects = _effects(test)
     own, common = (whitening @ part @ whitening.T for part in (errors.own, errors.common))
     values, geometry = whitening @ errors.errors, effects @ effects.T
     changes = [np.zeros((len(values), 0)), *(item.basis for item in test.seen)]
@@ -38,6 +34,24 @@ def for_another_geometry(test: GlobalTest, fitted: Sequence[tuple[float, int]]) 
     noisier = min(noisier, *(misfit + count * float(np.log(len(values))) for misfit, count in fitted))
     other = min(_deviance(values, own + common + spread**2 * geometry, changes[:1]) for spread in _SPREADS)
     return noisier - other
+
+
+def single_deviation(test: GlobalTest) -> float:
+    """Least sum of squares that one length, zero or direction of an axis leaves that differs from the calibrated, as of a bent link."""
+    values, effects = test.whitening @ test.errors.errors, _effects(test)
+    sizes = np.sum(effects**2, axis=0)
+    gains = (effects.T @ values) ** 2 / np.where(sizes > 0, sizes, np.inf)
+    return float(values @ values - gains.max(initial=0.0))
+
+
+def _effects(test: GlobalTest) -> np.ndarray:
+    """Whitened effects (m, p) of the errors of all lengths, zeros and directions of axes, of their usual sizes."""
+    errors = test.errors
+    names = [f"{joint.name}.{key}" for joint in errors.model.motor_joints for key in GEOMETRY]
+    names += [f"tool.{key}" for key in GEOMETRY if key.startswith("length")]
+    sizes = np.array([_LENGTH if name.rpartition(".")[2].startswith("length") else _ANGLE for name in names])
+    jacobian = errors.at.jacobian(names)
+    return test.whitening @ (jacobian.reshape(-1, jacobian.shape[2]) * sizes)
 
 
 def _deviance(values: np.ndarray, covariance: np.ndarray, changes: Sequence[np.ndarray]) -> float:

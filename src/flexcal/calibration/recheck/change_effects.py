@@ -7,30 +7,49 @@ from typing import Literal
 
 import numpy as np
 
-from flexcal.calibration.measurement import PredictedMeasurements, predict_measurements
-from flexcal.model.robot import GEOMETRY, STATION, RobotModel
+from flexcal.calibration.measurement import (
+    PredictedMeasurements,
+    covariance_root,
+    moving_parameters,
+    predict_measurements,
+)
+from flexcal.model.parts import Payload
+from flexcal.model.robot import GEOMETRY, LATERAL, STATION, RobotModel
+from flexcal.model.statics import gravity_torque
 
 ChangeKind = Literal[
     "joint_shifted",
     "tool_bumped",
     "thermal_growth",
     "payload_changed",
+    "joint_softer",
     "instrument_moved",
     "wrong_reading",
     "readings_drift",
     "gear_worn",
+    "two_changes",
 ]
 _NO_LOAD = 1e-4
 """Gravity torque, relative to the largest of the arm, that presses a gear to neither side."""
 _STEP = 0.1
 """Payload, kg, of the finite difference."""
+_NO_EFFECT = 1e-12
+"""Effect of a unit of a change, m, below which it moves no point."""
+_SHARE = 0.1
+"""Step of a compliance, in its standard deviations, of the finite difference."""
+_ANYWHERE = 0.1
+"""Standard deviation, m, of the centre of mass of a load that is not declared, about the measured point."""
+_YIELDING = ("gravity_compliance", *LATERAL, "stiffness", "hardening")
+"""Parameters by which an arm yields to a load."""
 
 
 @dataclass(frozen=True, eq=False)
 class PossibleChange:
     """Change of one `kind`: of `subject`, a joint, a point on the tool, a station or a pose, by parameters `names` in `units`.
 
-    `columns` (3 K, k) are the derivatives of the measured points, m per unit.
+    `columns` (3 K, k) are the derivatives of the measured points, m per unit; `spread` (3 K, p) are roots of the covariance of the
+    column of a single parameter, as of a load on compliances that are known to some per cent, None for columns that are known. Two
+    changes together have these two as `parts`, and the columns of both.
     """
 
     kind: ChangeKind
@@ -38,12 +57,34 @@ class PossibleChange:
     names: tuple[str, ...]
     units: tuple[str, ...]
     columns: np.ndarray
+    spread: np.ndarray | None = None
+    parts: tuple[PossibleChange, ...] = ()
+
+    @classmethod
+    def of_two(cls, one: PossibleChange, other: PossibleChange) -> PossibleChange:
+        """Both changes at once."""
+        return cls(
+            "two_changes",
+            f"{one.subject} and {other.subject}",
+            one.names + other.names,
+            one.units + other.units,
+            np.hstack([one.columns, other.columns]),
+            parts=(one, other),
+        )
+
+    def spread_at(self, estimate: np.ndarray) -> np.ndarray:
+        """Roots (3 K, p), m, of the covariance of the effect of an `estimate` (k,), as the columns are known."""
+        if self.parts:
+            count = len(self.parts[0].names)
+            halves = zip(self.parts, (estimate[:count], estimate[count:]), strict=True)
+            return np.hstack([part.spread_at(own) for part, own in halves])
+        return np.zeros((len(self.columns), 0)) if self.spread is None else estimate[0] * self.spread
 
 
 def possible_changes(model: RobotModel, at: PredictedMeasurements) -> list[PossibleChange]:
-    """Changes of single joints, of the tool, of all lengths, of the payload and of the instrument's place at predicted points.
+    """Changes of single joints, of the tool, of all lengths, of the load and of the instrument's place at predicted points.
 
-    Joints that move no point are left out, and so is the payload of an arm that does not yield to it.
+    Joints that move no point are left out, and so is the compliance of joints without a gravity torque.
     """
     changes = [
         PossibleChange(
@@ -63,7 +104,7 @@ def possible_changes(model: RobotModel, at: PredictedMeasurements) -> list[Possi
         changes.append(
             PossibleChange("thermal_growth", "all lengths", ("growth",), ("m/m",), _flat(at.moved(grown)))
         )
-    changes += _payload(model, at)
+    changes += [_payload(model, at), *_softer(model, at)]
     for station in at.poses.stations:
         names = tuple(f"station.{station}.{key}" for key in STATION)
         changes.append(
@@ -75,7 +116,7 @@ def possible_changes(model: RobotModel, at: PredictedMeasurements) -> list[Possi
                 _flat(at.jacobian(names)),
             )
         )
-    return [change for change in changes if np.abs(change.columns).max(initial=0.0) > 1e-12]
+    return [change for change in changes if np.abs(change.columns).max(initial=0.0) > _NO_EFFECT]
 
 
 def wrong_readings(poses: int, numbers: np.ndarray) -> list[PossibleChange]:
@@ -164,13 +205,87 @@ def _places(model: RobotModel, at: PredictedMeasurements) -> np.ndarray:
     return (there.position - there.position[0]) @ axes
 
 
-def _payload(model: RobotModel, at: PredictedMeasurements) -> list[PossibleChange]:
-    """Change of the payload's mass, kg, where one is declared."""
-    if model.payload is None:
-        return []
+def _payload(model: RobotModel, at: PredictedMeasurements) -> PossibleChange:
+    """Change of the mass, kg, of the declared payload, or else of a load at the first measured point."""
+    told = model.payload is not None
+    subject = "payload" if told else at.poses.targets[0]
+    robot = model if told else replace(model, payload=_load_at(model, at.poses.targets[0]))
+    column = _by_mass(robot, at)
+    if np.abs(column).max() < _NO_EFFECT:
+        return _payload_of_rigid_arm(robot, at, subject)
+    names = [n for n in moving_parameters(model) if n.rpartition(".")[2] in _YIELDING]
+    roots = covariance_root(model, names) if names else np.zeros((0, 0))
+    spread = [np.zeros((len(column), 0))]
+    if names:
+        steps = _SHARE * np.linalg.norm(roots, axis=1)
+        slopes = [
+            (_by_mass(robot.with_values({name: robot.value(name) + step}), at) - column) / step
+            if step > 0
+            else np.zeros_like(column)
+            for name, step in zip(names, steps.tolist(), strict=True)
+        ]
+        spread.append(np.hstack(slopes) @ roots)
+    if not told:
+        # lever arms are linear in the place
+        spread += [_by_mass(_displaced(robot, _ANYWHERE * axis), at) - column for axis in np.eye(3)]
+    return PossibleChange("payload_changed", subject, ("payload.mass",), ("kg",), column, np.hstack(spread))
+
+
+def _payload_of_rigid_arm(model: RobotModel, at: PredictedMeasurements, subject: str) -> PossibleChange:
+    """Change of the load on an arm whose compliances are not calibrated: its mass times the compliance of the joints, by which each joint
+    yields in proportion to the torque of the load, known to 100 %.
+    """
+    torque = gravity_torque(model, at.poses.q, 1.0) - gravity_torque(model, at.poses.q, 0.0)
+    joints = [joint for joint in model.motor_joints if joint.kind == "revolute"]
+    each = _flat(at.jacobian([f"{joint.name}.offset" for joint in joints]))
+    yields = -torque[:, [model.joint_index(joint.name) for joint in joints]]
+    spread = 1e-6 * each * np.repeat(yields, 3, axis=0)
+    column = spread.sum(axis=1, keepdims=True)
+    return PossibleChange("payload_changed", subject, ("payload.sag",), ("kg µrad/(N m)",), column, spread)
+
+
+def _load_at(model: RobotModel, target: str) -> Payload:
+    """A payload without mass, at a point on the tool."""
+    point = model.points[target]
+    return Payload(
+        point.frame,
+        point.joint,
+        point.rotation,
+        point.translation,
+        0.0,
+        0.0,
+        0.0,
+        point.xyz,
+        np.zeros((3, 3)),
+    )
+
+
+def _displaced(model: RobotModel, by: np.ndarray) -> RobotModel:
+    """The robot with its payload's centre of mass displaced, m."""
+    assert model.payload is not None
+    return replace(model, payload=replace(model.payload, com=model.payload.com + by))
+
+
+def _by_mass(model: RobotModel, at: PredictedMeasurements) -> np.ndarray:
+    """Derivative (3 K, 1) of the points by the mass of the payload, m/kg."""
+    assert model.payload is not None
     poses = at.poses
     mass = np.full(len(poses), model.payload.mass) if poses.payload is None else poses.payload
     heavier = predict_measurements(model, replace(poses, payload=mass + _STEP)).position
     lighter = predict_measurements(model, replace(poses, payload=mass)).position
-    columns = (heavier - lighter).reshape(-1, 1) / _STEP
-    return [PossibleChange("payload_changed", "payload", ("payload.mass",), ("kg",), columns)]
+    return (heavier - lighter).reshape(-1, 1) / _STEP
+
+
+def _softer(model: RobotModel, at: PredictedMeasurements) -> list[PossibleChange]:
+    """Further compliance of single joints about their axes, rad/(N m), by the gravity torque of the masses that are known."""
+    return [
+        PossibleChange(
+            "joint_softer",
+            joint.name,
+            (name := f"{joint.name}.gravity_compliance",),
+            ("rad/(N m)",),
+            _flat(at.jacobian([name])),
+        )
+        for joint in model.motor_joints
+        if joint.kind == "revolute"
+    ]

@@ -11,6 +11,7 @@ from flexcal.calibration.measurement import PredictedMeasurements, random_poses,
 from flexcal.calibration.recheck.change_effects import (
     OF_THE_MEASUREMENT,
     WHOLE_TOOL,
+    PossibleChange,
     possible_changes,
     worn_gears,
 )
@@ -55,16 +56,18 @@ def moved_tool(
     moved, or a wrong reading.
     """
     at = _random_points(model, ranges, _concerned(suspect, targets))
-    columns = _columns(model, at, suspect)
-    if columns is None:
+    change = _change_at(at, suspect)
+    if change is None:
         nothing = (0.0, 0.0)
         return MovedTool(0.0, nothing, 0.0, nothing, at.poses.q[0], 0.0)
-    distance = _distances(columns @ suspect.estimate)
+    distance = _distances(change.columns @ suspect.estimate)
     # two points on a tool do not show its rotation about the line through them: the covariance may be singular
     values, vectors = np.linalg.eigh(suspect.covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
-    drawn = suspect.estimate + np.random.default_rng(2).standard_normal((_DRAWS, len(values))) @ root.T
-    spread = np.stack([_distances(columns @ change) for change in drawn])
+    rng, uncertain = np.random.default_rng(2), change.spread_at(suspect.estimate)
+    drawn = suspect.estimate + rng.standard_normal((_DRAWS, len(values))) @ root.T
+    effects = drawn @ change.columns.T + rng.standard_normal((_DRAWS, uncertain.shape[1])) @ uncertain.T
+    spread = np.stack([_distances(effect) for effect in effects])
     mean, p95 = spread.mean(axis=1), np.quantile(spread, 0.95, axis=1)
     farthest = int(distance.argmax())
     return MovedTool(
@@ -85,10 +88,10 @@ def telling_pose(
 ) -> TellingPose | None:
     """The pose at which two suspects differ most; None where one of them is of the instrument or a reading."""
     at = _random_points(model, ranges, targets)
-    columns = [_columns(model, at, suspect) for suspect in suspects]
-    if columns[0] is None or columns[1] is None:
+    one, other = (_change_at(at, suspect) for suspect in suspects)
+    if one is None or other is None:
         return None
-    apart = _distances(columns[0] @ suspects[0].estimate - columns[1] @ suspects[1].estimate)
+    apart = _distances(one.columns @ suspects[0].estimate - other.columns @ suspects[1].estimate)
     best = int(apart.argmax())
     return TellingPose(at.poses.q[best], float(apart[best]))
 
@@ -104,14 +107,18 @@ def _random_points(
     return seen_from_base(model, random_poses(model, limits, targets, _POSES), jacobians=True)
 
 
-def _columns(model: RobotModel, at: PredictedMeasurements, suspect: Suspect) -> np.ndarray | None:
+def _change_at(at: PredictedMeasurements, suspect: Suspect) -> PossibleChange | None:
+    """The suspected change with its effect on other points; None for those of the measurement."""
     if suspect.change.kind in OF_THE_MEASUREMENT:
         return None
-    return next(
-        change.columns
+    there = {
+        (change.kind, change.subject): change
         for change in (*possible_changes(at.model, at), *worn_gears(at.model, at))
-        if (change.kind, change.subject) == (suspect.change.kind, suspect.change.subject)
-    )
+    }
+    if suspect.change.parts:
+        one, other = (there[part.kind, part.subject] for part in suspect.change.parts)
+        return PossibleChange.of_two(one, other)
+    return there[suspect.change.kind, suspect.change.subject]
 
 
 def _concerned(suspect: Suspect, targets: Sequence[str]) -> Sequence[str]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from flexcal.calibration.recheck.another_geometry import CLEAR, for_another_geometry
 from flexcal.calibration.recheck.change_effects import (
+    OF_THE_MEASUREMENT,
     PossibleChange,
     drift_of_readings,
     possible_changes,
@@ -24,7 +25,7 @@ from flexcal.calibration.recheck.global_test import (
     SeenChange,
     seen_change,
 )
-from flexcal.calibration.recheck.pairs_of_changes import Pair, two_changes
+from flexcal.calibration.recheck.pairs_of_changes import FittedPair, pairs_of_changes, two_changes
 from flexcal.calibration.recheck.scatter_of_visit import LargerScatter, scatter_about, unexplained
 from flexcal.calibration.recheck.visit_errors import VisitErrors
 from flexcal.estimation import student_quantile
@@ -32,8 +33,12 @@ from flexcal.estimation import student_quantile
 _LARGE = 1e-4
 """Shift of a joint, rad or m, above which the points do not move in proportion to it."""
 _STEPS = 4
+_NO_WARMTH = 3e-3
+"""Growth, m/m, that no temperature makes: 250 K of steel."""
 _EVIDENT = 0.1
 """Share of the errors that an instrument that moved may leave where something else changed too."""
+_BY_CHANCE = 0.05
+"""Probability that two changes seem likelier than the single one that is true."""
 _LEAST = 12
 """Least number of coordinates for which the place of the instrument is fitted without being asked."""
 
@@ -60,6 +65,8 @@ class Suspect:
         Twice the negative log-likelihood alone.
     misfit : float
         Sum of squares that the change leaves, whitened.
+    parameters : float
+        Effective number of parameters, with those of an effect that is uncertain.
     same : bool
         Whether its effect at these points cannot be told from that of the best suspect, which is part of it.
     """
@@ -73,6 +80,7 @@ class Suspect:
     score: float
     cost: float
     misfit: float
+    parameters: float
     same: bool = False
 
 
@@ -101,8 +109,9 @@ class JudgedVisit:
     geometry : bool
         Whether many differences of the geometry, as of another robot, explain the errors about as well as scatter or suspects do; where
         there is neither, far better.
-    rivals : tuple of two PossibleChange, or None
-        Where the instrument stands elsewhere and nothing else changed, two changes of the robot that together explain the errors too.
+    rivals : FittedPair or None
+        Where the instrument stands elsewhere and nothing else changed, or no single change explains the errors, two changes of the robot
+        that together do.
     """
 
     test: GlobalTest
@@ -114,7 +123,7 @@ class JudgedVisit:
     place: Suspect | None = None
     scatter: LargerScatter | None = None
     geometry: bool = False
-    rivals: Pair | None = None
+    rivals: FittedPair | None = None
 
     @property
     def as_calibrated(self) -> bool:
@@ -134,6 +143,8 @@ class JudgedVisit:
         """Shifts of single joints, of all lengths and of the payload with the part of their variance that visits of a `series` share."""
         result = []
         for suspect in self.shifts:
+            if suspect.change.kind == "joint_softer":
+                continue
             item = next(seen for seen in self.test.seen if seen.change is suspect.change)
             weights = (item.columns.T @ self.test.whitening)[0] * suspect.covariance[0, 0]
             own, common = (
@@ -169,12 +180,18 @@ def judge_visit(errors_of: Callable[[bool], VisitErrors | None], *, placed: bool
     before = float(np.sum((judged.test.whitening @ errors.errors) ** 2))
     after = float(np.sum((moved.test.whitening @ again.errors) ** 2))
     explained = moved.suspects and moved.scatter is None and after < _EVIDENT * before
+    explained = explained or (len(moved.suspects) == 1 and is_no_warmth(moved.suspects[0]))
     if moved.as_calibrated or explained:
         rivals = two_changes(judged.test) if moved.as_calibrated else None
         return replace(
             moved, instrument="evident", place=judged.suspects[0] if alone else None, rivals=rivals
         )
     return judged
+
+
+def is_no_warmth(suspect: Suspect) -> bool:
+    """Whether all lengths are others by more than any temperature makes: by 250 K of steel."""
+    return suspect.change.kind == "thermal_growth" and abs(float(suspect.estimate[0])) > _NO_WARMTH
 
 
 def _judge(errors: VisitErrors) -> JudgedVisit:
@@ -187,21 +204,26 @@ def _judge(errors: VisitErrors) -> JudgedVisit:
         return JudgedVisit(test, probability, (), together, shifts)
     found = _explanations(test)
     suspects = _suspects(found)
-    worn = [] if suspects else _worn(test)
-    explained = [(suspect.misfit, item.basis.shape[1]) for item, suspect in (*found, *worn)]
+    # play is a step where a compliance is a slope, over the same gravity torques
+    yields = any(suspect.change.kind in ("joint_softer", "payload_changed") for suspect in suspects)
+    worn = _worn(test) if yields or not suspects else []
+    suspects = _suspects([*found, *worn]) if yields else suspects or _suspects(worn)
+    pair = _pair(test, found, suspects)
+    explained = [(suspect.misfit, item.basis.shape[1]) for item, suspect in (*found, *worn, *pair)]
     other = for_another_geometry(test, explained)
     if other > CLEAR:
-        return JudgedVisit(test, probability, (), together, shifts, geometry=True)
-    suspects = suspects or _suspects(worn)
+        return JudgedVisit(test, probability, (), together, shifts, geometry=True, rivals=two_changes(test))
+    suspects = tuple(sorted((*suspects, *(suspect for _, suspect in pair)), key=lambda s: s.score))
     scatter = scatter_about(test, [suspect.remainder for _, suspect in (*found, *worn)], together)
     if scatter is None:
-        return JudgedVisit(test, probability, suspects, together, shifts, geometry=other > 0)
+        rivals = None if suspects else two_changes(test)
+        return JudgedVisit(test, probability, suspects, together, shifts, geometry=other > 0, rivals=rivals)
     # causes by the scatter that the visit has; what that explains is none
     wider = GlobalTest.of(scatter.applied(errors), changes, directed=True)
     caused = wider.probability(errors.errors) <= VISIT_ALARM
     suspects = _suspects(_explanations(wider)) if caused else ()
     if caused and not suspects:  # scatter is not it: more changed, or this is another robot
-        return JudgedVisit(test, probability, (), together, shifts)
+        return JudgedVisit(test, probability, (), together, shifts, rivals=two_changes(test))
     shifts = tuple(_suspect(wider, item, 1) for item in wider.seen if len(item.change.names) == 1)
     return JudgedVisit(
         wider, probability, suspects, together, shifts, scatter=scatter, geometry=other > -CLEAR
@@ -238,6 +260,36 @@ def _worn(test: GlobalTest) -> list[tuple[SeenChange, Suspect]]:
     return [(item, suspect) for item, suspect in found if suspect.estimate[0] > 0]
 
 
+def _pair(
+    test: GlobalTest, found: list[tuple[SeenChange, Suspect]], suspects: tuple[Suspect, ...]
+) -> list[tuple[SeenChange, Suspect]]:
+    """Two changes at once, where they are likelier than the best single one beyond chance; empty where they are not.
+
+    Were a single change the true one, the best pair would gain more over it than this limit in at most 5 % of visits (χ², Bonferroni's
+    inequality over the pairs).
+    """
+    from scipy.special import chdtri
+
+    if not suspects or suspects[0].change.kind in OF_THE_MEASUREMENT:
+        return []
+    best = suspects[0]
+    item = next((seen for seen, suspect in found if suspect.change is best.change), None)
+    if item is None:  # play in a gear
+        return []
+    root = _effect_root(test, best.change, best.estimate)
+    values = _left(test, item, best.estimate) + item.columns @ best.estimate
+    pairs = pairs_of_changes(test, root, values)
+    if not pairs:
+        return []
+    likeliest = min(pairs, key=lambda pair: pair.misfit + pair.rank * np.log(test.size))
+    whole = np.linalg.cholesky(test.errors.covariance)
+    both = seen_change(PossibleChange.of_two(*likeliest.changes), test.whitening, whole)
+    suspect = _suspect(test, both, len(pairs))
+    further = max(likeliest.rank - item.basis.shape[1], 1)
+    beyond = best.cost - suspect.cost > float(chdtri(further, _BY_CHANCE / len(pairs)))
+    return [(both, suspect)] if beyond and suspect.remainder > FALSE_ALARM else []
+
+
 def _suspects(found: list[tuple[SeenChange, Suspect]]) -> tuple[Suspect, ...]:
     """Those that explain the errors, and are not excluded by the best of them, the best first."""
     fitting = [pair for pair in found if pair[1].remainder > FALSE_ALARM]
@@ -247,8 +299,13 @@ def _suspects(found: list[tuple[SeenChange, Suspect]]) -> tuple[Suspect, ...]:
     # alike: as likely with all that the criterion adds; not told from the best by the errors themselves; or a change of more parameters
     # of which the best one is a part
     alike = [best]
-    for item, suspect in fitting:
+    for item, suspect in found:
         if suspect is best:
+            continue
+        if suspect.remainder <= FALSE_ALARM:
+            # what an uncertain effect explains may be that of another change, however little chance leaves of it
+            if best.change.spread is not None and _not_excluded(suspect, item, best, best_item, len(found)):
+                alike.append(suspect)
             continue
         same = _contains(item, best_item)
         if (
@@ -273,7 +330,7 @@ def _not_excluded(
     if suspect.change.kind == "wrong_reading" or item.basis.shape[1] > best_item.basis.shape[1]:
         return False
     gain = suspect.cost - best.cost
-    return gain < float(chdtri(best_item.basis.shape[1], FALSE_ALARM / alternatives))
+    return gain < float(chdtri(best.parameters, FALSE_ALARM / alternatives))
 
 
 def _contains(larger: SeenChange, smaller: SeenChange) -> bool:
@@ -283,26 +340,27 @@ def _contains(larger: SeenChange, smaller: SeenChange) -> bool:
 
 
 def _suspect(test: GlobalTest, item: SeenChange, alternatives: int) -> Suspect:
-    """A change fitted alone; a joint's by Gauss-Newton, as its effect is not in proportion to a large shift."""
-    change, columns = item.change, item.columns
-    values = test.whitening @ test.errors.errors
-    scale = np.linalg.norm(columns, axis=0)
-    inverse = np.linalg.pinv(columns / np.where(scale > 0, scale, 1.0), rcond=1e-6)
-    inverse = inverse / np.where(scale > 0, scale, np.inf)[:, None]
-    estimate = inverse @ values
-    left = values - columns @ estimate
-    if change.kind == "joint_shifted" and np.abs(estimate).max() > _LARGE:
-        start = test.errors.model.value(change.names[0])
+    """A change fitted alone: joints by Gauss-Newton, as their effect is not in proportion to a large shift, and columns that are uncertain
+    with the covariance of the effect that is estimated (iterated generalised least squares).
+    """
+    change = item.change
+    inverse = _inverse(item.columns)
+    estimate = inverse @ (test.whitening @ test.errors.errors)
+    if change.spread_at(np.ones_like(estimate)).size > 0 or _is_large(change, estimate):
         for _ in range(_STEPS):
-            left = test.whitening @ test.errors.with_values({change.names[0]: start + float(estimate[0])})
-            estimate = estimate + inverse @ left
-        left = test.whitening @ test.errors.with_values({change.names[0]: start + float(estimate[0])})
-    misfit = float(left @ left)
+            left = _left(test, item, estimate)
+            root = _effect_root(test, change, estimate)
+            inverse = _inverse(np.linalg.solve(root, item.columns))
+            estimate = estimate + inverse @ np.linalg.solve(root, left)
+    left = _left(test, item, estimate)
+    root = _effect_root(test, change, estimate)
+    misfit = float(np.sum(np.linalg.solve(root, left) ** 2))
     rank = item.basis.shape[1]
     count = test.size - rank
     remainder = float(test.chance(misfit, count)) if count > 0 else 1.0
     freedom = test.freedom
     cost = misfit if not np.isfinite(freedom) else (freedom + test.size) * float(np.log1p(misfit / freedom))
+    cost += 2 * float(np.log(np.diag(root)).sum())
     covariance = inverse @ inverse.T
     return Suspect(
         change,
@@ -314,4 +372,41 @@ def _suspect(test: GlobalTest, item: SeenChange, alternatives: int) -> Suspect:
         cost + rank * float(np.log(test.size)) + 2 * float(np.log(alternatives)),
         cost,
         misfit,
+        rank + test.size - float(np.sum(np.linalg.inv(root) ** 2)),
     )
+
+
+def _effect_root(test: GlobalTest, change: PossibleChange, estimate: np.ndarray) -> np.ndarray:
+    """Cholesky factor (m, m) of the covariance of the whitened errors with that of the effect of an `estimate` (k,)."""
+    spread = test.whitening @ change.spread_at(estimate)
+    return np.linalg.cholesky(np.eye(test.size) + spread @ spread.T)
+
+
+def _inverse(columns: np.ndarray) -> np.ndarray:
+    """Pseudo-inverse (k, m) of columns of any scale."""
+    scale = np.linalg.norm(columns, axis=0)
+    inverse = np.linalg.pinv(columns / np.where(scale > 0, scale, 1.0), rcond=1e-6)
+    return inverse / np.where(scale > 0, scale, np.inf)[:, None]
+
+
+def _shifts(change: PossibleChange) -> list[int]:
+    """Which of its parameters are shifts of joints."""
+    return [k for k, name in enumerate(change.names) if name.endswith(".offset")]
+
+
+def _is_large(change: PossibleChange, estimate: np.ndarray) -> bool:
+    """Whether joints shift by so much that the points do not move in proportion."""
+    return bool(np.abs(estimate[_shifts(change)]).max(initial=0.0) > _LARGE)
+
+
+def _left(test: GlobalTest, item: SeenChange, estimate: np.ndarray) -> np.ndarray:
+    """Whitened errors (m,) beside a change by `estimate` (k,)."""
+    errors, shifts = test.errors, _shifts(item.change)
+    if not _is_large(item.change, estimate):
+        return test.whitening @ errors.errors - item.columns @ estimate
+    names = [item.change.names[k] for k in shifts]
+    moved = {
+        name: errors.model.value(name) + float(estimate[k]) for name, k in zip(names, shifts, strict=True)
+    }
+    rest = np.delete(np.arange(len(estimate)), shifts)
+    return test.whitening @ errors.with_values(moved) - item.columns[:, rest] @ estimate[rest]

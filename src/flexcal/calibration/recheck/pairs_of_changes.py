@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -12,15 +13,37 @@ from flexcal.calibration.recheck.global_test import FALSE_ALARM, GlobalTest, mis
 Pair = tuple[PossibleChange, PossibleChange]
 
 
-def two_changes(test: GlobalTest) -> Pair | None:
-    """The two changes, neither of them of the instrument, that leave least, where chance leaves as much; None where no two do."""
-    values = test.whitening @ test.errors.errors
+@dataclass(frozen=True)
+class FittedPair:
+    """Two `changes` with the sum of squares that they leave, whitened, and their number of independent parameters."""
+
+    changes: Pair
+    misfit: float
+    rank: int
+
+
+def pairs_of_changes(test: GlobalTest, root: np.ndarray, values: np.ndarray) -> list[FittedPair]:
+    """All two changes, neither of them of the instrument and none a part of the other, fitted to whitened `values` (m,).
+
+    `root` (m, m) is a Cholesky factor of the covariance of the values.
+    """
     robot = [item for item in test.seen if item.change.kind != "instrument_moved"]
-    best: tuple[float, Pair] | None = None
-    for one, other in combinations(robot, 2):
-        misfit, rank = misfit_of(values, np.hstack([one.basis, other.basis]))
-        freedom = test.size - rank
-        chance = float(test.chance(misfit, freedom)) if freedom > 0 else 0.0
-        if chance > FALSE_ALARM and (best is None or chance > best[0]):
-            best = chance, (one.change, other.change)
-    return None if best is None else best[1]
+    bases = [np.linalg.solve(root, item.basis) for item in robot]
+    left = np.linalg.solve(root, values)
+    found = []
+    for one, other in combinations(range(len(robot)), 2):
+        misfit, rank = misfit_of(left, np.hstack([bases[one], bases[other]]))
+        if rank == bases[one].shape[1] + bases[other].shape[1]:
+            found.append(FittedPair((robot[one].change, robot[other].change), misfit, rank))
+    return found
+
+
+def two_changes(test: GlobalTest) -> FittedPair | None:
+    """The two changes that leave least, where chance leaves as much; None where no two do."""
+    pairs = pairs_of_changes(test, np.eye(test.size), test.whitening @ test.errors.errors)
+    chances = [
+        float(test.chance(pair.misfit, test.size - pair.rank)) if test.size > pair.rank else 0.0
+        for pair in pairs
+    ]
+    best = int(np.argmax(chances)) if pairs else -1
+    return pairs[best] if best >= 0 and chances[best] > FALSE_ALARM else None

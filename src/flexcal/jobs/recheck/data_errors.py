@@ -9,7 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.calibration.measurement import predict_measurements
-from flexcal.calibration.recheck import FALSE_ALARM, GlobalTest, JudgedVisit, misfit_of, two_changes
+from flexcal.calibration.recheck import (
+    ALIKE,
+    FALSE_ALARM,
+    GlobalTest,
+    JudgedVisit,
+    misfit_of,
+    single_deviation,
+)
 from flexcal.data.poses import PoseSet
 from flexcal.jobs.inputs import misread_point, planned_pose
 from flexcal.model.robot import RobotModel
@@ -69,14 +76,19 @@ def disagreeing_poses(
 ) -> DataErrors | None:
     """The fewest poses, at most a quarter of them, without which the visit is as calibrated or shows one change; None for none.
 
-    Several are not blamed where two changes of the robot explain all errors, which has fewer numbers than their readings.
+    None are blamed where two changes of the robot explain all errors, or one link that bent or grew, unless these are less likely by odds
+    of 20 (Schwarz's criterion).
     """
     test = judged.test
     changes = [np.zeros((test.size, 0)), *(item.basis for item in test.seen)]
     found = [left for basis in changes if (left := _left_out(test, basis)) is not None]
-    if any(len(wrong) > 1 for wrong, _ in found) and two_changes(test) is not None:
-        found = [left for left in found if len(left[0]) == 1]
-    for wrong, _ in sorted(found, key=lambda item: (len(item[0]), -item[1])):
+    rivals = [(single_deviation(test), 1)]
+    if judged.rivals is not None:
+        rivals.append((judged.rivals.misfit, judged.rivals.rank))
+    limit = min(_score(test, misfit, rank) for misfit, rank in rivals) - ALIKE
+    found = [left for left in found if _score(test, left.misfit, left.rank) < limit]
+    for left in sorted(found, key=lambda left: (len(left.poses), -left.chance)):
+        wrong = left.poses
         numbers = test.errors.poses.pose[list(wrong)]
         rest = judge(poses.subset(~np.isin(poses.pose, numbers)))
         if rest is None or not (rest.as_calibrated or rest.suspects):
@@ -91,9 +103,28 @@ def disagreeing_poses(
     return None
 
 
-def _left_out(test: GlobalTest, basis: np.ndarray) -> tuple[tuple[int, ...], float] | None:
+@dataclass(frozen=True)
+class _LeftOut:
+    """Indices of `poses` that are left out, and what the others and a change leave: the sum of squares, whitened, by `rank` numbers, and
+    the probability that chance leaves as much.
+    """
+
+    poses: tuple[int, ...]
+    misfit: float
+    rank: int
+    chance: float
+
+
+def _score(test: GlobalTest, misfit: float, rank: int) -> float:
+    """Twice the negative log-likelihood with what Schwarz's criterion adds for the parameters."""
+    freedom = test.freedom
+    cost = misfit if not np.isfinite(freedom) else (freedom + test.size) * float(np.log1p(misfit / freedom))
+    return cost + rank * float(np.log(test.size))
+
+
+def _left_out(test: GlobalTest, basis: np.ndarray) -> _LeftOut | None:
     """Poses left out one by one, each time that which explains most beside a change with this `basis` (m, r), until chance leaves the
-    rest; and the probability of that.
+    rest.
     """
     values = test.whitening @ test.errors.errors
     count = len(test.errors.poses)
@@ -106,5 +137,5 @@ def _left_out(test: GlobalTest, basis: np.ndarray) -> tuple[tuple[int, ...], flo
         misfit, rank = left[best]
         basis = np.hstack([basis, blocks[best]])
         if test.size > rank and (chance := float(test.chance(misfit, test.size - rank))) > FALSE_ALARM:
-            return tuple(wrong), chance
+            return _LeftOut(tuple(wrong), misfit, rank, chance)
     return None

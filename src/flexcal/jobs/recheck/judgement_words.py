@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from flexcal.calibration.recheck import (
     FALSE_ALARM,
     VISIT_ALARM,
+    FittedPair,
     JudgedVisit,
     MovedTool,
     PossibleChange,
     Suspect,
     TellingPose,
+    is_no_warmth,
 )
 from flexcal.jobs.recheck.visit_course import CourseOverVisits
 from flexcal.model.robot import EXPANSION, RobotModel
@@ -24,8 +27,6 @@ _LEAST_CHANCE = 1e-4
 """Least probability that the draws of the test tell."""
 _KELVIN = 12e-6
 """Growth of steel, m/m/K."""
-_NO_WARMTH = 3e-3
-"""Growth, m/m, that no temperature makes: 250 K of steel."""
 _CLEAR = 4.0
 """Distance, in standard deviations of a mean of readings, that tells two points apart."""
 _SMALL = 0.5
@@ -48,13 +49,14 @@ def judgement_sentence(judged: JudgedVisit, course: CourseOverVisits | None = No
             told = place if judged.place is None else suspect_in_words(judged.place, judged.test.errors.model)
             rivals = ""
             if judged.rivals is not None:
-                one, other = (change_name(change) for change in judged.rivals)
-                rivals = f"; {one} and {other} together would explain the readings too"
+                rivals = f"; {_together(judged.rivals)} together would explain the readings too"
             return (
                 f"{told}; beside that the robot is as calibrated{_as_far_as_seen(judged)} ({chance}; false alarms {VISIT_ALARM:.1%})"
                 f"{rivals}"
             )
         return f"as calibrated ({chance}; false alarms {VISIT_ALARM:.1%})"
+    # where lengths are in another unit, so is the place of the instrument
+    moved = moved and not any(is_no_warmth(suspect) for suspect in judged.suspects)
     lead = "the instrument, or the base of the robot, stands elsewhere; beside that: " if moved else ""
     if judged.scatter is not None:
         usual = "repeated readings of these poses" if errors.noise == "repeats" else "at the calibration"
@@ -69,12 +71,17 @@ def judgement_sentence(judged: JudgedVisit, course: CourseOverVisits | None = No
         lead = f"{lead}{scatters}; what is more than such scatter: "
     if not judged.suspects:
         several = (
-            f"{lead}recalibrate ({size}): no single change of a joint, of the tool, of all lengths, of the payload or of the instrument "
-            "explains the errors; several together would"
+            f"{lead}recalibrate ({size}): no single change of a joint, of the tool, of all lengths, of the load or of the instrument "
+            "explains the errors; "
+            + (
+                "several together would"
+                if judged.rivals is None
+                else f"two together would, as {_together(judged.rivals)}"
+            )
         )
         if judged.together > FALSE_ALARM:
             another = ", as after a crash, and so would the geometry of another robot: is this the one that was calibrated?"
-            return several + (another if judged.geometry else ", or play in a gear")
+            return several + (another if judged.geometry else ", or play in a gear, or a link that bent")
         if judged.geometry:
             return (
                 f"{lead}recalibrate ({size}): the errors are not those of shifted joints, a bumped tool, growth or a moved instrument, nor "
@@ -94,6 +101,10 @@ def judgement_sentence(judged: JudgedVisit, course: CourseOverVisits | None = No
     if len(judged.suspects) == 1:
         return f"{lead}{told} (beyond chance: {chance}; no other single change explains the readings){since}"
     return f"{lead}something changed ({chance}), and these readings do not tell which: {told}{since}"
+
+
+def _together(pair: FittedPair) -> str:
+    return " and ".join(change_name(change) for change in pair.changes)
 
 
 def effect_sentence(judged: JudgedVisit, tools: Sequence[MovedTool], expected: float) -> str:
@@ -171,7 +182,9 @@ def change_name(change: PossibleChange) -> str:
         "joint_shifted": f"a shift of {subject}",
         "tool_bumped": f"a bump of {subject}",
         "thermal_growth": "thermal growth",
-        "payload_changed": "another payload",
+        "payload_changed": "another payload" if subject == "payload" else f"another load at {subject}",
+        "joint_softer": f"another compliance of {subject}",
+        "two_changes": " and ".join(change_name(part) for part in change.parts),
         "gear_worn": f"play in the gear of {subject}",
         "instrument_moved": "another place of the instrument",
         "wrong_reading": f"a wrong reading of pose {subject}",
@@ -190,7 +203,7 @@ def suspect_in_words(suspect: Suspect, model: RobotModel) -> str:
         return (
             f"play in the gear of {change.subject}: {play} to either side, as of a worn gear or a loose belt"
         )
-    if change.kind == "thermal_growth" and abs(value) > _NO_WARMTH:
+    if is_no_warmth(suspect):
         return (
             f"all lengths are {1 + value:.5g} times those of the robot, which no temperature does: the points are in another unit, or the "
             "scale of the instrument is off"
@@ -200,8 +213,36 @@ def suspect_in_words(suspect: Suspect, model: RobotModel) -> str:
             f"thermal growth: all lengths by {amount(1e6 * value, 1e6 * half, 'µm/m')} ({_as_warmth(value, model)}), unless it is the "
             "scale of the instrument"
         )
-    if change.kind == "payload_changed":
+    if change.kind == "two_changes":
+        count = len(change.parts[0].names)
+        parts = zip(change.parts, (slice(count), slice(count, None)), strict=True)
+        told = " and ".join(
+            suspect_in_words(
+                replace(
+                    suspect,
+                    change=part,
+                    estimate=values[own],
+                    std=suspect.std[own],
+                    covariance=suspect.covariance[own, own],
+                ),
+                model,
+            )
+            for part, own in parts
+        )
+        return f"two changes together, as {told}"
+    if change.names == ("payload.sag",):
+        what = (
+            "another payload"
+            if change.subject == "payload"
+            else f"a load at {change.subject} that is not declared"
+        )
+        return f"{what}, whose mass is not known, as the calibrated robot is rigid"
+    if change.kind == "payload_changed" and change.subject == "payload":
         return f"the payload changed by {amount(value, half, 'kg')}"
+    if change.kind == "payload_changed":
+        return f"a load that is not declared, {amount(value, half, 'kg')} at {change.subject}"
+    if change.kind == "joint_softer":
+        return f"{change.subject} yields {_compliance(value, half, model.value(change.names[0]))}"
     size = float(np.linalg.norm(values[:3]))
     # half-width along the displacement itself
     along = values[:3] / max(size, 1e-30)
@@ -218,6 +259,13 @@ def suspect_in_words(suspect: Suspect, model: RobotModel) -> str:
     return f"the instrument, or the base of the robot, stands elsewhere by {told} and {turned * 1e3:.3f} mrad"
 
 
+def _compliance(value: float, half: float, calibrated: float) -> str:
+    """Change of the compliance of a joint, rad/(N m), and its share of what was calibrated."""
+    share = f", {abs(value) / calibrated:.0%} of what was calibrated" if calibrated > half else ""
+    told = f"{1e6 * abs(value):.3g} ± {1e6 * half:.2g} µrad/(N m)"
+    return f"{'more' if value > 0 else 'less'} to gravity, by {told}{share}"
+
+
 def _as_warmth(growth: float, model: RobotModel) -> str:
     """Growth of all lengths, m/m, as a change of temperature: by the arm's own coefficient where it is known to a third."""
     expansion, posterior = model.value(EXPANSION), model.posterior
@@ -229,7 +277,7 @@ def _as_warmth(growth: float, model: RobotModel) -> str:
 
 
 def _effect(suspect: Suspect, tool: MovedTool, expected: float) -> str:
-    if suspect.change.kind == "instrument_moved":
+    if suspect.change.kind == "instrument_moved" or is_no_warmth(suspect):
         return ""
     if suspect.change.kind in ("wrong_reading", "readings_drift"):
         return "; beside that the robot is as calibrated"

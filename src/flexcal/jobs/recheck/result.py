@@ -240,7 +240,7 @@ class Recheck(PlottedFolder):
         if (
             self.absolute is not None
             and not self.absolute.as_calibrated
-            and judged.as_calibrated
+            and judged.verdict == "as_calibrated"
             and not self._differed
         ):
             remarks.append(

@@ -180,7 +180,11 @@ class CourseOverVisits:
         if change.kind == "thermal_growth":
             return f"all lengths grow by {amount(1e6 * value, 1e6 * half, 'µm/m')} {unit} {start}, unless it is the scale of the instrument"
         if change.kind == "payload_changed":
-            return f"the payload changes by {amount(value, half, 'kg')} {unit} {start}"
+            load = "payload" if change.subject == "payload" else f"load at {change.subject}"
+            return f"the {load} changes by {amount(value, half, 'kg')} {unit} {start}"
+        if change.kind == "joint_softer":
+            told = amount(1e6 * value, 1e6 * half, "µrad/(N m)")
+            return f"the compliance of {change.subject} changes by {told} {unit} {start}"
         size = float(np.linalg.norm(item.estimate[:3])) * per / MILLIMETRE
         half = float(item.quantile * np.linalg.norm(item.std[:3]) / np.sqrt(3)) * per / MILLIMETRE
         return f"{change.subject} creeps on its mount by {size:.3f} ± {half:.3f} mm {unit} {start}"

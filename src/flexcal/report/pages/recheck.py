@@ -32,6 +32,7 @@ _HEADLINES = {
     "tool_bumped": "Tool bumped",
     "thermal_growth": "Thermal growth",
     "payload_changed": "Another payload",
+    "joint_softer": "A joint yields more or less",
     "gear_worn": "Play in a gear",
     "instrument_moved": "The instrument moved, the robot is as calibrated",
     "wrong_reading": "Readings disagree: mend or repeat them",
@@ -130,6 +131,7 @@ def _change_headline(results: Mapping[str, Any]) -> str:
         "tool_bumped",
         "thermal_growth",
         "payload_changed",
+        "joint_softer",
         "gear_worn",
         "ambiguous",
     ):
