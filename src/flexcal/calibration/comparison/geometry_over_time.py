@@ -28,6 +28,12 @@ from flexcal.calibration.comparison.model_covariance import (
     split_of,
     waves_of,
 )
+from flexcal.calibration.comparison.thermal_growth import (
+    GROWTH,
+    ThermalGrowth,
+    growth_columns,
+    temperature_of,
+)
 from flexcal.calibration.measurement import random_poses, seen_from_base
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
@@ -59,13 +65,17 @@ class GeometryTrend:
     freedom : float
         Degrees of freedom of the fits.
     names : tuple of str
-        Parameters of joints that may have caused a change.
+        Parameters of joints that may have caused a change, and the relative growth of all lengths (`GROWTH`).
     units : tuple of str
         Their units.
     map : ndarray
         Derivatives (m, p) of `change` by these, natural units.
     jacobian : ndarray
         Derivatives (3 N, p) of the tool's positions in the base frame by these at N common poses, but for a motion of the whole robot.
+    temperatures : ndarray or None
+        Temperatures (K,), °C, that the lengths of the calibrations are of; None where one is not known.
+    expansion : tuple of float or None
+        Expansion of all lengths, 1/K, by these temperatures if nothing else changed, and its standard deviation.
     """
 
     change: np.ndarray
@@ -76,6 +86,8 @@ class GeometryTrend:
     units: tuple[str, ...]
     map: np.ndarray
     jacobian: np.ndarray
+    temperatures: np.ndarray | None = None
+    expansion: tuple[float, float] | None = None
 
     @property
     def statistic(self) -> float:
@@ -116,7 +128,8 @@ def geometry_courses(
     steps between one calibration and the next.
 
     `model` is the robot without a calibration, with stiffness and inertia as identified; `same_springs` says whether all had these as
-    their prior. Raises `FlexcalError` where they measured no point in common, or no common joint range.
+    their prior. Where the temperatures of all calibrations are known, the growth of arm and links with these, as of steel or aluminium, is
+    no change. Raises `FlexcalError` where they measured no point in common, or no common joint range.
     """
     limits = common_ranges(model, estimates)
     targets = common_targets(model, estimates)
@@ -150,37 +163,67 @@ def geometry_courses(
     apart = {name for e in estimates for name in waves_of(e)}
     sources = _stacked([by_parameter @ s.known for s in splits], [s.sources for s in splits], apart)
 
+    temperatures = _temperatures(estimates)
+    grown = growth_columns(first, drawn, at.position)
+    reduced = left[:, :rank].T @ (grown - gauge @ (gauge.T @ grown)) / count
+    growth = ThermalGrowth.of(temperatures, reduced)
+
     causes = [
         k for k, name in enumerate(names) if is_geometric(nominal, name) and "transmission_" not in name
     ]
-    free = whole - rigid @ (rigid.T @ whole)
+    every = np.column_stack([whole[:, causes], grown[:, 0]])
+    free = every - rigid @ (rigid.T @ every)
+    by_cause = np.column_stack([by_parameter[:, causes], reduced[:, 0]])
+    cause_names = [*(names[k] for k in causes), GROWTH]
+    units = [*(unit_in(nominal, names[k]) for k in causes), "1"]
+    expansion = None
+    if temperatures is not None and np.ptp(temperatures) > 0:
+        change, _, matrix = _change(np.array(moved), noises, sources, temperatures - temperatures.mean())
+        of_growth = matrix @ reduced[:, 0]
+        size = float(of_growth @ of_growth)
+        expansion = float(of_growth @ change) / size, size**-0.5
     freedom = float(sum(e.degrees_of_freedom for e in estimates))
 
     def along(shape: np.ndarray) -> GeometryTrend:
         """Change by a course of `shape` (K,), which rises by one."""
-        change, residual, matrix = _change(np.array(moved), noises, sources, shape - shape.mean())
-        matrix = matrix @ by_parameter[:, causes]
-        told = np.linalg.norm(matrix, axis=0) * 1e-3 > 1.0
-        own = [k for k, there in zip(causes, told, strict=True) if there]
+        change, residual, matrix = _change(
+            np.array(moved) - growth.expected, noises, sources, shape - shape.mean(), growth.sources
+        )
+        matrix = matrix @ by_cause
+        own = np.linalg.norm(matrix, axis=0) * 1e-3 > 1.0
         return GeometryTrend(
             change,
             residual,
             len(times),
             freedom,
-            tuple(names[k] for k in own),
-            tuple(unit_in(nominal, names[k]) for k in own),
-            matrix[:, told],
+            tuple(name for name, there in zip(cause_names, own, strict=True) if there),
+            tuple(unit for unit, there in zip(units, own, strict=True) if there),
+            matrix[:, own],
             free[:, own],
+            temperatures,
+            expansion,
         )
 
     visit = np.arange(len(times))
     return along(times / np.ptp(times)), *(along(1.0 * (visit > k)) for k in visit[:-1])
 
 
+def _temperatures(estimates: Sequence[Estimate]) -> np.ndarray | None:
+    known = [value for e in estimates if (value := temperature_of(e)) is not None]
+    return np.array(known) if len(known) == len(estimates) else None
+
+
 def _change(
-    values: np.ndarray, noises: Sequence[np.ndarray], sources: np.ndarray, span: np.ndarray
+    values: np.ndarray,
+    noises: Sequence[np.ndarray],
+    sources: np.ndarray,
+    span: np.ndarray,
+    growth: np.ndarray | None = None,
 ) -> tuple[np.ndarray, float, np.ndarray]:
-    """Whitened change (m,) of values (K, r) along `span` (K,), the sum of squares about it, and the matrix (m, r) that whitens a change."""
+    """Whitened change (m,) of values (K, r) along `span` (K,), the sum of squares about it, and the matrix (m, r) that whitens a change.
+
+    `sources` and `growth` are columns (K r, s) of errors that calibrations share; combinations mainly of the `sources` are left out.
+    """
     rank = values.shape[1]
     weights = span / (span @ span)
     by_noise = np.einsum("k,kij->ij", weights**2, np.array(noises))
@@ -191,8 +234,9 @@ def _change(
             "E-CAL-035",
             "no combination of the robot's parameters was determined by all its calibrations; measure more poses.",
         )
+    every = sources if growth is None or not growth.size else np.hstack([sources, growth])
     slope, factor, residual = _line(
-        values @ whiten.T, [whiten @ n @ whiten.T for n in noises], _each(whiten, sources), span
+        values @ whiten.T, [whiten @ n @ whiten.T for n in noises], _each(whiten, every), span
     )
     return factor @ slope, residual, factor @ whiten
 

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from flexcal.calibration.comparison import ALUMINIUM
 from flexcal.calibration.diagnostics import ReadingLag
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.fit import StratifiedSample, all_errors
-from flexcal.calibration.measurement import require_points
+from flexcal.calibration.measurement import require_points, seen_from_base
 from flexcal.calibration.verification import (
     CALIBRATED,
     ErrorCovariance,
@@ -50,6 +51,7 @@ from flexcal.jobs.inputs import (
     CalibratedRobot,
     image_provenance,
     is_station_identified,
+    kelvin_outside,
     require_distinct_files,
     with_temperature,
 )
@@ -102,6 +104,9 @@ class Verification(ReportedResult):
         Errors at all points, where a sample was taken.
     temperatures : tuple of str
         Remarks on the temperatures of the points.
+    outside_temperatures : float or None
+        How far these lie outside the temperatures of a calibration without a term for them, K, at most, negative below them; None where
+        either is not known.
     """
 
     poses: PoseSet
@@ -121,6 +126,7 @@ class Verification(ReportedResult):
     sample: StratifiedSample | None = None
     everywhere: ErrorStatistics | None = None
     temperatures: tuple[str, ...] = ()
+    outside_temperatures: float | None = None
 
     @property
     def residuals(self) -> np.ndarray:
@@ -197,6 +203,25 @@ class Verification(ReportedResult):
         """The content of results.json."""
         return {**header("verification"), **self._numbers, "verdict": self.trust.document()}
 
+    @property
+    def _temperature(self) -> dict[str, Any] | None:
+        """Temperatures of the points, how far they lie outside those of the calibration, and what an arm of aluminium grows by in that, as
+        the 90th percentile at the points, mm.
+        """
+        warm, outside = self.poses.temperature, self.outside_temperatures
+        if warm is None:
+            return None
+        growth = None
+        if outside is not None:
+            place = np.linalg.norm(seen_from_base(self.model, self.poses).position, axis=1)
+            growth = ALUMINIUM * abs(outside) * float(np.percentile(place, 90)) / MILLIMETRE
+        return {
+            "lowest": float(warm.min()),
+            "highest": float(warm.max()),
+            "outside": outside,
+            "growth_mm": growth,
+        }
+
     @cached_property
     def _numbers(self) -> dict[str, Any]:
         """Document without the verdict; `rms_mm` has the root mean square distances.
@@ -230,6 +255,7 @@ class Verification(ReportedResult):
             "prediction": prediction_document(result, self.covariance),
             "ambiguous_poses": int(result.ambiguous.sum()),
             "lag": None if self.lag is None else self.lag.document(),
+            "temperature": self._temperature,
             "sample": subsample_document(self.sample, self.everywhere),
             "fitted": list(self.fitted),
             "refused": self.refused,
@@ -315,6 +341,7 @@ def verify(
         orientation=orientation_errors(standing, turned),
         orientation_before=uncalibrated_orientations(uncalibrated.registered, turned),
         temperatures=warm,
+        outside_temperatures=kelvin_outside(robot, poses.temperature),
     )
 
 

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from flexcal.calibration.comparison import TEMPERATURE
 from flexcal.calibration.error_model import TRANSMISSION
 from flexcal.calibration.fit import (
     LEVELS,
@@ -31,7 +32,7 @@ from flexcal.jobs.calibration.held_out_tilts import held_out_tilts
 from flexcal.jobs.calibration.joint_ranges import joint_extents
 from flexcal.jobs.calibration.odd_temperatures import plausible_temperatures, with_plausible_temperatures
 from flexcal.jobs.calibration.result import Calibration
-from flexcal.jobs.inputs import TARGETS, TARGETS_BETWEEN, TEMPERATURE, is_station_identified
+from flexcal.jobs.inputs import TARGETS, TARGETS_BETWEEN, is_station_identified
 from flexcal.model.robot import ZERO_DRIFT, RobotModel
 from flexcal.progress import Progress, silent
 

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import date, datetime
 from typing import Literal
+
+import numpy as np
 
 from flexcal.fleet import FEWEST_VISITS, Crossing, crossing
 from flexcal.jobs.fleet.courses import Record, date_at, latest, visits_of, years
 from flexcal.jobs.fleet.drifts import Drift, error_drifts
 from flexcal.jobs.fleet.rises import Rise, error_rises
+from flexcal.jobs.fleet.warmth import Warmth, explains, explains_trend, warmth_of
 
 _ONE_SIDED = 1.645
 """Quantile of the normal distribution: a robot that keeps its tolerance is called out of it in 5 % of verifications at most."""
@@ -28,6 +31,8 @@ class RobotAccuracy:
     `verification` is the record of the P90 of its latest usable verification, None without one; `state` says whether that keeps the
     `tolerance`, m, and `reason` why. `drift` is the trend of the P90, `reaches` when that reaches the tolerance, years since 2000;
     `outlook` says both in a clause. `rise` is a significant one between two verifications, `rises_tested` whether there are two.
+    `warmth` is that of the latest verification, None where it is not known; `warm_drift` and `warm_rise` say whether growth with
+    temperature explains the trend and the rise.
     """
 
     robot: str
@@ -41,6 +46,9 @@ class RobotAccuracy:
     outlook: str
     rise: Rise | None
     rises_tested: bool
+    warmth: Warmth | None = None
+    warm_drift: bool = False
+    warm_rise: bool = False
 
     @property
     def reached(self) -> tuple[datetime | None, datetime | None, datetime | None]:
@@ -66,7 +74,7 @@ def robot_accuracies(
         robot: [r for r in group if r["calibration"] == last[robot]["calibration"]]
         for robot, group in verified.items()
     }
-    drifts, rises = error_drifts(same), error_rises(same, level)
+    drifts, rises, every = error_drifts(same), error_rises(same, level), warmth_of(records)
     found = []
     for robot, (model, tolerance) in robots.items():
         verification, drift = last.get(robot), drifts.get(robot)
@@ -78,7 +86,14 @@ def robot_accuracies(
             )
         else:
             state, reason = _state(verification, tolerance, len(left_out[robot]))
-        reaches, outlook = _outlook(same.get(robot, []), drift, tolerance, state, level)
+        warmth, rise = every.get(robot, {}), rises.get(robot)
+        warm_drift = drift is not None and explains_trend(
+            [date.date() for date in drift.visits.dates],
+            warmth,
+            np.array([years(date) for date in drift.visits.dates]),
+            drift.trend.slope,
+        )
+        reaches, outlook = _outlook(same.get(robot, []), drift, tolerance, state, level, warm_drift)
         found.append(
             RobotAccuracy(
                 robot,
@@ -90,8 +105,16 @@ def robot_accuracies(
                 drift,
                 reaches,
                 outlook,
-                rises.get(robot),
+                rise,
                 len(visits_of(same.get(robot, [])).dates) > 1,
+                _warmth(warmth, verification),
+                warm_drift,
+                rise is not None
+                and explains(
+                    warmth.get(rise.dates[0].date()),
+                    warmth.get(rise.dates[1].date()),
+                    rise.errors[1] - rise.errors[0],
+                ),
             )
         )
     return found
@@ -114,7 +137,12 @@ def _state(verification: Record | None, tolerance: float | None, fitted: int) ->
 
 
 def _outlook(
-    verifications: Sequence[Record], drift: Drift | None, tolerance: float | None, state: State, level: float
+    verifications: Sequence[Record],
+    drift: Drift | None,
+    tolerance: float | None,
+    state: State,
+    level: float,
+    warm: bool,
 ) -> tuple[Crossing | None, str]:
     """When the tolerance is reached, where the data say it, and a sentence on the trend."""
     if drift is None:
@@ -129,6 +157,11 @@ def _outlook(
         return None, "no significant trend of the errors"
     if drift.trend.slope < 0:
         return None, "errors decrease"
+    if warm:
+        return (
+            None,
+            "errors increase as the verifications get farther from the temperature of the calibration, which can explain it, so no date is given",
+        )
     if tolerance is None or state == "out":
         return None, "errors increase"
     reaches = crossing(drift.trend, tolerance)
@@ -141,6 +174,12 @@ def _outlook(
         )
     date, low, high = (_day(time) for time in (reaches.time, reaches.low, reaches.high))
     return reaches, f"errors increase and reach the tolerance by {date} ({low} to {high}) if they go on so"
+
+
+def _warmth(warmth: dict[date, Warmth], verification: Record | None) -> Warmth | None:
+    if verification is None or verification["date"] is None:
+        return None
+    return warmth.get(verification["date"].date())
 
 
 def _day(time: float) -> str:

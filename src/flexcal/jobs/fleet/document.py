@@ -18,6 +18,7 @@ from flexcal.jobs.fleet.outlooks import outlook_of
 from flexcal.jobs.fleet.parameters import ParameterSpread
 from flexcal.jobs.fleet.projects import date_of
 from flexcal.jobs.fleet.rechecks import LatestRecheck
+from flexcal.jobs.fleet.warmth import growth_remark, warm_remarks
 from flexcal.jobs.fleet_prior import comparable_terms
 from flexcal.report.layout import counted, listed
 from flexcal.report.results import TOLERANCE_STATES, is_drifting
@@ -111,7 +112,11 @@ def fleet_document(
         "parameters": [_spread(spread) for spread in spreads],
         "problems": [{"place": p.place, "sentence": p.sentence} for p in gathered.problems],
         "batches": [item.document() for item in gathered.batches],
-        "remarks": _remarks(gathered, accuracies, spreads),
+        "remarks": [
+            *_remarks(gathered, accuracies, spreads),
+            *growth_remark(geometry, level),
+            *warm_remarks(accuracies),
+        ],
         "command": command,
     }
 
@@ -136,6 +141,7 @@ def _headline(robots: Sequence[Mapping[str, Any]], states: Mapping[str, int], fo
         many += f": {', '.join(words)}"
     for what, named in (
         ("drifting or changed", [robot["robot"] for robot in robots if is_drifting(robot)]),
+        ("verified at another temperature", [robot["robot"] for robot in robots if robot["warmth"]]),
         ("geometry not tested", [robot["robot"] for robot in robots if robot["not_tested"] is not None]),
     ):
         if named:
@@ -155,7 +161,9 @@ def _accuracy(item: RobotAccuracy, declared: float | None, level: float) -> dict
         "p90_mm": None if verification is None else _millimetres(verification["value"]),
         "p90_std_mm": None if verification is None else _millimetres(verification["std"]),
         "verified": None if verification is None else _day(verification["date"]),
+        "warmth": None if item.warmth is None else item.warmth.words or None,
         "drifts": drift is not None and drift.probability <= level,
+        "drifts_by_warmth": item.warm_drift,
         "trend": None if drift is None else _trend(drift, MILLIMETRE, "mm"),
         "rise": None
         if item.rise is None
@@ -164,6 +172,7 @@ def _accuracy(item: RobotAccuracy, declared: float | None, level: float) -> dict
             "last": _day(item.rise.dates[1]),
             "from_mm": _millimetres(item.rise.errors[0]),
             "to_mm": _millimetres(item.rise.errors[1]),
+            "by_warmth": item.warm_rise,
             "adjusted_probability": item.rise.probability,
         },
         "rises_tested": item.rises_tested,
@@ -270,15 +279,16 @@ def _remarks(
         remarks.append(
             f"no results in {folders} of {listed(bare, _NAMED)}: give calibrate and verify an --out there"
         )
-    undated = frame.filter(frame["date"].is_null())["folder"].n_unique()
+    undated = sorted(frame.filter(frame["date"].is_null())["folder"].unique())
     if undated:
         subject = (
             "1 folder of results has no date and counts"
-            if undated == 1
-            else f"{undated} folders of results have no date and count"
+            if len(undated) == 1
+            else f"{len(undated)} folders of results have no date and count"
         )
         remarks.append(
-            f"{subject} in no trend: give folders of --out a name with the day of the measurement, as 2026-03-01"
+            f"{subject} in no trend ({listed(undated, _NAMED)}): give folders "
+            "of --out a name with the day of the measurement, as 2026-03-01"
         )
     if gathered.repeated:
         remarks.append(

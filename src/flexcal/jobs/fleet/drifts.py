@@ -6,6 +6,9 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from flexcal.calibration.comparison import ALUMINIUM
 from flexcal.fleet import Trend, holm, moderated_trends
 from flexcal.jobs.fleet.courses import Record, Visits, visits_of
 from flexcal.jobs.fleet_prior import comparable_terms
@@ -42,7 +45,8 @@ def error_drifts(verifications: dict[str, list[Record]]) -> dict[str, Drift]:
 
 def parameter_drifts(records: Sequence[Record], families: int) -> list[Drift]:
     """Trend of every parameter of every robot with three visits or more, estimated with the same terms; its tests share the error rate with
-    those of all `families` of tests.
+    those of all `families` of tests. Lengths at temperatures between which a metre of aluminium grows by more than their uncertainty are
+    not tested alone, but with the geometry as a whole, which the growth is taken out of.
     """
     groups: dict[tuple, list[Record]] = defaultdict(list)
     for r in records:
@@ -59,9 +63,15 @@ def parameter_drifts(records: Sequence[Record], families: int) -> list[Drift]:
     found = []
     for key, group in groups.items():
         visits = visits_of(group)
-        if visits.many:
+        if visits.many and not (group[0]["unit"] == "m" and _grows(group)):
             found.append((group[-1], visits, key[1:]))
     return _tested(found, families)
+
+
+def _grows(records: Sequence[Record]) -> bool:
+    """Whether temperatures of a length's estimates differ by so much that its growth matters."""
+    known = [r["temperature"] for r in records if r["temperature"] is not None]
+    return len(known) > 1 and ALUMINIUM * float(np.ptp(known)) > min(r["std"] for r in records)
 
 
 def _tested(courses: Sequence[tuple[Record, Visits, object]], families: int = 1) -> list[Drift]:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from flexcal.calibration.comparison import temperature_of
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, read_estimates, sha256_of
@@ -177,6 +178,7 @@ def _row(root: Path, folder: ResultFolder, path: Path) -> Row:
         data="",
         calibration=None,
         independent=None,
+        temperature=None,
         file=path.relative_to(root).as_posix(),
         sha256=sha256_of(path),
     )
@@ -196,6 +198,7 @@ def _block(common: Row, project: Project, block: Block, estimate: Estimate) -> _
         urdf=_digest_of_urdf(estimate.provenance) or common.urdf,
         terms=estimate.provenance.get("option.terms", ""),
         data=_data(estimate.provenance),
+        temperature=temperature_of(estimate) if block == "calibration" else None,
     )
     parameters = estimate.parameters
     deviation = np.sqrt(np.diag(estimate.covariance))
@@ -233,6 +236,9 @@ def _values(common: Row, project: Project, path: Path) -> Iterator[_Result]:
         data=_data(origin),
         calibration=origin.get("block.calibration"),
         independent=None if fitted is None else not fitted,
+        temperature=None
+        if (warm := document.get("temperature")) is None
+        else (warm["lowest"] + warm["highest"]) / 2,
     )
     yield _Result.of(common, values)
 

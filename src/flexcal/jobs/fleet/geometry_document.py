@@ -5,6 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Any
 
+from flexcal.calibration.comparison import GROWTH
 from flexcal.jobs.fleet.courses import years
 from flexcal.jobs.fleet.geometry_drifts import GeometryDrift
 from flexcal.report.results import explanation_in_words
@@ -45,6 +46,8 @@ def geometry_entry(drift: GeometryDrift, tolerance: float | None) -> dict[str, A
             }
             for item in drift.explanations
         ],
+        "grows": _grows(drift),
+        "temperatures": None if course.trend.temperatures is None else course.trend.temperatures.tolist(),
         "tool_mm": None
         if drift.moved is None
         else dict(zip(("mean", "mean_std", "largest"), (m / MILLIMETRE for m in drift.moved), strict=True)),
@@ -75,9 +78,30 @@ def _sentence(drift: GeometryDrift, tolerance: float | None) -> str:
         f"{over}{', from the first to the last' if drift.step is None else ':'} {changes}: "
         f"this moves the tool by {mean:.3f} ± {std:.3f} mm on average, {largest:.3f} mm at most"
     )
+    said += _of_temperature(drift)
     if tolerance is None:
         return said
     limit = tolerance / MILLIMETRE
     if largest <= _SMALL * limit:
         return f"{said}; significant, but small beside the tolerance of {limit:.3g} mm"
     return f"{said}; the tolerance is {limit:.3g} mm"
+
+
+def _grows(drift: GeometryDrift) -> bool:
+    """Whether growth of all lengths may have caused the change."""
+    return any(GROWTH in (item.subject, *item.alternatives) for item in drift.explanations)
+
+
+def _of_temperature(drift: GeometryDrift) -> str:
+    """What temperatures have to do with a change, where they are known to differ, or may be its cause."""
+    known = drift.course.trend.temperatures
+    if known is not None and known.max() > known.min():
+        return f"; growth with the temperature, {known.min():.3g} to {known.max():.3g} °C, is taken out of it"
+    if not _grows(drift):
+        return ""
+    if known is not None:
+        return "; the scale of the instrument, or an arm warmer than its sensor, explains growth of all lengths as well"
+    return (
+        "; a warmer arm, or the scale of the instrument, explains growth of all lengths as well, which the readings cannot tell: measure "
+        "with a column temperature"
+    )

@@ -24,6 +24,12 @@ def _changes(robot: Mapping[str, Any], errors: str, geometry: Mapping[str, Any] 
     if rise is not None:
         yield (
             f"P90 rose from {rise['from_mm']:.3f} mm ({rise['first']}) to {rise['to_mm']:.3f} mm ({rise['last']})"
+            + (
+                f", which was {robot['warmth']}"
+                if rise["last"] == robot["verified"] and robot["warmth"]
+                else ""
+            )
+            + (": growth of the arm can explain it" if rise["by_warmth"] else "")
         )
     if geometry is not None:
         moved = geometry["tool_mm"]
@@ -33,8 +39,12 @@ def _changes(robot: Mapping[str, Any], errors: str, geometry: Mapping[str, Any] 
             else f"drifts over {geometry['visits']} calibrations"
         )
         by = "" if moved is None else f", the tool by {moved['largest']:.3f} mm at most"
-        yield f"the geometry {how}{by}"
-    if names := robot["drifting_parameters"]:
+        grows = (
+            ", all lengths together, as by warmth or the scale of the instrument" if geometry["grows"] else ""
+        )
+        yield f"the geometry {how}{by}{grows}"
+    grown = geometry is not None and geometry["grows"]
+    if names := [n for n in robot["drifting_parameters"] if not (grown and ".length_" in n)]:
         yield f"{', '.join(names[:_NAMED])}{' and others' if len(names) > _NAMED else ''}: drifts"
     if visit is not None and visit["changed"]:
         yield f"not as calibrated by the recheck of {visit['date']}: {visit['verdict'].replace('_', ' ')}"

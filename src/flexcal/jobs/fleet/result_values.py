@@ -65,6 +65,9 @@ def _verification(document: Mapping[str, Any]) -> list[ResultValue]:
     moved = document["refit_proposed"]
     what = "" if moved is None else " and ".join(moved["what"])
     values.append(ResultValue("moved", float(moved is not None), None, "1", what))
+    if (warm := document.get("temperature")) is not None and warm["outside"] is not None:
+        values.append(ResultValue("temperature.outside", warm["outside"], None, "K"))
+        values.append(_length("error.growth", warm["growth_mm"]))
     own = document["before"]["own"] or document["before"]["registered"]
     if own is not None:
         values.append(_length("uncalibrated.p90", own["p90_mm"]))

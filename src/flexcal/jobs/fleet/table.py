@@ -40,6 +40,7 @@ class Row:
     data: str
     calibration: str | None
     independent: bool | None
+    temperature: float | None
     file: str
     sha256: str
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from flexcal.calibration.comparison import temperature_of
 from flexcal.jobs.fleet_prior.member import Member
-from flexcal.jobs.inputs import TEMPERATURE
-from flexcal.model.robot import EXPANSION, REFERENCE
+from flexcal.model.robot import EXPANSION
 
 _APART = 2.0
 """Largest difference between temperatures, K, that is not spoken of: 0.05 mm/m of aluminium."""
@@ -20,7 +20,9 @@ def temperature_remark(members: Sequence[Member]) -> list[str]:
     The lengths of a calibration are those at its own temperature: with the thermal term at the reference of that, without it in the middle
     of what was measured.
     """
-    known = {member.name: value for member in members if (value := _temperature(member)) is not None}
+    known = {
+        member.name: value for member in members if (value := temperature_of(member.estimate)) is not None
+    }
     if not known:
         return []
     low, high = min(known.values()), max(known.values())
@@ -47,16 +49,6 @@ def temperature_remark(members: Sequence[Member]) -> list[str]:
             f"({low:.3g} to {high:.3g} °C)"
         )
     return said
-
-
-def _temperature(member: Member) -> float | None:
-    """Temperature, °C, that the lengths of a calibration are of."""
-    estimate = member.estimate
-    if REFERENCE in estimate.parameters:
-        return float(estimate.values[REFERENCE])
-    if TEMPERATURE in estimate.ranges:
-        return sum(estimate.ranges[TEMPERATURE]) / 2
-    return None
 
 
 def _coefficient(member: Member) -> float | None:

@@ -9,9 +9,9 @@ from .experiment_files import (
     robot_file,
 )
 from .given_temperature import (
-    TEMPERATURE,
     calibrated_temperatures,
     held_at,
+    kelvin_outside,
     reference_temperature,
     require_temperature,
     temperature_remarks,
@@ -37,7 +37,6 @@ __all__ = [
     "REFUSED",
     "TARGETS",
     "TARGETS_BETWEEN",
-    "TEMPERATURE",
     "CalibratedRobot",
     "Misreading",
     "calibrated_temperatures",
@@ -46,6 +45,7 @@ __all__ = [
     "held_at",
     "image_provenance",
     "is_station_identified",
+    "kelvin_outside",
     "measured_points",
     "misread_point",
     "other_pose",

@@ -7,6 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from flexcal.calibration.comparison import TEMPERATURE
 from flexcal.data.poses import PoseSet, ToolTargets
 from flexcal.errors import InputError
 from flexcal.jobs.inputs.stored_model import CalibratedRobot
@@ -14,8 +15,6 @@ from flexcal.model.kinematics import at_temperature, depends_on_temperature
 from flexcal.model.robot import RobotModel
 from flexcal.units import temperature_fault
 
-TEMPERATURE = "temperature"
-"""Name of the range of temperatures in the block `calibration` of estimates.yaml."""
 _Rows = TypeVar("_Rows", PoseSet, ToolTargets)
 _BEYOND = 0.1
 """Share of the calibrated range by which a temperature may lie outside it."""
@@ -87,6 +86,19 @@ def temperature_remarks(
     if outside.all() and np.ptp(temperature) == 0:
         return (f"the temperature of {worst:.1f} °C lies {beyond}",)
     return (f"{outside.sum()} of {len(temperature)} temperatures, as {worst:.1f} °C, lie {beyond}",)
+
+
+def kelvin_outside(robot: CalibratedRobot, temperature: np.ndarray | None) -> float | None:
+    """How far the temperatures (N,), °C, at which a robot is used lie outside those of its calibration, K, at most, negative below them;
+    None where either is not known, and for a robot that changes with temperature.
+    """
+    if depends_on_temperature(robot.model):
+        return None
+    measured = robot.blocks["calibration"].ranges.get(TEMPERATURE) if "calibration" in robot.blocks else None
+    if measured is None or temperature is None:
+        return None
+    above, below = float(temperature.max()) - measured[1], float(temperature.min()) - measured[0]
+    return max(above, 0.0) if above >= -below else min(below, 0.0)
 
 
 def _unused(robot: CalibratedRobot, temperature: np.ndarray, what: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from flexcal.calibration.comparison import Explanation, GeometryChange
+from flexcal.calibration.comparison import GROWTH, Explanation, GeometryChange
 from flexcal.model.robot import unit_of
 from flexcal.report.results.chance_wording import chance_in_words
 from flexcal.units import MILLIMETRE
@@ -26,7 +26,9 @@ def change_sentence(change: GeometryChange) -> str:
 def explanation_in_words(item: Explanation) -> str:
     """A parameter or point with its change and standard deviation in mm, mrad or SI units, and what may have changed in its place."""
     name = next(iter(item.names))
-    if item.subject != name:
+    if item.subject == GROWTH:
+        told = f"all lengths by {amount(1e6 * sum(item.change), 1e6 * sum(item.std), 'µm/m')}"
+    elif item.subject != name:
         size = math.hypot(*item.change)
         # along the change itself
         std = (
@@ -39,7 +41,7 @@ def explanation_in_words(item: Explanation) -> str:
         told = f"{item.subject} by {amount(sum(item.change), sum(item.std), unit_of(name))}"
     if not item.alternatives:
         return told
-    others = list(item.alternatives[:_ALTERNATIVES])
+    others = ["all lengths" if name == GROWTH else name for name in item.alternatives[:_ALTERNATIVES]]
     if len(item.alternatives) > _ALTERNATIVES:
         others.append(f"{len(item.alternatives) - _ALTERNATIVES} others")
     return f"{told} (or {', '.join(others)}, which cannot be told from it)"

@@ -17,7 +17,9 @@ TOLERANCE_STATES = {
 def tolerance_kept(robot: Mapping[str, Any]) -> str:
     """Whether a robot of the document keeps its tolerance, and why that is not judged."""
     told = TOLERANCE_STATES[robot["state"]]
-    return f"{told}: {robot['reason']}" if robot["state"] == "not_judged" else told
+    if robot["state"] == "not_judged":
+        return f"{told}: {robot['reason']}"
+    return f"{told}, verified {robot['warmth']}" if robot["warmth"] else told
 
 
 def with_trends(document: Mapping[str, Any]) -> Sequence[str]:
@@ -34,11 +36,13 @@ def with_trends(document: Mapping[str, Any]) -> Sequence[str]:
 
 
 def is_drifting(robot: Mapping[str, Any]) -> bool:
-    """Whether a robot of the document changed significantly: its errors, a parameter or the geometry as a whole, or by its rechecks."""
-    visit = robot["recheck"]
+    """Whether a robot of the document changed significantly: its errors, beyond what warmth explains, a parameter or the geometry as a
+    whole, or by its rechecks.
+    """
+    rise, visit = robot["rise"], robot["recheck"]
     return bool(
-        robot["drifts"]
-        or robot["rise"]
+        (robot["drifts"] and not robot["drifts_by_warmth"])
+        or (rise is not None and not rise["by_warmth"])
         or robot["drifting_parameters"]
         or robot["geometry_drift"]
         or (visit is not None and (visit["changed"] or visit["alarms"]))

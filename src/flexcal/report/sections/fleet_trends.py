@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from flexcal.calibration.comparison import GROWTH
 from flexcal.report.figures import trend_courses
 from flexcal.report.layout import (
     NOTHING,
@@ -126,7 +127,8 @@ def _yearly(cause: Mapping[str, Any]) -> str:
     if cause["per_year"] is None:
         return NOTHING
     rate, std = (significant(factor * cause[key], 3) for key in ("per_year", "per_year_std"))
-    return f"{cause['name']} {rate} ± {std} {unit}"
+    name = "all lengths" if cause["name"] == GROWTH else cause["name"]
+    return f"{name} {rate} ± {std} {unit}"
 
 
 def _drift_row(item: Mapping[str, Any]) -> tuple[str, ...]:
