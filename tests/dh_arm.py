@@ -68,6 +68,11 @@ class DHArm:
         """The same arm with its reflector moved, m."""
         return replace(self, tool=self.tool + np.array(xyz))
 
+    def grown(self, strain: float) -> DHArm:
+        """The same arm with all lengths longer by `strain`."""
+        rows = self.rows * np.array([1.0, 1.0 + strain, 1.0 + strain, 1.0])
+        return replace(self, rows=rows, tool=self.tool * (1.0 + strain))
+
     def points(self, q: np.ndarray) -> np.ndarray:
         """The reflector (N, 3) in the base frame."""
         found = np.empty((len(q), 3))

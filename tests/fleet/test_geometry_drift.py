@@ -27,10 +27,15 @@ SIGMA = 2e-5
 
 
 def write_fleet(
-    root: Path, robots: int, seed: int, after: Callable[[DHArm, int, int], DHArm], visits: int = 4
+    root: Path,
+    robots: int,
+    seed: int,
+    after: Callable[[DHArm, int, int], DHArm],
+    visits: int = 4,
+    temperatures: tuple[float, ...] = (),
 ) -> Fleet:
     """Robots that are calibrated on every day at other poses, with the tracker elsewhere and the reflector put on anew; `after` makes of
-    an arm what it is at a visit of a robot.
+    an arm what it is at a visit of a robot. Where `temperatures` of the days, °C, are given, they were measured.
     """
     for number in range(robots):
         folder = root / f"r{number}"
@@ -52,6 +57,8 @@ def write_fleet(
                 "input.poses.csv": hashlib.sha256(poses.read_bytes()).hexdigest(),
             }
             ranges = {f"joint_{k + 1}": (float(q[:, k].min()), float(q[:, k].max())) for k in range(6)}
+            if temperatures:
+                ranges["temperature"] = (temperatures[visit], temperatures[visit])
             (folder / day).mkdir()
             estimate = replace(fit.estimate, provenance=origin, ranges=ranges)
             write_estimates(folder / day / "estimates.yaml", "calibration", estimate)
@@ -101,6 +108,39 @@ def test_a_jump_is_found_named_and_dated(tmp_path: Path) -> None:
     assert f"jump between the calibrations of {DAYS[1]} and {DAYS[2]}: joint_3" in jump["sentence"]
     fleet.write(tmp_path / "fleet.parquet")
     assert f"jump between the calibrations of {DAYS[1]}" in (tmp_path / "fleet.html").read_text("utf-8")
+
+
+WARMER = (15.0, 20.0, 25.0, 30.0)
+
+
+def grown(arm: DHArm, visit: int) -> DHArm:
+    """The arm at the temperature of a visit, of a metal that grows by 12 µm/m a kelvin."""
+    return arm.grown(12e-6 * (WARMER[visit] - WARMER[0]))
+
+
+def test_robots_at_other_temperatures_do_not_drift(tmp_path: Path) -> None:
+    """All lengths grow by 180 µm/m over four visits; of two such robots one turns its joint 4 besides, by 0.2 mrad a visit."""
+    fleet = write_fleet(
+        tmp_path,
+        4,
+        5,
+        lambda arm, n, visit: grown(arm, visit).turned(4, 2e-4 * visit * (n == 1)),
+        temperatures=WARMER,
+    )
+    document = fleet.document()
+    (drift,) = document["geometry_drifts"]
+    assert drift["robot"] == "r1"
+    assert [cause["name"] for cause in drift["explanations"]] == ["joint_4.offset"]
+    assert document["headline"].endswith("drifting or changed: r1")
+    (remark,) = [text for text in document["remarks"] if "15 to 30 °C" in text]
+    assert "explains how their lengths differ" in remark
+
+
+def test_growth_at_unknown_temperatures_is_named(tmp_path: Path) -> None:
+    fleet = write_fleet(tmp_path, 2, 6, lambda arm, n, visit: grown(arm, visit))
+    drifts = fleet.document()["geometry_drifts"]
+    assert {drift["robot"] for drift in drifts} == {"r0", "r1"}
+    assert all(drift["grows"] and "warmer arm" in drift["sentence"] for drift in drifts)
 
 
 def test_another_reflector_and_station_are_no_drift(tmp_path: Path) -> None:

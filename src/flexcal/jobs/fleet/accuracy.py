@@ -160,7 +160,8 @@ def _outlook(
     if warm:
         return (
             None,
-            "errors increase as the verifications get farther from the temperature of the calibration, which can explain it, so no date is given",
+            "errors increase as the verifications get farther from the temperature of the calibration, which can explain it, so no date is "
+            "given",
         )
     if tolerance is None or state == "out":
         return None, "errors increase"

@@ -88,8 +88,10 @@ def _sentence(drift: GeometryDrift, tolerance: float | None) -> str:
 
 
 def _grows(drift: GeometryDrift) -> bool:
-    """Whether growth of all lengths may have caused the change."""
-    return any(GROWTH in (item.subject, *item.alternatives) for item in drift.explanations)
+    """Whether growth of all lengths may have caused all of the change."""
+    return bool(drift.explanations) and all(
+        GROWTH in (item.subject, *item.alternatives) for item in drift.explanations
+    )
 
 
 def _of_temperature(drift: GeometryDrift) -> str:
