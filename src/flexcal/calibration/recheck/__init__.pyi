@@ -1,5 +1,5 @@
 from .another_geometry import single_deviation
-from .change_effects import PossibleChange, possible_changes
+from .change_effects import OF_THE_MEASUREMENT, PossibleChange, possible_changes
 from .course_likelihood import VisitCourse, visit_courses
 from .cumulative_sums import AVERAGE_RUN, DriftSum, ShiftAtVisit, drift_sums
 from .detection import DetectionLimit, detection_limits
@@ -21,6 +21,7 @@ __all__ = [
     "AVERAGE_RUN",
     "FALSE_ALARM",
     "LEAST_MATCHED",
+    "OF_THE_MEASUREMENT",
     "VISIT_ALARM",
     "Compared",
     "DetectionLimit",

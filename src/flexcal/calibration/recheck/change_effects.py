@@ -26,6 +26,7 @@ ChangeKind = Literal[
     "instrument_moved",
     "wrong_reading",
     "readings_drift",
+    "noisier_readings",
     "gear_worn",
     "two_changes",
 ]
@@ -138,6 +139,11 @@ def drift_of_readings(poses: int) -> PossibleChange:
     return PossibleChange("readings_drift", "the readings", ("dx", "dy", "dz"), ("m",) * 3, columns)
 
 
+def noisier_readings(poses: int) -> PossibleChange:
+    """More scatter of the readings of K poses by a factor; it moves no point."""
+    return PossibleChange("noisier_readings", "the readings", ("scatter",), ("1",), np.zeros((3 * poses, 1)))
+
+
 def worn_gears(model: RobotModel, at: PredictedMeasurements) -> list[PossibleChange]:
     """Play in the gear of every joint, by half of it: the arm lies on the flank to which gravity presses it.
 
@@ -179,7 +185,7 @@ def _tool(model: RobotModel, at: PredictedMeasurements, target: str) -> Possible
 
 WHOLE_TOOL = "the tool"
 """Subject of a motion of all points on the tool together."""
-OF_THE_MEASUREMENT = ("instrument_moved", "wrong_reading", "readings_drift")
+OF_THE_MEASUREMENT = ("instrument_moved", "wrong_reading", "readings_drift", "noisier_readings")
 """Kinds of changes that leave the tool where it was."""
 
 

@@ -105,6 +105,14 @@ class GlobalTest:
         """Probability that chance makes a sum of squares of `count` whitened values as large."""
         return chance_of_squares(statistic, count, self.freedom)
 
+    def cost(self, misfit: float) -> float:
+        """Twice the negative log-likelihood of errors with a whitened sum of squares, but for a constant: normal, or of Student's
+        multivariate t where the size of the scatter is estimated.
+        """
+        if not np.isfinite(self.freedom):
+            return misfit
+        return (self.freedom + self.size) * float(np.log1p(misfit / self.freedom))
+
     def least_of(self, draws: int, effect: np.ndarray | None = None, seed: int = 0) -> np.ndarray:
         """Smallest p-values (draws,) of normal errors, of mean `effect` (m,) in whitened coordinates."""
         rng = np.random.default_rng(seed)

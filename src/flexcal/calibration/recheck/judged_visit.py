@@ -12,6 +12,7 @@ from flexcal.calibration.recheck.change_effects import (
     OF_THE_MEASUREMENT,
     PossibleChange,
     drift_of_readings,
+    noisier_readings,
     possible_changes,
     worn_gears,
     wrong_readings,
@@ -26,7 +27,13 @@ from flexcal.calibration.recheck.global_test import (
     seen_change,
 )
 from flexcal.calibration.recheck.pairs_of_changes import FittedPair, pairs_of_changes, two_changes
-from flexcal.calibration.recheck.scatter_of_visit import LargerScatter, scatter_about, unexplained
+from flexcal.calibration.recheck.scatter_of_visit import (
+    LARGEST,
+    LargerScatter,
+    scatter_about,
+    scatter_alone,
+    unexplained,
+)
 from flexcal.calibration.recheck.visit_errors import VisitErrors
 from flexcal.estimation import student_quantile
 
@@ -214,10 +221,19 @@ def _judge(errors: VisitErrors) -> JudgedVisit:
     if other > CLEAR:
         return JudgedVisit(test, probability, (), together, shifts, geometry=True, rivals=two_changes(test))
     suspects = tuple(sorted((*suspects, *(suspect for _, suspect in pair)), key=lambda s: s.score))
-    scatter = scatter_about(test, [suspect.remainder for _, suspect in (*found, *worn)], together)
+    rivals = None if suspects else two_changes(test)
+    remainders = [suspect.remainder for _, suspect in (*found, *worn)]
+    scatter = scatter_about(test, remainders, together)
     if scatter is None:
-        rivals = None if suspects else two_changes(test)
-        return JudgedVisit(test, probability, suspects, together, shifts, geometry=other > 0, rivals=rivals)
+        scatter, noise = _noise(test)
+        best = min(suspect.score for _, suspect in (*found, *worn, *pair))
+        best = best if rivals is None else min(best, rivals.score(test))
+        if scatter is None or noise.score > best:
+            if suspects and scatter is not None and noise.score < best + ALIKE:
+                suspects = tuple(sorted((*suspects, noise), key=lambda s: s.score))
+            return JudgedVisit(
+                test, probability, suspects, together, shifts, geometry=other > 0, rivals=rivals
+            )
     # causes by the scatter that the visit has; what that explains is none
     wider = GlobalTest.of(scatter.applied(errors), changes, directed=True)
     caused = wider.probability(errors.errors) <= VISIT_ALARM
@@ -225,9 +241,36 @@ def _judge(errors: VisitErrors) -> JudgedVisit:
     if caused and not suspects:  # scatter is not it: more changed, or this is another robot
         return JudgedVisit(test, probability, (), together, shifts, rivals=two_changes(test))
     shifts = tuple(_suspect(wider, item, 1) for item in wider.seen if len(item.change.names) == 1)
+    rivals = None if suspects else rivals
     return JudgedVisit(
-        wider, probability, suspects, together, shifts, scatter=scatter, geometry=other > -CLEAR
+        wider,
+        probability,
+        suspects,
+        together,
+        shifts,
+        scatter=scatter,
+        geometry=other > -CLEAR,
+        rivals=rivals,
     )
+
+
+def _noise(test: GlobalTest) -> tuple[LargerScatter | None, Suspect]:
+    """More scatter of the readings as if nothing else were the cause; no scatter where it is too large for noise."""
+    scatter, cost = scatter_alone(test)
+    std = np.array([scatter.std])
+    suspect = Suspect(
+        noisier_readings(len(test.errors.poses)),
+        np.array([scatter.factor]),
+        std,
+        np.diag(std**2),
+        1.96,
+        1.0,
+        cost + float(np.log(test.size)),
+        cost,
+        float(test.size),
+        1.0,
+    )
+    return scatter if scatter.factor < LARGEST else None, suspect
 
 
 def _together(test: GlobalTest) -> float:
@@ -359,8 +402,7 @@ def _suspect(test: GlobalTest, item: SeenChange, alternatives: int) -> Suspect:
     count = test.size - rank
     remainder = float(test.chance(misfit, count)) if count > 0 else 1.0
     freedom = test.freedom
-    cost = misfit if not np.isfinite(freedom) else (freedom + test.size) * float(np.log1p(misfit / freedom))
-    cost += 2 * float(np.log(np.diag(root)).sum())
+    cost = test.cost(misfit) + 2 * float(np.log(np.diag(root)).sum())
     covariance = inverse @ inverse.T
     return Suspect(
         change,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations
+from math import comb, log
 
 import numpy as np
 
@@ -15,11 +16,18 @@ Pair = tuple[PossibleChange, PossibleChange]
 
 @dataclass(frozen=True)
 class FittedPair:
-    """Two `changes` with the sum of squares that they leave, whitened, and their number of independent parameters."""
+    """Two `changes` with the sum of squares that they leave, whitened, their number of independent parameters, and the number of
+    `alternatives` that were tried.
+    """
 
     changes: Pair
     misfit: float
     rank: int
+    alternatives: int
+
+    def score(self, test: GlobalTest) -> float:
+        """Twice the negative log-likelihood, with what Schwarz's criterion adds for the parameters and for the number of pairs."""
+        return test.cost(self.misfit) + self.rank * log(test.size) + 2 * log(self.alternatives)
 
 
 def pairs_of_changes(test: GlobalTest, root: np.ndarray, values: np.ndarray) -> list[FittedPair]:
@@ -30,11 +38,11 @@ def pairs_of_changes(test: GlobalTest, root: np.ndarray, values: np.ndarray) -> 
     robot = [item for item in test.seen if item.change.kind != "instrument_moved"]
     bases = [np.linalg.solve(root, item.basis) for item in robot]
     left = np.linalg.solve(root, values)
-    found = []
+    found, pairs = [], comb(len(robot), 2)
     for one, other in combinations(range(len(robot)), 2):
         misfit, rank = misfit_of(left, np.hstack([bases[one], bases[other]]))
         if rank == bases[one].shape[1] + bases[other].shape[1]:
-            found.append(FittedPair((robot[one].change, robot[other].change), misfit, rank))
+            found.append(FittedPair((robot[one].change, robot[other].change), misfit, rank, pairs))
     return found
 
 

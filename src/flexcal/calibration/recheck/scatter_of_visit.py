@@ -12,8 +12,9 @@ from flexcal.calibration.recheck.visit_errors import VisitErrors
 
 _CHANCE = 0.05
 """Probability below which what is left about the best explanation, and about all together, is more scatter than assumed."""
-_LARGEST = 4.0
+LARGEST = 4.0
 """Factor above which errors that no change explains are hardly noise: of a model or poses that are others."""
+_FACTORS = np.geomspace(1.0, LARGEST, 60)
 _LEAST = 6
 """Least number of coordinates beside all changes that tell the scatter."""
 
@@ -27,6 +28,11 @@ class LargerScatter:
     factor: float
     freedom: int
     chance: float
+
+    @property
+    def std(self) -> float:
+        """Standard deviation of the factor, of normal errors."""
+        return self.factor / float(np.sqrt(2 * self.freedom))
 
     def applied(self, errors: VisitErrors) -> VisitErrors:
         """The errors with this scatter of the visit."""
@@ -57,4 +63,20 @@ def scatter_about(test: GlobalTest, remainders: Sequence[float], together: float
     errors = test.errors
     share = float(np.trace(errors.common) / np.trace(errors.own))
     factor = float(np.sqrt(whole + (whole - 1) * share))
-    return LargerScatter(factor, freedom, together) if factor <= _LARGEST else None
+    return LargerScatter(factor, freedom, together) if factor <= LARGEST else None
+
+
+def scatter_alone(test: GlobalTest) -> tuple[LargerScatter, float]:
+    """The likeliest factor of a scatter that explains the errors of a visit by itself, and twice its negative log-likelihood."""
+    errors, whitening = test.errors, test.whitening
+    own, common = (whitening @ part @ whitening.T for part in (errors.own, errors.common))
+    whitened = whitening @ errors.errors
+    roots = [np.linalg.cholesky(factor**2 * own + common) for factor in _FACTORS]
+    costs = [
+        test.cost(float(np.sum(np.linalg.solve(root, whitened) ** 2)))
+        + 2 * float(np.log(np.diag(root)).sum())
+        for root in roots
+    ]
+    best = int(np.argmin(costs))
+    chance = float(test.chance(float(whitened @ whitened), test.size))
+    return LargerScatter(float(_FACTORS[best]), test.size, chance), costs[best]

@@ -9,6 +9,7 @@ import numpy as np
 
 from flexcal.calibration.recheck import (
     FALSE_ALARM,
+    OF_THE_MEASUREMENT,
     VISIT_ALARM,
     FittedPair,
     JudgedVisit,
@@ -66,6 +67,10 @@ def judgement_sentence(judged: JudgedVisit, course: CourseOverVisits | None = No
         )
         if judged.geometry:
             scatters += "; the geometry in several places, as of another robot, would explain them too"
+        elif not judged.suspects and judged.rivals is not None:
+            scatters += f"; so would {_together(judged.rivals)} together"
+        elif not judged.suspects and judged.together > FALSE_ALARM:
+            scatters += "; several changes of the robot together would explain them too"
         if not judged.suspects:
             return f"{lead}{scatters}; whether the robot changed too cannot be told by them ({chance} of the whole)"
         lead = f"{lead}{scatters}; what is more than such scatter: "
@@ -119,7 +124,7 @@ def effect_sentence(judged: JudgedVisit, tools: Sequence[MovedTool], expected: f
         f"if it was {suspect_name(suspect)}, "
         + (
             "the tool is where it was"
-            if suspect.change.kind in ("instrument_moved", "wrong_reading", "readings_drift")
+            if suspect.change.kind in OF_THE_MEASUREMENT
             else f"the tool is off by {tool.p95 / MILLIMETRE:.3f} mm at 95 % of the poses"
         )
         for suspect, tool in zip(judged.suspects, tools, strict=True)
@@ -141,6 +146,8 @@ def telling_sentence(judged: JudgedVisit, telling: TellingPose | None, noise: fl
         return ""
     kinds = {suspect.change.kind for suspect in judged.suspects[:2]}
     first, second = (suspect_name(s) for s in judged.suspects[:2])
+    if "noisier_readings" in kinds:
+        return f"what tells {first} from {second}: the same poses measured again, each several times"
     if "instrument_moved" in kinds:
         return (
             f"what tells {first} from {second}: a point that is fixed to the robot's base, measured with the others; it moves with the "
@@ -189,6 +196,7 @@ def change_name(change: PossibleChange) -> str:
         "instrument_moved": "another place of the instrument",
         "wrong_reading": f"a wrong reading of pose {subject}",
         "readings_drift": "a drift of the readings",
+        "noisier_readings": "more scatter of the readings",
     }[change.kind]
 
 
@@ -243,6 +251,8 @@ def suspect_in_words(suspect: Suspect, model: RobotModel) -> str:
         return f"a load that is not declared, {amount(value, half, 'kg')} at {change.subject}"
     if change.kind == "joint_softer":
         return f"{change.subject} yields {_compliance(value, half, model.value(change.names[0]))}"
+    if change.kind == "noisier_readings":
+        return f"the readings scatter {value:.1f} times as much as is expected of them: check the instrument, and measure them again"
     size = float(np.linalg.norm(values[:3]))
     # half-width along the displacement itself
     along = values[:3] / max(size, 1e-30)
