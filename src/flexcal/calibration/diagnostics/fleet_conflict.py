@@ -53,6 +53,12 @@ class FleetConflict:
         """Whether the prior does not fit the robot."""
         return self.probability < CONTRADICTED
 
+    @property
+    def single(self) -> dict[str, float]:
+        """Deviations of the parameters one of which alone may be off; empty where none is, or too many may be."""
+        listed = self.contradicted and self.alone and self.deviating == len(self.shifts)
+        return dict(self.shifts) if listed else {}
+
     def document(self) -> dict[str, Any]:
         """Entry of results.json."""
         return {

@@ -13,13 +13,20 @@ OF_THE_CELL = ("tool.", "point.", "station.", "sockets.", "board.", "camera.")
 """Beginnings of the names of parameters of tool, targets and instruments, of which another cell tells nothing."""
 
 
+_FREE = 10.0
+"""Spread of a parameter of which a prior tells nothing, relative to its deviation."""
+_CERTAIN = 1e6
+"""Degrees of freedom of a spread that is not estimated."""
+
+
 @dataclass(frozen=True, eq=False)
 class FleetPrior:
     """Normal distribution of geometric parameters over the robots of a model, as calibrated ones tell it.
 
     `mean` (p,) of the parameters `names` is known with the covariance `uncertainty` (p, p); robots differ from it by `spread` (p,), 1σ,
     which is known with `freedom` (p,) degrees of freedom. All are in natural units, as deviations from the URDF. `terms` are those fitted
-    to the `robots`, the folders' names; `measurements` are the digests of theirs, `source` says where the prior was read.
+    to the `robots`, the folders' names; `measurements` are the digests of theirs, `source` says where the prior was read. Of parameters
+    in which a robot deviates alone, `released` has the deviations, in standard deviations of the prior: there it tells nothing.
     """
 
     names: tuple[str, ...]
@@ -31,6 +38,7 @@ class FleetPrior:
     robots: tuple[str, ...]
     measurements: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     source: str = ""
+    released: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def covariance(self) -> np.ndarray:
@@ -48,6 +56,17 @@ class FleetPrior:
             uncertainty=self.uncertainty[np.ix_(kept, kept)],
             spread=self.spread[kept],
             freedom=self.freedom[kept],
+        )
+
+    def without(self, deviations: Mapping[str, float]) -> FleetPrior:
+        """Prior that tells nothing of parameters with these `deviations`, in its standard deviations: its spread is ten times as large."""
+        named = np.isin(self.names, list(deviations))
+        size = np.array([abs(deviations.get(name, 0.0)) for name in self.names])
+        return replace(
+            self,
+            spread=np.where(named, _FREE * size * np.sqrt(np.diag(self.covariance)), self.spread),
+            freedom=np.where(named, _CERTAIN, self.freedom),
+            released=dict(deviations),
         )
 
     def applied(self, parameters: Parameters) -> Parameters:

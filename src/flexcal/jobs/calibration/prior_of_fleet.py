@@ -15,13 +15,14 @@ _LEARNT = 0.8
 _LISTED = 8
 
 
-def fleet_document(fit: GeometricFit) -> dict[str, Any] | None:
+def fleet_document(fit: GeometricFit, conflict: FleetConflict | None) -> dict[str, Any] | None:
     """Block `fleet` of results.json; None for a calibration without such a prior.
 
     `from_fleet` are the parameters of which these measurements tell so little that their standard deviation is at least 0.8 times the
-    prior's, and which the other robots tell; `enough` is how many poses with the prior reach what many do without it.
+    prior's, and which the other robots tell; `released` those in which the robot deviates alone; `enough` is how many poses with the prior
+    reach what many do without it.
     """
-    fleet, conflict = fit.fleet, FleetConflict.of(fit)
+    fleet = fit.fleet
     if fleet is None or conflict is None:
         return None
     enough = None if conflict.contradicted else EnoughPoses.of(fit)
@@ -37,6 +38,7 @@ def fleet_document(fit: GeometricFit) -> dict[str, Any] | None:
         "robots": list(fleet.robots),
         "parameters": len(fleet.names),
         "from_fleet": known,
+        "released": dict(fleet.released),
         "conflict": conflict.document(),
         "enough": None if enough is None else enough.document(),
     }
@@ -61,7 +63,19 @@ def fleet_remarks(block: dict[str, Any] | None) -> list[str]:
     )
     if block["enough"] is not None:
         sentence += f"; {_enough_sentence(block['enough'])}"
-    return [sentence, *([conflict_sentence(block)] if contradicts(block) else [])]
+    remarks = [sentence]
+    if block["released"]:
+        remarks.append(_released_sentence(block["released"]))
+    return [*remarks, *([conflict_sentence(block)] if contradicts(block) else [])]
+
+
+def _released_sentence(released: dict[str, float]) -> str:
+    most = listed([f"{name} ({shift:+.1f} σ)" for name, shift in released.items()], _LISTED)
+    one = len(released) == 1
+    return (
+        f"the robot deviates from the others beyond chance (p < 0.01) in {'' if one else 'one or more of '}{most}, as after a repair: "
+        f"{'it was' if one else 'these were'} estimated without the prior, and what the others tell of the rest fits"
+    )
 
 
 def _enough_sentence(enough: dict[str, Any]) -> str:

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from flexcal.calibration.comparison import TEMPERATURE
+from flexcal.calibration.diagnostics import FleetConflict
 from flexcal.calibration.error_model import TRANSMISSION
 from flexcal.calibration.fit import (
     LEVELS,
@@ -25,6 +26,7 @@ from flexcal.calibration.verification import uncalibrated_model, uncalibrated_or
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.files.formats import provenance
+from flexcal.jobs.calibration.deviating_parameters import without_deviating
 from flexcal.jobs.calibration.fits import Fits, FitSettings, sampled
 from flexcal.jobs.calibration.fitted_measurements import measurement_digests
 from flexcal.jobs.calibration.held_out import held_out_errors
@@ -78,7 +80,7 @@ def calibrate(
         and compared with it: `Calibration.held_out`.
     prior : FleetPrior, optional
         Prior of the geometry from other robots of the model, as `flexcal fleet --prior` writes it. Its terms are fitted, and those asked
-        for.
+        for. Parameters in which the robot deviates from the others beyond chance, up to three, are estimated without the prior.
     progress : Progress
         Called with the stage and the share of it that is done.
 
@@ -118,6 +120,16 @@ def calibrate(
         requested = _with_prior(prior, requested)
     settings = FitSettings(requested, loss, secant_scale, elasticity, prior)
     fits = Fits.of(nominal, poses, settings, progress=progress)
+    conflict = FleetConflict.of(fits.selected)
+    if prior is not None and conflict is not None:
+        released = without_deviating(
+            prior,
+            conflict,
+            lambda own: Fits.of(nominal, poses, replace(settings, fleet=own), progress=progress),
+        )
+        if released is not None:
+            own, fits, conflict = released
+            settings = replace(settings, fleet=own)
     held_out = None
     if hold_out is not None:
         progress("held out", 0.0)
@@ -165,6 +177,7 @@ def calibrate(
         everywhere=None if sample is None else all_errors(selected.model, measured, progress),
         held_out=held_out,
         orientation_before=uncalibrated_orientations(uncalibrated.registered, poses),
+        conflict=conflict,
     )
 
 

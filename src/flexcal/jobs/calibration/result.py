@@ -13,6 +13,7 @@ from flexcal.calibration.diagnostics import (
     BearingAxes,
     Coupling,
     Drift,
+    FleetConflict,
     LearningCurve,
     PlaceAgreement,
     ReadingLag,
@@ -124,6 +125,8 @@ class Calibration(Identification):
         Errors at groups of measurements that were left out whole, where they were asked for.
     orientation_before : OrientationErrors or None
         Errors of the orientations of the uncalibrated robot, where they were measured.
+    conflict : FleetConflict or None
+        Test of the prior from other robots of the model, where there is one.
     pooled_stiffness : PooledUse or None
         Stiffness from other robots of the model, in place of one that was identified.
     estimates : Path or None
@@ -146,6 +149,7 @@ class Calibration(Identification):
     everywhere: ErrorStatistics | None = None
     held_out: HeldOut | HeldOutTilts | None = None
     orientation_before: OrientationErrors | None = None
+    conflict: FleetConflict | None = None
     pooled_stiffness: PooledUse | None = None
     estimates: Path | None = None
     command: str = ""
@@ -279,7 +283,7 @@ class Calibration(Identification):
         drift = drift if drift is not None and np.isfinite(drift.probability) else None
         agreement, scale = PlaceAgreement.of(selected), scale_document(selected)
         coupling = self.coupling
-        fleet = fleet_document(selected)
+        fleet = fleet_document(selected, self.conflict)
         pooled = self.pooled_stiffness
         contradicted = contradicts(fleet) or (pooled is not None and pooled.contradicted)
         lagging = self.lag is not None and self.lag.certain

@@ -26,10 +26,11 @@ def check_fleet(block: Mapping[str, Any] | None) -> tuple[Check, ...]:
                 "fleet",
             ),
         )
+    beside = f"beside {' or '.join(block['released'])} " if block["released"] else ""
     return (
         Check(
             _QUESTION,
-            f"Yes: nothing in these measurements contradicts the {robots} others ({chance_in_words(conflict['probability'])}); "
+            f"Yes: {beside} nothing in these measurements contradicts the {robots} others ({chance_in_words(conflict['probability'])}); "
             f"{len(block['from_fleet'])} of {block['parameters']} parameters are known from them, not from these measurements.",
             "good",
             "fleet",
