@@ -26,6 +26,8 @@ _WAVES = np.array([0.0, *np.geomspace(1e-5, 1.0, 21)])
 the fit's.
 """
 _SEEN = 1e-9
+_SAME = 1e-6
+"""One less the cosine between the effects of two parameters below which they are one, as lengths along parallel axes."""
 _NAMED = 3.0
 """Deviation, in standard deviations of the prior, from which a parameter is named."""
 _LISTED = 3
@@ -39,7 +41,8 @@ class FleetConflict:
 
     `probability` is that of likelihood ratios as large where it is one of them. `shifts` (name, deviation in standard deviations of the
     prior) say where it deviates, the farthest first, and `deviating` in how many parameters by more than three; where one parameter alone
-    explains it better, `alone`, they are the parameters that may be this one, the likeliest first, in standard deviations given the others.
+    explains it better, `alone`, they are the parameters that may be this one, zeros first, in standard deviations given the others,
+    one of those with the same effect, a zero if there is one.
     """
 
     size: float
@@ -116,6 +119,7 @@ class FleetConflict:
                 for k in np.argsort(-found.ratios[:, 0])
                 if found.ratios[k, 0] > found.ratios[:, 0].max() - _UNLIKELY
             ]
+            order = _different(own, sorted(order, key=lambda k: not fleet.names[k].endswith(".offset")))
         else:
             size, noise, best = found.size[0], found.noise[0], spaces[found.space[0]]
             inside = best.coordinates(seen[None])[0][0]
@@ -124,6 +128,16 @@ class FleetConflict:
             order = [k for k in np.argsort(-np.abs(relative)) if abs(relative[k]) > _NAMED]
         shifts = tuple((fleet.names[k], float(relative[k])) for k in order[:_LISTED])
         return cls(float(found.size[0]), probability, shifts, len(order), alone)
+
+
+def _different(columns: np.ndarray, order: Sequence[int]) -> list[int]:
+    """Those of columns (d, p) in this `order` whose effect is not that of one before."""
+    units = columns / np.linalg.norm(columns, axis=0)
+    found: list[int] = []
+    for k in order:
+        if all(abs(float(units[:, k] @ units[:, j])) < 1 - _SAME for j in found):
+            found.append(k)
+    return found
 
 
 @dataclass(frozen=True, eq=False)

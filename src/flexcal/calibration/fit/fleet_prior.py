@@ -13,7 +13,7 @@ OF_THE_CELL = ("tool.", "point.", "station.", "sockets.", "board.", "camera.")
 """Beginnings of the names of parameters of tool, targets and instruments, of which another cell tells nothing."""
 
 
-_FREE = 10.0
+_FREE = 2.0
 """Spread of a parameter of which a prior tells nothing, relative to its deviation."""
 _CERTAIN = 1e6
 """Degrees of freedom of a spread that is not estimated."""
@@ -59,7 +59,7 @@ class FleetPrior:
         )
 
     def without(self, deviations: Mapping[str, float]) -> FleetPrior:
-        """Prior that tells nothing of parameters with these `deviations`, in its standard deviations: its spread is ten times as large."""
+        """Prior that tells nothing of parameters with these `deviations`, in its standard deviations: its spread is twice the deviation."""
         named = np.isin(self.names, list(deviations))
         size = np.array([abs(deviations.get(name, 0.0)) for name in self.names])
         return replace(
