@@ -72,10 +72,10 @@ def fleet_remarks(block: dict[str, Any] | None) -> list[str]:
 def _released_sentence(released: dict[str, float]) -> str:
     most = listed([f"{name} ({shift:+.1f} σ)" for name, shift in released.items()], _LISTED)
     one = len(released) == 1
-    loaded = any(name.endswith("compliance") for name in released)
+    loaded = " or with a load that is not declared" if any("compliance" in name for name in released) else ""
     return (
         f"the robot deviates from the others beyond chance (p < 0.01) in {'' if one else 'one or more of '}{most}, or in what has the same "
-        f"effect, as after a repair{' or with a load that is not declared' if loaded else ''}: {'it was' if one else 'these were'} estimated "
+        f"effect, as after a repair{loaded}: {'it was' if one else 'these were'} estimated "
         "without the prior, and what the others tell of the rest fits"
     )
 
