@@ -7,7 +7,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 unexport PYTHONDONTWRITEBYTECODE
 SOURCES := pyproject.toml CMakeLists.txt $(wildcard kernels/* runtime/include/flexcal/*.hpp runtime/include/flexcal/runtime/*.hpp)
 
-.PHONY: install demo test test-all coverage sanitize check bench docs wheels clean
+.PHONY: install demo test test-statistical test-all coverage sanitize check bench docs wheels clean
 
 install: $(VENV)/.installed
 
@@ -37,6 +37,9 @@ PARALLEL := -n 3 --dist loadfile --no-loadscope-reorder
 
 test: $(VENV)/.developer
 	$(BIN)/python -m pytest $(PARALLEL)
+
+test-statistical: $(VENV)/.developer
+	$(BIN)/python -m pytest $(PARALLEL) -m "statistical and not slow"
 
 test-all: $(VENV)/.developer sanitize
 	$(BIN)/python -m pytest $(PARALLEL) -m ""

@@ -169,6 +169,7 @@ def scale(
     return error_scale(verification, ErrorCovariance(roots, 0, independent))
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize("factor", [0.4, 1.0, 2.5])
 def test_the_interval_of_the_scale_covers_it(factor: float, rng: np.random.Generator) -> None:
     """Errors that share few parameters, drawn with a known scale: counting poses as independent would cover far less."""

@@ -140,6 +140,7 @@ def test_every_limit_holds_between_the_instants(tx90l: RobotModel) -> None:
     assert used > 0.5  # else the limits would be kept by standing still
 
 
+@pytest.mark.statistical
 def test_better_than_the_best_of_many_random_motions(tx90l: RobotModel) -> None:
     problem = program(tx90l)
     drawn = [

@@ -68,6 +68,7 @@ def test_c_optimal_predicts_a_smaller_error_at_poses_it_never_saw(tx90l, design,
     assert design.tool_error == pytest.approx(chosen, rel=0.05)
 
 
+@pytest.mark.statistical
 def test_sigma_min_beats_the_best_of_many_random_sets(pool, rng):
     found = exchange(pool, 40, SpectralCriterion("E"))
     assert found.merit == pytest.approx(observability(pool, found.chosen).sigma_min)
@@ -75,6 +76,7 @@ def test_sigma_min_beats_the_best_of_many_random_sets(pool, rng):
     assert found.merit > 1.5 * max(drawn)
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize("criterion", [DOptimal(), SpectralCriterion("E")], ids=lambda c: c.name)
 def test_one_run_comes_near_the_best_of_restarts_on_the_stored_pool(pool, rng, criterion):
     found = exchange(pool, 40, criterion).merit

@@ -69,6 +69,7 @@ def of_one_recording(
     return held, [(found.values[n] - expected[n]) / (found.std(n) or np.nan) for n in kept]
 
 
+@pytest.mark.statistical
 def test_intervals_cover_in_coloured_noise(
     observation: Observation, base: BaseParameters, tour: Motion
 ) -> None:
@@ -189,6 +190,7 @@ def short_of_rows(recorded: Recorded, runs: int, bootstraps: int) -> tuple[np.nd
     return np.array([own[0] for own in found]), drawn, float(np.mean([own[1] for own in found]))
 
 
+@pytest.mark.statistical
 def test_every_standard_deviation_is_true_on_average(recorded: Recorded) -> None:
     """61 parameters from 6.4 s. Of 30 runs chance alone takes the largest above 1.25 in 19 of a hundred draws; 300 have it at 1.14."""
     reported, _, coverage = short_of_rows(recorded, 100, 0)

@@ -99,6 +99,7 @@ def of_gross_errors(
     return np.abs([list(own.values()), [misses[name] for name in own]]) / reach
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize(
     ("recordings", "low", "high"), [(5, 0.91, 0.985), pytest.param(16, 0.93, 0.97, marks=pytest.mark.slow)]
 )

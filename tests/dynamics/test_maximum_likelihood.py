@@ -68,6 +68,7 @@ def test_friction_that_depends_on_the_past_comes_back(
     assert max(map(abs, errors(found, observation, truth).values())) < 1e-6
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize(("acceleration", "gain"), [(0.0, 0.95), (0.5, 0.75)])
 def test_intervals_cover_where_noise_is_coloured(
     acceleration: float,

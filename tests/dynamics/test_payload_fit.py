@@ -214,6 +214,7 @@ def of_one_recording(
     return row
 
 
+@pytest.mark.statistical
 def test_intervals_are_of_the_size_of_errors(tmp_path: Path) -> None:
     """Coarsely, from eight runs; intervals for white noise would be three times too narrow here."""
     missed = scores(tmp_path, range(8)) * 1.98

@@ -148,6 +148,7 @@ def test_exact_links_leave_rotors_and_friction(tx90l: RobotModel, single: Trajec
         assert std is not None and abs(estimate.values[key] - truth.value(key)) < 4 * std
 
 
+@pytest.mark.statistical
 def test_covariance_is_true_under_coloured_noise(tx90l: RobotModel, single: TrajectoryPlan) -> None:
     inside, together, _ = coverage(tx90l, single, range(2))
     assert 0.90 < inside < 0.99

@@ -81,6 +81,7 @@ def test_motion_that_is_too_short_is_refused(
         power_least_squares(recorded(observation, base, clean(40, 5.0)))
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize(
     ("estimator", "model"), [(power_least_squares, PowerModel), (energy_least_squares, EnergyModel)]
 )

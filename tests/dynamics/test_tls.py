@@ -63,6 +63,7 @@ def test_without_noise_the_truth_comes_back(
     np.testing.assert_allclose(found.covariance, plain.covariance, rtol=1e-6, atol=1e-12)
 
 
+@pytest.mark.statistical
 def test_noisy_columns_bend_least_squares_and_not_this(
     observation: Observation, base: BaseParameters, clean: Motion, truth: np.ndarray, rng: np.random.Generator
 ) -> None:

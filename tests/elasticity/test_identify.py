@@ -294,6 +294,7 @@ def test_masses_that_take_up_a_misfit_have_no_intervals(stiff, synthesise, shake
     assert moved.std("link_3.mass") is None and moved.covariance[moved.parameters.index("link_3.mass")].any()
 
 
+@pytest.mark.statistical
 def test_torque_constants_are_in_the_intervals(stiff, synthesise, poses, rng):
     """Believed torques of all motors 2 % too small: the springs of a robot whose inertias follow are as wrong, and say so."""
     responses = [

@@ -13,6 +13,7 @@ def measured(parameters: np.ndarray, noise: float, rng: np.random.Generator) -> 
     return [Measured(rows, rows @ own + rng.standard_normal(size)) for own in parameters]
 
 
+@pytest.mark.statistical
 def test_many_individuals_give_the_moments_of_the_balanced_random_effects_model() -> None:
     """With equal errors the REML estimate of the variance is s² - v (Searle, Casella and McCulloch 1992, section 3.8)."""
     rng = np.random.default_rng(4)

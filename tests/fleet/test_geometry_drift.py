@@ -118,6 +118,7 @@ def grown(arm: DHArm, visit: int) -> DHArm:
     return arm.grown(12e-6 * (WARMER[visit] - WARMER[0]))
 
 
+@pytest.mark.statistical
 def test_robots_at_other_temperatures_do_not_drift(tmp_path: Path) -> None:
     """All lengths grow by 180 µm/m over four visits; of two such robots one turns its joint 4 besides, by 0.2 mrad a visit."""
     fleet = write_fleet(

@@ -166,6 +166,7 @@ def errors_by_count(q: np.ndarray, robot: SimulatedRobot, counts: Sequence[int],
     return np.array(found)
 
 
+@pytest.mark.statistical
 def test_how_many_poses_are_enough_is_said_with_a_prior(six: Pooled) -> None:
     """Against derivatives of the simulator, where the other robots tell everything; and nothing."""
     rng = np.random.default_rng(51)
@@ -213,6 +214,7 @@ def test_a_robot_of_another_type_is_told_and_one_of_the_type_is_not(six: Pooled)
         assert test.shifts
 
 
+@pytest.mark.statistical
 @pytest.mark.parametrize("size", [5e-3, 2e-2, 5e-2])
 @pytest.mark.parametrize("count", [14, 40])
 def test_a_zero_that_is_far_off_is_told_beside_waves_of_transmission_errors(

@@ -28,6 +28,7 @@ def test_std_against_inertials_drawn_from_the_prior(tx90l: RobotModel, rng: np.r
     np.testing.assert_allclose(gravity_torque_std(tx90l, q), np.std(draws, axis=0), rtol=0.12, atol=1e-3)
 
 
+@pytest.mark.statistical
 def test_std_against_inertials_drawn_from_the_posterior(tx90l: RobotModel, rng: np.random.Generator) -> None:
     """Masses as logarithms, correlated with a centre of mass; what was not estimated keeps its prior."""
     q = rng.uniform(-2, 2, (4, 6))

@@ -80,6 +80,7 @@ def test_the_desired_error(tx90l: RobotModel):
     assert not far.is_enough and "not yet with 10 more poses" in far.sentence
 
 
+@pytest.mark.statistical
 def test_poses_chosen_anywhere_tell_more_than_the_candidates(tx90l: RobotModel):
     """Moved to neighbours, they predict a smaller error than the best of the candidates, and pass the same checks."""
     moved = GuidedSession(tx90l).prospect()
