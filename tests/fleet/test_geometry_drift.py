@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime
@@ -108,6 +109,47 @@ def test_a_jump_is_found_named_and_dated(tmp_path: Path) -> None:
     assert f"jump between the calibrations of {DAYS[1]} and {DAYS[2]}: joint_3" in jump["sentence"]
     fleet.write(tmp_path / "fleet.parquet")
     assert f"jump between the calibrations of {DAYS[1]}" in (tmp_path / "fleet.html").read_text("utf-8")
+
+
+def with_one_serial(root: Path, one: str, other: str) -> Fleet:
+    """The fleet where the first two calibrations of a robot are in the folder `one`, the others in the folder `other`, with one serial."""
+    for name, gone in ((one, DAYS[2:]), (other, DAYS[:2])):
+        with (root / name / "robot.yaml").open("a", encoding="utf-8") as file:
+            file.write('serial: "20195500123"\n')
+        for day in gone:
+            shutil.rmtree(root / name / day)
+    return review_fleet(root)
+
+
+@pytest.mark.parametrize("seed", [11, 12])
+def test_two_robots_with_one_serial_are_asked_about(tmp_path: Path, seed: int) -> None:
+    write_fleet(tmp_path, 3, seed, lambda arm, *_: arm)
+    document = with_one_serial(tmp_path, "r0", "r1").document()
+    (jump,) = document["geometry_drifts"]
+    assert (jump["change"], jump["first"], jump["last"]) == ("step", DAYS[1], DAYS[2])
+    assert jump["two_robots"] == ("r0", "r1") and jump["explanations"] == []
+    assert "are r0 and r1 two robots with one serial number?" in jump["sentence"]
+    (robot,) = [item for item in document["robots"] if item["robot"] == "20195500123"]
+    assert "are r0 and r1 two robots" in robot["outlook"] and "drifts" not in robot["outlook"]
+
+
+@pytest.mark.parametrize("dated", [False, True], ids=["two folders", "a project a visit"])
+def test_one_robot_in_several_folders_is_one_robot(tmp_path: Path, dated: bool) -> None:
+    """Its joint_3 is 0.3 mrad elsewhere in the second folder, or it has two joints elsewhere in the second of two dated folders."""
+    arm = DHArm.made(1300)
+    jumped = arm.turned(3, 3e-4).turned(5, 6e-4) if dated else arm.turned(3, 3e-4)
+    write_fleet(tmp_path, 3, 13, lambda own, n, _: (arm, jumped, own)[n])
+    if dated:
+        (tmp_path / "r").mkdir()
+        for name, day in (("r0", DAYS[0]), ("r1", DAYS[2])):
+            (tmp_path / name).rename(tmp_path / "r" / f"r_{day}")
+        fleet = with_one_serial(tmp_path / "r", f"r_{DAYS[0]}", f"r_{DAYS[2]}")
+    else:
+        fleet = with_one_serial(tmp_path, "r0", "r1")
+    (jump,) = fleet.document()["geometry_drifts"]
+    assert jump["two_robots"] is None and "serial" not in jump["sentence"]
+    names = [cause["name"] for cause in jump["explanations"]]
+    assert len(names) > 1 if dated else names == ["joint_3.offset"]
 
 
 WARMER = (15.0, 20.0, 25.0, 30.0)

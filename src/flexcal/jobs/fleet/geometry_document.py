@@ -44,8 +44,9 @@ def geometry_entry(drift: GeometryDrift, tolerance: float | None) -> dict[str, A
                 "per_year_std": sum(item.std) / span if drift.step is None else None,
                 "alternatives": list(item.alternatives),
             }
-            for item in drift.explanations
+            for item in (drift.explanations if drift.two_robots is None else ())
         ],
+        "two_robots": drift.two_robots,
         "grows": _grows(drift),
         "temperatures": None if course.trend.temperatures is None else course.trend.temperatures.tolist(),
         "tool_mm": None
@@ -57,8 +58,8 @@ def geometry_entry(drift: GeometryDrift, tolerance: float | None) -> dict[str, A
 
 def _dates(drift: GeometryDrift) -> tuple[datetime, datetime]:
     """Of the first and the last calibration, or of those before and after a step."""
-    dates = drift.course.dates
-    return (dates[0], dates[-1]) if drift.step is None else (dates[drift.step], dates[drift.step + 1])
+    before, after = drift.compared
+    return drift.course.dates[before], drift.course.dates[after]
 
 
 def _sentence(drift: GeometryDrift, tolerance: float | None) -> str:
@@ -67,6 +68,11 @@ def _sentence(drift: GeometryDrift, tolerance: float | None) -> str:
     over = f"trend over {len(drift.course.dates)} calibrations"
     if drift.step is not None:
         over = f"jump between the calibrations of {before} and {after}"
+    if drift.two_robots is not None:
+        return (
+            f"{over}, of no single cause: are {' and '.join(drift.two_robots)} two robots with one serial number? Give each robot.yaml its "
+            "own; another arm in place of the first, or several changes at once, look the same"
+        )
     if drift.moved is None:
         return (
             f"{over}, of no single parameter of a joint; "

@@ -28,7 +28,9 @@ _OTHER_URDF = "the URDF is another than that of its calibrations, so they cannot
 
 @dataclass(frozen=True, eq=False)
 class GeometryCourse:
-    """A robot's geometry over calibrations on `dates`: its `trend`, and its `steps` between each and the next."""
+    """A robot's geometry over calibrations on `dates`: its `trend`, and its `steps` between each and the next. `places` are the folders of
+    the robot, without dates, that the calibrations are in.
+    """
 
     robot: str
     model: str
@@ -36,6 +38,7 @@ class GeometryCourse:
     dates: tuple[datetime, ...]
     trend: GeometryTrend
     steps: tuple[GeometryTrend, ...]
+    places: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +56,19 @@ class GeometryDrift:
     probability: float
     explanations: tuple[Explanation, ...]
     moved: tuple[float, float, float] | None
+
+    @property
+    def compared(self) -> tuple[int, int]:
+        """Numbers of the first and the last calibration, or of those before and after a step."""
+        return (0, len(self.course.dates) - 1) if self.step is None else (self.step, self.step + 1)
+
+    @property
+    def two_robots(self) -> tuple[str, str] | None:
+        """Folders that may be of two robots with one serial number: the calibrations compared are of both, and no single change explains
+        how they differ.
+        """
+        places = {self.course.places[k] for k in self.compared if self.course.places}
+        return tuple(sorted(places)) if len(places) == 2 and len(self.explanations) != 1 else None
 
 
 def geometry_courses(
@@ -83,7 +99,8 @@ def geometry_courses(
         if trend is None:
             untested[robot] = _OTHER_URDF
         else:
-            courses.append(GeometryCourse(robot, model, urdf, dates, trend, tuple(steps)))
+            places = tuple(_place(root / row.file, projects) for row in visits)
+            courses.append(GeometryCourse(robot, model, urdf, dates, trend, tuple(steps), places))
     return courses, problems, untested
 
 
@@ -112,6 +129,11 @@ def geometry_drifts(courses: Sequence[GeometryCourse], families: int, level: flo
         moved = along.displacement(explanations, test.scale)
         found.append(replace(drift, explanations=explanations, moved=moved))
     return found
+
+
+def _place(file: Path, projects: Sequence[Project]) -> str:
+    """Place of the project that a file is of."""
+    return max((p for p in projects if p.folder in file.parents), key=lambda p: len(p.folder.parts)).place
 
 
 def _visits(rows: Sequence[Row]) -> list[Row]:
