@@ -67,8 +67,10 @@ class GeometryDrift:
         """Folders that may be of two robots with one serial number: the calibrations compared are of both, and no single change explains
         how they differ.
         """
-        places = {self.course.places[k] for k in self.compared if self.course.places}
-        return tuple(sorted(places)) if len(places) == 2 and len(self.explanations) != 1 else None
+        if not self.course.places or len(self.explanations) == 1:
+            return None
+        before, after = (self.course.places[k] for k in self.compared)
+        return None if before == after else (before, after)
 
 
 def geometry_courses(
