@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import shutil
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -152,6 +152,35 @@ def test_one_robot_in_several_folders_is_one_robot(tmp_path: Path, dated: bool) 
     assert len(names) > 1 if dated else names == ["joint_3.offset"]
 
 
+@dataclass(frozen=True)
+class LoadedArm(DHArm):
+    """An arm that carries 8 kg at its reflector, to whose torque its joints yield by `yields`, rad/(N m)."""
+
+    yields: tuple[float, ...] = (1e-6, 2e-6, 2.5e-6, 4e-6, 6e-6, 8e-6)
+
+    def points(self, q: np.ndarray) -> np.ndarray:
+        step = 1e-5 * np.eye(6)
+        height = [super(LoadedArm, self).points(q + by)[:, 2] for by in (*step, *-step)]
+        torque = 8 * 9.81 * (np.array(height[:6]) - height[6:]) / 2e-5
+        return super().points(q - torque.T * self.yields)
+
+
+@pytest.mark.parametrize("seed", [14, 15])
+def test_a_load_that_was_not_declared_is_a_possible_cause(tmp_path: Path, seed: int) -> None:
+    """A robot carries a load at the last two of four visits; another turns a joint then, which no load does."""
+
+    def after(arm: DHArm, n: int, visit: int) -> DHArm:
+        loaded = LoadedArm(arm.rows, arm.tilts, arm.tool)
+        return arm if visit < 2 or n == 2 else (loaded, arm.turned(3, 4e-4))[n]
+
+    document = write_fleet(tmp_path, 3, seed, after).document()
+    carries, turns = (item for _, item in sorted((d["robot"], d) for d in document["geometry_drifts"]))
+    assert (carries["robot"], carries["by_load"]) == ("r0", True)
+    assert "a load that was not declared" in carries["sentence"]
+    assert "as by a load" in document["robots"][0]["outlook"]
+    assert (turns["robot"], turns["by_load"]) == ("r1", False) and "load" not in turns["sentence"]
+
+
 WARMER = (15.0, 20.0, 25.0, 30.0)
 
 
@@ -245,7 +274,9 @@ def courses(rng: np.random.Generator, robots: int, visits: int, spread: np.ndarr
             rest = values - values.mean(axis=0) - np.outer(span, slope)
             none = np.zeros((spread.shape[1], 0))
             change = slope * np.sqrt(span @ span)
-            along.append(GeometryTrend(change, float((rest**2).sum()), visits, 2000.0, (), (), none, none))
+            along.append(
+                GeometryTrend(change, float((rest**2).sum()), visits, 2000.0, (), (), none, none, none)
+            )
         trend, *steps = along
         dates = tuple(datetime.fromisoformat(day) for day in DAYS[:visits])
         found.append(GeometryCourse(f"r{number}", "arm", "0", dates, trend, tuple(steps)))

@@ -11,7 +11,7 @@ LEVEL = 0.05
 """Probability of naming a change where there is none."""
 _MOST = 6
 """Largest number of explaining parameters."""
-_ALIKE = 4.0
+ALIKE = 4.0
 """Difference of χ² below which two explanations cannot be told from each other: two standard deviations."""
 
 
@@ -61,7 +61,7 @@ def explain(
         best = max(range(len(left)), key=lambda k: gains[k][0] - 2 * gains[k][1], default=None)
         if best is None:
             break
-        alike = [k for k in range(len(left)) if gains[k][0] > gains[best][0] - _ALIKE]
+        alike = [k for k in range(len(left)) if gains[k][0] > gains[best][0] - ALIKE]
         best = min(alike, key=lambda k: (_rank(left[k]), -gains[k][0]))
         chance = min(1.0, len(left) * chance_of(*gains[best], freedom))
         if chance > LEVEL:
@@ -98,7 +98,7 @@ def _told(
         alike = [
             c.subject
             for c in candidates
-            if c not in chosen and _rest(difference, [*others, c])[0] < whole + _ALIKE
+            if c not in chosen and _rest(difference, [*others, c])[0] < whole + ALIKE
         ]
         result.append(
             Explanation(

@@ -44,8 +44,8 @@ class GeometryCourse:
 @dataclass(frozen=True, eq=False)
 class GeometryDrift:
     """Test of a course, its p-value corrected for the number of robots and of tests of each, and what explains the change where that is
-    significant: `explanations` from the first to the last visit, and by how far they move the tool, m: mean, its standard deviation,
-    largest.
+    significant: `explanations` from the first to the last visit, by how far they move the tool, m: mean, its standard deviation, largest,
+    and `by_load`: whether a load that was not declared explains it about as well.
 
     `step` is the number of the calibration, from 0, after which the robot jumped, where that explains its course better than the trend.
     """
@@ -56,6 +56,7 @@ class GeometryDrift:
     probability: float
     explanations: tuple[Explanation, ...]
     moved: tuple[float, float, float] | None
+    by_load: bool = False
 
     @property
     def compared(self) -> tuple[int, int]:
@@ -65,9 +66,9 @@ class GeometryDrift:
     @property
     def two_robots(self) -> tuple[str, str] | None:
         """Folders that may be of two robots with one serial number: the calibrations compared are of both, and no single change explains
-        how they differ.
+        how they differ, nor a load.
         """
-        if not self.course.places or len(self.explanations) == 1:
+        if not self.course.places or len(self.explanations) == 1 or self.by_load:
             return None
         before, after = (self.course.places[k] for k in self.compared)
         return None if before == after else (before, after)
@@ -129,7 +130,8 @@ def geometry_drifts(courses: Sequence[GeometryCourse], families: int, level: flo
         test = drift.test
         explanations = along.explained(test.scale, test.freedom) if drift.probability <= level else ()
         moved = along.displacement(explanations, test.scale)
-        found.append(replace(drift, explanations=explanations, moved=moved))
+        by_load = drift.probability <= level and along.is_load(explanations, test.scale, test.freedom)
+        found.append(replace(drift, explanations=explanations, moved=moved, by_load=by_load))
     return found
 
 

@@ -44,7 +44,8 @@ def _changes(robot: Mapping[str, Any], errors: str, geometry: Mapping[str, Any] 
         )
         places = geometry["two_robots"]
         asked = "" if places is None else f": are {' and '.join(places)} two robots with one serial number?"
-        yield f"the geometry {how}{by}{grows}{asked}"
+        load = ", as by a load that was not declared" if geometry["by_load"] else ""
+        yield f"the geometry {how}{by}{grows}{load}{asked}"
     grown = geometry is not None and geometry["grows"]
     alike = geometry is None or geometry["two_robots"] is None
     if names := [n for n in robot["drifting_parameters"] if alike and not (grown and ".length_" in n)]:
