@@ -148,8 +148,9 @@ def test_one_robot_in_several_folders_is_one_robot(tmp_path: Path, dated: bool) 
         fleet = with_one_serial(tmp_path, "r0", "r1")
     (jump,) = fleet.document()["geometry_drifts"]
     assert jump["two_robots"] is None and "serial" not in jump["sentence"]
-    names = [cause["name"] for cause in jump["explanations"]]
-    assert len(names) > 1 if dated else names == ["joint_3.offset"]
+    # joint_4.misalignment_2 resembles both joints together, and is left out again
+    names = {cause["name"] for cause in jump["explanations"]}
+    assert names == ({"joint_3.offset", "joint_5.offset"} if dated else {"joint_3.offset"})
 
 
 @dataclass(frozen=True)

@@ -47,8 +47,9 @@ def explain(
 ) -> tuple[Explanation, ...]:
     """Explanations of a whitened `difference` (m,) by forward selection, while what is left is beyond chance.
 
-    `freedom` are the degrees of freedom of the noise. Among candidates that explain about the same, the place of a point on the tool comes
-    first, then joint zeros: reflectors and belts slip more often than axes bend.
+    Those without which no more than chance is left, because later ones took their place, are left out again. `freedom` are the degrees of
+    freedom of the noise. Among candidates that explain about the same, the place of a point on the tool comes first, then joint zeros:
+    reflectors and belts slip more often than axes bend.
     """
     chosen: list[Candidate] = []
     chances: list[float] = []
@@ -68,6 +69,12 @@ def explain(
             break
         chosen.append(left[best])
         chances.append(chance)
+    for item in chosen[:-1]:
+        others = [c for c in chosen if c is not item]
+        rest, used = _rest(difference, others)
+        if chance_of(rest, len(difference) - used, freedom) > LEVEL:
+            del chances[next(k for k, c in enumerate(chosen) if c is item)]
+            chosen = others
     return _told(difference, chosen, chances, candidates)
 
 
