@@ -20,16 +20,22 @@ def _not_negative(config: DataclassInstance) -> None:
             raise FlexcalError("E-CELL-016", f"{field.name} must not be negative, not {value}.")
 
 
-_SMALLER = {"m": ("mm", 1e-3), "rad": ("mrad", 1e-3), "rad/K": ("µrad/K", 1e-6), "1/K": ("µm/m/K", 1e-6)}
-"""Units that values are given in by mistake, and their size."""
+_SMALLER = {
+    "m": {"mm": 1e-3, "µm": 1e-6},
+    "rad": {"mrad": 1e-3, "µrad": 1e-6},
+    "rad/K": {"µrad/K": 1e-6},
+    "1/K": {"µm/m/K": 1e-6},
+}
+"""Units that values are given in by mistake, and their size, the largest first."""
 
 
 def _at_most(config: DataclassInstance, largest: float, unit: str, *names: str) -> None:
     """Raise `FlexcalError` for the first of the named values that no robot or instrument has: it is in another unit."""
-    smaller, size = _SMALLER[unit]
     for name in names:
         value = float(np.max(getattr(config, name)))
         if value > largest:
+            possible = [item for item in _SMALLER[unit].items() if item[1] * value <= largest]
+            smaller, size = (possible or list(_SMALLER[unit].items()))[0]
             raise FlexcalError(
                 "E-CELL-035",
                 f"{name} is {value:g} {unit}, more than {largest:g} {unit}; it is in {unit}: write {size * value:g} for {value:g} "
