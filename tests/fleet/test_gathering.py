@@ -11,7 +11,7 @@ import numpy as np
 import polars as pl
 import pytest
 from fleet_files import write_calibration, write_robot, write_verification, write_visits_of_recheck
-from refusals import refused
+from refusals import assert_refusal, refused
 
 from flexcal.cli.main import main
 from flexcal.jobs.fleet import Fleet, gather_fleet, review_fleet
@@ -52,6 +52,33 @@ def test_table_has_every_value_with_its_source(tmp_path: Path, capsys: pytest.Ca
     p90 = table.row(by_predicate=pl.col("name") == "error.p90", named=True)
     assert p90["value"] == pytest.approx(1e-4) and p90["unit"] == "m" and p90["independent"]
     assert str(p90["date"]) == "2026-03-01 00:00:00"
+
+
+def test_the_table_is_of_the_kind_that_its_name_says(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_robot(tmp_path / "arm")
+    write_calibration(tmp_path / "arm" / "2026-03-01", {"j1.offset": (1e-3, 1e-4)}, data="a")
+    for name in ("fleet.csv", "fleet.parquet"):
+        assert main(["fleet", str(tmp_path / "arm"), "--out", str(tmp_path / name)]) == 0
+    lines = (tmp_path / "fleet.csv").read_text("utf-8").splitlines()
+    table = [dict(zip(lines[0].split(","), line.split(","), strict=True)) for line in lines[1:]]
+    (row,) = [row for row in table if row["name"] == "j1.offset"]
+    assert (float(row["value"]), row["date"][:10]) == (1e-3, "2026-03-01")
+    assert pl.read_parquet(tmp_path / "fleet.parquet").height == len(table)
+    capsys.readouterr()
+    assert main(["fleet", str(tmp_path / "arm"), "--out", str(tmp_path / "fleet.xlsx")]) == 2
+    assert_refusal(capsys.readouterr().err, "E-TABLE-025", "fleet.xlsx", ".csv or .parquet")
+    assert not (tmp_path / "fleet.xlsx").exists()
+
+
+@pytest.mark.parametrize("millimetres", ["250", "0.00025", "-1"])
+def test_a_tolerance_in_another_unit_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], millimetres: str
+) -> None:
+    write_robot(tmp_path / "arm")
+    assert main(["fleet", str(tmp_path), f"--tolerance={millimetres}"]) == 2
+    assert_refusal(capsys.readouterr().err, "E-CLI-049", f"{millimetres} mm", "in mm")
 
 
 def test_quality_of_a_stiffness_fit(tmp_path: Path) -> None:

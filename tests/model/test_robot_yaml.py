@@ -59,6 +59,7 @@ MISTAKES = [
     (LOOP, LOOP.replace("20, 8, 4]", "20, 8, 4, 1]"), ["E-ROBOT-036", "kd", "7", "6"]),
     (LOOP, LOOP.replace("4000", "0"), ["E-ROBOT-023"]),
     (LOOP, LOOP.replace("400, 400,", "400, -400,"), ["E-ROBOT-023"]),
+    (GRAVITY, f"{GRAVITY}\ntolerance: 0.25", ["E-ROBOT-081", "0.25 m", "write 0.00025 for 0.25 mm"]),
     (GRAVITY, "gravity: [0, -9.81]", ["E-YAML-024", "gravity", "3", "2"]),
     (POINT, "smr: {frame: flange, xyz: [0.10, 0.15]}", ["E-YAML-024", "xyz", "3", "2"]),
     # names

@@ -77,7 +77,7 @@ def test_groups_and_draws_of_a_data_set(tmp_path: Path) -> None:
         ({"grid": {"poses": []}}, "E-STUDY-015", ("line 6", "poses")),
         ({"options": {"poses": 9}}, "E-STUDY-016", ("poses",)),
         ({"options": {"terms": ["kinematik"]}}, "E-RUN-011", ("line", "kinematik")),
-        ({"options": {"cell.sensors.tracker_noise_m": 10.0}}, "E-STUDY-025", ("line 4", "10 m", "in m")),
+        ({"options": {"cell.sensors.tracker_noise_m": 0.03}}, "E-CELL-035", ("line 4", "0.03 m,", "3e-05 for 0.03 mm")),
         ({"seeds": {"count": 0}}, "E-STUDY-001", ("line 3",)),
         ({"seeds": {"count": 10_000_000}}, "E-STUDY-014", ("20000000",)),
         ({"draw": {"count": 2, "options": {"poses": {"uniform": [10, 20]}}}, "grid": None}, "E-YAML-028", ("line 8",)),

@@ -52,7 +52,7 @@ def changed(config: Any, path: tuple[str, ...]) -> Any:
     elif isinstance(value, str):
         other = {"linear": "warming"}[value]
     else:
-        other = 2 * value if value else 1e5 if path[0] == "elastic_wrist" else 0.1
+        other = 2 * value if value else {"elastic_wrist": 1e5, "cubic_stiffness": 0.1}.get(path[0], 1e-3)
     return replace(config, **{path[0]: other})
 
 
@@ -101,6 +101,13 @@ def test_no_option_is_ignored(tx90l: RobotModel, usual: bytes, path: tuple[str, 
         ("friction: {coulomb_velocity: 0}", ["E-CELL-019", "line 1"]),
         ("spread: {backlash: [2e-5, 1e-5]}", ["E-CELL-020", "line 1"]),
         ("sensors: {encoder_counts: 2.5}", ["E-YAML-028", "line 1"]),
+        (
+            "sensors: {torque_noise: 1,\n  tracker_noise_m: 0.03}",
+            ["E-CELL-035", "line 2", "in m: write 3e-05 for 0.03 mm"],
+        ),
+        ("spread: {backlash: [0.0, 0.04]}", ["E-CELL-035", "line 1", "0.04 rad", "4e-05 for 0.04 mrad"]),
+        ("mismatch: {repeatability: 35}", ["E-CELL-035", "line 1", "35 m,", "3.5e-05 for 35 µm"]),
+        ("mismatch: {link_growth: 12}", ["E-CELL-035", "line 1", "1.2e-05 for 12 µm/m/K"]),
         ("mismatch: {hysteresis: .nan}", ["E-YAML-026", "line 1"]),
     ],
 )
@@ -109,3 +116,8 @@ def test_mistakes_are_named_with_their_line(tmp_path: Path, text: str, refusal: 
     code, *names = refusal
     with refused(code, "cell.yaml", *names):
         read_yaml(tmp_path / "cell.yaml", CellConfig)
+
+
+def test_a_camera_may_measure_to_a_millimetre(tmp_path: Path) -> None:
+    (tmp_path / "cell.yaml").write_text("sensors: {tracker_noise_m: 1.0e-3}\n")
+    assert read_yaml(tmp_path / "cell.yaml", CellConfig).sensors.tracker_noise_m == 1e-3

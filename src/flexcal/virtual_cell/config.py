@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+
 from flexcal.errors import FlexcalError
 
 if TYPE_CHECKING:
@@ -16,6 +18,29 @@ def _not_negative(config: DataclassInstance) -> None:
         value = getattr(config, field.name)
         if isinstance(value, int | float) and not value >= 0:
             raise FlexcalError("E-CELL-016", f"{field.name} must not be negative, not {value}.")
+
+
+_SMALLER = {
+    "m": {"mm": 1e-3, "µm": 1e-6},
+    "rad": {"mrad": 1e-3, "µrad": 1e-6},
+    "rad/K": {"µrad/K": 1e-6},
+    "1/K": {"µm/m/K": 1e-6},
+}
+"""Units that values are given in by mistake, and their size, the largest first."""
+
+
+def _at_most(config: DataclassInstance, largest: float, unit: str, *names: str) -> None:
+    """Raise `FlexcalError` for the first of the named values that no robot or instrument has: it is in another unit."""
+    for name in names:
+        value = float(np.max(getattr(config, name)))
+        if value > largest:
+            possible = [item for item in _SMALLER[unit].items() if item[1] * value <= largest]
+            smaller, size = (possible or list(_SMALLER[unit].items()))[0]
+            raise FlexcalError(
+                "E-CELL-035",
+                f"{name} is {value:g} {unit}, more than {largest:g} {unit}; it is in {unit}: write {size * value:g} for {value:g} "
+                f"{smaller}.",
+            )
 
 
 @dataclass(frozen=True)
@@ -56,6 +81,7 @@ class SensorConfig:
 
     def __post_init__(self) -> None:
         _not_negative(self)
+        _at_most(self, 5e-3, "m", "tracker_noise_m", "displacement_noise")
 
 
 @dataclass(frozen=True)
@@ -114,6 +140,8 @@ class SpreadConfig:
                 "E-CELL-021",
                 f"the spread's stiffness and damping are of logarithms, at most {_WIDEST:g} (1σ); give for example 0.15.",
             )
+        _at_most(self, 0.02, "m", "length")
+        _at_most(self, 0.02, "rad", "angle", "backlash")
 
 
 @dataclass(frozen=True)
@@ -147,6 +175,10 @@ class MismatchConfig:
         _not_negative(self)
         if not self.hysteresis_width > 0:
             raise FlexcalError("E-CELL-022", "the mismatch's hysteresis_width must be positive.")
+        _at_most(self, 0.02, "m", "repeatability", "temperature_drift")
+        _at_most(self, 0.02, "rad", "hysteresis")
+        _at_most(self, 1e-3, "rad/K", "zero_drift")
+        _at_most(self, 1e-3, "1/K", "link_growth")
 
 
 @dataclass(frozen=True)

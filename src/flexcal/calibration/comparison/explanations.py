@@ -11,7 +11,7 @@ LEVEL = 0.05
 """Probability of naming a change where there is none."""
 _MOST = 6
 """Largest number of explaining parameters."""
-_ALIKE = 4.0
+ALIKE = 4.0
 """Difference of χ² below which two explanations cannot be told from each other: two standard deviations."""
 
 
@@ -47,8 +47,9 @@ def explain(
 ) -> tuple[Explanation, ...]:
     """Explanations of a whitened `difference` (m,) by forward selection, while what is left is beyond chance.
 
-    `freedom` are the degrees of freedom of the noise. Among candidates that explain about the same, the place of a point on the tool comes
-    first, then joint zeros: reflectors and belts slip more often than axes bend.
+    Those without which no more than chance is left, because later ones took their place, are left out again. `freedom` are the degrees of
+    freedom of the noise. Among candidates that explain about the same, the place of a point on the tool comes first, then joint zeros:
+    reflectors and belts slip more often than axes bend.
     """
     chosen: list[Candidate] = []
     chances: list[float] = []
@@ -61,13 +62,19 @@ def explain(
         best = max(range(len(left)), key=lambda k: gains[k][0] - 2 * gains[k][1], default=None)
         if best is None:
             break
-        alike = [k for k in range(len(left)) if gains[k][0] > gains[best][0] - _ALIKE]
+        alike = [k for k in range(len(left)) if gains[k][0] > gains[best][0] - ALIKE]
         best = min(alike, key=lambda k: (_rank(left[k]), -gains[k][0]))
         chance = min(1.0, len(left) * chance_of(*gains[best], freedom))
         if chance > LEVEL:
             break
         chosen.append(left[best])
         chances.append(chance)
+    for item in chosen[:-1]:
+        others = [c for c in chosen if c is not item]
+        rest, used = _rest(difference, others)
+        if chance_of(rest, len(difference) - used, freedom) > LEVEL:
+            del chances[next(k for k, c in enumerate(chosen) if c is item)]
+            chosen = others
     return _told(difference, chosen, chances, candidates)
 
 
@@ -98,7 +105,7 @@ def _told(
         alike = [
             c.subject
             for c in candidates
-            if c not in chosen and _rest(difference, [*others, c])[0] < whole + _ALIKE
+            if c not in chosen and _rest(difference, [*others, c])[0] < whole + ALIKE
         ]
         result.append(
             Explanation(

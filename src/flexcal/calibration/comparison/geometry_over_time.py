@@ -34,7 +34,8 @@ from flexcal.calibration.comparison.thermal_growth import (
     growth_columns,
     temperature_of,
 )
-from flexcal.calibration.measurement import random_poses, seen_from_base
+from flexcal.calibration.comparison.undeclared_load import load_explains
+from flexcal.calibration.measurement import random_poses, sag_columns, seen_from_base, with_load_at
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 from flexcal.model.robot import RobotModel, unit_in
@@ -72,6 +73,8 @@ class GeometryTrend:
         Derivatives (m, p) of `change` by these, natural units.
     jacobian : ndarray
         Derivatives (3 N, p) of the tool's positions in the base frame by these at N common poses, but for a motion of the whole robot.
+    sag : ndarray
+        Derivatives (m, n) of `change` by what each joint yields to a load on the tool that was not declared.
     temperatures : ndarray or None
         Temperatures (K,), °C, that the lengths of the calibrations are of; None where one is not known.
     expansion : tuple of float or None
@@ -86,6 +89,7 @@ class GeometryTrend:
     units: tuple[str, ...]
     map: np.ndarray
     jacobian: np.ndarray
+    sag: np.ndarray
     temperatures: np.ndarray | None = None
     expansion: tuple[float, float] | None = None
 
@@ -100,6 +104,12 @@ class GeometryTrend:
         """
         size = np.sqrt(scale)
         return explain(self.change / size, candidates_of(self.names, self.map / size, {}), freedom)
+
+    def is_load(self, explanations: Sequence[Explanation], scale: float, freedom: float) -> bool:
+        """Whether a load that was not declared explains the change about as well as these explanations."""
+        size = np.sqrt(scale)
+        rows = [self.names.index(name) for item in explanations for name in item.names]
+        return load_explains(self.change / size, self.sag / size, self.map[:, rows] / size, freedom)
 
     def displacement(
         self, explanations: Sequence[Explanation], scale: float
@@ -176,6 +186,8 @@ def geometry_courses(
     by_cause = np.column_stack([by_parameter[:, causes], reduced[:, 0]])
     cause_names = [*(names[k] for k in causes), GROWTH]
     units = [*(unit_in(nominal, names[k]) for k in causes), "1"]
+    sag = sag_columns(with_load_at(first, targets[0]), at)
+    by_load = left[:, :rank].T @ (sag - gauge @ (gauge.T @ sag)) / count
     expansion = None
     if temperatures is not None and np.ptp(temperatures) > 0:
         change, _, matrix = _change(np.array(moved), noises, sources, temperatures - temperatures.mean())
@@ -189,7 +201,7 @@ def geometry_courses(
         change, residual, matrix = _change(
             np.array(moved) - growth.expected, noises, sources, shape - shape.mean(), growth.sources
         )
-        matrix = matrix @ by_cause
+        by_load_white, matrix = matrix @ by_load, matrix @ by_cause
         own = np.linalg.norm(matrix, axis=0) * 1e-3 > 1.0
         return GeometryTrend(
             change,
@@ -200,6 +212,7 @@ def geometry_courses(
             tuple(unit for unit, there in zip(units, own, strict=True) if there),
             matrix[:, own],
             free[:, own],
+            by_load_white,
             temperatures,
             expansion,
         )

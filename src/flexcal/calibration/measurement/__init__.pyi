@@ -11,6 +11,7 @@ from .prediction import (
 from .propagated_covariance import Propagation, covariance_root, moving_parameters, propagation
 from .readings import METRES, OF_INSTRUMENTS, RADIANS, ROBOT, Readings, kind_names, stated_sigma
 from .registration import register, require_orientations, with_target_axes
+from .unknown_load import sag_columns, with_load_at
 
 __all__ = [
     "METRES",
@@ -34,9 +35,11 @@ __all__ = [
     "require_both_flanks",
     "require_orientations",
     "require_points",
+    "sag_columns",
     "seen_from_base",
     "stated_sigma",
     "with_camera_places",
+    "with_load_at",
     "with_places_of",
     "with_stations_at_base",
     "with_target_axes",

@@ -12,10 +12,10 @@ from flexcal.calibration.measurement import (
     covariance_root,
     moving_parameters,
     predict_measurements,
+    sag_columns,
+    with_load_at,
 )
-from flexcal.model.parts import Payload
 from flexcal.model.robot import GEOMETRY, LATERAL, STATION, RobotModel
-from flexcal.model.statics import gravity_torque
 
 ChangeKind = Literal[
     "joint_shifted",
@@ -215,7 +215,7 @@ def _payload(model: RobotModel, at: PredictedMeasurements) -> PossibleChange:
     """Change of the mass, kg, of the declared payload, or else of a load at the first measured point."""
     told = model.payload is not None
     subject = "payload" if told else at.poses.targets[0]
-    robot = model if told else replace(model, payload=_load_at(model, at.poses.targets[0]))
+    robot = with_load_at(model, at.poses.targets[0])
     column = _by_mass(robot, at)
     if np.abs(column).max() < _NO_EFFECT:
         return _payload_of_rigid_arm(robot, at, subject)
@@ -241,29 +241,9 @@ def _payload_of_rigid_arm(model: RobotModel, at: PredictedMeasurements, subject:
     """Change of the load on an arm whose compliances are not calibrated: its mass times the compliance of the joints, by which each joint
     yields in proportion to the torque of the load, known to 100 %.
     """
-    torque = gravity_torque(model, at.poses.q, 1.0) - gravity_torque(model, at.poses.q, 0.0)
-    joints = [joint for joint in model.motor_joints if joint.kind == "revolute"]
-    each = _flat(at.jacobian([f"{joint.name}.offset" for joint in joints]))
-    yields = -torque[:, [model.joint_index(joint.name) for joint in joints]]
-    spread = 1e-6 * each * np.repeat(yields, 3, axis=0)
+    spread = sag_columns(model, at)
     column = spread.sum(axis=1, keepdims=True)
     return PossibleChange("payload_changed", subject, ("payload.sag",), ("kg µrad/(N m)",), column, spread)
-
-
-def _load_at(model: RobotModel, target: str) -> Payload:
-    """A payload without mass, at a point on the tool."""
-    point = model.points[target]
-    return Payload(
-        point.frame,
-        point.joint,
-        point.rotation,
-        point.translation,
-        0.0,
-        0.0,
-        0.0,
-        point.xyz,
-        np.zeros((3, 3)),
-    )
 
 
 def _displaced(model: RobotModel, by: np.ndarray) -> RobotModel:

@@ -11,10 +11,12 @@ from tyro.conf import Positional, arg
 from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import Json, MaybeNumber, MaybePath, file_argument
 from flexcal.cli.terminal.console import Console
-from flexcal.errors import FlexcalError
+from flexcal.errors import FlexcalError, InputError
 
 _LISTED = 10
 """Largest number of problems that are printed."""
+_LEAST = 0.005
+"""Smallest tolerance, mm, that is not taken for one in m."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class Fleet:
         ),
     ]
     out: Annotated[Path, arg(metavar="FILE", aliases=["-o"])] = Path("fleet.parquet")
-    """The table (.parquet), with the page beside it."""
+    """The table (.parquet or .csv), with the page beside it."""
     tolerance: Annotated[
         MaybeNumber, arg(metavar="MM", help_behavior_hint="(default: as each robot.yaml declares)")
     ] = None
@@ -46,9 +48,17 @@ class Fleet:
         """Gather, judge, and print every robot that needs attention; returns why no prior could be written, where one was asked for."""
         from flexcal.cli.tables.fleet import fleet_table
         from flexcal.data.plans import page_beside
+        from flexcal.data.tables import require_table
         from flexcal.jobs.fleet import review_fleet, write_prior
+        from flexcal.model.robot import MOST_TOLERANCE
         from flexcal.units import MILLIMETRE
 
+        require_table(self.out)
+        if self.tolerance is not None and not _LEAST <= self.tolerance <= MOST_TOLERANCE / MILLIMETRE:
+            raise InputError(
+                "E-CLI-049",
+                f"--tolerance is {self.tolerance:g} mm; it is in mm, from {_LEAST:g} to {MOST_TOLERANCE / MILLIMETRE:g}, such as 0.25.",
+            )
         console = Console(self.json)
         with console.progress() as progress:
             fleet = review_fleet(

@@ -12,7 +12,7 @@ from .signals import (
     timestamp_columns,
 )
 from .streaming import streamed_table
-from .tabular_file import Table, TableFile, open_table, tables_in, write_table
+from .tabular_file import Table, TableFile, open_table, require_table, tables_in, write_frame, write_table
 from .timestamps import STAMP, seconds_of, with_seconds
 
 __all__ = [
@@ -30,11 +30,13 @@ __all__ = [
     "check_joint_units",
     "mapped_signals",
     "open_table",
+    "require_table",
     "seconds_of",
     "standard_columns",
     "streamed_table",
     "tables_in",
     "timestamp_columns",
     "with_seconds",
+    "write_frame",
     "write_table",
 ]

@@ -214,10 +214,18 @@ def write_table(path: str | Path, columns: Mapping[str, np.ndarray]) -> None:
     """Write columns (N,) as CSV or Parquet by the file's suffix, atomically; numbers come back bit by bit."""
     import polars as pl
 
-    path = Path(path)
+    write_frame(Path(path), pl.DataFrame({name: pl.Series(values) for name, values in columns.items()}))
+
+
+def require_table(path: Path) -> None:
+    """Raise `InputError` for a file to be written that is no table by its suffix."""
     if path.suffix not in (".csv", ".parquet"):
         raise InputError("E-TABLE-025", f"{path}: a table must end in .csv or .parquet; give another name.")
-    frame = pl.DataFrame({name: pl.Series(values) for name, values in columns.items()})
+
+
+def write_frame(path: Path, frame: pl.DataFrame) -> None:
+    """As `write_table`, of a frame of Polars."""
+    require_table(path)
     with atomic_path(path) as temporary, temporary.open("wb") as stream:
         if path.suffix == ".csv":
             frame.write_csv(stream)

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 from flexcal.errors import InputError, unreadable
 from flexcal.files.formats.yaml_document import parse_document
 from flexcal.files.formats.yaml_writer import write_yaml
-from flexcal.files.structuring import Keys, StructureError, structure
+from flexcal.files.structuring import Keys, StructureError, dotted, structure
 from flexcal.files.transaction import current_path
 
 __all__ = ["YamlFile", "read_yaml", "read_yaml_file", "write_yaml"]
@@ -46,7 +46,9 @@ class YamlFile:
             return structure(self.data, cls)
         except StructureError as problem:
             failure = min(problem.failures, key=lambda failure: self.line(*failure.keys))
-            raise self.error(failure.code, failure.keys, failure.sentence) from problem
+            # a sentence on a mapping that begins with one of its keys is placed there
+            said = failure.sentence.removeprefix(f"{dotted(failure.keys)}: ").split()[0].rstrip(":")
+            raise self.error(failure.code, (*failure.keys, said), failure.sentence) from problem
 
 
 def read_yaml(path: str | Path, cls: type[T]) -> T:

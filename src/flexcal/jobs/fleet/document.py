@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from datetime import datetime
-from pathlib import Path
 from typing import Any
 
 from flexcal.jobs.fleet.accuracy import RobotAccuracy
@@ -16,7 +15,6 @@ from flexcal.jobs.fleet.geometry_document import geometry_entry
 from flexcal.jobs.fleet.geometry_drifts import GeometryDrift
 from flexcal.jobs.fleet.outlooks import outlook_of
 from flexcal.jobs.fleet.parameters import ParameterSpread
-from flexcal.jobs.fleet.projects import date_of
 from flexcal.jobs.fleet.rechecks import LatestRecheck
 from flexcal.jobs.fleet.warmth import growth_remark, warm_remarks
 from flexcal.jobs.fleet_prior import comparable_terms
@@ -123,11 +121,7 @@ def fleet_document(
 
 def _folders(gathered: GatheredFleet) -> int:
     """Number of project folders, those of one robot's visits as one: as many as robots, unless several have one serial."""
-    return len({_place(project.folder) for project in gathered.projects})
-
-
-def _place(folder: Path) -> tuple[str, ...]:
-    return tuple(part for part in folder.parts if date_of((part,)) is None)
+    return len({project.place for project in gathered.projects})
 
 
 def _headline(robots: Sequence[Mapping[str, Any]], states: Mapping[str, int], folders: int) -> str:

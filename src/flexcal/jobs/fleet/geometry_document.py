@@ -11,6 +11,7 @@ from flexcal.jobs.fleet.geometry_drifts import GeometryDrift
 from flexcal.report.results import explanation_in_words
 from flexcal.units import MILLIMETRE
 
+_LOAD = "; joints that yield to a load that was not declared explain it as well: check what the robot carried then"
 _SMALL = 0.2
 """Largest movement of the tool, over the tolerance, that is called small."""
 
@@ -44,9 +45,11 @@ def geometry_entry(drift: GeometryDrift, tolerance: float | None) -> dict[str, A
                 "per_year_std": sum(item.std) / span if drift.step is None else None,
                 "alternatives": list(item.alternatives),
             }
-            for item in drift.explanations
+            for item in (drift.explanations if drift.two_robots is None else ())
         ],
+        "two_robots": drift.two_robots,
         "grows": _grows(drift),
+        "by_load": drift.by_load,
         "temperatures": None if course.trend.temperatures is None else course.trend.temperatures.tolist(),
         "tool_mm": None
         if drift.moved is None
@@ -57,8 +60,8 @@ def geometry_entry(drift: GeometryDrift, tolerance: float | None) -> dict[str, A
 
 def _dates(drift: GeometryDrift) -> tuple[datetime, datetime]:
     """Of the first and the last calibration, or of those before and after a step."""
-    dates = drift.course.dates
-    return (dates[0], dates[-1]) if drift.step is None else (dates[drift.step], dates[drift.step + 1])
+    before, after = drift.compared
+    return drift.course.dates[before], drift.course.dates[after]
 
 
 def _sentence(drift: GeometryDrift, tolerance: float | None) -> str:
@@ -67,10 +70,15 @@ def _sentence(drift: GeometryDrift, tolerance: float | None) -> str:
     over = f"trend over {len(drift.course.dates)} calibrations"
     if drift.step is not None:
         over = f"jump between the calibrations of {before} and {after}"
+    if drift.two_robots is not None:
+        return (
+            f"{over}, of no single cause: are {' and '.join(drift.two_robots)} two robots with one serial number? Give each robot.yaml its "
+            "own; another arm in place of the first, or several changes at once, look the same"
+        )
     if drift.moved is None:
         return (
             f"{over}, of no single parameter of a joint; "
-            "flexcal report --compare shows where the tool moved between two of them"
+            f"flexcal report --compare shows where the tool moved between two of them{_LOAD if drift.by_load else ''}"
         )
     changes = "; ".join(explanation_in_words(item) for item in drift.explanations)
     mean, std, largest = (m / MILLIMETRE for m in drift.moved)
@@ -78,7 +86,7 @@ def _sentence(drift: GeometryDrift, tolerance: float | None) -> str:
         f"{over}{', from the first to the last' if drift.step is None else ':'} {changes}: "
         f"this moves the tool by {mean:.3f} ± {std:.3f} mm on average, {largest:.3f} mm at most"
     )
-    said += _of_temperature(drift)
+    said += _of_temperature(drift) + (_LOAD if drift.by_load else "")
     if tolerance is None:
         return said
     limit = tolerance / MILLIMETRE

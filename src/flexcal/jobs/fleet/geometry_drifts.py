@@ -28,7 +28,9 @@ _OTHER_URDF = "the URDF is another than that of its calibrations, so they cannot
 
 @dataclass(frozen=True, eq=False)
 class GeometryCourse:
-    """A robot's geometry over calibrations on `dates`: its `trend`, and its `steps` between each and the next."""
+    """A robot's geometry over calibrations on `dates`: its `trend`, and its `steps` between each and the next. `places` are the folders of
+    the robot, without dates, that the calibrations are in.
+    """
 
     robot: str
     model: str
@@ -36,13 +38,14 @@ class GeometryCourse:
     dates: tuple[datetime, ...]
     trend: GeometryTrend
     steps: tuple[GeometryTrend, ...]
+    places: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class GeometryDrift:
     """Test of a course, its p-value corrected for the number of robots and of tests of each, and what explains the change where that is
-    significant: `explanations` from the first to the last visit, and by how far they move the tool, m: mean, its standard deviation,
-    largest.
+    significant: `explanations` from the first to the last visit, by how far they move the tool, m: mean, its standard deviation, largest,
+    and `by_load`: whether a load that was not declared explains it about as well.
 
     `step` is the number of the calibration, from 0, after which the robot jumped, where that explains its course better than the trend.
     """
@@ -53,6 +56,22 @@ class GeometryDrift:
     probability: float
     explanations: tuple[Explanation, ...]
     moved: tuple[float, float, float] | None
+    by_load: bool = False
+
+    @property
+    def compared(self) -> tuple[int, int]:
+        """Numbers of the first and the last calibration, or of those before and after a step."""
+        return (0, len(self.course.dates) - 1) if self.step is None else (self.step, self.step + 1)
+
+    @property
+    def two_robots(self) -> tuple[str, str] | None:
+        """Folders that may be of two robots with one serial number: the calibrations compared are of both, and no single change explains
+        how they differ, nor a load.
+        """
+        if not self.course.places or len(self.explanations) == 1 or self.by_load:
+            return None
+        before, after = (self.course.places[k] for k in self.compared)
+        return None if before == after else (before, after)
 
 
 def geometry_courses(
@@ -83,7 +102,8 @@ def geometry_courses(
         if trend is None:
             untested[robot] = _OTHER_URDF
         else:
-            courses.append(GeometryCourse(robot, model, urdf, dates, trend, tuple(steps)))
+            places = tuple(_place(root / row.file, projects) for row in visits)
+            courses.append(GeometryCourse(robot, model, urdf, dates, trend, tuple(steps), places))
     return courses, problems, untested
 
 
@@ -110,8 +130,14 @@ def geometry_drifts(courses: Sequence[GeometryCourse], families: int, level: flo
         test = drift.test
         explanations = along.explained(test.scale, test.freedom) if drift.probability <= level else ()
         moved = along.displacement(explanations, test.scale)
-        found.append(replace(drift, explanations=explanations, moved=moved))
+        by_load = drift.probability <= level and along.is_load(explanations, test.scale, test.freedom)
+        found.append(replace(drift, explanations=explanations, moved=moved, by_load=by_load))
     return found
+
+
+def _place(file: Path, projects: Sequence[Project]) -> str:
+    """Place of the project that a file is of."""
+    return max((p for p in projects if p.folder in file.parents), key=lambda p: len(p.folder.parts)).place
 
 
 def _visits(rows: Sequence[Row]) -> list[Row]:

@@ -93,7 +93,7 @@ class Fleet(SummarisedResult):
         )
 
     def write(self, out: Path) -> None:
-        """Write the table as Parquet, and the page (.html) of the same name beside it.
+        """Write the table (.parquet or .csv), and the page (.html) of the same name beside it.
 
         Parameters
         ----------

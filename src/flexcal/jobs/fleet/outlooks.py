@@ -42,9 +42,13 @@ def _changes(robot: Mapping[str, Any], errors: str, geometry: Mapping[str, Any] 
         grows = (
             ", all lengths together, as by warmth or the scale of the instrument" if geometry["grows"] else ""
         )
-        yield f"the geometry {how}{by}{grows}"
+        places = geometry["two_robots"]
+        asked = "" if places is None else f": are {' and '.join(places)} two robots with one serial number?"
+        load = ", as by a load that was not declared" if geometry["by_load"] else ""
+        yield f"the geometry {how}{by}{grows}{load}{asked}"
     grown = geometry is not None and geometry["grows"]
-    if names := [n for n in robot["drifting_parameters"] if not (grown and ".length_" in n)]:
+    alike = geometry is None or geometry["two_robots"] is None
+    if names := [n for n in robot["drifting_parameters"] if alike and not (grown and ".length_" in n)]:
         yield f"{', '.join(names[:_NAMED])}{' and others' if len(names) > _NAMED else ''}: drifts"
     if visit is not None and visit["changed"]:
         yield f"not as calibrated by the recheck of {visit['date']}: {visit['verdict'].replace('_', ' ')}"

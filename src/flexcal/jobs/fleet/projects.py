@@ -34,11 +34,12 @@ class Problem:
 
 @dataclass(frozen=True)
 class Project:
-    """A folder with a robot.yaml. `robot` is its serial, or without one its path from the fleet's folder without dates; `model` the name
-    in the URDF and `urdf` the SHA-256 of that; `base` are the joints that are on the base.
+    """A folder with a robot.yaml. `place` is its path from the fleet's folder without dates, and `robot` its serial, or without one the
+    place; `model` the name in the URDF and `urdf` the SHA-256 of that; `base` are the joints that are on the base.
     """
 
     folder: Path
+    place: str
     robot: str
     serial: str | None
     model: str
@@ -170,6 +171,7 @@ def _project(root: Path, folder: Path) -> Project:
     place = "/".join(names) or root.resolve().name
     return Project(
         folder,
+        place,
         config.serial or place,
         config.serial,
         model,

@@ -8,7 +8,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flexcal.files.transaction import atomic_path
+from flexcal.data.tables import write_frame
 
 if TYPE_CHECKING:
     import polars as pl
@@ -86,12 +86,11 @@ class FleetTable:
         return cls(pl.DataFrame({n: [getattr(row, n) for row in data] for n in names}, schema=schema))
 
     def write(self, path: Path) -> None:
-        """Write it as Parquet, atomically.
+        """Write it as CSV or Parquet by the suffix, atomically.
 
         Parameters
         ----------
         path : Path
             The file.
         """
-        with atomic_path(path) as file:
-            self.frame.write_parquet(file)
+        write_frame(path, self.frame)

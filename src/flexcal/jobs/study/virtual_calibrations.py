@@ -14,7 +14,6 @@ from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.design.poses import random_poses, select_poses
 from flexcal.design.scene import MeasuringSetup
-from flexcal.errors import FlexcalError
 from flexcal.jobs.calibration import Fits, FitSettings, requested_terms
 from flexcal.jobs.study.measured_values import error_columns, fit_columns, parameter_columns
 from flexcal.jobs.study.options import VirtualCalibrationOptions, structured
@@ -25,8 +24,6 @@ from flexcal.virtual_cell import VirtualCell
 
 _TRUTH, _POSES, _FRESH = range(3)
 """Streams of random numbers of a seed."""
-_MOST_NOISE = 0.1
-"""Noise relative to the reach above which nothing can be calibrated."""
 
 
 @dataclass(frozen=True)
@@ -45,17 +42,10 @@ class VirtualCalibrations(StudyTasks):
         return self.settings
 
     def require(self, options: Mapping[str, Any]) -> None:
-        """As `StudyTasks.require`: there are such terms, and measurements of this noise could tell of a robot."""
+        """As `StudyTasks.require`: there are such terms."""
         chosen = structured(options, VirtualCalibrationOptions, self.settings)
         if chosen.terms:
             requested_terms(self.nominal, chosen.terms)
-        noise, reach = chosen.cell.sensors.tracker_noise_m, self.nominal.reach
-        if noise > _MOST_NOISE * reach:
-            raise FlexcalError(
-                "E-STUDY-025",
-                f"a noise of {noise:g} m is more than {_MOST_NOISE:.0%} of the robot's reach of {reach:.2g} m, from which nothing can be "
-                "calibrated; noises are in m, and those of a laser tracker about 1e-5.",
-            )
 
     def result(self, row: StudyRow) -> dict[str, Any]:
         """As `StudyTasks.result`."""

@@ -1,6 +1,6 @@
 from .arm_sensor import ArmSensor, mounting_names, sensitivity_name, sensor_column, sensor_delay_name
 from .attached_payload import carried_inertias, last_frame, with_payload, with_point, with_point_at_frame
-from .config import RobotConfig, SignalConfig
+from .config import MOST_TOLERANCE, RobotConfig, SignalConfig
 from .drive_config import DynamicsConfig
 from .loading import read_robot
 from .measuring_config import (
@@ -78,6 +78,7 @@ __all__ = [
     "LINK_EXPANSION",
     "MASS_AND_COM",
     "MOMENTS",
+    "MOST_TOLERANCE",
     "NUISANCE",
     "ORIGIN",
     "PARALLEL",

@@ -25,7 +25,10 @@ from flexcal.model.robot.measuring_config import (
     Triple,
     WireConfig,
 )
-from flexcal.units import temperature_fault
+from flexcal.units import MILLIMETRE, temperature_fault
+
+MOST_TOLERANCE = 10 * MILLIMETRE
+"""Largest tolerance of the tool's errors, m, that is not taken for one in mm."""
 
 
 @dataclass(frozen=True)
@@ -201,3 +204,9 @@ class RobotConfig:
     def __post_init__(self) -> None:
         if self.tolerance is not None and not self.tolerance > 0:
             raise FlexcalError("E-ROBOT-079", f"tolerance must be positive, not {self.tolerance:g} m.")
+        if self.tolerance is not None and self.tolerance > MOST_TOLERANCE:
+            raise FlexcalError(
+                "E-ROBOT-081",
+                f"tolerance: {self.tolerance:g} m is more than {MOST_TOLERANCE / MILLIMETRE:g} mm; it is in metres: write "
+                f"{MILLIMETRE * self.tolerance:g} for {self.tolerance:g} mm.",
+            )
