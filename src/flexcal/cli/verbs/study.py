@@ -74,6 +74,7 @@ class Study:
 
 def _lines(document: dict[str, Any]) -> list[str]:
     from flexcal.report.layout import listed
+    from flexcal.report.results import effect_sentence, share_between
 
     count = document["tasks"]
     lines = [
@@ -83,7 +84,11 @@ def _lines(document: dict[str, Any]) -> list[str]:
     error = document["errors"].get(document["error"], {}).get("p90_mm")
     if error and error["tasks"]:
         middle = f"90th percentile of the errors ({document['error']}): median {error['median']:.4f} mm over the tasks"
-        span = f", {error['low']:.4f} to {error['high']:.4f} mm in 95 % of them" if error["tasks"] > 1 else ""
+        span = (
+            f", {error['low']:.4f} to {error['high']:.4f} mm in {share_between(error)} of them"
+            if error["tasks"] > 1
+            else ""
+        )
         lines.append(middle + span)
     covered = document["coverage"]
     if covered and covered["low"] is not None:
@@ -99,11 +104,7 @@ def _lines(document: dict[str, Any]) -> list[str]:
     larger = document["resampling"]["surely_larger"] if spread else []
     if larger:
         lines.append(f"{listed(larger, 3)}: more spread than the fit states, by more than chance explains")
-    for item in document["effects"]:
-        if item["share"] is not None:
-            lines.append(
-                f"{item['option']} explains {100 * item['share']:.0f} % of the variance between tasks"
-            )
+    lines += [effect_sentence(item) for item in document["effects"]]
     for item in document["failures"][:3]:
         lines.append(f"failed, {item['tasks']} tasks: {item['error']}")
     return lines
