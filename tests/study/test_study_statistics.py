@@ -225,6 +225,51 @@ def test_a_jackknife_of_means_gives_their_standard_error() -> None:
     assert block["parameters"]["a"]["spread"] == pytest.approx(np.std(means[1:], ddof=1))
 
 
+def jackknife_of_lines(
+    groups: int, rows: int, unknowns: int, rng: np.random.Generator, *, far: float = 1.0
+) -> dict[str, Any]:
+    """Jackknife of a linear least-squares problem with normal errors, its last group `far` times as far out as the others."""
+    matrix, group = rng.standard_normal((rows, unknowns)), np.arange(rows) % groups
+    matrix[group == groups - 1] *= far
+    right = rng.standard_normal(rows)
+    estimates = [
+        np.linalg.lstsq(matrix[group != left], right[group != left])[0] for left in (-1, *range(groups))
+    ]
+    residual = right - matrix @ estimates[0]
+    std = np.sqrt(residual @ residual / (rows - unknowns) * np.diag(np.linalg.inv(matrix.T @ matrix)))
+    sizes = np.array([rows, *(int((group != left).sum()) for left in range(groups))])
+    columns = {"resample": ["all", *(f"without {k}" for k in range(groups))], "freedom": sizes - unknowns}
+    columns["rank"] = np.full(groups + 1, unknowns)
+    for k in range(unknowns):
+        columns |= {f"p{k}.estimate": [x[k] for x in estimates], f"p{k}.std": np.full(groups + 1, std[k])}
+    return study_statistics(table(columns, truth=False))["resampling"]
+
+
+@pytest.mark.parametrize(("groups", "rows"), [(10, 60), (10, 120), (20, 60)])
+def test_a_jackknife_of_sound_data_spreads_as_expected(groups: int, rows: int) -> None:
+    """27 parameters of few measurements: the spread alone would call the stated standard deviations too small."""
+    rng = np.random.default_rng(groups + rows)
+    blocks = [jackknife_of_lines(groups, rows, 27, rng) for _ in range(30)]
+    ratios = [block["ratio"] / block["expected"] for block in blocks]
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.1)
+    assert sum(bool(block["surely_larger"]) for block in blocks) <= 1
+
+
+def test_one_group_of_great_influence_is_no_spread_beyond_chance() -> None:
+    rng = np.random.default_rng(17)
+    blocks = [jackknife_of_lines(10, 120, 20, rng, far=3.0) for _ in range(60)]
+    assert (
+        sum(bool(block["surely_larger"]) for block in blocks) <= 4
+    )  # by chi-square of nine degrees of freedom 12
+
+
+def test_fewer_than_eight_data_sets_are_not_judged() -> None:
+    columns = spreads([9.0] * 5, 6, np.random.default_rng(18))
+    assert [check.status for check in checks_of_resamples(columns, 6)] == ["good", "good"]
+    studied = table({"resample": ["all", *(f"bootstrap {k}" for k in range(6))], **columns}, truth=False)
+    assert study_statistics(studied)["resampling"]["surely_larger"] == []
+
+
 def checks_of_resamples(columns: dict[str, object], count: int) -> tuple[Check, ...]:
     """Checks of the page of a study of resampled data."""
     names = ["all", *(f"bootstrap {k}" for k in range(count))]

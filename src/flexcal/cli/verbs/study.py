@@ -74,7 +74,7 @@ class Study:
 
 def _lines(document: dict[str, Any]) -> list[str]:
     from flexcal.report.layout import listed
-    from flexcal.report.results import effect_sentence, share_between
+    from flexcal.report.results import FEWEST_RESAMPLES, effect_sentence, share_between
 
     count = document["tasks"]
     lines = [
@@ -96,14 +96,23 @@ def _lines(document: dict[str, Any]) -> list[str]:
             f"95 % intervals that hold the true value: {100 * covered['share']:.1f} % "
             f"({100 * covered['low']:.1f} to {100 * covered['high']:.1f} %)"
         )
-    spread = document["resampling"] and document["resampling"]["ratio"]
-    if spread:
-        lines.append(
-            f"the estimates spread over the resampled data {spread:.2g} times as much as the fit states (median over the parameters)"
+    block = document["resampling"]
+    if block and block["ratio"]:
+        few = (
+            ""
+            if block["resamples"] >= FEWEST_RESAMPLES
+            else f"; {block['resamples']} data sets are too few to judge by"
         )
-    larger = document["resampling"]["surely_larger"] if spread else []
-    if larger:
-        lines.append(f"{listed(larger, 3)}: more spread than the fit states, by more than chance explains")
+        expected = "" if block["expected"] < 1.05 else f"; of sound data {block['expected']:.2g} times"
+        lines.append(
+            f"the estimates spread over the resampled data {block['ratio']:.2g} times as much as the fit states (median over the "
+            f"parameters{expected}{few})"
+        )
+        larger = block["surely_larger"]
+        if larger:
+            lines.append(
+                f"{listed(larger, 3)}: more spread than the fit states, by more than chance explains"
+            )
     lines += [effect_sentence(item) for item in document["effects"]]
     for item in document["failures"][:3]:
         lines.append(f"failed, {item['tasks']} tasks: {item['error']}")

@@ -143,6 +143,7 @@ class ResampledCalibrations(StudyTasks):
             **columns,
             **error_columns("fit", fit.errors),
             **fit_columns(fit.estimate, fit.variances),
+            "freedom": fit.linear.freedom,
             "terms": " ".join(fits.terms),
             **parameter_columns(
                 fit.estimate, other=_of_another_meaning(fit.estimate, whole.selected.estimate)

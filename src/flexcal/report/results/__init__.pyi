@@ -10,12 +10,13 @@ from .run_significance import LEVEL, ParameterChanges, parameter_changes
 from .runs import Comparison, Run
 from .study_coverage import NOMINAL_COVERAGE, binomial_interval
 from .study_effects import effect_probability, effect_sentence, explained_share, study_level_rows
-from .study_summary import ABOUT_ALIKE, share_between, study_statistics
+from .study_summary import ABOUT_ALIKE, FEWEST_RESAMPLES, share_between, study_statistics
 from .study_table import StudyTable
 from .two_stage_study import TwoStageStudy
 
 __all__ = [
     "ABOUT_ALIKE",
+    "FEWEST_RESAMPLES",
     "LEVEL",
     "NOMINAL_COVERAGE",
     "NOT_GIVEN",

@@ -76,6 +76,8 @@ def option_effects(table: StudyTable) -> list[dict[str, Any]]:
 def effect_sentence(item: Mapping[str, Any]) -> str:
     """What a study tells of the effect of an option."""
     name, p = item["option"], item["p"]
+    if item["levels"] and sum(level["median_mm"] is not None for level in item["levels"]) < 2:
+        return f"{name}: fewer than two of its values have results"
     if p is None:
         return f"{name}: too few seeds, draws or data sets to tell an effect from chance"
     if item["by_chance"]:
