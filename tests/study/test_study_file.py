@@ -69,6 +69,18 @@ def test_groups_and_draws_of_a_data_set(tmp_path: Path) -> None:
     ("changes", "code", "names"),
     [
         ({"seed": 3}, "E-YAML-001", ("line 7", "seed")),
+        ({"seeds": {"count": 10**11}}, "E-STUDY-014", ("200000000000 tasks",)),
+        ({"draw": {"count": 10**9, "options": {"plan": {"choice": ["random"]}}}}, "E-STUDY-014", ("4000000000",)),
+        (
+            {"draw": {"count": 2, "options": {"cell.spread.angle": {"uniform": [0.002, 0.001]}}}},
+            "E-STUDY-028",
+            ("uniform: [0.001, 0.002]",),
+        ),
+        (
+            {"draw": {"count": 2, "options": {"cell.spread.angle": {"log_uniform": [0.002, 0.001]}}}},
+            "E-STUDY-028",
+            ("log_uniform: [0.001, 0.002]",),
+        ),
         ({"kind": "calibrat"}, "E-YAML-034", ("line 1", "calibrat")),
         ({"options": {"terms": ["kinematic"], "losss": "cauchy"}}, "E-YAML-001", ("line 6", "losss")),
         ({"options": {"cell.sensors.noise": 1}}, "E-YAML-001", ("line 4", "noise")),
