@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from flexcal.design.scene import CollisionChecker
 from flexcal.errors import FlexcalError, InputError
 from flexcal.files.formats import YamlFile, provenance, read_yaml, read_yaml_file
 from flexcal.files.structuring import StructureError
@@ -80,7 +81,7 @@ def _tasks(path: Path, config: StudyConfig) -> StudyTasks:
     if isinstance(config, TwoStageConfig):
         return TwoStageRuns.of(robot, nominal, settings)
     sources = (robot, nominal.urdf, *([declared] if declared.exists() else []))
-    return VirtualCalibrations(nominal, settings, provenance(sources))
+    return VirtualCalibrations(nominal, CollisionChecker(nominal), settings, provenance(sources))
 
 
 def _check_options(file: YamlFile, config: StudyConfig, tasks: StudyTasks) -> None:
