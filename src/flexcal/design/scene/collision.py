@@ -255,4 +255,6 @@ def _add_obstacle(geometry: Any, path: Path) -> None:
         )
     for item in _shapes(model, path).geometryObjects:
         name = f"{path.stem}.{item.name}"
-        geometry.addGeometryObject(pin.GeometryObject(name, 0, 0, item.placement, item.geometry))
+        placed = pin.GeometryObject(name, 0, 0, item.placement, item.geometry)
+        placed.meshPath = item.meshPath
+        geometry.addGeometryObject(placed)
