@@ -1,3 +1,5 @@
+import pickle
+
 import numpy as np
 from refusals import refused
 
@@ -94,7 +96,11 @@ def test_obstacles_of_robot_yaml(tmp_path):
         CollisionChecker(model)
 
 
-def test_meshes_count_as_their_hull_and_missing_ones_are_an_error(tmp_path):
+_MESH = '<collision><geometry><mesh filename="part.stl"/></geometry></collision>'
+
+
+def _write_mesh(path):
+    """A wedge of four corners, 1 m long."""
     corners = np.array([[0, -0.05, 0.95], [1, -0.05, 0.95], [1, 0.05, 0.95], [0.5, 0, 1.05]])
     faces = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)]
     facets = "".join(
@@ -103,13 +109,33 @@ def test_meshes_count_as_their_hull_and_missing_ones_are_an_error(tmp_path):
         + "endloop\nendfacet\n"
         for face in faces
     )
-    mesh = '<collision><geometry><mesh filename="part.stl"/></geometry></collision>'
-    model = _planar(tmp_path, last=mesh)
+    path.write_text(f"solid part\n{facets}endsolid part\n")
+
+
+def test_meshes_count_as_their_hull_and_missing_ones_are_an_error(tmp_path):
+    model = _planar(tmp_path, last=_MESH)
     with refused("E-DESIGN-036"):
         CollisionChecker(model)
-    (tmp_path / "part.stl").write_text(f"solid part\n{facets}endsolid part\n")
+    _write_mesh(tmp_path / "part.stl")
     checker = CollisionChecker(model, floor=None)
     np.testing.assert_array_equal(checker.collides(np.array([[0, 2.9, 0.2], [0, 0.3, 0.2]])), [True, False])
+
+
+def test_a_checker_travels_without_its_files(tmp_path, rng):
+    wall = _LINK.format(name="wall", shape=_BOX.format(xyz="1.5 0 1", size=".1 1 1"))
+    (tmp_path / "wall.urdf").write_text(f'<robot name="wall">{wall}</robot>')
+    _write_mesh(tmp_path / "part.stl")
+    model = _planar(tmp_path, last=_MESH, obstacles="obstacles: [wall.urdf]\n")
+    checker = CollisionChecker(model)
+    sent = pickle.dumps(checker)
+    for path in list(tmp_path.iterdir()):
+        path.unlink()
+    there = pickle.loads(sent)
+    q = rng.uniform(-3, 3, (200, 3))
+    assert 20 < checker.collides(q).sum() < 180
+    np.testing.assert_array_equal(there.collides(q), checker.collides(q))
+    np.testing.assert_array_equal(there.margins, checker.margins)
+    assert there.permanent == checker.permanent
 
 
 def test_no_shapes_no_collisions(ur5, rng):

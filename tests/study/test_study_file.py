@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 from refusals import refused
 from small_study import EXAMPLES, UR5, write_study
 
+from flexcal.design.scene import CollisionChecker
 from flexcal.jobs.study import read_study
+from flexcal.jobs.study.two_stage_runs import TwoStageRuns
+from flexcal.model.robot import RobotModel
 
 DATA_SET = {
     "kind": "calibrate",
@@ -69,6 +74,18 @@ def test_groups_and_draws_of_a_data_set(tmp_path: Path) -> None:
     ("changes", "code", "names"),
     [
         ({"seed": 3}, "E-YAML-001", ("line 7", "seed")),
+        ({"seeds": {"count": 10**11}}, "E-STUDY-014", ("200000000000 tasks",)),
+        ({"draw": {"count": 10**9, "options": {"plan": {"choice": ["random"]}}}}, "E-STUDY-014", ("4000000000",)),
+        (
+            {"draw": {"count": 2, "options": {"cell.spread.angle": {"uniform": [0.002, 0.001]}}}},
+            "E-STUDY-028",
+            ("uniform: [0.001, 0.002]",),
+        ),
+        (
+            {"draw": {"count": 2, "options": {"cell.spread.angle": {"log_uniform": [0.002, 0.001]}}}},
+            "E-STUDY-028",
+            ("log_uniform: [0.001, 0.002]",),
+        ),
         ({"kind": "calibrat"}, "E-YAML-034", ("line 1", "calibrat")),
         ({"options": {"terms": ["kinematic"], "losss": "cauchy"}}, "E-YAML-001", ("line 6", "losss")),
         ({"options": {"cell.sensors.noise": 1}}, "E-YAML-001", ("line 4", "noise")),
@@ -113,3 +130,31 @@ def test_a_two_stage_study_takes_the_robots_own_files(tmp_path: Path) -> None:
     assert {
         f"input.{name}" for name in ("robot.yaml", "tx90l.urdf", "cell.yaml", "frequency_poses.csv")
     } < set(plan.tasks.origin)
+
+
+def test_a_two_stage_study_takes_obstacles_and_meshes(tmp_path: Path) -> None:
+    """Written elsewhere, its files make the robot with the same collision shapes."""
+    folder = tmp_path / "here" / "cell" / "robots"
+    shutil.copytree(EXAMPLES / "tx90l", folder)
+    for name, end in (("package://cell/part.stl", "part"), ("../part.stl", "other")):
+        shape = f'<collision><origin xyz="3 0 1"/><geometry><mesh filename="{name}"/></geometry></collision>'
+        (folder / f"{end}.urdf").write_text(f'<robot name="wall"><link name="wall">{shape}</link></robot>')
+    corners = np.eye(4, 3)
+    vertices = [
+        "".join(f"vertex {x} {y} {z}\n" for x, y, z in np.delete(corners, k, axis=0)) for k in range(4)
+    ]
+    facets = [f"facet normal 0 0 0\nouter loop\n{text}endloop\nendfacet\n" for text in vertices]
+    (folder.parent / "part.stl").write_text(f"solid part\n{''.join(facets)}endsolid part\n")
+    with (folder / "robot.yaml").open("a") as file:
+        file.write("obstacles: [part.urdf, other.urdf]\n")
+    path = write_study(tmp_path, kind="two_stage", robot=str(folder / "robot.yaml"), grid=None, options=None)
+    tasks = read_study(path).tasks
+    assert isinstance(tasks, TwoStageRuns)
+    shapes = [shape.name for shape in CollisionChecker(RobotModel.from_yaml(folder / "robot.yaml")).shapes]
+    shutil.rmtree(tmp_path / "here")
+    for name, content in tasks.contents.items():
+        there = tmp_path / "there" / name
+        there.parent.mkdir(parents=True, exist_ok=True)
+        there.write_bytes(content)
+    copied = RobotModel.from_yaml(tmp_path / "there" / tasks.robot)
+    assert [shape.name for shape in CollisionChecker(copied).shapes] == shapes

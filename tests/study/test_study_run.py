@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import pickle
 import shutil
 import signal
 import subprocess
@@ -19,6 +20,7 @@ from small_study import UR5, stored, write_study
 
 from flexcal.cli.main import main
 from flexcal.jobs.study import read_study, run_study
+from flexcal.jobs.study.tasks import run_row
 from flexcal.parallel import ThisProcess, open_workers
 
 
@@ -36,6 +38,22 @@ def test_processes_and_a_cluster_give_the_same_bits(whole: Path, dask_address: s
         with open_workers(on, jobs) as workers:
             run_study(plan, tmp_path / name, workers)
         assert_frame_equal(stored(tmp_path / name), stored(whole), check_exact=True)
+
+
+@pytest.mark.parametrize("kind", ["virtual_calibration", "calibrate"])
+def test_tasks_need_no_files(kind: str, tmp_path: Path) -> None:
+    """As on the worker of another machine: robot and measurements are sent."""
+    folder = tmp_path / "robot"
+    shutil.copytree(UR5, folder)
+    given: dict[str, object] = {"robot": "robot.yaml", "kind": kind}
+    if kind == "calibrate":
+        given |= {"poses": ["random.csv"], "resampling": {"jackknife": 20}, "options": {"terms": ["offsets"]}}
+        given |= {"seeds": None, "grid": None}
+    plan = read_study(write_study(folder, **given))
+    expected = run_row(plan.rows[1], plan.tasks)
+    sent = pickle.dumps(plan.tasks)
+    shutil.rmtree(folder)
+    assert run_row(plan.rows[1], pickle.loads(sent)) == expected
 
 
 def test_a_row_a_task_and_a_page(whole: Path) -> None:

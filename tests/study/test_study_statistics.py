@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import polars
 import pytest
-from scipy.stats import binomtest
+from scipy.stats import binomtest, ttest_rel
 
 from flexcal.report.layout import Check, write_page
 from flexcal.report.pages import StudyReport, study_page
-from flexcal.report.results import StudyTable, binomial_interval, study_statistics
+from flexcal.report.results import (
+    StudyTable,
+    binomial_interval,
+    effect_probability,
+    effect_sentence,
+    study_statistics,
+)
 
 
 @pytest.mark.parametrize(("inside", "count"), [(0, 7), (7, 7), (93, 100), (1, 2), (1900, 2000)])
@@ -124,6 +130,85 @@ def test_the_share_of_an_option_is_that_of_the_variance_it_makes() -> None:
     assert [level["value"] for level in found["poses"]["levels"]] == [10, 20, 40]
 
 
+def effects(
+    seeds: int,
+    cells: Sequence[dict[str, float]],
+    mean: Callable[[dict[str, float]], float],
+    rng: np.random.Generator,
+) -> dict[str, dict[str, Any]]:
+    """Effects of the options of `cells`, each run with every seed: seeds scatter the logarithm by 0.5, and tasks by 0.2."""
+    of_seed = rng.normal(0, 0.5, seeds)
+    rows = [(seed, cell) for cell in cells for seed in range(seeds)]
+    errors = np.exp([mean(cell) + of_seed[seed] + rng.normal(0, 0.2) for seed, cell in rows])
+    columns = {f"option.{name}": [cell[name] for _, cell in rows] for name in cells[0]}
+    studied = table(
+        {"seed": [seed for seed, _ in rows], "verification.p90_mm": errors, **columns},
+        tuple(columns),
+        truth=False,
+    )
+    return {item["option"]: item for item in study_statistics(studied)["effects"]}
+
+
+GRID = [{"poses": poses, "noise": noise} for poses in (10, 20) for noise in (1, 2, 3)]
+
+
+def drawn_cells(count: int, rng: np.random.Generator) -> list[dict[str, float]]:
+    return [{"poses": poses, "noise": noise} for poses, noise in rng.uniform(0, 1, (count, 2))]
+
+
+@pytest.mark.parametrize(("seeds", "draws"), [(2, 0), (3, 0), (8, 0), (4, 9), (3, 24)])
+def test_options_without_effect_are_seldom_said_to_have_one(seeds: int, draws: int) -> None:
+    rng = np.random.default_rng(11)
+    alarms = 0
+    for _ in range(60):
+        found = effects(seeds, drawn_cells(draws, rng) if draws else GRID, lambda _: 0.0, rng)
+        alarms += any(not item["by_chance"] for item in found.values())
+    assert alarms <= 8  # 5 % of 60 are 3; more than 8 have a probability of 0.3 %
+
+
+def test_an_effect_is_that_of_its_own_option_only() -> None:
+    """Draws of two options of which one has an effect, in as many studies of a grid and of draws."""
+    rng = np.random.default_rng(12)
+    found = [effects(4, GRID, lambda cell: cell["noise"], rng) for _ in range(20)]
+    found += [effects(4, drawn_cells(20, rng), lambda cell: 4.0 * cell["noise"], rng) for _ in range(20)]
+    assert all(not item["noise"]["by_chance"] for item in found)
+    assert sum(not item["poses"]["by_chance"] for item in found) <= 4
+
+
+def test_an_interaction_is_an_effect_of_the_options_together() -> None:
+    cells = [{"poses": a, "noise": b} for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
+    found = effects(6, cells, lambda cell: 2.0 * cell["poses"] * cell["noise"], np.random.default_rng(13))
+    assert found["poses"]["by_chance"] and found["noise"]["by_chance"]
+    together = found["all options together"]
+    assert not together["by_chance"] and together["share"] > 0.8
+
+
+@pytest.mark.parametrize(("seeds", "draws"), [(1, 0), (1, 30), (6, 5)])
+def test_one_seed_or_a_few_draws_do_not_tell_an_effect_from_chance(seeds: int, draws: int) -> None:
+    """Five draws of two options: whatever one explains the other explains too."""
+    rng = np.random.default_rng(14)
+    found = effects(seeds, drawn_cells(draws, rng) if draws else GRID, lambda cell: 9.0 * cell["noise"], rng)
+    assert all(item["p"] is None and item["by_chance"] for item in found.values())
+    assert "too few" in effect_sentence(found["noise"])
+
+
+def test_the_probability_of_an_effect_is_that_of_the_analysis_of_variance() -> None:
+    """Two levels and n seeds: the paired t-test. Failed tasks leave out their seed."""
+    rng = np.random.default_rng(15)
+    first, second = rng.normal(0, 1, (2, 9))
+    labels, seeds = np.repeat([0, 1], 9), np.tile(np.arange(9), 2)
+    values = np.concatenate([first, second])
+    expected = ttest_rel(first, second).pvalue
+    assert effect_probability(values, labels, labels, seeds) == pytest.approx(expected, rel=1e-9)
+    kept = np.arange(18) != 4
+    expected = ttest_rel(np.delete(first, 4), np.delete(second, 4)).pvalue
+    assert effect_probability(values[kept], labels[kept], labels[kept], seeds[kept]) == pytest.approx(
+        expected, rel=1e-9
+    )
+    alike = np.tile(first, 2)
+    assert effect_probability(alike, labels, labels, seeds) == 1.0
+
+
 def test_a_jackknife_of_means_gives_their_standard_error() -> None:
     """Means of all but one of n numbers: exactly s / √n."""
     values = np.random.default_rng(7).standard_normal(12)
@@ -138,6 +223,51 @@ def test_a_jackknife_of_means_gives_their_standard_error() -> None:
         table({"resample": names, "a.estimate": means, "a.std": [1.0] * 13}, truth=False)
     )["resampling"]
     assert block["parameters"]["a"]["spread"] == pytest.approx(np.std(means[1:], ddof=1))
+
+
+def jackknife_of_lines(
+    groups: int, rows: int, unknowns: int, rng: np.random.Generator, *, far: float = 1.0
+) -> dict[str, Any]:
+    """Jackknife of a linear least-squares problem with normal errors, its last group `far` times as far out as the others."""
+    matrix, group = rng.standard_normal((rows, unknowns)), np.arange(rows) % groups
+    matrix[group == groups - 1] *= far
+    right = rng.standard_normal(rows)
+    estimates = [
+        np.linalg.lstsq(matrix[group != left], right[group != left])[0] for left in (-1, *range(groups))
+    ]
+    residual = right - matrix @ estimates[0]
+    std = np.sqrt(residual @ residual / (rows - unknowns) * np.diag(np.linalg.inv(matrix.T @ matrix)))
+    sizes = np.array([rows, *(int((group != left).sum()) for left in range(groups))])
+    columns = {"resample": ["all", *(f"without {k}" for k in range(groups))], "freedom": sizes - unknowns}
+    columns["rank"] = np.full(groups + 1, unknowns)
+    for k in range(unknowns):
+        columns |= {f"p{k}.estimate": [x[k] for x in estimates], f"p{k}.std": np.full(groups + 1, std[k])}
+    return study_statistics(table(columns, truth=False))["resampling"]
+
+
+@pytest.mark.parametrize(("groups", "rows"), [(10, 60), (10, 120), (20, 60)])
+def test_a_jackknife_of_sound_data_spreads_as_expected(groups: int, rows: int) -> None:
+    """27 parameters of few measurements: the spread alone would call the stated standard deviations too small."""
+    rng = np.random.default_rng(groups + rows)
+    blocks = [jackknife_of_lines(groups, rows, 27, rng) for _ in range(30)]
+    ratios = [block["ratio"] / block["expected"] for block in blocks]
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.1)
+    assert sum(bool(block["surely_larger"]) for block in blocks) <= 1
+
+
+def test_one_group_of_great_influence_is_no_spread_beyond_chance() -> None:
+    rng = np.random.default_rng(17)
+    blocks = [jackknife_of_lines(10, 120, 20, rng, far=3.0) for _ in range(60)]
+    assert (
+        sum(bool(block["surely_larger"]) for block in blocks) <= 4
+    )  # by chi-square of nine degrees of freedom 12
+
+
+def test_fewer_than_eight_data_sets_are_not_judged() -> None:
+    columns = spreads([9.0] * 5, 6, np.random.default_rng(18))
+    assert [check.status for check in checks_of_resamples(columns, 6)] == ["good", "good"]
+    studied = table({"resample": ["all", *(f"bootstrap {k}" for k in range(6))], **columns}, truth=False)
+    assert study_statistics(studied)["resampling"]["surely_larger"] == []
 
 
 def checks_of_resamples(columns: dict[str, object], count: int) -> tuple[Check, ...]:
@@ -233,6 +363,28 @@ def test_eight_seeds_do_not_show_that_uncertainties_are_too_large() -> None:
     assert (
         check.status == "unknown" and "may be too large" in check.answer and "8 seeds are few" in check.answer
     )
+
+
+@pytest.mark.parametrize("seeds", [1, 2, 3])
+def test_a_few_seeds_do_not_show_that_intervals_are_right(seeds: int) -> None:
+    """All intervals hold the truth; nothing is known of robots that no seed drew."""
+    covered, check = judged(table(intervals(np.zeros((seeds, 40)), 1.0) | {"seed": np.arange(seeds)}))
+    assert covered["low"] < 0.88 and check.status == "unknown" and "too few to tell" in check.answer
+
+
+@pytest.mark.parametrize(("count", "told"), [(2, "in all of the tasks"), (200, "in 95 % of the tasks")])
+def test_the_range_of_the_errors_holds_as_many_tasks_as_it_says(count: int, told: str) -> None:
+    errors = np.random.default_rng(16).uniform(0.1, 0.2, count)
+    studied = table({f"verification.{name}": errors for name in ("mean_mm", "p90_mm", "max_mm")}, truth=False)
+    item = study_statistics(studied)["errors"]["verification"]["p90_mm"]
+    assert np.mean((item["low"] <= errors) & (errors <= item["high"])) >= (1.0 if count < 40 else 0.95)
+    results = {"study": "calibrate", "name": "s", "error": "verification", "has_truth": False, "command": ""}
+    results |= {
+        "provenance": {},
+        "tasks": {"total": count, "done": count, "failed": 0},
+        **study_statistics(studied),
+    }
+    assert told in study_page(StudyReport(results, studied)).verdict.facts[0].detail
 
 
 def test_names_and_messages_are_text_in_the_page(tmp_path) -> None:

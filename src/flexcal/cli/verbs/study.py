@@ -74,6 +74,7 @@ class Study:
 
 def _lines(document: dict[str, Any]) -> list[str]:
     from flexcal.report.layout import listed
+    from flexcal.report.results import FEWEST_RESAMPLES, effect_sentence, share_between
 
     count = document["tasks"]
     lines = [
@@ -83,7 +84,11 @@ def _lines(document: dict[str, Any]) -> list[str]:
     error = document["errors"].get(document["error"], {}).get("p90_mm")
     if error and error["tasks"]:
         middle = f"90th percentile of the errors ({document['error']}): median {error['median']:.4f} mm over the tasks"
-        span = f", {error['low']:.4f} to {error['high']:.4f} mm in 95 % of them" if error["tasks"] > 1 else ""
+        span = (
+            f", {error['low']:.4f} to {error['high']:.4f} mm in {share_between(error)} of them"
+            if error["tasks"] > 1
+            else ""
+        )
         lines.append(middle + span)
     covered = document["coverage"]
     if covered and covered["low"] is not None:
@@ -91,19 +96,24 @@ def _lines(document: dict[str, Any]) -> list[str]:
             f"95 % intervals that hold the true value: {100 * covered['share']:.1f} % "
             f"({100 * covered['low']:.1f} to {100 * covered['high']:.1f} %)"
         )
-    spread = document["resampling"] and document["resampling"]["ratio"]
-    if spread:
-        lines.append(
-            f"the estimates spread over the resampled data {spread:.2g} times as much as the fit states (median over the parameters)"
+    block = document["resampling"]
+    if block and block["ratio"]:
+        few = (
+            ""
+            if block["resamples"] >= FEWEST_RESAMPLES
+            else f"; {block['resamples']} data sets are too few to judge by"
         )
-    larger = document["resampling"]["surely_larger"] if spread else []
-    if larger:
-        lines.append(f"{listed(larger, 3)}: more spread than the fit states, by more than chance explains")
-    for item in document["effects"]:
-        if item["share"] is not None:
+        expected = "" if block["expected"] < 1.05 else f"; of sound data {block['expected']:.2g} times"
+        lines.append(
+            f"the estimates spread over the resampled data {block['ratio']:.2g} times as much as the fit states (median over the "
+            f"parameters{expected}{few})"
+        )
+        larger = block["surely_larger"]
+        if larger:
             lines.append(
-                f"{item['option']} explains {100 * item['share']:.0f} % of the variance between tasks"
+                f"{listed(larger, 3)}: more spread than the fit states, by more than chance explains"
             )
+    lines += [effect_sentence(item) for item in document["effects"]]
     for item in document["failures"][:3]:
         lines.append(f"failed, {item['tasks']} tasks: {item['error']}")
     return lines

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -79,9 +78,17 @@ class CollisionChecker:
         near = self._always_touching(pairs, [margin] * len(pairs))
         self._checked = self._set_pairs(pairs, [0.0 if pair in near else margin for pair in pairs])
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Made anew in another process: Pinocchio's and coal's objects do not travel."""
-        return partial(CollisionChecker, margin=self.margin, floor=self.floor), (self.model,)
+    def __getstate__(self) -> dict[str, Any]:
+        """All but what Pinocchio computes in; another process needs none of the files."""
+        left_out = {"_data": None, "_checked": [float(margin) for margin in self.margins]}
+        return {**vars(self), **left_out}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """State of an equal checker, with memory of its own to compute in."""
+        vars(self).update(state)
+        self._data = self.kinematics.createData()
+        pairs = [(pair.first, pair.second) for pair in self.geometry.collisionPairs]
+        self._checked = self._set_pairs(pairs, state["_checked"])
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
@@ -248,4 +255,6 @@ def _add_obstacle(geometry: Any, path: Path) -> None:
         )
     for item in _shapes(model, path).geometryObjects:
         name = f"{path.stem}.{item.name}"
-        geometry.addGeometryObject(pin.GeometryObject(name, 0, 0, item.placement, item.geometry))
+        placed = pin.GeometryObject(name, 0, 0, item.placement, item.geometry)
+        placed.meshPath = item.meshPath
+        geometry.addGeometryObject(placed)

@@ -29,6 +29,9 @@ class UniformConfig:
 
     uniform: tuple[float, float]
 
+    def __post_init__(self) -> None:
+        _require_order("uniform", self.uniform)
+
 
 @dataclass(frozen=True)
 class LogUniformConfig:
@@ -39,6 +42,14 @@ class LogUniformConfig:
     def __post_init__(self) -> None:
         if not min(self.log_uniform) > 0:
             raise FlexcalError("E-STUDY-002", "log_uniform needs two positive numbers.")
+        _require_order("log_uniform", self.log_uniform)
+
+
+def _require_order(name: str, limits: tuple[float, float]) -> None:
+    if limits[0] > limits[1]:
+        raise FlexcalError(
+            "E-STUDY-028", f"{name} needs its limits in order; write {name}: [{limits[1]:g}, {limits[0]:g}]."
+        )
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from flexcal.calibration.fit import GeometricFit
+from flexcal.calibration.measurement import kind_names
 from flexcal.data.poses import PoseSet, read_grouped_poses, read_poses, tables_of
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
@@ -141,6 +143,7 @@ class ResampledCalibrations(StudyTasks):
             **columns,
             **error_columns("fit", fit.errors),
             **fit_columns(fit.estimate, fit.variances),
+            "freedom": fit.linear.freedom,
             "terms": " ".join(fits.terms),
             **parameter_columns(
                 fit.estimate, other=_of_another_meaning(fit.estimate, whole.selected.estimate)
@@ -170,13 +173,15 @@ def _of_another_meaning(estimate: Estimate, whole: Estimate) -> frozenset[str]:
 def _with_residuals(fits: Fits, rng: np.random.Generator) -> PoseSet:
     """Fitted measurements plus residuals that are drawn, with replacement, among those of the same station and kind.
 
-    Residuals are scaled by √(n / (n − p)), as they are smaller than the errors (Efron and Tibshirani 1993, section 9.4).
+    Residuals are drawn in units of their standard deviations, as readings of another stated sigma scatter otherwise, and scaled by
+    √(n / (n − p)), as they are smaller than the errors (Efron and Tibshirani 1993, section 9.4; Davison and Hinkley 1997, section 6.2.4).
     """
     fit = fits.selected
     poses, residuals = fit.poses, fit.residuals
     readings = poses.position.size if poses.kind is None else int(np.sum(residuals != 0))
     scale = np.sqrt(readings / max(readings - fit.estimate.rank, 1))
     position = poses.position - residuals
+    std = _standard_deviations(fit)
     kinds = np.full(len(poses), "") if poses.kind is None else poses.kind
     for group in dict.fromkeys(zip(poses.station.tolist(), kinds.tolist(), strict=True)):
         rows = np.flatnonzero((poses.station == group[0]) & (kinds == group[1]))
@@ -185,9 +190,19 @@ def _with_residuals(fits: Fits, rng: np.random.Generator) -> PoseSet:
                 "E-STUDY-013",
                 f"station '{group[0]}' has {len(rows)} measurements, too few to draw residuals from; use jackknife or leave_one_out.",
             )
-        own = residuals[rows] - residuals[rows].mean(axis=0)
-        position[rows] += scale * own[rng.integers(len(rows), size=len(rows))]
+        own = residuals[rows] / std[rows]
+        own -= own.mean(axis=0)
+        position[rows] += scale * std[rows] * own[rng.integers(len(rows), size=len(rows))]
     return replace(poses, position=position)
+
+
+def _standard_deviations(fit: GeometricFit) -> np.ndarray:
+    """Standard deviations (N, 3), m, of measured coordinates: of the instrument as stated, of the robot and of the model error."""
+    scatter, own = fit.scatter, np.full(len(fit.poses), fit.robot_scatter)
+    for name in fit.linear.readings.instruments:
+        own[kind_names(fit.poses) == name] = getattr(scatter, name)
+    variance = (scatter.share * fit.poses.sigma) ** 2 + own[:, None] ** 2 + scatter.model**2
+    return np.sqrt(np.where(variance > 0, variance, 1.0))
 
 
 def _random_groups(pose: np.ndarray, resampling: ResamplingConfig) -> np.ndarray:

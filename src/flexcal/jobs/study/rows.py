@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -27,6 +28,11 @@ class StudyRow:
         """Name of the task, which depends on nothing but what it is given."""
         given = json.dumps([dict(sorted(self.options.items())), self.seed, self.resample])
         return hashlib.sha256(given.encode()).hexdigest()[:20]
+
+
+def combination_count(config: StudyConfig) -> int:
+    """Number of `combinations`."""
+    return math.prod(map(len, config.grid.values())) * (1 if config.draw is None else config.draw.count)
 
 
 def combinations(config: StudyConfig) -> Iterator[dict[str, Any]]:

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from flexcal.design.scene import CollisionChecker
 from flexcal.errors import FlexcalError, InputError
 from flexcal.files.formats import YamlFile, provenance, read_yaml, read_yaml_file
 from flexcal.files.structuring import StructureError
 from flexcal.jobs.study.config import CalibrateConfig, StudyConfig, TwoStageConfig
 from flexcal.jobs.study.options import structured
 from flexcal.jobs.study.resampled_calibrations import ResampledCalibrations
-from flexcal.jobs.study.rows import StudyRow, combinations, rows
+from flexcal.jobs.study.rows import StudyRow, combination_count, combinations, rows
 from flexcal.jobs.study.tasks import StudyTasks
 from flexcal.jobs.study.two_stage_runs import TwoStageRuns
 from flexcal.jobs.study.virtual_calibrations import VirtualCalibrations
@@ -44,6 +45,16 @@ def read_study(path: Path) -> StudyPlan:
     config: StudyConfig = file.structure(StudyConfig)  # type: ignore[arg-type]
     tasks = _tasks(path, config)
     _check_options(file, config, tasks)
+    if isinstance(config, CalibrateConfig):
+        seed = 0 if config.resampling is None else config.resampling.seed
+        seeds = range(seed, seed + 1)
+    else:
+        seeds = range(config.seeds.first, config.seeds.first + config.seeds.count)
+    count = combination_count(config) * len(seeds) * len(tasks.resamples)
+    if count > _MOST_ROWS:
+        raise InputError(
+            "E-STUDY-014", f"{path} declares {count} tasks; at most {_MOST_ROWS} fit in a study."
+        )
     chosen = list(combinations(config))
     for options in chosen:
         try:
@@ -51,15 +62,6 @@ def read_study(path: Path) -> StudyPlan:
         except FlexcalError as problem:
             given = ", ".join(f"{name}: {json.dumps(value)}" for name, value in options.items())
             raise InputError(problem.code, f"{path}: {problem} (with {given})") from problem
-    if isinstance(config, CalibrateConfig):
-        seeds = [0 if config.resampling is None else config.resampling.seed]
-    else:
-        seeds = list(range(config.seeds.first, config.seeds.first + config.seeds.count))
-    count = len(chosen) * len(seeds) * len(tasks.resamples)
-    if count > _MOST_ROWS:
-        raise InputError(
-            "E-STUDY-014", f"{path} declares {count} tasks; at most {_MOST_ROWS} fit in a study."
-        )
     planned = rows(chosen, seeds, tasks.resamples)
     different = {row.key: row for row in planned}
     return StudyPlan(path, config, tasks, tuple(different.values()))
@@ -79,7 +81,7 @@ def _tasks(path: Path, config: StudyConfig) -> StudyTasks:
     if isinstance(config, TwoStageConfig):
         return TwoStageRuns.of(robot, nominal, settings)
     sources = (robot, nominal.urdf, *([declared] if declared.exists() else []))
-    return VirtualCalibrations(nominal, settings, provenance(sources))
+    return VirtualCalibrations(nominal, CollisionChecker(nominal), settings, provenance(sources))
 
 
 def _check_options(file: YamlFile, config: StudyConfig, tasks: StudyTasks) -> None:

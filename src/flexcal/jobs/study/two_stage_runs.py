@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, ClassVar
 
+from flexcal.design.scene import CollisionChecker
 from flexcal.files.formats import provenance
 from flexcal.jobs.study.measured_values import error_columns, fit_columns, parameter_columns
 from flexcal.jobs.study.options import TwoStageOptions, structured
@@ -31,10 +32,21 @@ class TwoStageRuns(StudyTasks):
 
     @classmethod
     def of(cls, robot: Path, model: RobotModel, settings: Mapping[str, Any]) -> TwoStageRuns:
-        """Tasks on the robot of a robot.yaml, with the files beside it that the demonstration needs."""
-        beside = [robot.parent / name for name in ("cell.yaml", "frequency_poses.csv")]
-        paths = [Path(os.path.abspath(path)) for path in (robot, model.urdf, *beside) if path.is_file()]
-        common = Path(os.path.commonpath([path.parent for path in paths]))
+        """Tasks on the robot of a robot.yaml, with the files that the demonstration needs: settings, obstacles and meshes too."""
+        beside = [
+            robot.parent / name for name in ("cell.yaml", "frequency_poses.csv", *model.config.obstacles)
+        ]
+        meshes = [Path(item.meshPath) for item in CollisionChecker(model).geometry.geometryObjects]
+        paths = list(
+            dict.fromkeys(
+                Path(os.path.abspath(path))
+                for path in (robot, model.urdf, *beside, *meshes)
+                if path.is_file()
+            )
+        )
+        common = Path(
+            os.path.commonpath([path.parent for path in paths])
+        ).parent  # package://name/ is in a folder of its name
         contents = {path.relative_to(common).as_posix(): path.read_bytes() for path in paths}
         return cls(paths[0].relative_to(common).as_posix(), contents, settings, provenance(paths))
 

@@ -11,9 +11,10 @@ import numpy as np
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.fit import GeometricFit, fit_geometry
 from flexcal.calibration.measurement import predict_measurements
+from flexcal.data.plans import PosePlan
 from flexcal.data.poses import PoseSet
 from flexcal.design.poses import random_poses, select_poses
-from flexcal.design.scene import MeasuringSetup
+from flexcal.design.scene import CollisionChecker, MeasuringSetup
 from flexcal.jobs.calibration import Fits, FitSettings, requested_terms
 from flexcal.jobs.study.measured_values import error_columns, fit_columns, parameter_columns
 from flexcal.jobs.study.options import VirtualCalibrationOptions, structured
@@ -28,9 +29,13 @@ _TRUTH, _POSES, _FRESH = range(3)
 
 @dataclass(frozen=True)
 class VirtualCalibrations(StudyTasks):
-    """Draws the true parameters of a robot from the seed, measures it, calibrates, and compares with the truth at fresh poses."""
+    """Draws the true parameters of a robot from the seed, measures it, calibrates, and compares with the truth at fresh poses.
+
+    `checker` is of the `nominal` robot: with it tasks need no files.
+    """
 
     nominal: RobotModel
+    checker: CollisionChecker
     settings: Mapping[str, Any]
     origin: Mapping[str, str]
     options: ClassVar[type] = VirtualCalibrationOptions
@@ -53,12 +58,13 @@ class VirtualCalibrations(StudyTasks):
         cell, truth = VirtualCell.drawn(self.nominal, options.cell, row.seed)
         setup = MeasuringSetup()
         choose = random_poses if options.plan == "random" else _most_informative
-        plan = choose(self.nominal, options.poses, np.random.default_rng([row.seed, _POSES]), setup)
+        checker = self.checker
+        rng = np.random.default_rng([row.seed, _POSES])
+        plan = choose(self.nominal, options.poses, rng, setup, checker=checker)
         measured = cell.measure(plan)
         fit = self._fitted(measured, options)
-        fresh = random_poses(
-            self.nominal, options.verification_poses, np.random.default_rng([row.seed, _FRESH]), setup
-        )
+        rng = np.random.default_rng([row.seed, _FRESH])
+        fresh = random_poses(self.nominal, options.verification_poses, rng, setup, checker=checker)
         seen = cell.measure(fresh)
         errors = cell.noise_free(fresh) - predict_measurements(fit.model, seen).position
         return {
@@ -78,5 +84,12 @@ class VirtualCalibrations(StudyTasks):
         return fit_geometry(model, poses, terms=terms, elastic=elastic, loss=options.loss)
 
 
-def _most_informative(model: RobotModel, count: int, rng: np.random.Generator, setup: MeasuringSetup) -> Any:
-    return select_poses(model, count, rng=rng, setup=setup).plan
+def _most_informative(
+    model: RobotModel,
+    count: int,
+    rng: np.random.Generator,
+    setup: MeasuringSetup,
+    *,
+    checker: CollisionChecker,
+) -> PosePlan:
+    return select_poses(model, count, rng=rng, setup=setup, checker=checker).plan

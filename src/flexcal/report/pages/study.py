@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,7 +23,7 @@ from flexcal.report.layout import (
     significant,
     worst,
 )
-from flexcal.report.results import ABOUT_ALIKE, NOMINAL_COVERAGE, StudyTable
+from flexcal.report.results import ABOUT_ALIKE, FEWEST_RESAMPLES, NOMINAL_COVERAGE, StudyTable, share_between
 from flexcal.report.sections import (
     coverage_range,
     coverage_section,
@@ -45,13 +45,13 @@ _KINDS = {
     "two_stage": "two-stage calibrations of virtual robots",
     "calibrate": "calibrations on measured poses",
 }
-_FEWEST_RESAMPLES = 8
-"""Least number of resamples that tell a spread."""
 _NAMED = 3
 """Largest number of parameters that a sentence names."""
 _COVERAGE_QUESTION = "Do the 95 % intervals hold the true values in 95 % of cases?"
 _NEAR = 0.02
 """Distance of a share of intervals from 95 % that changes no decision: 93 to 97 %."""
+_CLEARLY_LESS = 0.883
+"""Share of intervals that hold the truth where standard deviations are stated a quarter too small: 2 Φ(1.96 / 1.25) − 1."""
 _FEW_SEEDS = 20
 """Number of seeds from which a share of intervals that is too large says that they are."""
 _LISTED = 100
@@ -94,7 +94,7 @@ def _verdict(results: Mapping[str, Any]) -> Verdict:
     error = results["errors"].get(results["error"], {}).get("p90_mm")
     facts = []
     if error and error["tasks"]:
-        range_ = f"{document_millimetres(error['low'])} to {document_millimetres(error['high'])} mm in 95 % of the tasks."
+        range_ = f"{document_millimetres(error['low'])} to {document_millimetres(error['high'])} mm in {share_between(error)} of the tasks."
         words = _NAMES[results["error"]]
         facts.append(
             Fact(
@@ -119,16 +119,8 @@ def _verdict(results: Mapping[str, Any]) -> Verdict:
                 f"Share of all intervals; {detail}",
             )
         )
-    if results["effects"] and results["effects"][0]["share"] is not None:
-        first = results["effects"][0]
-        facts.append(
-            Fact(
-                "What drives the error most?",
-                percent(first["share"]),
-                "",
-                f"of the variance between tasks is explained by {first['option']}.",
-            )
-        )
+    if results["effects"]:
+        facts.append(_effect_fact(results["effects"]))
     count = results["tasks"]
     headline = (
         f"{count['done']} tasks"
@@ -142,6 +134,29 @@ def _verdict(results: Mapping[str, Any]) -> Verdict:
     if seconds["tasks"]:
         sentence += f" A task takes {significant(seconds['median'], 2)} s (median)."
     return Verdict(worst(checks), headline, sentence, tuple(facts), (), "", checks)
+
+
+def _effect_fact(effects: Sequence[Mapping[str, Any]]) -> Fact:
+    """The option with the largest effect of those that are not by chance."""
+    question = "What drives the error most?"
+    sure = [item for item in effects if not item["by_chance"]]
+    if sure:
+        single = [item for item in sure if item["levels"]] or sure
+        first = max(single, key=lambda item: item["share"])
+        return Fact(
+            question,
+            percent(first["share"]),
+            "",
+            f"of the variance between tasks is explained by {first['option']}.",
+        )
+    if all(item["p"] is None for item in effects):
+        return Fact(
+            question,
+            "unknown",
+            "",
+            "Too few seeds, draws or data sets to tell an effect of an option from chance.",
+        )
+    return Fact(question, "nothing", "", "No option has an effect beyond chance.")
 
 
 def _checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
@@ -174,6 +189,10 @@ def _coverage_check(covered: Mapping[str, Any]) -> Check:
     low, high = covered["low"], covered["high"]
     answer = f"{percent(covered['share'])} of the intervals hold the true value, 95 % interval of this share {coverage_range(covered)}"
     if low <= NOMINAL_COVERAGE <= high:
+        if low < _CLEARLY_LESS:
+            seeds = f"{covered['seeds']} seed{' is' if covered['seeds'] == 1 else 's are'}"
+            answer += f": {seeds} too few to tell whether the stated uncertainties are too small; run {_FEW_SEEDS} or more"
+            return Check(_COVERAGE_QUESTION, f"{answer}.", "unknown")
         return Check(_COVERAGE_QUESTION, f"{answer}.", "good")
     small = high < NOMINAL_COVERAGE
     near = low >= NOMINAL_COVERAGE - _NEAR and high <= NOMINAL_COVERAGE + _NEAR
@@ -192,13 +211,17 @@ def _coverage_check(covered: Mapping[str, Any]) -> Check:
 
 def _resampling_check(block: Mapping[str, Any]) -> list[Check]:
     """Whether the spread over resamples is that which the fit states, as far as so many resamples tell."""
-    middle = block["ratio"]
-    if middle is None or block["resamples"] < _FEWEST_RESAMPLES:
+    middle, expected = block["ratio"], block["expected"]
+    if middle is None or block["resamples"] < FEWEST_RESAMPLES:
         return []
     tolerated = ABOUT_ALIKE + 2 / np.sqrt(2 * (block["resamples"] - 1))
-    answer = f"The spread over {block['resamples']} data sets is {significant(middle, 3)} times the stated one (median over the parameters)"
+    beside = "" if expected < 1.05 else f"; a jackknife of sound data would have {significant(expected, 3)}"
+    answer = (
+        f"The spread over {block['resamples']} data sets is {significant(middle, 3)} times the stated one (median over the parameters"
+        f"{beside})"
+    )
     question = "Do resampled data spread the estimates as their standard deviations say?"
-    if middle > tolerated:
+    if middle > tolerated * expected:
         return [Check(question, f"{answer}: the stated uncertainties are too small for these data.", "bad")]
     single = block["surely_larger"]
     if single:
@@ -212,7 +235,7 @@ def _resampling_check(block: Mapping[str, Any]) -> list[Check]:
                 "care",
             )
         ]
-    if middle < 1 / tolerated:
+    if middle < expected / tolerated:
         shared = "they also hold errors that all resamples share, as those of the model at neighbouring poses"
         return [Check(question, f"{answer}: no sign that the stated ones are too small; {shared}.", "good")]
     return [Check(question, f"{answer}.", "good")]
@@ -232,7 +255,7 @@ def _errors_section(study: StudyReport) -> Section:
     blocks = [
         Table(
             "table-errors",
-            "Errors of a task: median over the tasks, and the range of 95 % of them",
+            "Errors of a task: median over the tasks, and the range of 95 % or, of fewer than 40, of all of them",
             columns,
             tuple(rows),
         ),

@@ -8,18 +8,15 @@ from .particulars import NOT_GIVEN, MeasurementDetails
 from .published_values import TX90L_PAPER, PublishedValues
 from .run_significance import LEVEL, ParameterChanges, parameter_changes
 from .runs import Comparison, Run
-from .study_summary import (
-    ABOUT_ALIKE,
-    NOMINAL_COVERAGE,
-    binomial_interval,
-    study_level_rows,
-    study_statistics,
-)
+from .study_coverage import NOMINAL_COVERAGE, binomial_interval
+from .study_effects import effect_probability, effect_sentence, explained_share, study_level_rows
+from .study_summary import ABOUT_ALIKE, FEWEST_RESAMPLES, share_between, study_statistics
 from .study_table import StudyTable
 from .two_stage_study import TwoStageStudy
 
 __all__ = [
     "ABOUT_ALIKE",
+    "FEWEST_RESAMPLES",
     "LEVEL",
     "NOMINAL_COVERAGE",
     "NOT_GIVEN",
@@ -39,11 +36,15 @@ __all__ = [
     "binomial_interval",
     "chance_in_words",
     "change_sentence",
+    "effect_probability",
+    "effect_sentence",
+    "explained_share",
     "explanation_in_words",
     "fitted_responses",
     "is_drifting",
     "parameter_changes",
     "relative_to_diagonal",
+    "share_between",
     "study_level_rows",
     "study_statistics",
     "tolerance_kept",

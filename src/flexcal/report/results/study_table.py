@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,6 +49,26 @@ class StudyTable:
     def values(self, name: str) -> list[Any]:
         """A column as it is."""
         return self.frame[name].to_list() if name in self.frame.columns else [None] * len(self.frame)
+
+    @cached_property
+    def drawn_together(self) -> tuple[str, ...]:
+        """Options of which not every value runs with every combination of the others."""
+        whole = self._count(self.options)
+        found = []
+        for name in self.options:
+            others = [other for other in self.options if other != name]
+            if whole < self._count((name,)) * self._count(others):
+                found.append(name)
+        return tuple(found)
+
+    def combinations(self, names: Sequence[str]) -> np.ndarray:
+        """Number (N,) of the combination of values of several columns in every row."""
+        numbers: dict[Any, int] = {}
+        rows = zip(*(self.values(name) for name in names), strict=True) if names else [()] * len(self)
+        return np.array([numbers.setdefault(row, len(numbers)) for row in rows], dtype=int)
+
+    def _count(self, names: Sequence[str]) -> int:
+        return len(np.unique(self.combinations(names)))
 
     @property
     def errors(self) -> tuple[str, ...]:

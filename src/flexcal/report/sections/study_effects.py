@@ -6,26 +6,41 @@ from collections.abc import Mapping
 from typing import Any
 
 from flexcal.report.figures import level_distributions
-from flexcal.report.layout import NOTHING, FigureBlock, Section, Table, Text, document_millimetres, percent
-from flexcal.report.results import StudyTable, study_level_rows
+from flexcal.report.layout import (
+    NOTHING,
+    FigureBlock,
+    Section,
+    Table,
+    Text,
+    document_millimetres,
+    p_value,
+    percent,
+)
+from flexcal.report.results import StudyTable, effect_sentence, study_level_rows
 
 
 def effects_section(results: Mapping[str, Any], table: StudyTable) -> Section:
     """Shares of the variance between tasks, and errors by the values of every option, from `effects` of results.json."""
     blocks = []
     shares = tuple(
-        (item["option"], percent(item["share"]) if item["share"] is not None else NOTHING)
+        (
+            item["option"],
+            percent(item["share"]) if item["share"] is not None else NOTHING,
+            p_value(item["p"]) if item["p"] is not None else NOTHING,
+        )
         for item in results["effects"]
     )
-    blocks.append(Table("table-shares", "Share of the variance between tasks", ("option", "share"), shares))
-    blocks.append(
-        Text(
-            (
-                "Variance of the logarithm of a task's 90th percentile, explained by the levels of an option alone (ε², adjusted for "
-                "chance; an option without effect has about 0). The rest are seeds, other options, and interactions.",
-            )
-        )
+    words = (
+        "Variance of the logarithm of a task's 90th percentile, explained by the levels of an option alone (ε², adjusted for chance; an "
+        "option without effect has about 0). The rest are seeds, other options, and interactions. p is the probability that an option "
+        "without effect explains as much, from the scatter between seeds and between draws; there is none where these are too few."
     )
+    told = tuple(f"{effect_sentence(item)}." for item in results["effects"])
+    blocks.append(Text(told))
+    blocks.append(
+        Table("table-shares", "Share of the variance between tasks", ("option", "share", "p"), shares)
+    )
+    blocks.append(Text((words,)))
     if any(item["option"].startswith("cell.") for item in results["effects"]):
         blocks.append(
             Text(
@@ -37,7 +52,7 @@ def effects_section(results: Mapping[str, Any], table: StudyTable) -> Section:
     values = table.numbers(f"{table.error}.p90_mm")
     known = results["has_truth"]
     columns = ("value", "tasks", "median / mm", *(("coverage",) if known else ()))
-    for number, item in enumerate(results["effects"], 1):
+    for number, item in enumerate((item for item in results["effects"] if item["levels"]), 1):
         option = item["option"]
         rows = tuple(
             (
