@@ -73,7 +73,7 @@ class Study:
 
 
 def _lines(document: dict[str, Any]) -> list[str]:
-    from flexcal.report.layout import listed
+    from flexcal.report.layout import counted, listed
     from flexcal.report.results import FEWEST_RESAMPLES, effect_sentence, share_between
 
     count = document["tasks"]
@@ -115,5 +115,5 @@ def _lines(document: dict[str, Any]) -> list[str]:
             )
     lines += [effect_sentence(item) for item in document["effects"]]
     for item in document["failures"][:3]:
-        lines.append(f"failed, {item['tasks']} tasks: {item['error']}")
+        lines.append(f"failed, {counted(item['tasks'], 'task')}: {item['error']}")
     return lines

@@ -17,6 +17,7 @@ from flexcal.report.layout import (
     Section,
     Table,
     Verdict,
+    counted,
     document_millimetres,
     listed,
     percent,
@@ -123,7 +124,7 @@ def _verdict(results: Mapping[str, Any]) -> Verdict:
         facts.append(_effect_fact(results["effects"]))
     count = results["tasks"]
     headline = (
-        f"{count['done']} tasks"
+        counted(count["done"], "task")
         if count["done"] == count["total"]
         else f"{count['done']} of {count['total']} tasks; the study is not complete"
     )
