@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
+import numpy as np
+
+from flexcal.dynamics.diagnostics import TorquePrediction
 from flexcal.dynamics.drives import stiffness_attenuation
 from flexcal.dynamics.estimators import EstimatorName
 from flexcal.dynamics.friction import FrictionSelection
@@ -69,6 +72,33 @@ def dynamics_remarks(data: RegressionData, estimate: Estimate) -> tuple[str, ...
             where = "in any recording" if name not in structural else "in these recordings"
             remarks.append(f"{name} is not identifiable beside {heirs} {where}")
     return tuple(remarks)
+
+
+_FEWEST_LOGS = 3
+_UNLIKE = 1.5
+"""Error of the torques of a log, relative to the median of the others, from which it is named."""
+_NOTABLE = 0.03
+"""Relative error below which no log is named."""
+
+
+def unlike_log_notes(predictions: Sequence[TorquePrediction]) -> Iterator[str]:
+    """Note on the log whose torques the fit misses by far more than those of two or more others."""
+    fitted = [item for item in predictions if not item.held_out.all()]
+    if len(fitted) < _FEWEST_LOGS:
+        return
+    measured = [item.measured[~item.held_out] for item in fitted]
+    scale = np.sqrt(np.mean(np.concatenate(measured) ** 2, axis=0))
+    scale = np.where(scale > 0, scale, np.inf)
+    left = [(item.measured - item.predicted)[~item.held_out] / scale for item in fitted]
+    errors = np.array([np.sqrt(np.mean(part**2)) for part in left])
+    worst = int(errors.argmax())
+    others = np.delete(errors, worst)
+    if errors[worst] > _UNLIKE * np.median(others) and errors[worst] > _NOTABLE:
+        yield (
+            f"the torques of {fitted[worst].name} are met worse than those of the {len(others)} other logs: relative error "
+            f"{errors[worst]:.1%}, of the others {others.min():.1%} to {others.max():.1%}; was another load, tool or robot recorded, or "
+            "another unit?"
+        )
 
 
 def dynamics_notes(data: RegressionData, estimate: Estimate, estimator: EstimatorName) -> tuple[str, ...]:

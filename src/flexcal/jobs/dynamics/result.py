@@ -19,7 +19,12 @@ from flexcal.dynamics.regression import RegressionData
 from flexcal.dynamics.signals import Motion
 from flexcal.errors import FlexcalError
 from flexcal.files.formats import Block
-from flexcal.jobs.dynamics.remarks import dynamics_notes, dynamics_remarks, selection_remark
+from flexcal.jobs.dynamics.remarks import (
+    dynamics_notes,
+    dynamics_remarks,
+    selection_remark,
+    unlike_log_notes,
+)
 from flexcal.jobs.logs import Preprocessing
 from flexcal.jobs.pages import TorqueIdentification, summary_row
 from flexcal.jobs.result_files import (
@@ -230,6 +235,7 @@ class DynamicsIdentification(TorqueIdentification):
             "notes": [
                 *([] if self.pooled is None else self.pooled.remarks),
                 *dynamics_notes(self.train, self.estimate, self.estimator),
+                *unlike_log_notes(self.predictions),
             ],
             "weight_shares": {
                 joint: asdict(share) for joint, share in self.weight_shares.items() if share.unlike

@@ -46,9 +46,9 @@ class RobotAccuracy:
     outlook: str
     rise: Rise | None
     rises_tested: bool
-    warmth: Warmth | None = None
-    warm_drift: bool = False
-    warm_rise: bool = False
+    warmth: Warmth | None
+    warm_drift: bool
+    warm_rise: bool
 
     @property
     def reached(self) -> tuple[datetime | None, datetime | None, datetime | None]:
@@ -88,9 +88,9 @@ def robot_accuracies(
             state, reason = _state(verification, tolerance, len(left_out[robot]))
         warmth, rise = every.get(robot, {}), rises.get(robot)
         warm_drift = drift is not None and explains_trend(
-            [date.date() for date in drift.visits.dates],
+            [time.date() for time in drift.visits.dates],
             warmth,
-            np.array([years(date) for date in drift.visits.dates]),
+            np.array([years(time) for time in drift.visits.dates]),
             drift.trend.slope,
         )
         reaches, outlook = _outlook(same.get(robot, []), drift, tolerance, state, level, warm_drift)
