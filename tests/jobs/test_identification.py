@@ -71,33 +71,23 @@ def test_a_log_with_another_load_is_named(files: tuple[Path, Path]) -> None:
     """A point mass at the end of the lower link, by virtual work; and three logs of the same robot."""
     model, mass = RobotModel.from_yaml(files[0]), 1.5
     rng = np.random.default_rng(11)
-    logs, loaded = [], []
+    logs = []
     for _ in range(3):
         _, q, dq, ddq = swings(10.0, 500.0, 0.1, rng)
         acted = torque(q, dq, ddq) + 0.1 * rng.normal(size=q.shape)
-        log = replace(read_recording(files[1], model), q=q, torque=acted)
-        logs.append(log)
-        first, both = q[:, 0], q.sum(axis=1)
-        # p = L (cos a + cos b, -sin a - sin b) in x and z, its acceleration with gravity, and columns of the Jacobian
-        speeds, turns = (dq[:, 0], dq.sum(axis=1)), (ddq[:, 0], ddq.sum(axis=1))
-        x = sum(
-            -LENGTH * (np.sin(a) * w + np.cos(a) * v**2)
-            for a, v, w in zip((first, both), speeds, turns, strict=True)
-        )
-        z = (
-            sum(
-                -LENGTH * (np.cos(a) * w - np.sin(a) * v**2)
-                for a, v, w in zip((first, both), speeds, turns, strict=True)
-            )
-            + GRAVITY
-        )
-        outer = (-LENGTH * np.sin(both), -LENGTH * np.cos(both))
-        whole = (outer[0] - LENGTH * np.sin(first), outer[1] - LENGTH * np.cos(first))
-        added = mass * np.stack([whole[0] * x + whole[1] * z, outer[0] * x + outer[1] * z], axis=1)
-        loaded.append(replace(log, torque=acted + added))
+        logs.append(replace(read_recording(files[1], model), q=q, torque=acted))
+    first, both = q[:, 0], q.sum(axis=1)
+    # p = L (cos a + cos b, -sin a - sin b) in x and z, its acceleration with gravity, and columns of the Jacobian
+    motion = [(first, dq[:, 0], ddq[:, 0]), (both, dq.sum(axis=1), ddq.sum(axis=1))]
+    x = sum(-LENGTH * (np.sin(a) * w + np.cos(a) * v**2) for a, v, w in motion)
+    z = sum(-LENGTH * (np.cos(a) * w - np.sin(a) * v**2) for a, v, w in motion) + GRAVITY
+    outer = (-LENGTH * np.sin(both), -LENGTH * np.cos(both))
+    whole = (outer[0] - LENGTH * np.sin(first), outer[1] - LENGTH * np.cos(first))
+    added = mass * np.stack([whole[0] * x + whole[1] * z, outer[0] * x + outer[1] * z], axis=1)
+    loaded = replace(logs[2], torque=acted + added)
     alike = identify_dynamics(model, logs, friction="classic").document()["notes"]
     assert not any("other logs" in note for note in alike)
-    notes = identify_dynamics(model, [*logs[:2], loaded[2]], friction="classic").document()["notes"]
+    notes = identify_dynamics(model, [*logs[:2], loaded], friction="classic").document()["notes"]
     (said,) = [note for note in notes if "other logs" in note]
     assert "log_3" in said and "was another load" in said
 

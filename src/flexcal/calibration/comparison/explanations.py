@@ -73,7 +73,7 @@ def explain(
         others = [c for c in chosen if c is not item]
         rest, used = _rest(difference, others)
         if chance_of(rest, len(difference) - used, freedom) > LEVEL:
-            del chances[next(k for k, c in enumerate(chosen) if c is item)]
+            del chances[chosen.index(item)]
             chosen = others
     return _told(difference, chosen, chances, candidates)
 

@@ -241,7 +241,6 @@ def _judge(errors: VisitErrors) -> JudgedVisit:
     if caused and not suspects:  # scatter is not it: more changed, or this is another robot
         return JudgedVisit(test, probability, (), together, shifts, rivals=two_changes(test))
     shifts = tuple(_suspect(wider, item, 1) for item in wider.seen if len(item.change.names) == 1)
-    rivals = None if suspects else rivals
     return JudgedVisit(
         wider,
         probability,
@@ -250,7 +249,7 @@ def _judge(errors: VisitErrors) -> JudgedVisit:
         shifts,
         scatter=scatter,
         geometry=other > -CLEAR,
-        rivals=rivals,
+        rivals=None if suspects else rivals,
     )
 
 

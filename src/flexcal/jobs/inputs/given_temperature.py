@@ -94,7 +94,7 @@ def kelvin_outside(robot: CalibratedRobot, temperature: np.ndarray | None) -> fl
     """
     if depends_on_temperature(robot.model):
         return None
-    measured = robot.blocks["calibration"].ranges.get(TEMPERATURE) if "calibration" in robot.blocks else None
+    measured = _measured_range(robot)
     if measured is None or temperature is None:
         return None
     above, below = float(temperature.max()) - measured[1], float(temperature.min()) - measured[0]
@@ -104,7 +104,7 @@ def kelvin_outside(robot: CalibratedRobot, temperature: np.ndarray | None) -> fl
 def _unused(robot: CalibratedRobot, temperature: np.ndarray, what: str) -> str:
     """That a calibration without a term of temperature takes none, and how far outside its own temperatures those given (N,), °C, are."""
     said = "the temperature is not used, because the calibration has no term that depends on it: "
-    measured = robot.blocks["calibration"].ranges.get(TEMPERATURE) if "calibration" in robot.blocks else None
+    measured = _measured_range(robot)
     if measured is None:
         return f"{said}{what} are for the temperature at which it was measured, which is not known"
     low, high = measured
@@ -121,6 +121,11 @@ def _unused(robot: CalibratedRobot, temperature: np.ndarray, what: str) -> str:
         else f"of those given the farthest, {farthest:.1f} °C,"
     )
     return f"{said}{what} are for the temperatures at which it was measured, {where}; {given} is {beyond:.1f} K outside"
+
+
+def _measured_range(robot: CalibratedRobot) -> tuple[float, float] | None:
+    """Lowest and highest temperature that the calibration measured, °C; None where it measured none."""
+    return robot.blocks["calibration"].ranges.get(TEMPERATURE) if "calibration" in robot.blocks else None
 
 
 def calibrated_temperatures(robot: CalibratedRobot) -> tuple[float, float]:

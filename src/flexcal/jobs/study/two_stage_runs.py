@@ -44,9 +44,8 @@ class TwoStageRuns(StudyTasks):
                 if path.is_file()
             )
         )
-        common = Path(
-            os.path.commonpath([path.parent for path in paths])
-        ).parent  # package://name/ is in a folder of its name
+        # package://name/ is in a folder of its name
+        common = Path(os.path.commonpath([path.parent for path in paths])).parent
         contents = {path.relative_to(common).as_posix(): path.read_bytes() for path in paths}
         return cls(paths[0].relative_to(common).as_posix(), contents, settings, provenance(paths))
 

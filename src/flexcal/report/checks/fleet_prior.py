@@ -30,7 +30,7 @@ def check_fleet(block: Mapping[str, Any] | None) -> tuple[Check, ...]:
     return (
         Check(
             _QUESTION,
-            f"Yes: {beside} nothing in these measurements contradicts the {robots} others ({chance_in_words(conflict['probability'])}); "
+            f"Yes: {beside}nothing in these measurements contradicts the {robots} others ({chance_in_words(conflict['probability'])}); "
             f"{len(block['from_fleet'])} of {block['parameters']} parameters are known from them, not from these measurements.",
             "good",
             "fleet",
