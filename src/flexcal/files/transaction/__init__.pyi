@@ -2,6 +2,7 @@ from .atomic_writing import atomic_path, atomic_paths, write_text
 from .file_kinds import refuse_irregular, refuse_stream
 from .locks import lock_file
 from .publication import FileTransaction, current_path
+from .reading import open_regular, read_bytes, read_text
 from .recovery import recover
 from .staging_folder import Stage, age, living_owner, stages_in
 
@@ -14,6 +15,9 @@ __all__ = [
     "current_path",
     "living_owner",
     "lock_file",
+    "open_regular",
+    "read_bytes",
+    "read_text",
     "recover",
     "refuse_irregular",
     "refuse_stream",
