@@ -25,6 +25,7 @@ from flexcal.programs.notation import Notation
 from flexcal.programs.orientation import RollPitchYaw
 from flexcal.programs.pose import Pose
 from flexcal.programs.program import Program, ProgramFile, ProgramTarget, RunTimeTarget
+from flexcal.programs.syntax import whole_number
 from flexcal.programs.target_list import TargetList
 from flexcal.units import DEGREE
 
@@ -170,7 +171,7 @@ class _Reader:
         words = [token for token in _words(statement) if token.type not in ("LABEL", "REMARK")]
         for key, (_, table, _) in _FRAMES.items():
             if len(words) > 3 and words[0].upper() == table and words[1] == "[":
-                number = int(words[2]) if words[2].type == "NUMBER" and words[3] == "]" else None
+                number = whole_number(words[2]) if words[2].type == "NUMBER" and words[3] == "]" else None
                 self.set_by_program.add((key, number))
 
     def _instruction(self, words: Sequence[Token]) -> None:
@@ -185,7 +186,7 @@ class _Reader:
             if name == choice:
                 last = words[-1]
                 whole = len(words) == 3 and last.type == "NUMBER" and last.isdigit()
-                self.active[key] = int(last) if whole else None
+                self.active[key] = whole_number(last) if whole else None
         if name == "PAYLOAD":
             self.payloads.add("".join(words[2:3]))
 
@@ -194,7 +195,9 @@ class _Reader:
         letter = next(str(token).strip().upper() for token in words if token.type == "MOTION")
         shift = next((_SHIFTS[token.upper()] for token in words if token.upper() in _SHIFTS), "")
         goals = [token for token in words if token.type in ("POINT", "REGISTER")][: 2 if letter == "C" else 1]
-        self.found.begin(len(goals), straight=letter in "LC")
+        self.found.begin(max(1, len(goals)), straight=letter in "LC")
+        if not goals:
+            self._leave(statement, "its position cannot be read")
         for token in goals:
             number = None if token.type == "REGISTER" else point_number(token)
             position = None if number is None else positions.get(number)

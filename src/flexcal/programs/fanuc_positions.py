@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from lark import Token, Tree
 
 from flexcal.programs.program import Word, Written
+from flexcal.programs.syntax import whole_number
 
 _POSE = (("X", "mm"), ("Y", "mm"), ("Z", "mm"), ("W", "deg"), ("P", "deg"), ("R", "deg"))
 _JOINTS = tuple((f"J{k}", "deg") for k in range(1, 7))
@@ -57,7 +58,7 @@ def fanuc_positions(tree: Tree, file: int) -> dict[int, FanucPosition]:
 
 def point_number(token: Token) -> int:
     """Number of P[…]."""
-    return int(re.sub(r":.*|\D", "", str(token)))
+    return whole_number(re.sub(r":.*|\D", "", str(token)))
 
 
 def _position(point: Token, group: Tree, file: int) -> FanucPosition:
@@ -118,7 +119,7 @@ def _unit(value: list[Token]) -> str:
 
 def _frame(value: list[Token]) -> int | None:
     number = next((token for token in value if token.type == "NUMBER"), None)
-    return None if number is None else int(float(number))
+    return None if number is None else whole_number(number)
 
 
 def _configuration(value: list[Token], file: int) -> tuple[Word, ...]:

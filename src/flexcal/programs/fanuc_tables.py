@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from flexcal.errors import InputError
+from flexcal.errors import InputError, naming
 from flexcal.programs.notation import Notation
 from flexcal.programs.orientation import RollPitchYaw
 from flexcal.programs.pose import Pose
 from flexcal.programs.program import ProgramFile
+from flexcal.programs.syntax import whole_number
 from flexcal.units import DEGREE
 
 _NUMBER = r"\s*(-?(?:\d+\.?\d*|\.\d+))\s*"
@@ -53,5 +54,6 @@ def fanuc_tables(files: Sequence[ProgramFile]) -> FanucTables:
             for entry in _ENTRY.finditer(table[2]):
                 if numbers := _POSE.search(entry[2]):
                     values = [float(number) for number in numbers.groups()]
-                    poses[_KEYS[table[1]], int(entry[1])] = _NOTATION.pose(values)
+                    with naming(Path(file.name)):
+                        poses[_KEYS[table[1]], whole_number(entry[1])] = _NOTATION.pose(values)
     return FanucTables(poses)

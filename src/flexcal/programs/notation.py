@@ -7,9 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexcal.errors import FlexcalError
 from flexcal.programs.orientation import Orientation
 from flexcal.programs.pose import Pose
 from flexcal.units import DEGREE, MILLIMETRE
+
+_FARTHEST = 1e3
+"""Distance, m, that no tool, target or frame of a robot has from another."""
+_LARGEST = 1e6
+"""Size that no other number of a target has, in any dialect."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +47,19 @@ class Notation:
         """Units of lengths and angles."""
         return f"{'mm' if self.length == MILLIMETRE else 'm'} and {'°' if self.angle == DEGREE else 'rad'}"
 
+    def fault(self, numbers: Sequence[float], *, joints: bool = False) -> str:
+        """Why the numbers are no pose, or no joint positions, of a robot; empty where they may be."""
+        if not joints and max(map(abs, numbers[:3])) * self.length > _FARTHEST:
+            return f"its position is more than {_FARTHEST:g} m away: correct its numbers"
+        if max(map(abs, numbers if joints else numbers[3:])) > _LARGEST:
+            return f"it has a number beyond {_LARGEST:g}: correct it"
+        return "" if joints or self.orientation.is_valid(numbers[3:]) else "its orientation is no quaternion"
+
     def pose(self, numbers: Sequence[float]) -> Pose:
-        """Pose that the numbers mean."""
+        """Pose that the numbers mean; raises `FlexcalError` where they can be none."""
+        if fault := self.fault(numbers):
+            shown = ", ".join(f"{number:.6g}" for number in numbers)
+            raise FlexcalError("E-PROG-021", f"the pose [{shown}] cannot be used, as {fault}.")
         position = np.array(numbers[:3]) * self.length
         return Pose(position, self.orientation.rotation(numbers[3:], self.angle))
 

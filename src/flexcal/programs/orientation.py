@@ -24,6 +24,10 @@ class Orientation(ABC):
 
     count: ClassVar[int] = 3
 
+    def is_valid(self, numbers: Sequence[float]) -> bool:
+        """Whether numbers of usual size stand for an orientation."""
+        return True
+
     @abstractmethod
     def rotation(self, numbers: Sequence[float], angle: float) -> np.ndarray:
         """Rotation (3, 3) of the numbers; `angle` is the dialect's unit of angles, rad."""
@@ -61,6 +65,10 @@ class Quaternion(Orientation):
     """Unit quaternion, scalar first (ABB); it is normalised where rounding has made it longer or shorter."""
 
     count: ClassVar[int] = 4
+
+    def is_valid(self, numbers: Sequence[float]) -> bool:
+        """As `Orientation.is_valid`: zeros are none."""
+        return float(np.linalg.norm(numbers)) > _SHORTEST
 
     def rotation(self, numbers: Sequence[float], angle: float) -> np.ndarray:
         """As `Orientation.rotation`."""
@@ -104,5 +112,7 @@ class RollPitchYaw(Orientation):
         return tuple((nearest[list(self.order)] / angle).tolist())
 
 
+_SHORTEST = 1e-3
+"""Length below which a quaternion that is not normalised is none."""
 _SINGULAR = 1e-9
 """Cosine of the pitch below which roll and yaw are not determined one by one."""

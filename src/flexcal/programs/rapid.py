@@ -9,13 +9,11 @@ from lark import Tree
 
 from flexcal.programs.arm_at_zero import ArmAtZero
 from flexcal.programs.dialect import Dialect
-from flexcal.programs.notation import Notation
-from flexcal.programs.orientation import Quaternion
 from flexcal.programs.pose import Pose
 from flexcal.programs.program import Program, ProgramFile, ProgramTarget, Span, Written
 from flexcal.programs.rapid_configuration import QuadrantConfiguration
 from flexcal.programs.rapid_data import RapidData, statements_of
-from flexcal.programs.rapid_frames import RapidFrames, Unreadable
+from flexcal.programs.rapid_frames import RAPID_NOTATION, RapidFrames, Unreadable
 from flexcal.programs.rapid_motion import KINDS, Arguments, MotionKind, divisible, motion_in
 from flexcal.programs.syntax import (
     Node,
@@ -32,7 +30,6 @@ from flexcal.programs.syntax import (
     written_numbers,
 )
 from flexcal.programs.target_list import RUN_TIME, TargetList
-from flexcal.units import DEGREE, MILLIMETRE
 
 _NO_AXIS = 8e9
 """Positions of external axes from here on say that there is none (9E9)."""
@@ -234,8 +231,6 @@ class _Reader:
             return parts[0] or (), (), parts[1] or ()
         if not joints and sizes == [3, 4, 4, 6]:
             position, orientation, words, external = (part or () for part in parts)
-            if not any(number.value for number in orientation):
-                raise Unreadable("its orientation is no quaternion")
             return position + orientation, words, external
         raise Unreadable(RUN_TIME)
 
@@ -284,7 +279,7 @@ class _Reader:
 RAPID = Dialect(
     "RAPID of ABB",
     (".mod", ".modx", ".prg", ".sys", ".sysx"),
-    Notation(MILLIMETRE, DEGREE, Quaternion(), 9),
+    RAPID_NOTATION,
     parse_rapid,
     configuration=QuadrantConfiguration(),
     zero=ArmAtZero(((0, 0, 1), (0, 1, 0), (0, 1, 0), (1, 0, 0), (0, 1, 0), (1, 0, 0)), (0, 0, 1)),

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from lark import Tree
 
-from flexcal.model.parts import wxyz_rotation
+from flexcal.programs.notation import Notation
+from flexcal.programs.orientation import Quaternion
 from flexcal.programs.pose import Pose
 from flexcal.programs.rapid_data import RapidData
 from flexcal.programs.syntax import (
@@ -19,7 +19,10 @@ from flexcal.programs.syntax import (
     written_number,
     written_numbers,
 )
-from flexcal.units import MILLIMETRE
+from flexcal.units import DEGREE, MILLIMETRE
+
+RAPID_NOTATION = Notation(MILLIMETRE, DEGREE, Quaternion(), 9)
+"""Millimetres, degrees and quaternions."""
 
 
 class Unreadable(Exception):
@@ -108,9 +111,8 @@ def _pose(node: Node) -> Pose | None:
     parts = [written_numbers(part[0], 0) if part else None for part in between_commas(node.children)]
     if [len(part or ()) for part in parts] != [3, 4]:
         return None
-    position, wxyz = (np.array([number.value for number in part or ()]) for part in parts)
-    length = float(np.linalg.norm(wxyz))
-    return Pose(position * MILLIMETRE, wxyz_rotation(wxyz / length)) if length > 0 else None
+    numbers = [number.value for part in parts for number in part or ()]
+    return RAPID_NOTATION.pose(numbers) if any(numbers[3:]) else None
 
 
 def _first_number(node: Node) -> float | None:

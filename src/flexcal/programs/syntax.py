@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -11,10 +12,12 @@ from pathlib import Path
 from lark import Lark, Token, Tree
 from lark.exceptions import UnexpectedInput
 
-from flexcal.errors import InputError
+from flexcal.errors import FlexcalError, InputError
 from flexcal.programs.program import ProgramFile, Word, Written
 
 Node = Tree | Token
+_DEEPEST = 100
+"""Brackets that stand in each other at most."""
 
 
 @dataclass(frozen=True)
@@ -36,15 +39,33 @@ class Statement:
 
 
 def parse_text(file: ProgramFile, dialect: str) -> list[Node]:
-    """Elements of a program's text by the grammar `dialect`.lark; raises `InputError` where brackets or quotes do not close."""
+    """Elements of a program's text by the grammar `dialect`.lark; raises `InputError` where brackets or quotes do not fit."""
     try:
-        return list(_grammar(dialect).parse(file.text).children)
+        nodes = list(_grammar(dialect).parse(file.text).children)
     except UnexpectedInput as error:
         line = error.line if error.line > 0 else len(file.text.splitlines())
         raise InputError(
             "E-PROG-001",
             f"{file.name}, line {line}: the brackets or quotes do not fit there, so the program cannot be read; correct it.",
         ) from error
+    inner = nodes
+    for _ in range(_DEEPEST):
+        inner = [child for node in inner if isinstance(node, Tree) for child in node.children]
+    if inner:
+        raise InputError(
+            "E-PROG-019",
+            f"{file.name}, line {line_of(inner[0])}: more than {_DEEPEST} brackets stand in each other; correct it.",
+        )
+    return nodes
+
+
+def whole_number(text: str) -> int:
+    """A number of a position, tool or frame; raises `FlexcalError` where it is none or has more than nine digits."""
+    if not re.fullmatch(r"\d{1,9}", text):
+        raise FlexcalError(
+            "E-PROG-020", f"the number {text[:20]} is none of a position, tool or frame; correct it."
+        )
+    return int(text)
 
 
 @cache

@@ -12,6 +12,8 @@ from flexcal.programs.program import Divisible, Move, Program, ProgramFile, Prog
 
 RUN_TIME = "the controller computes it when the program runs"
 """Why a target is not corrected whose numbers are not in the program."""
+_HEAVIEST = 1e4
+"""Mass, kg, beyond any that an arm of six joints carries."""
 
 
 @dataclass
@@ -60,6 +62,11 @@ class TargetList:
         remarks: Sequence[str],
     ) -> Program:
         """The program; of a target that is computed from corrected ones of the `variables` the reason names these."""
+        for place, target in self.targets.items():
+            if fault := dialect.notation.fault(target.values, joints=target.joints):
+                self.doubtful[place] = fault
+            elif abs(target.payload or 0.0) > _HEAVIEST:
+                self.doubtful[place] = f"its payload is more than {_HEAVIEST:g} kg: correct it"
         kept = [target for place, target in self.targets.items() if place not in self.doubtful]
         known = {name.lower() for name in variables}
         sources = {target.variable.lower() for target in kept} & known

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from flexcal.errors import InputError
+from flexcal.errors import InputError, naming
 from flexcal.files.transaction import atomic_paths
 from flexcal.programs import Program, ProgramFile, dialect_of
 
@@ -51,7 +51,8 @@ def read_program(*paths: str | Path) -> Program:
                 f"{files[0]} is {dialects[0].name}, {file} is {dialect.name}; give the files of one program.",
             )
     every = with_companions(files)
-    return dialects[0].parse([ProgramFile(str(file), _text(file)) for file in every])
+    with naming(files[0]):
+        return dialects[0].parse([ProgramFile(str(file), _text(file)) for file in every])
 
 
 def with_companions(files: Sequence[Path]) -> list[Path]:
