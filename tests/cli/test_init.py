@@ -140,7 +140,7 @@ def test_joints_without_limits(run, tmp_path: Path) -> None:
         ("", "a.urdf", ["E-URDF-030", "a.urdf"]),
         ("<robot name='x'>", "a.urdf", ["E-URDF-031"]),
         ("<robot name='x'/>", "a.urdf.xacro", ["E-URDF-033", "a.urdf", "xacro"]),
-        ("<robot name='x' xmlns:xacro='u'><xacro:macro name='m'/></robot>", "a.urdf", ["E-URDF-002", "xacro"]),
+        ("<robot name='x' xmlns:xacro='u'><xacro:macro name='m'/></robot>", "a.urdf", ["E-URDF-033", "a.urdf", "line 1", "xacro:macro"]),
         ("<robot name='x'><link name='a'/></robot>", "a.urdf", ["E-URDF-036"]),
     ],
 )  # fmt: skip

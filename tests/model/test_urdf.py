@@ -43,7 +43,11 @@ MISTAKES = [
     # XML
     ("</joint>\n  <joint name=\"mount\"", "<joint name=\"mount\"", ["E-URDF-031", "22", "3", "mismatched tag"]),
     ('name="arm"', 'name="arm', ["E-URDF-031", "3", "3"]),
-    ('<robot name="arm">', '<robot name="arm"><xacro:include filename="x"/>', ["E-URDF-002", "line 2", "xacro:include"]),
+    ('<robot name="arm">', '<robot name="arm"><xacro:include filename="x"/>', ["E-URDF-033", "line 2", "xacro:include", "xacro arm.urdf"]),
+    ('<robot name="arm">', '<robot name="arm" xmlns:x="http://www.ros.org/wiki/xacro"><x:arg name="a"/>', ["E-URDF-033", "x:arg"]),
+    ('value="4.0"', 'value="${mass}"', ["E-URDF-033", "line 7", "value", "mass"]),
+    ('<mass ', '<mass xacro:note="" ', ["E-URDF-033", "line 7", "xacro:note"]),
+    ('<robot name="arm">', '<robot name="arm"><visual file="$(find arm)/a.stl"/>', ["E-URDF-033", "line 2", "file"]),
     # inertials
     ('value="4.0"', 'value="4,0"', ["E-URDF-028", "line 7: value", "4,0", "mass", "link 'boom'", "a number"]),
     ('value="4.0"', 'value="heavy"', ["E-URDF-028", "line 7: value", "heavy", "mass", "link 'boom'"]),
@@ -93,7 +97,9 @@ def test_one_sentence_with_line_and_name(tmp_path: Path, right: str, wrong: str,
 
 
 def test_the_sound_file(tmp_path: Path) -> None:
-    (tmp_path / "arm.urdf").write_text(ARM)
+    """A namespace of xacro that expanded files declare is no macro."""
+    left = '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+    (tmp_path / "arm.urdf").write_text(ARM.replace('<robot name="arm">', left))
     found = read_urdf(tmp_path / "arm.urdf", {})
     (joint,) = found.joints
     assert (joint.name, joint.link, joint.lower, joint.upper) == ("shoulder", "boom", -2.0, 2.0)

@@ -23,12 +23,6 @@ def carried_links(robot: Element, locked: Container[str]) -> dict[str, str]:
     """
     if robot.tag != "robot":
         raise robot.error("E-URDF-001", f"the root element is <{robot.tag}>, not <robot>; give a URDF file.")
-    for child in robot.children:
-        if child.tag.startswith("xacro:"):
-            raise child.error(
-                "E-URDF-002",
-                f"<{child.tag}> is xacro, not URDF; expand the file with the xacro program first.",
-            )
     links = _named(robot, "link")
     joints = _named(robot, "joint")
     for name, link in links.items():

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+import shlex
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
@@ -14,6 +16,7 @@ from flexcal.files.transaction import current_path
 from flexcal.units import LARGEST
 
 _DEEPEST = 50
+_MACRO = re.compile(r"\$[{(]")
 _QUOTED = 60
 """Largest number of characters of an attribute that a message quotes."""
 _REFERENCES = str.maketrans(
@@ -73,14 +76,49 @@ class Element:
         return values
 
 
+def xacro_error(path: Path, what: str = ": this") -> InputError:
+    """Error of a file that xacro has to expand before it is a URDF; `what` in it is xacro, after the file's path."""
+    expanded = f"{path.stem.removesuffix('.urdf')}{'' if path.suffix == '.xacro' else '.expanded'}.urdf"
+    return InputError(
+        "E-URDF-033",
+        f"{path}{what} is xacro, not URDF; expand it first: xacro {shlex.quote(path.name)} > {shlex.quote(expanded)}.",
+    )
+
+
+def macro_in(tag: str, attributes: Mapping[str, str], prefixes: set[str]) -> str | None:
+    """What of a start tag xacro has to expand: an element or attribute of its own, a value with ${…} or $(…).
+
+    `prefixes` are those of its namespace, to which the declarations among the attributes are added. These alone are no macro: xacro
+    leaves them in what it has expanded.
+    """
+    declared = [name for name in attributes if name.partition(":")[0] == "xmlns"]
+    prefixes.update(name.partition(":")[2] for name in declared if "xacro" in attributes[name])
+    own = prefixes - {""}
+    if tag.partition(":")[0] in own and ":" in tag:
+        return f"<{tag}>"
+    for name, value in attributes.items():
+        if name in declared:
+            continue
+        if (":" in name and name.partition(":")[0] in own) or _MACRO.search(value):
+            return f'{name}="{value if len(value) <= _QUOTED else f"{value[:_QUOTED]}…"}"'
+    return None
+
+
 def read_elements(path: Path) -> Element:
-    """Root element of an XML file; raises `InputError`, with line and column if possible, for a file that is not well-formed."""
+    """Root element of an XML file that xacro need not expand.
+
+    Raises `InputError`, with line and column if possible, for a file that is not well-formed or has macros.
+    """
     parser = expat.ParserCreate()
     above: list[Element] = []
     roots: list[Element] = []
+    prefixes = {"xacro"}
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         element = Element(path, tag, attributes, parser.CurrentLineNumber)
+        macro = macro_in(tag, attributes, prefixes)
+        if macro is not None:
+            raise xacro_error(path, f" line {element.line}: {macro}")
         if len(above) > _DEEPEST:
             raise element.error(
                 "E-URDF-029",

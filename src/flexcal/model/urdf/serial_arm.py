@@ -11,7 +11,7 @@ from flexcal.errors import InputError
 from flexcal.files.structuring import suggestion
 from flexcal.files.transaction import current_path
 from flexcal.model.urdf.checks import carried_links
-from flexcal.model.urdf.elements import Element, read_elements
+from flexcal.model.urdf.elements import Element, read_elements, xacro_error
 
 _GRIPPER = re.compile(
     r"gripper|finger|knuckle|jaw|thumb|(?<![a-z])(hand|claw|suction|vacuum)(?![a-z])", re.IGNORECASE
@@ -50,10 +50,7 @@ def find_arm(path: Path, tip: str | None = None) -> Arm:
     be the arm, and where `tip` is no link or moves with no joint.
     """
     if path.suffix == ".xacro":
-        raise InputError(
-            "E-URDF-033",
-            f"{path}: this is xacro, not URDF; expand it first: xacro {path.name} > {path.stem.removesuffix('.urdf')}.urdf.",
-        )
+        raise xacro_error(path)
     if path.is_dir():
         raise InputError("E-URDF-034", f"{path} is a folder; name the robot's URDF in it.")
     if not current_path(path).is_file():

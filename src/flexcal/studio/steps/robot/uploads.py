@@ -8,7 +8,7 @@ from pathlib import Path
 
 from flexcal.errors import InputError
 from flexcal.files.transaction import atomic_path
-from flexcal.model.urdf import read_elements
+from flexcal.model.urdf import read_elements, xacro_error
 from flexcal.studio.project import Project
 from flexcal.studio.steps.robot.mesh_places import mesh_places
 
@@ -54,10 +54,7 @@ def write_upload(project: Project, name: str, content: bytes, *, replace: bool) 
     elif ending in _MESHES:
         place = _mesh_place(project, name)
     elif ending == ".xacro":
-        raise InputError(
-            "E-STUDIO-022",
-            f"{name} is xacro, not URDF; expand it first and upload that: xacro {name} > {Path(name).stem.removesuffix('.urdf')}.urdf.",
-        )
+        raise xacro_error(Path(name))
     else:
         raise InputError(
             "E-STUDIO-023",
@@ -91,7 +88,7 @@ def _shown(name: str) -> str:
 
 def _require_urdf(name: str, content: bytes) -> None:
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "upload.urdf")
+        path = Path(folder, name)
         path.write_bytes(content)
         try:
             root = read_elements(path)
