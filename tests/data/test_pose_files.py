@@ -21,6 +21,7 @@ from flexcal.data.poses import (
     read_poses,
     write_poses,
 )
+from flexcal.data.tables import tabular_file
 from flexcal.model.robot import RobotModel
 from flexcal.units import DEGREE, MILLIMETRE
 
@@ -227,6 +228,23 @@ def test_sentences(tmp_path: Path, robot: Any, header: str, lines: list[str], re
     with refused(*refusal) as caught:
         read_poses(file(tmp_path / "poses.csv", lines, header), robot)
     assert str(caught.value).startswith(str(tmp_path / "poses.csv"))
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_too_many_rows_are_refused_before_they_are_read(
+    tmp_path: Path, robot: Any, ending: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tabular_file, "MOST_ROWS", 3)
+    poses = make_poses(3, payload=None, torque=None, target=np.full(3, "smr"), station=np.full(3, "1"))
+    path = tmp_path / f"poses.{ending}"
+    write_poses(path, poses)
+    assert len(read_poses(path, robot)) == 3
+    if ending == "csv":
+        path.write_text(path.read_text() + 4 * "neither number nor pose\n")
+    else:
+        pl.concat([pl.read_parquet(path)] * 3).write_parquet(path)
+    with refused("E-TABLE-045", str(path), "3", "keep one pose of 3"):
+        read_poses(path, robot)
 
 
 def test_robot_that_declares_too_little(tmp_path: Path, make_robot: Callable[..., Any]) -> None:

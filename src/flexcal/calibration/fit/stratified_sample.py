@@ -12,9 +12,9 @@ from flexcal.data.poses import PoseSet
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 
-MOST = 10_000
-"""Largest number of points of a fit: their noise contributes a hundredth of its size to the calibrated tool, far below any instrument's
-own error.
+MOST = 4_000
+"""Largest number of points of a fit: of p parameters their noise contributes √(p/3N), a twentieth of its size, to the calibrated tool, far
+below any instrument's own error.
 """
 _COMMANDS = 400
 """Number of positions of which several visits are kept."""
@@ -69,11 +69,11 @@ def _kept_visits(command: np.ndarray, stratum: np.ndarray, budget: int) -> np.nd
         members = np.flatnonzero(own == one)
         share = max(min(len(members), least), wanted * len(members) // len(starts))
         chosen.append(rng.permutation(members)[:share])
-    kept = []
-    for k in np.concatenate(chosen):
-        places = np.unique(np.linspace(0, counts[k] - 1, min(each, int(counts[k]))).astype(int))
-        kept.append(order[starts[k] + places])
-    return np.concatenate(kept)
+    positions = np.concatenate(chosen)
+    taken = np.minimum(each, counts[positions])
+    number = np.arange(taken.sum()) - np.repeat(np.cumsum(taken) - taken, taken)
+    visit = number * np.repeat(counts[positions] - 1, taken) // np.repeat(np.maximum(taken - 1, 1), taken)
+    return order[np.repeat(starts[positions], taken) + visit]
 
 
 def all_errors(model: RobotModel, poses: PoseSet, progress: Progress = silent) -> ErrorStatistics:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import os
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -27,6 +28,8 @@ _PEEKED = 2**16
 """Bytes of a table that are read, for every line of its header, to see which columns hold texts."""
 _SMALL = 300_000
 """Bytes of CSV that are read cell by cell sooner than Polars is imported."""
+MOST_ROWS = 4_000_000
+"""Largest number of rows of a table that is read whole."""
 _QUOTED = 20
 """Largest number of characters of a number that a message quotes."""
 
@@ -81,7 +84,8 @@ class TableFile:
         return replace(self, skipped=tuple(rows))
 
     def texts(self, column: str) -> list[str]:
-        """All cells of one column as text; empty where there is nothing. Raises `InputError` where a line cannot be read."""
+        """All cells of one column as text; empty where there is nothing. Raises `InputError` as `read` does."""
+        self._require_few_rows()
         if self.path.suffix == ".csv":
             with _open(self.path) as stream:
                 lines = stream.read().rstrip().split(b"\n")[self.first - 1 :]
@@ -123,7 +127,11 @@ class TableFile:
         return InputError(code, f"{self.path}{place}: {sentence}")
 
     def read(self, texts: Collection[str] = ()) -> Table:
-        """All rows; `texts` are the columns that hold names. Raises `InputError` with row and column of the first fault."""
+        """All rows; `texts` are the columns that hold names.
+
+        Raises `InputError` with row and column of the first fault, and, before any is loaded, for more rows than `MOST_ROWS`.
+        """
+        self._require_few_rows()
         blocks = list(self.blocks(texts, None))
         if not blocks:
             raise self.error("E-TABLE-019", "the file has a header but no rows; add some.")
@@ -140,6 +148,30 @@ class TableFile:
             yield from self._csv_blocks(texts, rows)
         else:
             yield from self._parquet_blocks(texts, rows)
+
+    def _require_few_rows(self) -> None:
+        rows = self._rows()
+        if rows > MOST_ROWS:
+            every = -(-rows // MOST_ROWS)
+            raise InputError(
+                "E-TABLE-045",
+                f"{self.path}: there are about {rows:.2g} rows, and a table that is read whole has at most {MOST_ROWS}; "
+                f"keep one pose of {every} with all its rows, or of a log a part.",
+            )
+
+    def _rows(self) -> int:
+        """Number of rows; of a CSV file of more than `MOST_ROWS` estimated from its size."""
+        if self.path.suffix != ".csv":
+            import polars as pl
+
+            return pl.scan_parquet(current_path(self.path)).select(pl.len()).collect().item()
+        counted, read = 1 - self.first, 0
+        with _open(self.path) as stream:
+            while part := stream.read(2**20):
+                counted, read = counted + part.count(b"\n"), read + len(part)
+                if counted > MOST_ROWS:
+                    return max(counted, counted * os.fstat(stream.fileno()).st_size // read)
+        return counted
 
     def _csv_blocks(self, texts: Collection[str], rows: int | None) -> Iterator[Table]:
         line = self.first
