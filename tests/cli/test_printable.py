@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from flexcal.cli.terminal.console import Console
-from flexcal.cli.terminal.escaping import LONGEST_SENTENCE, printable, sentence
+from flexcal.printable import LONGEST_SENTENCE, printable, sentence
 
 ODD = "\x1b[31mred\x1b]0;title\x07[/bold][red]:smile:\u202etxt"
 

@@ -15,10 +15,10 @@ from contextlib import redirect_stderr, suppress
 from flexcal.cli.arguments.invocation import record_command_line
 from flexcal.cli.arguments.verb_table import Verb, command_class, find_verb, overview, unknown_verb
 from flexcal.cli.terminal.encoding import substitute_unencodable
-from flexcal.cli.terminal.escaping import sentence
 from flexcal.cli.terminal.standard_streams import buffered_output, replace_closed_streams
 from flexcal.cli.terminal.stop_signals import StopSignal, raise_on_stop_signals
 from flexcal.errors import FlexcalError
+from flexcal.printable import sentence
 
 FAILED = 2
 INTERRUPTED = 130

@@ -21,7 +21,7 @@ from flexcal.export.dh_parameters import (
 )
 from flexcal.export.representation_error import AT_REST, ToolMap
 from flexcal.export.transforms import X, Y, Z, from_xyz_rpy, shifted, turned, xyz_rpy
-from flexcal.export.written_file import RenderedModel
+from flexcal.export.written_file import RenderedModel, rows_of
 from flexcal.model.robot import RobotModel, propagated_covariance_root
 
 Convention = Literal["standard", "modified"]
@@ -143,7 +143,7 @@ def dh_transforms(
 ) -> Callable[[np.ndarray], np.ndarray]:
     """Forward kinematics of a table's `text`: positions (N, m) of its joints, rad or m, to frames (N, 4, 4)."""
     rows: dict[tuple[str, str], dict[str, float]] = {}
-    for row in csv.DictReader(line for line in text.splitlines() if not line.startswith("#")):
+    for row in rows_of(text):
         rows.setdefault((row["joint"], row["type"]), {})[row["parameter"]] = float(row[column])
     base, tool = (from_xyz_rpy(rows[name, "fixed"]) for name in ("base", "tool"))
     joints = [(kind, row) for (_, kind), row in rows.items() if kind != "fixed"]

@@ -12,7 +12,7 @@ from flexcal.export.chain import motors_to
 from flexcal.export.offset_fit import OffsetFit, error_after_offsets, fit_offsets, offset_tool
 from flexcal.export.representation_error import AT_REST, GEOMETRY, ToolMap
 from flexcal.export.transforms import XYZ_RPY, from_xyz_rpy, transform, xyz_rpy
-from flexcal.export.written_file import RenderedModel
+from flexcal.export.written_file import RenderedModel, rows_of
 from flexcal.model.parts import rotation_vector, vector_rotation
 from flexcal.model.robot import RobotModel
 from flexcal.units import DEGREE, MILLIMETRE
@@ -115,8 +115,7 @@ def offsets_of(text: str, nominal: RobotModel) -> np.ndarray:
     """Parameters (n + 9,) of `offset_tool` that a table's `text` holds; raises `FlexcalError` for a joint that the robot does not have."""
     parameters = np.zeros(nominal.n + 9)
     pose: dict[str, float] = dict.fromkeys(XYZ_RPY, 0.0)
-    lines = (line for line in text.splitlines() if not line.startswith("#"))
-    for row in csv.DictReader(lines):
+    for row in rows_of(text):
         value = float(row["value"])
         if row["parameter"] == "offset":
             nominal.joint_index(row["joint"])

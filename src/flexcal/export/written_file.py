@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import csv
+import re
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from itertools import dropwhile
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,6 +15,7 @@ import numpy as np
 from flexcal.export.representation_error import ExportErrors, ToolMap, measure_export_error
 from flexcal.files.transaction import write_text
 from flexcal.model.robot import RobotModel
+from flexcal.printable import one_line
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,11 +71,18 @@ def write_rendered(model: RobotModel, path: str | Path, rendered: RenderedModel)
     return ExportedFile(Path(path), loss, rendered.remarks, rendered.table)
 
 
+def rows_of(text: str) -> Iterator[dict[str, str]]:
+    """Rows of a CSV table by column, without the comments of its header."""
+    lines = dropwhile(lambda line: line.startswith("#"), text.splitlines())
+    return iter(csv.DictReader(lines))
+
+
 def _with_header(text: str, lines: list[str], comments: str | None) -> str:
     if comments is None:
         return text
+    lines = [one_line(line) for line in lines]
     if comments == "#":
         return "".join(f"# {line}\n" for line in lines) + text
-    body = "\n".join(f"  {line.replace('--', '- -')}" for line in lines)
+    body = "\n".join(f"  {re.sub('-(?=-)', '- ', line)}" for line in lines)
     declaration, text = text.split("\n", 1) if text.startswith("<?xml") else ('<?xml version="1.0"?>', text)
     return f"{declaration}\n<!--\n{body}\n-->\n{text}"

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flexcal.errors import InputError
+from flexcal.printable import quoted
 
 if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
@@ -20,18 +21,18 @@ def measure_command(plan: Path, robot: Path, folder: str) -> str:
         near = robot_file(plan, None).samefile(robot)
     except InputError:
         near = False
-    named = "" if near else f" --robot {robot}"
-    return f"flexcal measure {plan}{named} --cell virtual --out {folder}"
+    named = "" if near else f" --robot {quoted(robot)}"
+    return f"flexcal measure {quoted(plan)}{named} --cell virtual --out {quoted(folder)}"
 
 
 def import_command(robot: Path, poses: str) -> str:
     """The other way to measure poses, where the robot is a real one."""
-    return f"; or measure them on the robot, and flexcal import {robot} FILE --out {poses}"
+    return f"; or measure them on the robot, and flexcal import {quoted(robot)} FILE --out {quoted(poses)}"
 
 
 def estimates_option(place: Path | None) -> str:
     """The option by which another verb finds estimates that are not beside robot.yaml; empty where they are."""
-    return "" if place is None else f" --estimates {place}"
+    return "" if place is None else f" --estimates {quoted(place)}"
 
 
 def temperature_option(celsius: float | None) -> str:
@@ -43,8 +44,8 @@ def after_dynamics(robot: Path, model: RobotModel, loaded: str) -> str:
     """Next commands after the robot's own dynamics: the payload by `loaded`, if one is declared and not identified, and springs or
     poses.
     """
-    springs = f"flexcal design frequency {robot} --out frequency.yaml"
-    poses = f"flexcal design poses {robot} --count 40 --out poses.yaml"
+    springs = f"flexcal design frequency {quoted(robot)} --out frequency.yaml"
+    poses = f"flexcal design poses {quoted(robot)} --count 40 --out poses.yaml"
     onward = springs if model.elastic else poses
     if model.payload is None:
         return onward

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from flexcal.cli.terminal.escaping import printable
+from flexcal.printable import printable
 from flexcal.progress import Progress
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import IO, Any
 from rich.console import Console
 from rich.text import Text
 
-from flexcal.cli.terminal.escaping import printable
+from flexcal.printable import printable
 
 
 class SafeConsole(Console):

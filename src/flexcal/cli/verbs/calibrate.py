@@ -23,6 +23,7 @@ from flexcal.cli.arguments.shared_options import (
 from flexcal.cli.arguments.suggested_commands import estimates_option
 from flexcal.cli.terminal.console import Console
 from flexcal.files.transaction import current_path, write_text
+from flexcal.printable import quoted
 from flexcal.units import MILLIMETRE
 
 if TYPE_CHECKING:
@@ -170,18 +171,18 @@ class Calibrate:
             console.say(f"wrote {self.out / 'report.html'}")
         following = (
             f"correct the data or {self.robot}, and calibrate again; "
-            f"flexcal import {self.robot} {self.poses[0]} looks for the error"
+            f"flexcal import {quoted(self.robot)} {quoted(self.poses[0])} looks for the error"
             if calibration.is_implausible
-            else f"flexcal verify {self.robot} OTHER_POSES…{where}, on poses outside this fit "
+            else f"flexcal verify {quoted(self.robot)} OTHER_POSES…{where}, on poses outside this fit "
             "(flexcal design poses --random plans some)"
             if located.any()
             else f"{command_line()} --hold-out fixture, for errors at places of the fixture outside the fit"
             if self.hold_out is None and len(poses.fixtures) > 1
             else f"{command_line()} --hold-out COLUMN, where a column tells recordings apart, for errors outside the fit"
             if self.hold_out is None
-            else f"flexcal export urdf {self.robot}{where}"
+            else f"flexcal export urdf {quoted(self.robot)}{where}"
             if len(calibration.selected.poses.pointed)
-            else f"flexcal export offsets {self.robot}{where}, for the joint zeros that these readings tell"
+            else f"flexcal export offsets {quoted(self.robot)}{where}, for the joint zeros that these readings tell"
         )
         if document["fleet"] is not None and document["fleet"]["conflict"]["contradicted"]:
             following = f"{command_line(without='--prior')}, on 30 poses or more, for a calibration from these measurements alone"

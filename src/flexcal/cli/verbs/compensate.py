@@ -21,6 +21,7 @@ from flexcal.cli.arguments.shared_options import (
 from flexcal.cli.arguments.suggested_commands import estimates_option, temperature_option
 from flexcal.cli.terminal.console import Console
 from flexcal.cli.verbs.calibrate import undetermined_point_remark
+from flexcal.printable import quoted
 from flexcal.units import MILLIMETRE
 
 _LISTED = 10
@@ -127,9 +128,9 @@ class Compensate:
             f"wrote {self.out}: commands for {document['compensated']} of {document['targets']} targets"
         )
         where = estimates_option(self.estimates)
-        measured = f"MEASURED.csv{temperature_option(self.temperature)}{where}"
+        robot, measured = quoted(self.robot), f"MEASURED.csv{temperature_option(self.temperature)}{where}"
         console.finish(
             document,
-            f"run {self.out} on the robot, measure it, and flexcal verify {self.robot} {measured}; with the nominal commands "
-            f"measured too, flexcal certificate {self.robot} --targets {self.targets} --before NOMINAL.csv --after {measured}",
+            f"run {self.out} on the robot, measure it, and flexcal verify {robot} {measured}; with the nominal commands "
+            f"measured too, flexcal certificate {robot} --targets {quoted(self.targets)} --before NOMINAL.csv --after {measured}",
         )

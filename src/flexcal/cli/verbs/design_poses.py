@@ -26,6 +26,7 @@ from flexcal.cli.arguments.shared_options import (
 from flexcal.cli.arguments.suggested_commands import import_command, measure_command
 from flexcal.cli.terminal.console import Console
 from flexcal.errors import InputError
+from flexcal.printable import quoted
 from flexcal.units import MILLIMETRE
 
 Planned = TypeVar("Planned")
@@ -195,7 +196,7 @@ class DesignPoses:
             + (f"; the straight joint motion from {ways} collides: add via points" if blocked else "")
         )
         console.say(f"wrote {self.out}: {document['poses']} poses")
-        then = "" if prior is None else f"; then flexcal calibrate with --prior {prior['file']}"
+        then = "" if prior is None else f"; then flexcal calibrate with --prior {quoted(prior['file'])}"
         console.finish(
             document,
             f"{measure_command(self.out, self.robot, 'measured')}{import_command(self.robot, 'measured.csv')}{then}",

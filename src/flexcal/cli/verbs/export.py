@@ -13,6 +13,7 @@ from flexcal.cli.arguments.shared_options import Estimates, Json, MaybeText, Rob
 from flexcal.cli.terminal.console import Console
 from flexcal.errors import InputError
 from flexcal.export import FORMATS, PlainFormat
+from flexcal.printable import quoted
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -64,7 +65,7 @@ class Export(ABC):
         following = self.following(document)
         if self.geometric and not exported.calibrated:
             console.say("there is no calibration: the joint placements are nominal")
-            following = f"flexcal calibrate {self.robot} POSES…, and export again"
+            following = f"flexcal calibrate {quoted(self.robot)} POSES…, and export again"
         console.finish(document, following)
 
 
@@ -209,7 +210,8 @@ class ExportOffsets(Export):
             return f"find out why offsets of {self.out} are so large before adding any to the joint zeros: see above"
         error, without = document["tool_error"], document["without_offsets"]
         if error["mean_mm"] > _WORTH * without["mean_mm"]:
-            return f"offsets alone improve little here: flexcal export mdh {self.robot}, or flexcal compensate {self.robot} TARGETS.csv"
+            robot = quoted(self.robot)
+            return f"offsets alone improve little here: flexcal export mdh {robot}, or flexcal compensate {robot} TARGETS.csv"
         return f"add the offsets of {self.out} to the joint zeros of the controller{frames}"
 
     def tables(self, document: dict[str, Any]) -> list[Table]:

@@ -10,6 +10,7 @@ from tyro.conf import arg
 
 from flexcal.cli.arguments.shared_options import Estimates, Json, Paths, Robot, Texts, require_robot
 from flexcal.cli.terminal.console import Console
+from flexcal.printable import quoted
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,8 @@ class ExportLerobot:
         verdict = document["zeros_or_geometry"]
         if verdict is not None and verdict["answer"] == "geometry":
             console.finish(
-                document, f"flexcal export urdf {self.robot} --out calibrated.urdf, beside LeRobot's old file"
+                document,
+                f"flexcal export urdf {quoted(self.robot)} --out calibrated.urdf, beside LeRobot's old file",
             )
             return
         console.finish(

@@ -21,6 +21,7 @@ from flexcal.cli.arguments.shared_options import (
 )
 from flexcal.cli.terminal.console import Console
 from flexcal.errors import InputError
+from flexcal.printable import quoted
 
 _LISTED = 6
 _SEPARATORS = {"arguments": ":=", "packages": "="}
@@ -89,7 +90,7 @@ class ExportXacro:
         following = f"compare {self.out} with the files in use, and load {self.out / document['main']}"
         if not exported.calibrated:
             console.say("there is no calibration: the joint placements are nominal")
-            following = f"flexcal calibrate {self.robot} POSES…, and export again"
+            following = f"flexcal calibrate {quoted(self.robot)} POSES…, and export again"
         console.finish(document, following)
 
 

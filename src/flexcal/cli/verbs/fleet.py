@@ -12,6 +12,7 @@ from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import Json, MaybeNumber, MaybePath, file_argument
 from flexcal.cli.terminal.console import Console
 from flexcal.errors import FlexcalError, InputError
+from flexcal.printable import quoted
 
 _LISTED = 10
 """Largest number of problems that are printed."""
@@ -92,8 +93,6 @@ class Fleet:
             for remark in written.remarks:
                 console.say(remark)
             console.say(f"wrote {self.prior}")
-            following = (
-                f"flexcal calibrate ROBOT POSES… --prior {self.prior}, for the next robot of the model"
-            )
+            following = f"flexcal calibrate ROBOT POSES… --prior {quoted(written.file)}, for the next robot of the model"
         console.finish(document, following)
         return refusal

@@ -21,6 +21,7 @@ from flexcal.cli.arguments.shared_options import (
 from flexcal.cli.arguments.suggested_commands import estimates_option, stored_lines
 from flexcal.cli.terminal.console import Console
 from flexcal.errors import InputError
+from flexcal.printable import quoted
 
 
 @dataclass(frozen=True)
@@ -81,5 +82,6 @@ class IdentifyActuators:
         for line in stored_lines(self.robot, found.estimates, self.out):
             console.say(line)
         console.finish(
-            document, f"flexcal export mjcf {self.robot}{estimates_option(self.out)} --out calibrated.xml"
+            document,
+            f"flexcal export mjcf {quoted(self.robot)}{estimates_option(self.out)} --out calibrated.xml",
         )

@@ -26,6 +26,7 @@ from flexcal.cli.arguments.suggested_commands import after_dynamics, estimates_o
 from flexcal.cli.terminal.console import Console
 from flexcal.dynamics.estimators import ESTIMATORS, EstimatorName
 from flexcal.errors import InputError
+from flexcal.printable import quoted
 
 if TYPE_CHECKING:
     from flexcal.jobs.dynamics import DynamicsIdentification
@@ -166,18 +167,16 @@ class IdentifyDynamics:
         inertials are physically consistent."""
         where = estimates_option(self.out)
         model = dynamics.train.observation.model
-        payload = (
-            f"record logs with the payload and flexcal identify payload {self.robot} LOADED.parquet{where}"
-        )
+        payload = f"record logs with the payload and flexcal identify payload {quoted(self.robot)} LOADED.parquet{where}"
         if model.elastic:
             return after_dynamics(self.robot, model, payload)
-        verb = f"flexcal identify dynamics {self.robot} {' '.join(map(str, self.logs))}"
+        verb = f"flexcal identify dynamics {quoted(self.robot)} {' '.join(map(quoted, self.logs))}"
         if not (self.hold_out or self.validate):
             kept = "" if self.estimator == "wls" else f" --estimator {self.estimator}"
             return f"{verb} --validate other.parquet{kept}"
         if dynamics.bodiless:
             return f"{verb} --estimator sdp" + (f" --hold-out {self.hold_out}" if self.hold_out else "")
-        urdf = f"flexcal export urdf {self.robot}{where} --out identified.urdf"
+        urdf = f"flexcal export urdf {quoted(self.robot)}{where} --out identified.urdf"
         return urdf if model.payload is None else f"{payload}; or {urdf}"
 
 

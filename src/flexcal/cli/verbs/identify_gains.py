@@ -19,6 +19,7 @@ from flexcal.cli.arguments.shared_options import (
     require_robot_and_files,
 )
 from flexcal.cli.terminal.console import Console
+from flexcal.printable import quoted
 
 
 @dataclass(frozen=True)
@@ -60,4 +61,4 @@ class IdentifyGains:
         console.say(gains.trust.sentence)
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")
-        console.finish(document, f"flexcal identify dynamics {self.robot} {self.logs[0]}")
+        console.finish(document, f"flexcal identify dynamics {quoted(self.robot)} {quoted(self.logs[0])}")

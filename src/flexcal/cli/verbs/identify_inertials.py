@@ -12,6 +12,7 @@ from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import EstimatesFolder, Json, Robot, require_robot
 from flexcal.cli.arguments.suggested_commands import after_dynamics, stored_lines
 from flexcal.cli.terminal.console import Console
+from flexcal.printable import quoted
 
 
 @dataclass(frozen=True)
@@ -50,5 +51,7 @@ class IdentifyInertials:
         console.say(inertials.trust.sentence)
         for line in stored_lines(self.robot, inertials.estimates, self.out):
             console.say(line)
-        loaded = f"flexcal design trajectory {self.robot} --loaded --out holding.yaml, for the payload"
+        loaded = (
+            f"flexcal design trajectory {quoted(self.robot)} --loaded --out holding.yaml, for the payload"
+        )
         console.finish(document, after_dynamics(self.robot, inertials.nominal, loaded))

@@ -22,6 +22,7 @@ from flexcal.cli.arguments.shared_options import (
 )
 from flexcal.cli.arguments.suggested_commands import estimates_option, stored_lines
 from flexcal.cli.terminal.console import Console
+from flexcal.printable import quoted
 
 if TYPE_CHECKING:
     from flexcal.jobs.payload import PayloadIdentification
@@ -102,7 +103,7 @@ class IdentifyPayload:
     def _next(self, payload: PayloadIdentification) -> str:
         where = estimates_option(self.out or self.estimates)
         if "calibration" in payload.blocks:
-            return f"flexcal compensate {self.robot} targets.csv{where} --out commands.csv"
+            return f"flexcal compensate {quoted(self.robot)} targets.csv{where} --out commands.csv"
         if payload.declared.elastic and "stiffness" not in payload.blocks:
-            return f"flexcal design frequency {self.robot} --out frequency.yaml"
-        return f"flexcal design poses {self.robot} --count 40 --out poses.yaml"
+            return f"flexcal design frequency {quoted(self.robot)} --out frequency.yaml"
+        return f"flexcal design poses {quoted(self.robot)} --count 40 --out poses.yaml"

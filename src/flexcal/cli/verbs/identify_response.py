@@ -21,6 +21,7 @@ from flexcal.cli.arguments.shared_options import (
 )
 from flexcal.cli.terminal.console import Console
 from flexcal.errors import InputError
+from flexcal.printable import quoted
 
 _ROBOT = (".yaml", ".yml")
 _RECOGNISED = "(default: recognised by names and units)"
@@ -107,7 +108,7 @@ class IdentifyResponse:
                 require_robot(*self.source)
             if self.source[0].suffix in _ROBOT and len(self.source) > 1:
                 require_robot(self.source[0], *self.source[1:])
-                files = " ".join(str(path) for path in self.source[1:])
+                files = " ".join(map(quoted, self.source[1:]))
                 raise InputError(
                     "E-CLI-029",
                     f"{self.source[1]} is no folder with a plan; records without one need no robot: "
@@ -131,7 +132,7 @@ class IdentifyResponse:
             console.say(remark)
         console.say(responses.trust.sentence)
         console.say(f"wrote {self.out / 'report.html'}")
-        console.finish(document, f"flexcal identify stiffness {robot} {self.out}")
+        console.finish(document, f"flexcal identify stiffness {quoted(robot)} {quoted(self.out)}")
 
     def _unplanned(self) -> None:
         from flexcal.cli.tables.excitation import element_table, masses_table, resonance_table

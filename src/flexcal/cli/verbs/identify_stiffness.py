@@ -20,6 +20,7 @@ from flexcal.cli.arguments.shared_options import (
 )
 from flexcal.cli.arguments.suggested_commands import stored_lines
 from flexcal.cli.terminal.console import Console
+from flexcal.printable import quoted
 
 _CHECK = "check that responses, payload and poses are of this robot, and the start values under `elastic:`"
 _OTHER_START = {
@@ -102,4 +103,4 @@ class IdentifyStiffness:
         console.say(stiffness.trust.sentence)
         for line in stored_lines(self.robot, stiffness.estimates, self.out):
             console.say(line)
-        console.finish(document, f"flexcal design poses {self.robot} --count 40 --out poses.yaml")
+        console.finish(document, f"flexcal design poses {quoted(self.robot)} --count 40 --out poses.yaml")

@@ -19,6 +19,7 @@ from flexcal.cli.arguments.shared_options import (
 )
 from flexcal.cli.terminal.console import Console
 from flexcal.errors import InputError
+from flexcal.printable import quoted
 from flexcal.units import MILLIMETRE
 
 if TYPE_CHECKING:
@@ -192,9 +193,9 @@ class Import:
         if self.out is None:
             return f"if the columns are right, the same with --out {'log' if imported.kind == 'log' else 'poses'}.csv, else with --map"
         if imported.kind == "log":
-            return f"flexcal identify dynamics {self.robot} {self.out}"
+            return f"flexcal identify dynamics {quoted(self.robot)} {quoted(self.out)}"
         if imported.kind == "joints":
-            return f"flexcal design poses {self.robot} --from {self.out} --out plan.yaml"
+            return f"flexcal design poses {quoted(self.robot)} --from {quoted(self.out)} --out plan.yaml"
         from flexcal.jobs.inputs import stored_estimates
 
         calibrate, verify = (f"flexcal {verb} {self.robot} {self.out}" for verb in ("calibrate", "verify"))

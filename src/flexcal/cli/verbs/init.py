@@ -10,6 +10,7 @@ from tyro.conf import Positional, arg
 
 from flexcal.cli.arguments.shared_options import Json, MaybeText
 from flexcal.cli.terminal.console import Console
+from flexcal.printable import quoted
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,6 @@ class Init:
         console.say(f"wrote {described.file}")
         console.finish(
             described.document(),
-            f"write the position of the reflector under `points:` in {described.file}, then flexcal design poses {described.file} "
-            f"--out {self.folder / 'poses.yaml'}; or, for existing measurements, flexcal import {described.file} FILE",
+            f"write the position of the reflector under `points:` in {described.file}, then flexcal design poses {quoted(described.file)} "
+            f"--out {quoted(self.folder / 'poses.yaml')}; or, for existing measurements, flexcal import {quoted(described.file)} FILE",
         )

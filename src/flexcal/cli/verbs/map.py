@@ -24,6 +24,7 @@ from flexcal.cli.arguments.shared_options import (
 )
 from flexcal.cli.arguments.suggested_commands import estimates_option, temperature_option
 from flexcal.cli.terminal.console import Console
+from flexcal.printable import quoted
 
 
 @dataclass(frozen=True)
@@ -110,8 +111,8 @@ class Map:
             document,
             "mend what the verdict names; do not use this calibration before that"
             if accuracy.trust.status == "bad"
-            else f"flexcal compensate {self.robot} TARGETS.csv{temperature_option(self.temperature)}{where}, for commands with this "
-            "accuracy",
+            else f"flexcal compensate {quoted(self.robot)} TARGETS.csv{temperature_option(self.temperature)}{where}, for commands with "
+            "this accuracy",
         )
 
 

@@ -10,6 +10,7 @@ from tyro.conf import Positional, arg
 
 from flexcal.cli.arguments.shared_options import Json, MaybePath, require_at_least
 from flexcal.cli.terminal.console import Console
+from flexcal.printable import quoted
 
 
 @dataclass(frozen=True)
@@ -60,15 +61,15 @@ class Measure:
         if measurement.kind == "trajectory":
             console.say(f"wrote {measurement.recordings} recordings to {self.out}")
             verb = "payload" if measurement.loaded else "inertials"
-            following = f"flexcal identify {verb} {robot} {self.out}"
+            following = f"flexcal identify {verb} {quoted(robot)} {quoted(self.out)}"
         elif measurement.recordings:
             console.say(
                 f"wrote {measurement.recordings} recordings of {measurement.poses} poses to {self.out}"
             )
-            following = f"flexcal identify response {robot} {self.out} --out responses"
+            following = f"flexcal identify response {quoted(robot)} {quoted(self.out)} --out responses"
         else:
             console.say(f"wrote {measurement.poses} measured points to {self.out / 'poses.csv'}")
-            points = f"{robot} {self.out / 'poses.csv'}"
+            points = f"{quoted(robot)} {quoted(self.out / 'poses.csv')}"
             following = f"flexcal {'verify' if measurement.for_verification else 'calibrate'} {points}"
             if self.plan.suffix not in (".yaml", ".yml"):
                 following = f"flexcal verify {points} to verify a calibration, or flexcal calibrate {points}"

@@ -11,6 +11,7 @@ from tyro.conf import Positional, arg
 from flexcal.cli.arguments.shared_options import Estimates, Json, Robot, Temperature, require_robot
 from flexcal.cli.arguments.suggested_commands import estimates_option, temperature_option
 from flexcal.cli.terminal.console import Console
+from flexcal.printable import quoted
 
 
 @dataclass(frozen=True)
@@ -58,5 +59,5 @@ class Predict:
         where = temperature_option(self.temperature) + estimates_option(self.estimates)
         console.finish(
             document,
-            f"flexcal compensate {self.robot} TARGETS.csv{where}, for commands that bring the tool to its targets",
+            f"flexcal compensate {quoted(self.robot)} TARGETS.csv{where}, for commands that bring the tool to its targets",
         )

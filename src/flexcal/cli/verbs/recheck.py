@@ -25,6 +25,7 @@ from flexcal.cli.arguments.shared_options import (
 from flexcal.cli.arguments.suggested_commands import estimates_option, import_command, measure_command
 from flexcal.cli.terminal.console import Console
 from flexcal.errors import InputError
+from flexcal.printable import quoted
 
 
 @dataclass(frozen=True)
@@ -104,21 +105,21 @@ class Recheck:
         console.say(f"wrote {self.out / 'report.html'}")
         document = checked.document()
         where = estimates_option(self.estimates)
-        kept = where if self.visits is None else f"{where} --out {self.visits}"
-        again = f"flexcal recheck {self.robot} NEXT_VISIT.csv{kept}"
+        kept = where if self.visits is None else f"{where} --out {quoted(self.visits)}"
+        again = f"flexcal recheck {quoted(self.robot)} NEXT_VISIT.csv{kept}"
         after = {
             "as_calibrated": f"{again}, at the same poses",
             "noisier_readings": f"check the instrument, measure the visit again, and {again}",
             "readings_drift": f"let instrument and robot settle, measure the visit again, and {again}",
             "wrong_reading": f"mend what is named, or measure it again, and {again}",
             "instrument_moved": f"while the instrument stands there, {again} --refit station, at the same poses",
-            "recalibrate": f"flexcal calibrate {self.robot} POSES… anew, unless the visit was measured or written wrongly",
+            "recalibrate": f"flexcal calibrate {quoted(self.robot)} POSES… anew, unless the visit was measured or written wrongly",
         }
         console.finish(
             document,
             after.get(
                 checked.verdict,
-                f"mend what is named where it can be, and {again}; or flexcal calibrate {self.robot} POSES… anew",
+                f"mend what is named where it can be, and {again}; or flexcal calibrate {quoted(self.robot)} POSES… anew",
             ),
         )
 
@@ -140,7 +141,7 @@ class Recheck:
                 progress=progress,
             )
         where = estimates_option(self.estimates)
-        kept = where if self.visits is None else f"{where} --out {self.visits}"
+        kept = where if self.visits is None else f"{where} --out {quoted(self.visits)}"
         console.say(
             f"shifts of single joints that are found in 95 % of visits, at false alarms of {100 * FALSE_ALARM:g} % (of a visit alone "
             f"{100 * VISIT_ALARM:g} %):"
@@ -151,5 +152,5 @@ class Recheck:
         console.finish(
             planned.document(),
             f"{measure_command(planned.file, self.robot, 'visit')}{import_command(self.robot, 'visit.csv')}; the first time every "
-            f"pose three times; then flexcal recheck {self.robot} visit.csv{kept}, and again at every visit",
+            f"pose three times; then flexcal recheck {quoted(self.robot)} visit.csv{kept}, and again at every visit",
         )

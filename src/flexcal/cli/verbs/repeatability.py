@@ -17,6 +17,7 @@ from flexcal.cli.arguments.shared_options import (
     require_robot_and_files,
 )
 from flexcal.cli.terminal.console import Console
+from flexcal.printable import quoted
 
 
 @dataclass(frozen=True)
@@ -65,5 +66,6 @@ class Repeatability:
             console.say(f"wrote {self.out / 'report.html'}")
         console.finish(
             document,
-            f"flexcal certificate {self.robot} --targets TARGETS.csv --before BEFORE.csv --after AFTER.csv, once commands are compensated",
+            f"flexcal certificate {quoted(self.robot)} --targets TARGETS.csv --before BEFORE.csv --after AFTER.csv, once commands are "
+            "compensated",
         )

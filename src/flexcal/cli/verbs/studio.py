@@ -12,6 +12,7 @@ from tyro.conf import Positional, arg
 
 from flexcal.cli.arguments.shared_options import Json, MaybeCount
 from flexcal.cli.terminal.console import Console
+from flexcal.printable import quoted
 
 if TYPE_CHECKING:
     from flexcal.studio.server import StudioServer
@@ -53,7 +54,7 @@ class Studio:
         run_studio(self.folder, self.host, self.port, self._ready)
         console = Console(self.json)
         console.say("the studio is closed")
-        console.finish({"folder": str(self.folder)}, f"flexcal studio {self.folder}")
+        console.finish({"folder": str(self.folder)}, f"flexcal studio {quoted(self.folder)}")
 
     def _ready(self, server: StudioServer) -> None:
         lines = [f"the studio is open at {server.url}", "Ctrl-C stops it"]

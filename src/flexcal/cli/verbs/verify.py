@@ -21,6 +21,7 @@ from flexcal.cli.arguments.shared_options import (
 )
 from flexcal.cli.arguments.suggested_commands import estimates_option
 from flexcal.cli.terminal.console import Console
+from flexcal.printable import quoted
 from flexcal.units import decimals
 
 if TYPE_CHECKING:
@@ -100,16 +101,14 @@ class Verify:
 
     def _next(self, status: Status, reasons: Sequence[str]) -> str:
         """The next step after a verdict."""
-        where = estimates_option(self.estimates)
+        robot, where = quoted(self.robot), estimates_option(self.estimates)
         if status == "bad":
             return "mend what the verdict names, and verify again; do not use this calibration before that"
         if status == "care" and "improvement" in reasons:
-            return f"flexcal calibrate {self.robot} MORE_POSES…: these poses do not show that the calibration makes the robot more accurate"
+            return f"flexcal calibrate {robot} MORE_POSES…: these poses do not show that the calibration makes the robot more accurate"
         if status == "unknown":
-            return (
-                f"flexcal verify {self.robot} MORE_POSES…{where} (flexcal design poses --random plans some)"
-            )
+            return f"flexcal verify {robot} MORE_POSES…{where} (flexcal design poses --random plans some)"
         return (
-            f"flexcal export urdf {self.robot}{where} --out calibrated.urdf, or flexcal compensate {self.robot} TARGETS.csv{where}; "
-            f"flexcal map {self.robot}{where} --verification {self.poses[0]} predicts the accuracy elsewhere"
+            f"flexcal export urdf {robot}{where} --out calibrated.urdf, or flexcal compensate {robot} TARGETS.csv{where}; "
+            f"flexcal map {robot}{where} --verification {quoted(self.poses[0])} predicts the accuracy elsewhere"
         )

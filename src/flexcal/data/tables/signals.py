@@ -16,6 +16,7 @@ from flexcal.errors import InputError, unreadable
 from flexcal.files.formats import read_yaml_file
 from flexcal.files.structuring import suggestion
 from flexcal.files.transaction import current_path
+from flexcal.printable import excerpt
 from flexcal.units import COLDEST, DEGREE, HOTTEST, INCH, MILLIMETRE, temperature_fault
 
 if TYPE_CHECKING:
@@ -300,7 +301,7 @@ def read_matrix(path: str | Path) -> np.ndarray:
             except ValueError:
                 raise InputError(
                     "E-TABLE-016",
-                    f"{path} line {number}, column {column}: '{cell.strip()}' is not a number; correct it.",
+                    f"{path} line {number}, column {column}: '{excerpt(cell)}' is not a number; correct it.",
                 ) from None
         if len(rows[-1]) != len(rows[0]) or not np.isfinite(rows[-1]).all():
             raise InputError(

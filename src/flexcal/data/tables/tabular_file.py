@@ -14,6 +14,7 @@ import numpy as np
 
 from flexcal.errors import InputError, unreadable
 from flexcal.files.transaction import atomic_path, current_path
+from flexcal.printable import excerpt
 from flexcal.units import LARGEST
 
 if TYPE_CHECKING:
@@ -238,7 +239,9 @@ def open_table(path: str | Path) -> TableFile:
             file = TableFile(path, _parquet_columns(path), 1)
     twice = [name for i, name in enumerate(file.columns) if name in file.columns[:i]]
     if twice:
-        raise file.error("E-TABLE-024", f"the column '{twice[0]}' stands twice; rename or remove one.")
+        raise file.error(
+            "E-TABLE-024", f"the column '{excerpt(twice[0])}' stands twice; rename or remove one."
+        )
     return file
 
 
@@ -449,7 +452,7 @@ def _fault(cell: str, is_text: bool) -> str | None:
         return None
     if not _is_number(cell):
         comma = " with a decimal point" if _is_number(cell.replace(",", ".")) else ""
-        return f"'{cell}' is not a number; write one{comma}."
+        return f"'{excerpt(cell)}' is not a number; write one{comma}."
     number = float(cell)
     if not abs(number) <= LARGEST:
         shown = cell if len(cell) < _QUOTED else f"{number:g}"

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from flexcal.errors import InputError
 from flexcal.files.structuring import Keys
+from flexcal.printable import excerpt
 
 if TYPE_CHECKING:
     from yaml import CSafeLoader, Event, ScalarEvent
@@ -110,7 +111,9 @@ class _Document:
         if isinstance(event, AliasEvent):
             return self._repeated(event)
         if event.tag not in (None, "!") and event.tag not in _TAGS:
-            raise self._error("E-YAML-008", event, f"the tag '{event.tag}' is not understood; remove it.")
+            raise self._error(
+                "E-YAML-008", event, f"the tag '{excerpt(event.tag)}' is not understood; remove it."
+            )
         if len(keys) > DEEPEST:
             raise _too_deep(self.path, event.start_mark.line + 1)
         anchored = _Anchored()
@@ -132,7 +135,7 @@ class _Document:
             raise self._error(
                 "E-YAML-010",
                 event,
-                f"the alias '*{event.anchor}' has no anchor before it; write the value out.",
+                f"the alias '*{excerpt(event.anchor)}' has no anchor before it; write the value out.",
             )
         if not anchored.size:
             raise self._error("E-YAML-011", event, "an alias refers to itself; write the value out.")
@@ -163,7 +166,9 @@ class _Document:
             if key in data:
                 first = self.lines[(*keys, key)]
                 raise self._error(
-                    "E-YAML-014", event, f"the key '{key}' stands here and on line {first}; keep one."
+                    "E-YAML-014",
+                    event,
+                    f"the key '{excerpt(key)}' stands here and on line {first}; keep one.",
                 )
             self.lines[(*keys, key)] = event.start_mark.line + 1
             data[key] = self._value(self._next(), (*keys, key))

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 from flexcal.errors import InputError, unreadable
 from flexcal.files.formats.yaml_document import parse_document
 from flexcal.files.formats.yaml_writer import write_yaml
-from flexcal.files.structuring import Keys, StructureError, dotted, structure
+from flexcal.files.structuring import UNQUOTED, Keys, StructureError, dotted, structure
 from flexcal.files.transaction import current_path
 
 __all__ = ["YamlFile", "read_yaml", "read_yaml_file", "write_yaml"]
@@ -43,7 +43,7 @@ class YamlFile:
     def structure(self, cls: type[T]) -> T:
         """The document as a `cls`; raises `InputError` with file and line where it does not fit."""
         try:
-            return structure(self.data, cls)
+            return structure(self.data if isinstance(self.data, dict | list | None) else UNQUOTED, cls)
         except StructureError as problem:
             failure = min(problem.failures, key=lambda failure: self.line(*failure.keys))
             # a sentence on a mapping that begins with one of its keys is placed there

@@ -1,9 +1,10 @@
 from .converter import structure
 from .faults import StructureError
 from .keys import Keys, dotted, file_key
-from .wording import suggestion
+from .wording import UNQUOTED, suggestion
 
 __all__ = [
+    "UNQUOTED",
     "Keys",
     "StructureError",
     "dotted",

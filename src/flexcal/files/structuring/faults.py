@@ -8,6 +8,7 @@ from typing import NamedTuple, cast
 from flexcal.errors import FlexcalError
 from flexcal.files.structuring.keys import Keys, dotted, file_key, known_keys
 from flexcal.files.structuring.wording import suggestion
+from flexcal.printable import excerpt
 
 
 class Failure(NamedTuple):
@@ -112,7 +113,7 @@ def _key_of(problem: BaseExceptionGroup, name: str) -> str:
 def _unknown_key(key: str, keys: Keys, known: list[str]) -> str:
     near = suggestion(key, known)
     hint = near or f"; known are {', '.join(known)}."
-    return f"unknown key '{key}'{_inside(keys)}{hint}"
+    return f"unknown key '{excerpt(key)}'{_inside(keys)}{hint}"
 
 
 def _inside(keys: Keys) -> str:

@@ -6,8 +6,12 @@ import difflib
 from collections.abc import Sequence
 from typing import Any
 
-_QUOTED = 40
-"""Letters of a value that a message quotes."""
+from flexcal.printable import excerpt
+
+UNQUOTED = object()
+"""Stands for a file that is no mapping and no list: probably none of flexcal's, so that no message may show what it holds."""
+_DIGITS = 40
+"""Digits of a whole number that a message quotes."""
 
 
 def suggestion(word: str, known: Sequence[str], most: int = 1) -> str:
@@ -20,6 +24,8 @@ def describe(value: Any) -> str:
     """A value as a message quotes it."""
     if value is None:
         return "nothing"
+    if value is UNQUOTED:
+        return "a single value"
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, dict):
@@ -27,6 +33,5 @@ def describe(value: Any) -> str:
     if isinstance(value, list):
         return f"a list of {len(value)}"
     if isinstance(value, str):
-        text = " ".join(value.split())
-        return f"the text '{text if len(text) <= _QUOTED else text[: _QUOTED - 1] + '…'}'"
-    return f"{value:.6g}" if isinstance(value, int) and abs(value) > 10**_QUOTED else str(value)
+        return f"the text '{excerpt(value)}'"
+    return f"{value:.6g}" if isinstance(value, int) and abs(value) > 10**_DIGITS else str(value)

@@ -29,6 +29,7 @@ from flexcal.jobs.inputs import CalibratedRobot
 from flexcal.jobs.pages import Result
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import tool_at_rest
+from flexcal.printable import quoted
 from flexcal.units import DEGREE, MILLIMETRE
 
 _SAME = 0.02
@@ -209,7 +210,7 @@ def export_motor_zeros(
     if "calibration" not in robot.blocks:
         raise InputError(
             "E-ROS-027",
-            f"{robot_file}: there is no calibration, so no zeros to write; run 'flexcal calibrate {robot_file} POSES…' first.",
+            f"{robot_file}: there is no calibration, so no zeros to write; run 'flexcal calibrate {quoted(robot_file)} POSES…' first.",
         )
     robot.nominal.require_motors("LeRobot's calibration")
     sliding = next((joint.name for joint in robot.nominal.joints if joint.kind == "prismatic"), None)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from flexcal.errors import InputError
 from flexcal.export import TIME_STEP, Actuators, RenderedModel, render_isaac
 from flexcal.jobs.inputs import CalibratedRobot
+from flexcal.printable import quoted
 
 
 def identified_actuators(robot: CalibratedRobot) -> Actuators | None:
@@ -40,6 +41,7 @@ def rendered_actuators(robot: CalibratedRobot, time_step: float | None) -> Rende
     if actuators is None:
         raise InputError(
             "E-RUN-107",
-            f"no actuators of {robot.nominal.path} are identified; run 'flexcal identify actuators {robot.nominal.path} LOGS…' first.",
+            f"no actuators of {robot.nominal.path} are identified; run 'flexcal identify actuators "
+            f"{quoted(robot.nominal.path)} LOGS…' first.",
         )
     return render_isaac(robot.nominal, actuators, time_step=TIME_STEP if time_step is None else time_step)

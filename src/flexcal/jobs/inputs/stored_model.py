@@ -14,6 +14,7 @@ from flexcal.estimation import Estimate
 from flexcal.files.formats import BLOCKS, Block, read_estimates, read_yaml_file
 from flexcal.jobs.result_files import ESTIMATES
 from flexcal.model.robot import RobotModel, with_blocks
+from flexcal.printable import quoted
 
 TARGETS = "targets"
 """Provenance key of a calibration: the measured points."""
@@ -80,13 +81,13 @@ class CalibratedRobot:
         if not stored.exists():
             raise InputError(
                 "E-RUN-055",
-                f"{stored} does not exist, so there is no calibration; run 'flexcal calibrate {nominal.path} POSES…' first.",
+                f"{stored} does not exist, so there is no calibration; run 'flexcal calibrate {quoted(nominal.path)} POSES…' first.",
             )
         blocks = read_estimates(stored)
         if "calibration" not in blocks:
             raise InputError(
                 "E-RUN-056",
-                f"{stored}: there is no calibration in it; run 'flexcal calibrate {path} POSES…' first.",
+                f"{stored}: there is no calibration in it; run 'flexcal calibrate {quoted(path)} POSES…' first.",
             )
         return cls(nominal, with_blocks(nominal, blocks, stored), blocks, stored)
 

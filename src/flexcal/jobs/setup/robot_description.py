@@ -16,6 +16,7 @@ from flexcal.files.transaction import write_text
 from flexcal.model.parts import Joint
 from flexcal.model.robot import RobotModel
 from flexcal.model.urdf import Arm, find_arm
+from flexcal.printable import quoted
 from flexcal.units import DEGREE
 
 _PLAIN = re.compile(r"[A-Za-z_./][\w./ -]*")
@@ -55,8 +56,9 @@ def init_robot(urdf: Path, out: Path, *, tip: str | None = None) -> InitialisedR
     if file.exists():
         raise InputError(
             "E-RUN-091",
-            f"{file} is there already and stays as it is: go on with 'flexcal design poses {file} --out {out / 'poses.yaml'}', "
-            f"with measurements at hand with 'flexcal import {file} FILE', or give --out DIR for a new one of {urdf}.",
+            f"{file} is there already and stays as it is: go on with 'flexcal design poses {quoted(file)} --out "
+            f"{quoted(out / 'poses.yaml')}', with measurements at hand with 'flexcal import {quoted(file)} FILE', "
+            f"or give --out DIR for a new one of {urdf}.",
         )
     made = [folder for folder in (out, *out.parents) if not folder.exists()]
     link = relpath(urdf, out)

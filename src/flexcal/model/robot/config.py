@@ -25,6 +25,7 @@ from flexcal.model.robot.measuring_config import (
     Triple,
     WireConfig,
 )
+from flexcal.printable import excerpt, name_fault
 from flexcal.units import MILLIMETRE, temperature_fault
 
 MOST_TOLERANCE = 10 * MILLIMETRE
@@ -202,6 +203,13 @@ class RobotConfig:
     estimates: str = "estimates.yaml"
 
     def __post_init__(self) -> None:
+        for key in ("points", "stations", "sensors", "measurements", "loops", "signals"):
+            for name in getattr(self, key):
+                if fault := name_fault(name):
+                    raise FlexcalError(
+                        "E-ROBOT-082",
+                        f"{key}: the name '{excerpt(name)}' holds the character {fault}, which no name may; rename it.",
+                    )
         if self.tolerance is not None and not self.tolerance > 0:
             raise FlexcalError("E-ROBOT-079", f"tolerance must be positive, not {self.tolerance:g} m.")
         if self.tolerance is not None and self.tolerance > MOST_TOLERANCE:

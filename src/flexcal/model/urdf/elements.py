@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shlex
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,12 +12,11 @@ import numpy as np
 
 from flexcal.errors import InputError, unreadable
 from flexcal.files.transaction import current_path
+from flexcal.printable import excerpt, name_fault, quoted
 from flexcal.units import LARGEST
 
 _DEEPEST = 50
 _MACRO = re.compile(r"\$[{(]")
-_QUOTED = 60
-"""Largest number of characters of an attribute that a message quotes."""
 _REFERENCES = str.maketrans(
     {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\n": "&#10;", "\r": "&#13;", "\t": "&#9;"}
 )
@@ -68,10 +66,9 @@ class Element:
             values = np.array([np.nan])
         if len(values) != count or not (np.abs(values) <= LARGEST).all():
             what = "a number" if count == 1 else f"{count} numbers"
-            quoted = text if len(text) <= _QUOTED else f"{text[:_QUOTED]}…"
             raise self.error(
                 "E-URDF-028",
-                f'{attribute}="{quoted}" in <{self.tag}> of {owner} is not {what}; write {what} with decimal points.',
+                f'{attribute}="{excerpt(text)}" in <{self.tag}> of {owner} is not {what}; write {what} with decimal points.',
             )
         return values
 
@@ -81,7 +78,7 @@ def xacro_error(path: Path, what: str = ": this") -> InputError:
     expanded = f"{path.stem.removesuffix('.urdf')}{'' if path.suffix == '.xacro' else '.expanded'}.urdf"
     return InputError(
         "E-URDF-033",
-        f"{path}{what} is xacro, not URDF; expand it first: xacro {shlex.quote(path.name)} > {shlex.quote(expanded)}.",
+        f"{path}{what} is xacro, not URDF; expand it first: xacro {quoted(path.name)} > {quoted(expanded)}.",
     )
 
 
@@ -100,7 +97,7 @@ def macro_in(tag: str, attributes: Mapping[str, str], prefixes: set[str]) -> str
         if name in declared:
             continue
         if (":" in name and name.partition(":")[0] in own) or _MACRO.search(value):
-            return f'{name}="{value if len(value) <= _QUOTED else f"{value[:_QUOTED]}…"}"'
+            return f'{name}="{excerpt(value)}"'
     return None
 
 
@@ -123,6 +120,11 @@ def read_elements(path: Path) -> Element:
             raise element.error(
                 "E-URDF-029",
                 f"elements nest more than {_DEEPEST} deep, so this is no URDF; name the robot's URDF.",
+            )
+        if fault := name_fault(attributes.get("name", "")):
+            raise element.error(
+                "E-URDF-045",
+                f"the name '{excerpt(attributes['name'])}' of a <{tag}> holds the character {fault}, which no name may; rename it.",
             )
         (above[-1].children if above else roots).append(element)
         above.append(element)
