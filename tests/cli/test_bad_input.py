@@ -257,6 +257,10 @@ def test_unknown_term(run, ur5_folder: Path) -> None:
         (("design", "poses"), "--candidates", "-5"),
         (("design", "poses"), "--payload", "nan"),
         (("design", "frequency"), "--seed", "-1"),
+        (("map",), "--count", "1000000000000"),
+        (("map",), "--count", 400 * "9"),
+        (("design", "poses"), "--count", "100000000"),
+        (("design", "trajectory"), "--duration", "1e300"),
     ],
 )
 def test_numbers_out_of_range(

@@ -5,12 +5,13 @@ from __future__ import annotations
 import shutil
 import subprocess
 from pathlib import Path
+from typing import get_type_hints
 
 import pytest
 from refusals import assert_refusal
 
 from flexcal.cli.arguments.verb_options import options_of
-from flexcal.cli.arguments.verb_table import VERBS
+from flexcal.cli.arguments.verb_table import VERBS, command_class
 
 TRIED = {
     ("ca",): {"calibrate"},
@@ -69,6 +70,9 @@ def test_every_option_is_that_of_the_help(run, verb) -> None:
     for option in options:
         assert f"{option.name} " in page or f"{option.name}]" in page
     assert shown <= {option.name for option in options}
+    kinds = get_type_hints(command_class(verb))
+    counts = [option for option in options if kinds[option.field] in (int, int | None)]
+    assert all(option.allowed is not None or option.name == "--port" for option in counts)
 
 
 @pytest.mark.parametrize(

@@ -118,6 +118,7 @@ def _carry_out(verb: Verb, arguments: list[str]) -> int:
     import tyro
 
     from flexcal.cli.arguments.parse_errors import parse_error, refuse_unknown_options
+    from flexcal.cli.arguments.verb_options import check_ranges
     from flexcal.cli.folders.overwrite_protection import complete_interrupted_runs, outputs
 
     _keep_freed_memory()
@@ -137,6 +138,7 @@ def _carry_out(verb: Verb, arguments: list[str]) -> int:
         if stop.code == 0:  # --help
             return 0
         raise parse_error(verb, said.getvalue()) from None
+    check_ranges(verb, parsed)
     if verb.interactive:
         parsed.run()
         return 0

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Optional
 
@@ -17,6 +19,21 @@ MaybeNumber = Optional[float]  # noqa: UP045
 MaybeCount = Optional[int]  # noqa: UP045
 """Of `Path | None` tyro would ask a type checker, which takes longer to load than some fits; not so of these, nor of `Paths` below."""
 Robot = Annotated[Positional[Path], arg(metavar="ROBOT", help="robot.yaml")]
+
+
+@dataclass(frozen=True)
+class Between:
+    """Note of an option whose number lies between two, which are allowed; checked for all verbs by `check_ranges`."""
+
+    least: float
+    most: float
+
+    def includes(self, value: float) -> bool:
+        """Whether a number lies in the range; NaN does not."""
+        return self.least <= value <= self.most
+
+    def __str__(self) -> str:
+        return f"at least {self.least}" if self.most == math.inf else f"{self.least} to {self.most}"
 
 
 def any_number(
@@ -97,8 +114,13 @@ On = Annotated[
         help_behavior_hint="(default: this machine)",
     ),
 ]
-Processes = Annotated[int, arg(metavar="N", help="Number of processes on this machine.")]
-Jobs = Annotated[int, arg(metavar="N", help="Number of logs read in parallel, each in its own process.")]
+Seed = Annotated[int, arg(metavar="N"), Between(0, 2**63 - 1)]
+PROCESS_COUNT = Between(1, 1000)
+Processes = Annotated[int, arg(metavar="N", help="Number of processes on this machine."), PROCESS_COUNT]
+Jobs = Annotated[
+    int, arg(metavar="N", help="Number of logs read in parallel, each in its own process."), PROCESS_COUNT
+]
+Payload = Between(0, 1_000_000)
 EstimatesFolder = Annotated[
     MaybePath,
     arg(
@@ -137,12 +159,3 @@ def require_robot_and_files(robot: Path, files: tuple[Path, ...], name: str) -> 
     require_robot(robot, *files)
     if not files:
         raise InputError("E-CLI-007", f"no {name} given; name at least one file after robot.yaml.")
-
-
-def require_at_least(least: float, **values: float | None) -> None:
-    """Raise `InputError` for the first named value that is smaller; None passes."""
-    for name, value in values.items():
-        if value is not None and not value >= least:
-            raise InputError(
-                "E-CLI-008", f"--{name.replace('_', '-')} is {value:g}; it must be at least {least:g}."
-            )

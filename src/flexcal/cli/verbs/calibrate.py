@@ -11,13 +11,13 @@ from tyro.conf import arg
 
 from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import (
+    Between,
     Json,
     MaybePath,
     MaybeText,
     PoseFiles,
     Robot,
     Texts,
-    require_at_least,
     require_robot_and_files,
 )
 from flexcal.cli.arguments.suggested_commands import estimates_option
@@ -79,7 +79,7 @@ class Calibrate:
     cross-validation supports, and transmission."""
     loss: Literal["auto", "squares", "huber", "cauchy"] = "auto"
     """Loss function; cauchy is robust and lists outliers; auto uses it where there are outliers."""
-    secant_scale: Annotated[float, arg(metavar="STD")] = 0.0
+    secant_scale: Annotated[float, arg(metavar="STD"), Between(0, 100)] = 0.0
     """Relative 1σ of the ratio of a drive's secant stiffness under gravity to its stiffness in the frequency response; 0.1 is usual."""
     elasticity: Literal["reestimated", "marginalised"] = "reestimated"
     """Treatment of the uncertainty of stiffness and inertia; both give the same geometry to first order."""
@@ -108,7 +108,6 @@ class Calibrate:
         )
 
         require_robot_and_files(self.robot, self.poses, "POSES")
-        require_at_least(0, secant_scale=self.secant_scale)
         console = Console(self.json)
         with console.progress() as progress:
             calibration = self._calibrated(self.terms, progress)

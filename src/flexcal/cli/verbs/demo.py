@@ -9,7 +9,11 @@ from typing import Annotated, Literal
 from tyro.conf import arg
 
 from flexcal.cli.arguments.invocation import command_line
-from flexcal.cli.arguments.shared_options import Json, MaybePath, require_at_least
+from flexcal.cli.arguments.shared_options import (
+    Json,
+    MaybePath,
+    Seed,
+)
 from flexcal.cli.terminal.console import Console
 
 
@@ -17,7 +21,7 @@ from flexcal.cli.terminal.console import Console
 class Demo:
     """Run the whole two-stage calibration on a virtual robot with hidden true parameters, and compare with these at the end."""
 
-    seed: Annotated[int, arg(metavar="N")] = 1
+    seed: Seed = 1
     """Seed of the true parameters and all noise."""
     plan: Literal["default", "paper", "designed", "quick"] = "default"
     """default: six poses with a payload; paper: three poses without, which determine less; designed: poses and amplitudes optimised for
@@ -44,7 +48,6 @@ class Demo:
         from flexcal.jobs.result_files import read_results
         from flexcal.jobs.two_stage import run_two_stage
 
-        require_at_least(0, seed=self.seed)
         console = Console(self.json)
         robot = example_robot("tx90l") if self.robot is None else self.robot
         with console.progress() as progress:

@@ -10,12 +10,13 @@ from tyro.conf import arg
 
 from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import (
+    Between,
     Json,
     MaybeCount,
     MaybeNumber,
     MaybePath,
     Robot,
-    require_at_least,
+    Seed,
     require_robot,
 )
 from flexcal.cli.arguments.suggested_commands import measure_command
@@ -41,9 +42,11 @@ class DesignFrequency:
         arg(metavar="FILE", help_behavior_hint="(default: frequency_poses.csv beside robot.yaml)"),
     ] = None
     """Poses of the experiments: CSV with plan, pose, q1_deg, q2_deg and so on."""
-    choose: Annotated[MaybeCount, arg(metavar="N", help_behavior_hint="(default: 6)")] = None
+    choose: Annotated[MaybeCount, arg(metavar="N", help_behavior_hint="(default: 6)"), Between(1, 1000)] = (
+        None
+    )
     """Number of poses for designed and quick."""
-    candidates: Annotated[int, arg(metavar="N")] = 300
+    candidates: Annotated[int, arg(metavar="N"), Between(1, 100_000)] = 300
     """Number of random candidate poses for designed and quick."""
     amplitude: Annotated[
         Literal["flat", "shaped"] | None,
@@ -62,7 +65,7 @@ class DesignFrequency:
     """Leave one line in four unexcited, to measure odd nonlinear distortion there."""
     place_payload: bool = False
     """Also predict the standard deviations for the payload at other angles about the last axis, at the same distance from it."""
-    seed: Annotated[int, arg(metavar="N")] = 0
+    seed: Seed = 0
     """Seed of the random phases."""
     json: Json = False
 
@@ -72,8 +75,6 @@ class DesignFrequency:
         from flexcal.jobs.experiments import FrequencyRequest, plan_frequency_experiments
 
         require_robot(self.robot)
-        require_at_least(0, seed=self.seed)
-        require_at_least(1, choose=self.choose, candidates=self.candidates)
         if self.std is not None and not self.std > 0:
             raise InputError(
                 "E-CLI-020", f"--std is {self.std:g}; it must be positive, such as 0.01 for 1 %."

@@ -12,15 +12,17 @@ from tyro.conf import arg
 
 from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import (
+    Between,
     Json,
     MaybeNumber,
     MaybePath,
     MaybeText,
     On,
     Paths,
+    Payload,
     Processes,
     Robot,
-    require_at_least,
+    Seed,
     require_robot,
 )
 from flexcal.cli.arguments.suggested_commands import import_command, measure_command
@@ -44,7 +46,7 @@ class DesignPoses:
     """
 
     robot: Robot
-    count: Annotated[int, arg(metavar="N")] = 40
+    count: Annotated[int, arg(metavar="N"), Between(1, 10_000)] = 40
     """Number of poses; with --wanted, --measured or --prior the maximum."""
     out: Annotated[Path, arg(metavar="FILE")] = Path("poses.yaml")
     """File for the plan, YAML or CSV."""
@@ -71,10 +73,10 @@ class DesignPoses:
     """Random poses, for a verification; of the other options only count, payload and seed apply."""
     criterion: Literal["c", "A", "D", "E", "O1", "O2", "O3", "O4", "O5"] = "c"
     """c: smallest predicted tool error; A, D, E: criteria of the parameter covariance; O1-O5: observability indices."""
-    candidates: Annotated[int, arg(metavar="N")] = 4000
+    candidates: Annotated[int, arg(metavar="N"), Between(1, 100_000_000)] = 4000
     """Number of random candidate poses, without --from; of more than 50000 the best of every block are compared (a million: a minute)."""
     payload: Annotated[
-        MaybeNumber, arg(metavar="KG", help_behavior_hint="(default: as robot.yaml declares)")
+        MaybeNumber, arg(metavar="KG", help_behavior_hint="(default: as robot.yaml declares)"), Payload
     ] = None
     """Payload in these poses, kg."""
     measure: Annotated[
@@ -86,7 +88,7 @@ class DesignPoses:
     )
     """Prior from other robots, as 'flexcal fleet --prior' writes it, for 'calibrate --prior': poses that tell what it does not, as
     many as reach what 40 random ones do without it."""
-    seed: Annotated[int, arg(metavar="N")] = 0
+    seed: Seed = 0
     """Seed of the random poses."""
     jobs: Processes = 1
     on: On = None
@@ -95,8 +97,6 @@ class DesignPoses:
     def run(self) -> None:
         """Choose the poses, and print the predicted tool error."""
         require_robot(self.robot)
-        require_at_least(1, count=self.count, candidates=self.candidates, jobs=self.jobs)
-        require_at_least(0, seed=self.seed, payload=self.payload)
         if self.wanted is not None and not self.wanted > 0:
             raise InputError("E-CLI-022", f"--wanted is {self.wanted:g}; it must be a positive number of mm.")
         if self.random and self.pool is not None:

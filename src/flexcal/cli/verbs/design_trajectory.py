@@ -10,18 +10,18 @@ from tyro.conf import arg
 
 from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import (
+    Between,
     Json,
     MaybeNumber,
     MaybePath,
     Numbers,
     Robot,
+    Seed,
     Texts,
-    require_at_least,
     require_robot,
 )
 from flexcal.cli.arguments.suggested_commands import measure_command
 from flexcal.cli.terminal.console import Console
-from flexcal.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class DesignTrajectory:
     robot: Robot
     out: Annotated[Path, arg(metavar="FILE")] = Path("trajectory.yaml")
     """File for the plan."""
-    count: Annotated[int, arg(metavar="N")] = 3
+    count: Annotated[int, arg(metavar="N"), Between(1, 99)] = 3
     """Number of trajectories; each is optimised given the previous ones."""
     criterion: Literal["compound", "posterior", "condition", "D", "E", "A", "c"] = "compound"
     """compound: posterior and condition together.
@@ -53,11 +53,11 @@ class DesignTrajectory:
     """A plan that is already recorded; its information is added."""
     kind: Literal["fourier", "spline"] = "fourier"
     """Fourier series, or cyclic B-splines with three control points for each of the harmonics."""
-    duration: Annotated[float, arg(metavar="S")] = 10.0
+    duration: Annotated[float, arg(metavar="S"), Between(0.01, 3600)] = 10.0
     """Duration of a trajectory in seconds, without one period to settle."""
-    base_frequency: Annotated[float, arg(metavar="HZ")] = 0.2
+    base_frequency: Annotated[float, arg(metavar="HZ"), Between(0.001, 100)] = 0.2
     """Base frequency of the trajectories."""
-    harmonics: Annotated[int, arg(metavar="N")] = 5
+    harmonics: Annotated[int, arg(metavar="N"), Between(1, 100)] = 5
     """Number of multiples of the base frequency."""
     rest: bool = False
     """Every period begins and ends at rest."""
@@ -67,15 +67,17 @@ class DesignTrajectory:
     """Fraction of the limits of velocities, accelerations and torques that a motion may use; the controller needs the rest."""
     loaded: bool = False
     """With the declared payload, as for a criterion of its parameters; without by default."""
-    searches: Annotated[int, arg(metavar="N")] = 3
+    searches: Annotated[int, arg(metavar="N"), Between(1, 1000)] = 3
     """Number of searches, each from a random start, of which the best is kept."""
-    steps: Annotated[int, arg(metavar="N")] = 20
+    steps: Annotated[int, arg(metavar="N"), Between(1, 10_000)] = 20
     """Iterations at each level of the barrier; 40 nearly converge."""
     rate: Annotated[
-        MaybeNumber, arg(metavar="HZ", help_behavior_hint="(default: 100, more for fast motions)")
+        MaybeNumber,
+        arg(metavar="HZ", help_behavior_hint="(default: 100, more for fast motions)"),
+        Between(1, 20_000),
     ] = None
     """Timed joint positions a second; the cycle of a controller that takes one position each."""
-    seed: Annotated[int, arg(metavar="N")] = 0
+    seed: Seed = 0
     """Seed of the random starts."""
     json: Json = False
 
@@ -84,12 +86,6 @@ class DesignTrajectory:
         from flexcal.jobs.experiments import TrajectoryRequest, plan_trajectories
 
         require_robot(self.robot)
-        require_at_least(
-            1, count=self.count, harmonics=self.harmonics, searches=self.searches, steps=self.steps
-        )
-        require_at_least(0, seed=self.seed)
-        if self.rate is not None and not 1 <= self.rate <= 20_000:
-            raise InputError("E-CLI-025", f"--rate is {self.rate:g} Hz; give 1 to 20000.")
         console = Console(self.json)
         request = TrajectoryRequest(
             count=self.count,

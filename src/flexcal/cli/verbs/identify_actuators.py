@@ -15,7 +15,6 @@ from flexcal.cli.arguments.shared_options import (
     Paths,
     Robot,
     file_argument,
-    require_at_least,
     require_robot_and_files,
 )
 from flexcal.cli.arguments.suggested_commands import estimates_option, stored_lines
@@ -54,7 +53,6 @@ class IdentifyActuators:
         from flexcal.jobs.actuators import identify_robot_actuators
 
         require_robot_and_files(self.robot, self.logs, "LOGS")
-        require_at_least(1, jobs=self.jobs)
         if not 0.05 <= self.hold_out <= 0.9:
             raise InputError(
                 "E-CLI-043",

@@ -19,7 +19,6 @@ from flexcal.cli.arguments.shared_options import (
     Paths,
     Robot,
     file_argument,
-    require_at_least,
     require_robot_and_files,
 )
 from flexcal.cli.arguments.suggested_commands import after_dynamics, estimates_option
@@ -87,7 +86,6 @@ class IdentifyDynamics:
         from flexcal.report.checks import check_external, check_fit, check_weight_shares
 
         require_robot_and_files(self.robot, self.logs, "LOGS")
-        require_at_least(1, jobs=self.jobs)
         share = _share(self.hold_out)
         if share and self.validate:
             raise InputError("E-CLI-026", "--hold-out and --validate exclude each other; give one of them.")

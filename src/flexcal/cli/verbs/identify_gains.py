@@ -15,7 +15,6 @@ from flexcal.cli.arguments.shared_options import (
     Paths,
     Robot,
     file_argument,
-    require_at_least,
     require_robot_and_files,
 )
 from flexcal.cli.terminal.console import Console
@@ -47,7 +46,6 @@ class IdentifyGains:
         from flexcal.jobs.logs import preprocessing_remarks
 
         require_robot_and_files(self.robot, self.logs, "LOGS")
-        require_at_least(1, jobs=self.jobs)
         console = Console(self.json)
         with console.progress() as progress:
             gains = identify_robot_gains(

@@ -17,7 +17,6 @@ from flexcal.cli.arguments.shared_options import (
     Paths,
     Robot,
     file_argument,
-    require_at_least,
     require_robot_and_files,
 )
 from flexcal.cli.arguments.suggested_commands import estimates_option, stored_lines
@@ -70,7 +69,6 @@ class IdentifyPayload:
         from flexcal.jobs.payload import identify_robot_payload
 
         require_robot_and_files(self.robot, self.logs, "LOGS")
-        require_at_least(1, jobs=self.jobs)
         console = Console(self.json)
         with console.progress() as progress:
             payload = identify_robot_payload(

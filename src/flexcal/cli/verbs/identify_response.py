@@ -10,6 +10,7 @@ from tyro.conf import Positional, arg
 
 from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import (
+    Between,
     Json,
     MaybeNumber,
     MaybeText,
@@ -69,7 +70,9 @@ class IdentifyResponse:
     ] = ()
     """What the controller was asked for, where one acts on the output: noise in its feedback then does not bias the response."""
     rate: Annotated[
-        MaybeNumber, arg(metavar="HZ", help_behavior_hint="(default: from the column of time)")
+        MaybeNumber,
+        arg(metavar="HZ", help_behavior_hint="(default: from the column of time)"),
+        Between(1e-3, 1e9),
     ] = None
     """Sampling rate of files without usable time stamps."""
     band: Annotated[
@@ -154,8 +157,6 @@ class IdentifyResponse:
                 f"--method {self.method} is for planned experiments; without a plan it is the local polynomial method, which is H1 without "
                 "leakage; leave --method out.",
             )
-        if self.rate is not None and not self.rate > 0:
-            raise InputError("E-CLI-032", f"--rate is {self.rate:g}; it must be positive.")
         console = Console(self.json)
         with console.progress() as progress:
             identified = identify_excitation(

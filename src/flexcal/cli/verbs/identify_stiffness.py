@@ -14,8 +14,8 @@ from flexcal.cli.arguments.shared_options import (
     MaybePath,
     Paths,
     Robot,
+    Seed,
     file_argument,
-    require_at_least,
     require_robot_and_files,
 )
 from flexcal.cli.arguments.suggested_commands import stored_lines
@@ -48,7 +48,7 @@ class IdentifyStiffness:
     """covariance: that of the measured responses, with correct intervals; paper: emphasis near poles and zeros; uniform: equal weights."""
     search: Literal["multi-start", "population"] = "multi-start"
     """Search for a start: multi-start with gradients, or differential evolution in place of the paper's genetic algorithm."""
-    seed: Annotated[int, arg(metavar="N")] = 0
+    seed: Seed = 0
     """Seed of the search for a start."""
     prior: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="")] = None
     """Prior of the stiffness from other robots of the model, as 'flexcal fleet --prior' writes it; not used where it does not fit."""
@@ -61,7 +61,6 @@ class IdentifyStiffness:
         from flexcal.jobs.stiffness import identify_robot_stiffness
 
         require_robot_and_files(self.robot, self.responses, "RESPONSES")
-        require_at_least(0, seed=self.seed)
         console = Console(self.json)
         with console.progress() as progress:
             stiffness = identify_robot_stiffness(

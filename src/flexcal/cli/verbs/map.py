@@ -10,16 +10,18 @@ from tyro.conf import arg
 
 from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import (
+    Between,
     Estimates,
     Json,
     MaybeNumber,
     MaybeText,
     On,
     Paths,
+    Payload,
     Processes,
     Robot,
+    Seed,
     Temperature,
-    require_at_least,
     require_robot,
 )
 from flexcal.cli.arguments.suggested_commands import estimates_option, temperature_option
@@ -46,15 +48,15 @@ class Map:
     """Ranges of x, y, z in m like 0.4:0.9,-0.3:0.3,0.2:0.8, or a file of points x, y, z, or of pose, q1, q2 and so on."""
     verification: Annotated[Paths, arg(metavar="FILE...", help_behavior_hint="(default: none)")] = ()
     """Measured poses outside the calibration."""
-    count: Annotated[int, arg(metavar="N")] = 20_000
+    count: Annotated[int, arg(metavar="N"), Between(1, 100_000_000)] = 20_000
     """Number of random poses; all poses of a file are used. More than 20000 are computed in blocks; quantiles are then right to 0.1 %."""
     payload: Annotated[
-        MaybeNumber, arg(metavar="KG", help_behavior_hint="(default: as robot.yaml declares)")
+        MaybeNumber, arg(metavar="KG", help_behavior_hint="(default: as robot.yaml declares)"), Payload
     ] = None
     """Payload, kg."""
     temperature: Temperature = None
     estimates: Estimates = None
-    seed: Annotated[int, arg(metavar="N")] = 0
+    seed: Seed = 0
     """Seed of the random poses."""
     jobs: Processes = 1
     on: On = None
@@ -67,8 +69,6 @@ class Map:
         from flexcal.jobs.accuracy import map_accuracy
 
         require_robot(self.robot)
-        require_at_least(1, count=self.count, jobs=self.jobs)
-        require_at_least(0, seed=self.seed, payload=self.payload)
         console = Console(self.json)
         with console.progress() as progress:
             accuracy = map_accuracy(

@@ -8,7 +8,11 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-from flexcal.cli.arguments.shared_options import Json, MaybePath, require_at_least
+from flexcal.cli.arguments.shared_options import (
+    Json,
+    MaybePath,
+    Seed,
+)
 from flexcal.cli.terminal.console import Console
 from flexcal.printable import quoted
 
@@ -35,7 +39,7 @@ class Measure:
         None
     )
     """File of the true parameters of the virtual cell."""
-    seed: Annotated[int, arg(metavar="N")] = 0
+    seed: Seed = 0
     """Seed of the virtual cell's true parameters and noise; use the same seed for all measurements of one robot."""
     json: Json = False
 
@@ -44,7 +48,6 @@ class Measure:
         from flexcal.jobs.experiments import measure
         from flexcal.jobs.inputs import robot_file
 
-        require_at_least(0, seed=self.seed)
         console = Console(self.json)
         robot = robot_file(self.plan, self.robot)
         with console.progress() as progress:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 from tyro.conf import Positional, arg
 
 from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import (
+    Between,
     Estimates,
     Json,
+    MaybeCount,
     MaybePath,
     MaybeText,
     Paths,
@@ -42,7 +44,9 @@ class Recheck:
         Positional[Paths],
         file_argument("POSES...", "files of measured poses (CSV or Parquet) of one visit; none with --plan"),
     ] = ()
-    plan: Annotated[Optional[int], arg(metavar="N", help_behavior_hint="(default: none)")] = None  # noqa: UP045
+    plan: Annotated[MaybeCount, arg(metavar="N", help_behavior_hint="(default: none)"), Between(1, 1000)] = (
+        None
+    )
     """Choose N poses for the reference visit and those after it, and write plan.yaml."""
     estimates: Estimates = None
     refit: Annotated[

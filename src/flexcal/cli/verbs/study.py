@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from tyro.conf import Positional, arg
 
 from flexcal.cli.arguments.invocation import command_line
-from flexcal.cli.arguments.shared_options import Json, MaybeCount, MaybeText, require_at_least
+from flexcal.cli.arguments.shared_options import PROCESS_COUNT, Json, MaybeCount, MaybeText
 from flexcal.cli.arguments.verb_table import VERBS
 from flexcal.cli.folders.overwrite_protection import outputs
 from flexcal.cli.terminal.console import Console
@@ -31,7 +31,9 @@ class Study:
     on: Annotated[MaybeText, arg(metavar="ADDRESS", help_behavior_hint="(default: this machine)")] = None
     """Dask scheduler, dask://host:port or tls://host:port. Its workers need the same flexcal, and run whatever they are sent: use only a
     cluster of your own."""
-    jobs: Annotated[MaybeCount, arg(metavar="N", help_behavior_hint="(default: one a core)")] = None
+    jobs: Annotated[
+        MaybeCount, arg(metavar="N", help_behavior_hint="(default: one a core)"), PROCESS_COUNT
+    ] = None
     """Number of processes on this machine."""
     resume: bool = False
     """Go on with the study in DIR: only tasks that are not stored yet run."""
@@ -43,8 +45,6 @@ class Study:
         from flexcal.parallel import open_workers
 
         leaves = next(verb.leaves for verb in VERBS if verb.name == "study")
-        if self.jobs is not None:
-            require_at_least(1, jobs=self.jobs)
         console = Console(self.json)
         plan = read_study(self.study)
         jobs = min(self.jobs or os.cpu_count() or 1, len(plan.rows))

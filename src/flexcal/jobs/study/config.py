@@ -8,6 +8,9 @@ from typing import Any, Literal
 
 from flexcal.errors import FlexcalError
 
+MOST_TASKS = 1_000_000
+"""Largest number of tasks of a study."""
+
 
 @dataclass(frozen=True)
 class SeedsConfig:
@@ -107,6 +110,10 @@ class ResamplingConfig:
             raise FlexcalError(
                 "E-STUDY-006",
                 "resampling needs one of bootstrap: COUNT, jackknife: GROUPS and leave_one_out: pose, station or COLUMN.",
+            )
+        if self.bootstrap > MOST_TASKS:
+            raise FlexcalError(
+                "E-STUDY-030", f"bootstrap: {self.bootstrap} is too many; write at most {MOST_TASKS}."
             )
         if self.jackknife == 1:
             raise FlexcalError("E-STUDY-007", "a jackknife needs at least 2 groups.")

@@ -12,7 +12,7 @@ from flexcal.design.scene import CollisionChecker
 from flexcal.errors import FlexcalError, InputError
 from flexcal.files.formats import YamlFile, provenance, read_yaml, read_yaml_file
 from flexcal.files.structuring import StructureError
-from flexcal.jobs.study.config import CalibrateConfig, StudyConfig, TwoStageConfig
+from flexcal.jobs.study.config import MOST_TASKS, CalibrateConfig, StudyConfig, TwoStageConfig
 from flexcal.jobs.study.options import structured
 from flexcal.jobs.study.resampled_calibrations import ResampledCalibrations
 from flexcal.jobs.study.rows import StudyRow, combination_count, combinations, rows
@@ -21,8 +21,6 @@ from flexcal.jobs.study.two_stage_runs import TwoStageRuns
 from flexcal.jobs.study.virtual_calibrations import VirtualCalibrations
 from flexcal.model.robot import RobotModel
 from flexcal.virtual_cell import CellConfig
-
-_MOST_ROWS = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -51,9 +49,9 @@ def read_study(path: Path) -> StudyPlan:
     else:
         seeds = range(config.seeds.first, config.seeds.first + config.seeds.count)
     count = combination_count(config) * len(seeds) * len(tasks.resamples)
-    if count > _MOST_ROWS:
+    if count > MOST_TASKS:
         raise InputError(
-            "E-STUDY-014", f"{path} declares {count} tasks; at most {_MOST_ROWS} fit in a study."
+            "E-STUDY-014", f"{path} declares {count} tasks; at most {MOST_TASKS} fit in a study."
         )
     chosen = list(combinations(config))
     for options in chosen:
