@@ -115,7 +115,7 @@ def test_what_is_refused(changes: dict, code: str, names: tuple[str, ...], tmp_p
         ({"bootstrap": 3, "jackknife": 2}, "E-STUDY-006"),
         ({"bootstrap": -3}, "E-STUDY-005"),
         ({"jackknife": 1}, "E-STUDY-007"),
-        ({"bootstrap": 10**9}, "E-STUDY-030"),
+        ({"bootstrap": 10**9}, "E-STUDY-029"),
     ],
 )
 def test_resampling_that_is_refused(resampling: dict, code: str, tmp_path: Path) -> None:

@@ -113,7 +113,7 @@ class ResamplingConfig:
             )
         if self.bootstrap > MOST_TASKS:
             raise FlexcalError(
-                "E-STUDY-030", f"bootstrap: {self.bootstrap} is too many; write at most {MOST_TASKS}."
+                "E-STUDY-029", f"bootstrap: {self.bootstrap} is too many; write at most {MOST_TASKS}."
             )
         if self.jackknife == 1:
             raise FlexcalError("E-STUDY-007", "a jackknife needs at least 2 groups.")
