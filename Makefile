@@ -48,7 +48,7 @@ test-all: $(VENV)/.developer sanitize
 coverage: $(VENV)/.developer
 	$(BIN)/python -m pytest $(PARALLEL) --cov --cov-report=term:skip-covered --cov-report=html
 
-# the kernels' tests on a build that checks every access to memory and every undefined operation; needs g++
+# the kernels' tests, and the runtime's fuzzing, on a build that checks every access to memory and every undefined operation; needs g++
 SANITIZED := build/sanitize
 PRELOADED = $(foreach library,asan ubsan stdc++,$(shell g++ -print-file-name=lib$(library).so))
 KERNEL_TESTS := tests/test_kernels.py tests/frequency/test_covariance.py tests/runtime/test_runtime_equality.py tests/model tests/virtual_cell/test_stepping.py
@@ -59,6 +59,9 @@ sanitize: $(VENV)/.developer
 	PATH="$(CURDIR)/$(BIN):$$PATH" cmake --build $(SANITIZED)
 	LD_PRELOAD="$(PRELOADED)" ASAN_OPTIONS=detect_leaks=0:alloc_dealloc_mismatch=0 UBSAN_OPTIONS=print_stacktrace=1 \
 	  SANITIZED_KERNELS="$(CURDIR)/$(SANITIZED)" $(BIN)/python -m pytest -q -p no:xdist -p sanitized_kernels -m "" $(KERNEL_TESTS)
+	g++ -std=c++17 -g -O1 -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all -Iruntime/include \
+	  tests/runtime/runtime_fuzzer.cpp -o $(SANITIZED)/runtime_fuzzer
+	$(SANITIZED)/runtime_fuzzer tests/runtime/corpus 1500
 
 check: $(VENV)/.developer docs
 	$(BIN)/ruff check .

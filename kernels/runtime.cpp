@@ -80,7 +80,8 @@ nb::tuple nominal(const Robot& robot, nb::handle q_, int point) {
     Solver solver(*robot.model);
     for (std::size_t s = 0; s < samples; ++s) {
         Pose pose{};
-        if (solver.nominal(q.data() + n * s, point, pose) != Status::ok) throw nb::value_error("q must be finite, and the point known");
+        const Status result = solver.nominal(q.data() + n * s, point, pose);
+        if (result != Status::ok) throw nb::value_error(runtime::describe(result));
         copy(pose, s, position, rotation);
     }
     return nb::make_tuple(position.release(), rotation.release());

@@ -41,7 +41,7 @@ int main(int count, char** arguments) {
     flexcal::runtime::Solver solver(*model);
     std::vector<double> nominal(n), command(n), took, late;
     took.reserve(cycles), late.reserve(cycles);
-    std::size_t became[7] = {};  // how many cycles had each status
+    std::size_t became[flexcal::runtime::statuses] = {};  // how many cycles had each status
 
     auto next = Clock::now();
     for (std::size_t cycle = 0; cycle < cycles; ++cycle) {
@@ -61,7 +61,7 @@ int main(int count, char** arguments) {
         late.push_back(microseconds(woken - next));
     }
     std::printf("%zu cycles\n", cycles);
-    for (int status = 0; status < 7; ++status)
+    for (int status = 0; status < flexcal::runtime::statuses; ++status)
         if (became[status]) std::printf("%8zu: %s\n", became[status], flexcal::runtime::describe(static_cast<flexcal::runtime::Status>(status)));
     for (auto [name, values] : {std::pair{"compensation", &took}, std::pair{"wake-up after the deadline", &late}})
         std::printf("%-27s median %.1f us, 99.99 %% %.1f us, most %.1f us\n", name, quantile(*values, 0.5), quantile(*values, 0.9999),

@@ -15,7 +15,8 @@ enum flexcal_status {
     FLEXCAL_SINGULAR = 3,    /* the arm can hardly move its tool in the direction in which it would have to */
     FLEXCAL_TOO_FAR = 4,     /* the command would be farther from the given joint positions than a correction is */
     FLEXCAL_NOT_REACHED = 5, /* the steps allowed did not bring the tool to its target */
-    FLEXCAL_UNSTABLE = 6     /* the springs cannot carry the arm */
+    FLEXCAL_UNSTABLE = 6,    /* the springs cannot carry the arm */
+    FLEXCAL_OVERFLOW = 7     /* the result is too large for a number, of a model or joint positions that no robot has */
 };
 
 /* A calibrated robot, constant: threads may share it. */
@@ -41,13 +42,14 @@ int flexcal_set_payload(flexcal_solver* solver, double mass);
 /* Farthest that a command may be from the joint positions it starts from: 0.2 rad or m by default. */
 void flexcal_set_largest_correction(flexcal_solver* solver, double distance);
 
+/* What the calls below compute is written only where the status is FLEXCAL_OK. */
 /* position (3), rotation (9, row by row) of a point with the motors at q; flank (n), +1 or -1, or null where gravity sets it. */
 int flexcal_forward(flexcal_solver* solver, const double* q, int point, const double* flank, double* position, double* rotation);
 /* The same of the nominal robot. */
 int flexcal_nominal(flexcal_solver* solver, const double* q, int point, double* position, double* rotation);
-/* Commands (n) with which the real tool stands where the nominal one would at q. Written only where the status is FLEXCAL_OK. */
+/* Commands (n) with which the real tool stands where the nominal one would at q. */
 int flexcal_compensate(flexcal_solver* solver, const double* q, int point, double* command);
-/* Commands (n) for a pose, from motor positions near (n). Written only where the status is FLEXCAL_OK. */
+/* Commands (n) for a pose, from motor positions near (n). */
 int flexcal_inverse(flexcal_solver* solver, const double* position, const double* rotation, const double* near, int point, double* command);
 /* Torques (n) of the motors, N m, that move the warm robot so: links, payload, rotors and friction. If elastic is not 0, links stand where
    the drives' springs let them, for motions slow beside their resonances. */

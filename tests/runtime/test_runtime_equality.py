@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from flexcal.compensation import desired_pose, motor_commands
 from flexcal.data.poses import ToolTargets
@@ -22,7 +24,7 @@ from flexcal.model.statics import tool_at_rest
 POSES = 10_000
 EXACT = 1e-12
 """m and rad."""
-OK, BAD_INPUT, LIMIT, SINGULAR, TOO_FAR, NOT_REACHED, UNSTABLE = range(7)
+OK, BAD_INPUT, LIMIT, SINGULAR, TOO_FAR, NOT_REACHED, UNSTABLE, OVERFLOW = range(8)
 
 _JOINT = """<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{0}_link"/><origin xyz="{3}" rpy="{4}"/><axis xyz="{5}"/>
 <limit lower="{6}" upper="{7}" effort="100" velocity="2"/></joint>
@@ -257,6 +259,79 @@ def test_other_documents_are_refused(tx90l: RobotModel) -> None:
         ({"joints": []}, "no joint"),
         ({"points": [document["points"][0] | {"rotation": [2, 0, 0, 0, 1, 0, 0, 0, 1]}]}, "point 1: 'rotation' is no rotation"),
         ({"joints": [document["joints"][0] | {"parent": 0}]}, "joint 1: 'parent' is out of its range"),
+        ({"joints": [document["joints"][0] | {"normals": [2, 0, 0, 0, 1, 0]}]}, "joint 1: 'normals' has a vector that is not of unit"),
+        ({"joints": [document["joints"][0] | {"rotation": [1, 0, 0, 0, 1, 0, 0, 0, -1]}]}, "joint 1: 'rotation' is no rotation"),
+        ({"joints": [document["joints"][0] | {"springs": document["joints"][0]["springs"][::-1]}]}, "joint 1: its springs do not"),
+        ({"joints": [document["joints"][0] | {"lower": 1, "upper": 0}]}, "joint 1: 'lower' is above 'upper'"),
+        ({"joints": document["joints"][:1] * 101}, "more than 100 joints"),
+        ({"points": [document["points"][0] | {"rows": 5}]}, "point 1: 'rows' is neither 3 nor 6"),
+        ({"points": [document["points"][0] | {"position": [0, 0, 1.1e20]}]}, "point 1: 'position' has a number beyond 1e20"),
+        ({"reach": -1}, "'reach' is negative"),
+        ({"robot": "x" * (4 << 20)}, "more than 4194304 bytes"),
     ):  # fmt: skip
         with pytest.raises(ValueError, match=said):
             RuntimeRobot.read(json.dumps(document | change))
+
+
+def test_texts_that_are_no_json_are_refused() -> None:
+    for text in ("+1", "01", "1.", ".5", "1e", "-", "1e999", '"\\udc00"', "NaN", "[" * 100, "{} {}"):
+        with pytest.raises(ValueError, match="line 1: "):
+            RuntimeRobot.read(text)
+
+
+def test_a_robot_beyond_the_runtime_is_not_exported(tx90l: RobotModel) -> None:
+    for value in (1e30, np.nan):
+        huge = tx90l.with_values({f"{tx90l.joints[1].link}.mass": value})
+        with refused("E-EXPORT-007", tx90l.name):
+            render_runtime(huge, tx90l, TorqueModel.of(tx90l).document())
+
+
+def test_results_too_large_for_a_number_have_a_status(tx90l: RobotModel) -> None:
+    arm = runtime(tx90l, tx90l)
+    q, declared = np.array([[0.3, 0.5, 1.2, 0.4, 0.9, -0.5]]), np.array([np.nan])
+    fast = np.full((1, 6), 1e200)
+    torque, status, _ = arm.torque(q, fast, fast, declared)
+    assert status[0] == OVERFLOW and np.isnan(torque).all()
+    assert arm.torque(q, q, q, declared)[1][0] == OK
+
+
+def _numbers(value: object) -> list[tuple[dict[str, Any] | list[Any], Any]]:
+    """Every number of a document, as what holds it and its place there."""
+    if not isinstance(value, dict | list):
+        return []
+    items = list(value.items() if isinstance(value, dict) else enumerate(value))
+    own = [(value, key) for key, item in items if isinstance(item, float)]
+    return own + [place for _, item in items for place in _numbers(item)]
+
+
+def test_models_with_odd_numbers_are_refused_or_answer_with_numbers(root: Path) -> None:
+    """What is read has a finite result, or a status, for every call."""
+    rng = np.random.default_rng(3)
+    odd = [0.0, -1.0, 1e-300, -1e-3, 1e6, -1e12, 1e20, 1e21, 1e50, -1e300]
+    read = answered = 0
+    for file in sorted((root / "tests" / "runtime" / "corpus").glob("*.json")):
+        text = file.read_text(encoding="utf-8")
+        for k in range(1 if file.name.startswith("refused") else 40):
+            document = json.loads(text)
+            places = _numbers(document)
+            if k > 0:
+                holder, key = places[rng.integers(len(places))]
+                holder[key] = odd[rng.integers(len(odd))]
+            try:
+                arm = RuntimeRobot.read(json.dumps(document))
+            except ValueError as refusal:
+                assert str(refusal) and (k > 0 or file.name.startswith("refused"))
+                continue
+            assert k > 0 or not file.name.startswith("refused")
+            read += 1
+            n = len(arm.joint_names)
+            q, dq, ddq = rng.uniform(-2, 2, (3, 20, n))
+            declared, free = np.full(20, np.nan), np.zeros((0, n))
+            position, rotation, status = arm.forward(q, 0, declared, free)
+            results = [(np.column_stack([position, rotation.reshape(20, 9)]), status)]
+            results += [arm.compensate(q, 0, declared)[:2]]
+            results += [arm.torque(q, dq, ddq, declared, elastic)[:2] for elastic in (False, True)]
+            for values, status in results:
+                assert np.isfinite(values[status == OK]).all()
+                answered += np.count_nonzero(status == OK)
+    assert read > 50 and answered > 2000

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from flexcal.errors import FlexcalError
 from flexcal.export.representation_error import ToolMap
 from flexcal.export.written_file import RenderedModel
 from flexcal.kernels import RuntimeRobot
@@ -27,7 +28,7 @@ def render_runtime(
 
     `drives` is the document of its `TorqueModel`.
     With `header` the text is a C and C++ header with the document as the constant `flexcal_robot`.
-    Raises `FlexcalError` for a robot without points, and one whose joints follow others.
+    Raises `FlexcalError` for a robot without points, one whose joints follow others, and one that the runtime refuses.
     """
     model.require_motors("the runtime")
     model.point()
@@ -53,12 +54,18 @@ def render_runtime(
             "inertia": drives["payload_inertia"],
         },
     }
-    text = json.dumps(document, indent=1, allow_nan=False) + "\n"
-    return RenderedModel(_header(text) if header else text, _tool_map(text), (), None)
+    try:
+        text = json.dumps(document, indent=1, allow_nan=False) + "\n"
+        robot = RuntimeRobot.read(text)
+    except ValueError as problem:
+        raise FlexcalError(
+            "E-EXPORT-007",
+            f"{model.name} is no robot that the runtime takes: {problem}; correct it in the URDF, robot.yaml or the estimates.",
+        ) from problem
+    return RenderedModel(_header(text) if header else text, _tool_map(robot), (), None)
 
 
-def _tool_map(text: str) -> ToolMap:
-    robot = RuntimeRobot.read(text)
+def _tool_map(robot: RuntimeRobot) -> ToolMap:
     no_flank = np.zeros((0, len(robot.joint_names)))
     return lambda q: robot.forward(q, 0, np.full(len(q), np.nan), no_flank)[0]
 

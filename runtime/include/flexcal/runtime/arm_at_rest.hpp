@@ -50,7 +50,12 @@ class ArmAtRest {
         else
             for (int i = 0; i < n_; ++i) flank_[i] = sign(load_[i]);
         for (int pass = 1;; ++pass) {
-            for (int i = 0; i < n_; ++i) moved_[i] = q[i] + free_[i] - flank_[i] * model_.joints[i].backlash;
+            double total = 0;
+            for (int i = 0; i < n_; ++i) {
+                moved_[i] = q[i] + free_[i] - flank_[i] * model_.joints[i].backlash;
+                total += moved_[i];
+            }
+            if (!std::isfinite(total)) return Status::overflow;
             const Status status = solve(payload);
             if (status != Status::ok) return status;
             for (int i = 0; i < n_; ++i) {
@@ -126,22 +131,22 @@ class ArmAtRest {
         for (int k = 0; k < most_steps; ++k) {
             elastic_.move(moved_.data(), bent_.data(), payload);
             if (k > 0 ? k % steps_of_one_factor == 0 : !near_factor(payload)) {
-                if (!factor(payload)) return forget();
+                if (!factor(payload)) return forget(Status::unstable);
                 before = std::numeric_limits<double>::infinity();
             }
             for (int j = 0; j < d_; ++j) step_[j] = elastic_.load(j) - model_.stiffness[j] * bent_[3 * model_.axes[j].joint + model_.axes[j].component];
             cholesky_solve(hessian_, d_, step_.data());
-            double largest = 0;
+            double largest = 0, total = 0;
             for (int j = 0; j < d_; ++j) {
                 bent_[3 * model_.axes[j].joint + model_.axes[j].component] += step_[j];
-                largest = std::max(largest, std::abs(step_[j]));
+                largest = std::max(largest, std::abs(step_[j])), total += step_[j];
             }
-            if (!std::isfinite(largest)) return forget();
+            if (!std::isfinite(total)) return forget(Status::overflow);
             // the error after a step is that step times the ratio by which steps shrink
             if (largest < still_enough || (std::isfinite(before) && largest * std::min(1.0, largest / before) < still_enough)) return Status::ok;
             before = largest;
         }
-        return forget();
+        return forget(Status::unstable);
     }
 
     bool near_factor(double payload) const {
@@ -161,10 +166,10 @@ class ArmAtRest {
         return cholesky(hessian_, d_);
     }
 
-    Status forget() {
+    Status forget(Status status) {
         std::fill(bent_.begin(), bent_.end(), 0.0);
         std::fill(factored_at_.begin(), factored_at_.end(), std::numeric_limits<double>::infinity());
-        return Status::unstable;
+        return status;
     }
 
     const Model& model_;

@@ -34,11 +34,13 @@ class JsonReader {
 
     // False, with `error` set, where the text is no JSON document.
     bool read(Json& value, std::string& error) {
-        if (!parse(value, 0) || (skip(), at_ != text_.size() && fail("something stands after the document"))) {
-            error = "line " + std::to_string(line()) + ": " + error_;
-            return false;
+        if (parse(value, 0)) {
+            skip();
+            if (at_ == text_.size()) return true;
+            fail("something stands after the document");
         }
-        return true;
+        error = "line " + std::to_string(line()) + ": " + error_;
+        return false;
     }
 
   private:
@@ -134,8 +136,8 @@ class JsonReader {
         if (k != std::string_view::npos) return out += meant[k], true;
         unsigned long code = 0, low = 0;
         if (text_[at_] != 'u' || !hexadecimal(code)) return fail("a text has an unknown escape");
-        if (code >= 0xD800 && code < 0xDC00) {
-            if (text_.substr(at_ + 1, 2) != "\\u" || (at_ += 2, !hexadecimal(low)) || low < 0xDC00 || low > 0xDFFF)
+        if (code >= 0xD800 && code < 0xE000) {
+            if (code >= 0xDC00 || text_.substr(at_ + 1, 2) != "\\u" || (at_ += 2, !hexadecimal(low)) || low < 0xDC00 || low > 0xDFFF)
                 return fail("a text has half of a surrogate pair");
             code = 0x10000 + ((code - 0xD800) << 10) + (low - 0xDC00);
         }
@@ -169,11 +171,19 @@ class JsonReader {
     bool number(Json& value) {
         value.kind = Json::Kind::number;
         const std::size_t first = at_;
-        while (at_ < text_.size() && std::string_view("+-.0123456789eE").find(text_[at_]) != std::string_view::npos) ++at_;
+        const auto one_of = [&](std::string_view some) { return at_ < text_.size() && some.find(text_[at_]) != some.npos && ++at_; };
+        const auto digits = [&] {
+            if (!one_of("0123456789")) return false;
+            while (one_of("0123456789")) {}
+            return true;
+        };
+        one_of("-");
+        if ((!one_of("0") && !digits()) || (one_of(".") && !digits()) || (one_of("eE") && (one_of("+-"), !digits())))
+            return fail("no value begins like this");
         std::istringstream stream{std::string(text_.substr(first, at_ - first))};
         stream.imbue(std::locale::classic());  // whatever the decimal point of the program's locale
         stream >> value.number;
-        return (!stream.fail() && stream.peek() == std::char_traits<char>::eof()) || fail("no value begins like this");
+        return !stream.fail() || fail("a number is too large");
     }
 
     std::string_view text_;

@@ -1,11 +1,11 @@
 // A calibrated robot as `flexcal export runtime` writes it, constant once it is read.
 #pragma once
 #include <cstddef>
+#include <filesystem>
 #include <fstream>
 #include <initializer_list>
 #include <limits>
 #include <memory>
-#include <sstream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,6 +14,10 @@
 #include "flexcal/runtime/json.hpp"
 
 namespace flexcal::runtime {
+
+constexpr double largest_number = 1e20;                     // of a robot, in SI units; products of a few such numbers do not overflow
+constexpr std::size_t most_joints = 100;
+constexpr std::size_t largest_text = std::size_t{4} << 20;  // bytes
 
 // Share of a joint's motion that its transmission adds: sine · sin(order q) + cosine · cos(order q), rad.
 struct Wave {
@@ -105,6 +109,7 @@ class ModelReader {
     // Null, with a sentence in `error`, where the text is no robot of this version.
     static std::unique_ptr<const Model> read(std::string_view text, std::string& error) {
         Json document;
+        if (text.size() > largest_text) return error = "it has more than " + std::to_string(largest_text) + " bytes", nullptr;
         if (!JsonReader(text).read(document, error)) return nullptr;
         ModelReader reader;
         auto model = std::make_unique<Model>();
@@ -114,22 +119,30 @@ class ModelReader {
     }
 
   private:
+    static constexpr double rounding = 1e-9;
+
     bool fail(const std::string& problem) {
         if (error_.empty()) error_ = problem;
         return false;
     }
 
+    bool bounded(const char* name, double number, double& value) {
+        value = number;
+        return std::abs(number) <= largest_number || fail(std::string("'") + name + "' has a number beyond 1e20, which no robot has");
+    }
+
     bool number(const Json& from, const char* name, double& value) {
         const Json* member = from.member(name);
         if (!member || member->kind != Json::Kind::number) return fail(std::string("'") + name + "' is missing or no number");
-        value = member->number;
-        return true;
+        return bounded(name, member->number, value);
     }
 
+    // Some programs write their largest number where there is no limit; nothing is multiplied by it.
     bool limit(const Json& from, const char* name, double without, double& value) {
         const Json* member = from.member(name);
-        value = without;
-        return (member && member->kind == Json::Kind::null) || number(from, name, value);
+        value = member && member->kind == Json::Kind::number ? member->number : without;
+        return (member && (member->kind == Json::Kind::null || member->kind == Json::Kind::number)) ||
+               fail(std::string("'") + name + "' is missing, or neither a number nor null");
     }
 
     bool index(const Json& from, const char* name, int least, int below, int& value) {
@@ -153,7 +166,7 @@ class ModelReader {
             return fail(std::string("'") + name + "' has not " + std::to_string(count) + " numbers");
         for (std::size_t i = 0; i < count; ++i) {
             if (member->items[i].kind != Json::Kind::number) return fail(std::string("'") + name + "' has something else than numbers");
-            values[i] = member->items[i].number;
+            if (!bounded(name, member->items[i].number, values[i])) return false;
         }
         return true;
     }
@@ -169,7 +182,7 @@ class ModelReader {
         double values[9];
         if (!numbers(from, name, 9, values)) return false;
         value = rotation(values);
-        return departure_from_rotation(value) < 1e-9 || fail(std::string("'") + name + "' is no rotation");
+        return (departure_from_rotation(value) < rounding && dot(cross(value.x, value.y), value.z) > 0) || fail(std::string("'") + name + "' is no rotation");
     }
 
     const std::vector<Json>* list(const Json& from, const char* name) {
@@ -193,7 +206,9 @@ class ModelReader {
             return false;
         const auto *joints = list(document, "joints"), *points = list(document, "points");
         if (!joints || !points) return false;
+        if (model.reach < 0) return fail("'reach' is negative");
         if (joints->empty() || points->empty()) return fail("it has no joint or no point");
+        if (joints->size() > most_joints) return fail("it has more than " + std::to_string(most_joints) + " joints");
         for (const Json& each : *joints)
             if (!joint(each, static_cast<int>(joints->size()), model)) return in("joint", model.joints.size() - 1);
         model.prepared = model.tree.prepare(model.geometry.data());
@@ -209,7 +224,7 @@ class ModelReader {
             if (!index(each, "motor", 0, model.size(), data.motor) || !index(each, "joint", 0, model.size(), data.joint) ||
                 !number(each, "ratio", data.ratio) || !number(each, "rotor_inertia", data.rotor_inertia) ||
                 !number(each, "viscous", data.viscous) || !number(each, "coulomb", data.coulomb))
-                return false;
+                return in("coupling", model.couplings.size());
             model.couplings.push_back(data);
         }
         const Json* held = document.member("payload");
@@ -234,6 +249,8 @@ class ModelReader {
             !vector(from, "translation", place.translation) || !numbers(from, "normals", 6, normals) || !turn(from, "bearing", place.bearing))
             return false;
         place.normal_1 = vector3(normals), place.normal_2 = vector3(normals + 3);
+        for (const Vector3& normal : {place.normal_1, place.normal_2})
+            if (!(std::abs(dot(normal, normal) - 1) < rounding)) return fail("'normals' has a vector that is not of unit length");
         nominal = place;
         model.geometry.resize(6 * (i + 1)), model.nominal_geometry.resize(6 * (i + 1));
         if (!vector(from, "nominal_translation", nominal.translation) || !numbers(from, "errors", 6, &model.geometry[6 * i]) ||
@@ -245,6 +262,7 @@ class ModelReader {
             !number(from, "gravity_compliance", data.gravity_compliance) ||
             !numbers(from, "lateral_compliance", 2, data.lateral_compliance))
             return false;
+        if (data.lower > data.upper) return fail("'lower' is above 'upper'");
         model.mass.push_back(mass);
         model.first_moment.insert(model.first_moment.end(), moment, moment + 3);
         const Vector3 across[2] = {place.normal_1, place.normal_2};
@@ -257,16 +275,21 @@ class ModelReader {
     bool springs(const Json& from, int i, Model& model) {
         const auto* found = list(from, "springs");
         if (!found) return false;
+        int last = -1;
         for (const Json& each : *found) {
             ElasticAxis axis{i, 0};
             double stiffness = 0;
             if (!index(each, "component", 0, 3, axis.component) || !number(each, "stiffness", stiffness)) return false;
             if (!(stiffness > 0)) return fail("a spring has no positive stiffness");
             if (model.tree.joints[i].prismatic) return fail("a prismatic joint has a spring");
+            const int place = !model.tree.tilts_first ? 2 - axis.component : axis.component == 2 ? 2 : 1 - axis.component;
+            if (place <= last) return fail("its springs do not stand in order from base to tool");
+            last = place;
             model.axes.push_back(axis), model.stiffness.push_back(stiffness);
             if (axis.component != 2) continue;
             model.joints[i].drive_stiffness = stiffness;
             if (!number(each, "hardening", model.joints[i].hardening)) return false;
+            if (model.joints[i].hardening < 0) return fail("the hardening of a spring is negative");
         }
         return true;
     }
@@ -304,6 +327,7 @@ class ModelReader {
 
     bool point(const Json& from, int count, PointData& data) {
         return text(from, "name", data.name) && index(from, "joint", 0, count, data.joint) && index(from, "rows", 3, 7, data.rows) &&
+               (data.rows == 3 || data.rows == 6 || fail("'rows' is neither 3 nor 6")) &&
                vector(from, "position", data.real.position) && turn(from, "rotation", data.real.rotation) &&
                vector(from, "nominal_position", data.nominal.position) && turn(from, "nominal_rotation", data.nominal.rotation);
     }
@@ -319,15 +343,18 @@ class ModelReader {
 // The robot in the text of a file of `flexcal export runtime`; null, with a sentence in `error`, where it cannot be read.
 inline std::unique_ptr<const Model> read_model(std::string_view text, std::string& error) { return ModelReader::read(text, error); }
 
-// The same for a file.
+// The same for a regular file.
 inline std::unique_ptr<const Model> read_model_file(const std::string& path, std::string& error) {
-    std::ifstream file(path, std::ios::binary);
-    std::ostringstream text;
-    if (!file || !(text << file.rdbuf())) {
+    std::error_code unknown;
+    std::ifstream file;
+    if (std::filesystem::is_regular_file(path, unknown)) file.open(path, std::ios::binary);
+    std::string text(largest_text + 1, 0);
+    if (!file.is_open() || (file.read(text.data(), static_cast<std::streamsize>(text.size())), file.bad())) {
         error = path + " cannot be read";
         return nullptr;
     }
-    auto model = read_model(text.str(), error);
+    text.resize(static_cast<std::size_t>(file.gcount()));
+    auto model = read_model(text, error);
     if (!model) error = path + ": " + error;
     return model;
 }

@@ -19,7 +19,7 @@ class Solver {
   public:
     explicit Solver(const Model& model)
         : model_(model), n_(model.size()), arm_(model), dynamics_(model), frames_(n_), still_(3 * n_, 0.0),
-          jacobian_(rows_ * n_), square_(rows_ * rows_), right_(rows_), q_(n_), origin_(n_), flank_(n_), held_(n_) {
+          jacobian_(rows_ * n_), square_(rows_ * rows_), right_(rows_), q_(n_), origin_(n_), flank_(n_), torque_(n_), held_(n_) {
         for (const PointData& point : model.points) paths_.push_back(model.tree.path(point.joint));
         payload_ = model.payload.mass;
     }
@@ -37,28 +37,34 @@ class Solver {
     // Farthest that a command may be from the joint positions it starts from, rad or m.
     void set_largest_correction(double distance) { largest_correction_ = distance; }
 
+    // What the calls below compute is written only where the status is ok.
+
     // Where the real tool is with the motors at q (n,), rad or m; flank (n,), ±1, the sides of backlashes, else those set by gravity.
     [[nodiscard]] Status forward(const double* q, int point, Pose& pose, const double* flank = nullptr) {
+        joint_ = -1;
         if (!finite(q) || !known(point)) return Status::bad_input;
         for (int i = 0; flank && i < n_; ++i)
             if (flank[i] != 1 && flank[i] != -1) return Status::bad_input;
         const Status status = arm_.settle(q, payload_, flank);
-        if (status == Status::ok) write(place(model_.tree, model_.prepared, q, arm_.deflection(), point, model_.points[point].real), pose);
-        return status;
+        if (status != Status::ok) return status;
+        return write(place(model_.tree, model_.prepared, q, arm_.deflection(), point, model_.points[point].real), pose);
     }
 
     // Where the nominal robot has the point at q (n,), rad or m.
     [[nodiscard]] Status nominal(const double* q, int point, Pose& pose) {
+        joint_ = -1;
         if (!finite(q) || !known(point)) return Status::bad_input;
-        write(nominal_place(q, point), pose);
-        return Status::ok;
+        return write(nominal_place(q, point), pose);
     }
 
     // Torques (n,) of the motors, N m, that move the warm robot so: links, payload, rotors and friction. If elastic, links stand where the
     // drives' springs let them, for motions slow beside their resonances.
     [[nodiscard]] Status torque(const double* q, const double* dq, const double* ddq, double* result, bool elastic = false) {
+        joint_ = -1;
         if (!finite(q) || !finite(dq) || !finite(ddq)) return Status::bad_input;
-        dynamics_.torque(q, dq, ddq, payload_, elastic, result);
+        dynamics_.torque(q, dq, ddq, payload_, elastic, torque_.data());
+        if (!finite(torque_.data())) return Status::overflow;
+        std::copy(torque_.begin(), torque_.end(), result);
         return Status::ok;
     }
 
@@ -68,16 +74,19 @@ class Solver {
     // The joint that the last status is about; -1 where it is about none.
     int joint() const { return joint_; }
 
-    // Motor positions (n,), rad or m, with which the real tool stands where the nominal one would at q. Not written unless the status is ok.
+    // Motor positions (n,), rad or m, with which the real tool stands where the nominal one would at q.
     [[nodiscard]] Status compensate(const double* q, int point, double* command) {
+        joint_ = -1;
         if (!finite(q) || !known(point)) return Status::bad_input;
         const Hung aim = nominal_place(q, point);
+        if (!finite(aim)) return Status::overflow;
         return search(aim, q, point, command);
     }
 
     // The same for a pose of the tool, from motor positions `near` (n,) within the limits. The rotation counts where the arm has six joints
     // before the point.
     [[nodiscard]] Status inverse(const Pose& target, const double* near, int point, double* command) {
+        joint_ = -1;
         if (!finite(near) || !known(point) || !is_pose(target)) return Status::bad_input;
         return search({vector3(target.position), rotation(target.rotation)}, near, point, command);
     }
@@ -94,17 +103,22 @@ class Solver {
         return true;
     }
 
+    static bool finite(Vector3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+    // One test instead of twelve: what is not finite stays so in a sum.
+    static bool finite(const Hung& hung) { return finite(hung.position + hung.rotation.x + hung.rotation.y + hung.rotation.z); }
+
     static bool is_pose(const Pose& pose) {
         const Rotation r = rotation(pose.rotation);
-        for (const double value : pose.position)
-            if (!std::isfinite(value)) return false;
-        return departure_from_rotation(r) < 1e-6 && dot(cross(r.x, r.y), r.z) > 0;
+        return finite(vector3(pose.position)) && departure_from_rotation(r) < 1e-6 && dot(cross(r.x, r.y), r.z) > 0;
     }
 
-    static void write(const Hung& placed, Pose& pose) {
+    static Status write(const Hung& placed, Pose& pose) {
+        if (!finite(placed)) return Status::overflow;
         const Vector3 p = placed.position;
         pose.position[0] = p.x, pose.position[1] = p.y, pose.position[2] = p.z;
         write_rows(placed.rotation, pose.rotation);
+        return Status::ok;
     }
 
     Hung place(const Tree& tree, const std::vector<Prepared>& prepared, const double* q, const double* deflection, int point, const Hung& hung) {
@@ -146,6 +160,7 @@ class Solver {
                 flank = flank_.data();
             }
             const Hung at = place(model_.tree, model_.prepared, q_.data(), arm_.deflection(), point, model_.points[point].real);
+            if (!finite(at)) return Status::overflow;
             const double off = residual(aim, at, model_.points[point].rows);
             if (off < there) {
                 if (!flanks_turned && arm_.turned()) {
@@ -269,7 +284,7 @@ class Solver {
     std::vector<std::vector<int>> paths_;
     std::vector<Frames> frames_;
     const std::vector<double> still_;
-    std::vector<double> jacobian_, square_, right_, q_, origin_, flank_;
+    std::vector<double> jacobian_, square_, right_, q_, origin_, flank_, torque_;
     std::vector<char> held_;
     double payload_ = 0, largest_correction_ = 0.2;
     bool singular_ = false;

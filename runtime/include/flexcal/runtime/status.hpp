@@ -11,7 +11,9 @@ enum class Status : int {
     too_far = 4,      // the command would be farther from the given joint positions than a correction is
     not_reached = 5,  // the steps allowed did not bring the tool to its target
     unstable = 6,     // the springs cannot carry the arm
+    overflow = 7,     // the result is too large for a number, of a model or joint positions that no robot has
 };
+constexpr int statuses = 8;
 
 inline const char* describe(Status status) {
     switch (status) {
@@ -23,6 +25,7 @@ inline const char* describe(Status status) {
         case Status::too_far: return "the command would be farther from the given joint positions than a correction is";
         case Status::not_reached: return "the steps allowed did not bring the tool to its target";
         case Status::unstable: return "the springs cannot carry the arm";
+        case Status::overflow: return "the result is too large for a number, as the model or the joint positions are those of no robot";
     }
     return "unknown status";
 }
