@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import re
@@ -12,6 +13,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from random import Random
 
 import numpy as np
 import pytest
@@ -21,7 +23,7 @@ from waiting import PATIENCE
 from flexcal import CalibratedRobot, compensate, read_torque_model
 from flexcal.cli.main import main
 from flexcal.data.poses import ToolTargets
-from flexcal.jobs.serving import Answers, serve_tcp, serve_unix
+from flexcal.jobs.serving import Answers, serve_tcp, serve_unix, server
 
 Q = [0.3, -1.2, 1.5, 0.1, 1.6, 0.2]
 
@@ -162,6 +164,147 @@ def test_nonsense_is_answered_in_a_sentence(robot_file: Path, line: bytes) -> No
     assert json.loads(answers.of(json.dumps({"q": Q}).encode()))["status"] == "done"
 
 
+ODD_VALUES = [
+    *(
+        "NaN",
+        "Infinity",
+        "-Infinity",
+        "1e308",
+        "-1e308",
+        "1e200",
+        "1e20",
+        "1e7",
+        "1e-320",
+        "1e999",
+        "-0.0",
+        "true",
+        "null",
+    ),
+    *(
+        "1" + "0" * 400,
+        "1" + "0" * 5000,
+        '"x"',
+        '"\\ud800"',
+        '"\\u0000\\n\\u2028"',
+        "[]",
+        "{}",
+        "[NaN]",
+        '{"a": NaN}',
+    ),
+    *("[[" + 500 * "[" + 502 * "]", 3000 * "[", '"' + 200 * "y" + '"'),
+]
+
+
+SIZES = [*90 * [0], 1, 3, 5, 8, 150]
+
+
+def odd_line(random: Random) -> bytes:
+    """A request of which some values, and now and then some bytes, are not those of a client that means well."""
+
+    def vector(length: int) -> str:
+        values = [
+            random.choice(ODD_VALUES)
+            if random.random() < 0.02
+            else repr(value * 10.0 ** random.choice(SIZES))
+            for value in (Q + Q)[:length]
+        ]
+        return f"[{', '.join(values)}]"
+
+    verb = random.choice(["compensate", "forward", "nominal", "torque", "inverse", "describe"])
+    vectors = {"torque": {"q": 6, "dq": 6, "ddq": 6}, "inverse": {"near": 6, "position": 3}}
+    fields = {"do": f'"{verb}"', "id": random.choice([*ODD_VALUES, *9 * ["7", '"a"']])}
+    fields |= {key: vector(length) for key, length in vectors.get(verb, {"q": 6}).items()}
+    if verb == "inverse":
+        fields["quaternion_wxyz"] = random.choice(["[1, 0, 0, 0]", vector(4)])
+    for key in ("point", "payload", "do", "q"):
+        if random.random() < 0.05:
+            fields[key] = random.choice(ODD_VALUES)
+    line = bytearray("{" + ", ".join(f'"{key}": {value}' for key, value in fields.items()) + "}", "utf-8")
+    if random.random() < 0.2:
+        for _ in range(3):
+            line[random.randrange(len(line))] = random.randrange(256)
+    if random.random() < 0.1:
+        del line[random.randrange(len(line)) :]
+    return bytes(line).replace(b"\n", b" ") + b"\n"
+
+
+def test_every_odd_line_gets_one_line(robot_file: Path) -> None:
+    """What is not finite, and what no joint can be, is a status: nothing overflows on the way."""
+    answers, random = Answers.from_yaml(robot_file), Random(4)
+    done = 0
+    with np.errstate(all="raise", under="ignore"):
+        for _ in range(3000):
+            line = odd_line(random)
+            answer = answers.of(line)
+            assert answer.index(b"\n") == len(answer) - 1, line
+            found = json.loads(answer, parse_constant=pytest.fail)
+            assert isinstance(found["status"], str), line
+            done += found["status"] == "done"
+    assert 600 < done < 2400
+
+
+@pytest.mark.parametrize(("key", "size"), [("q", 2e5), ("dq", -2e5), ("ddq", 1e8)])
+def test_motions_of_no_joint_are_refused(robot_file: Path, key: str, size: float) -> None:
+    motion = {"q": Q, "dq": [0.0] * 6, "ddq": [0.0] * 6}
+    motion[key] = [0.0, size, 0.0, 0.0, 0.0, 0.0]
+    found = json.loads(
+        Answers.from_yaml(robot_file).of(json.dumps({"id": 3, "do": "torque", **motion}).encode())
+    )
+    assert found["id"] == 3 and found["status"].startswith(
+        f"'{key}' has a number that is not finite, or beyond ±"
+    )
+
+
+async def lines_of(port: int, *lines: bytes) -> list[str]:
+    """Statuses that a client is answered, until the server closes or as many as it sent."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    writer.write(b"".join(lines))
+    statuses = []
+    while len(statuses) < max(1, len(lines)) and (line := await reader.readline()):
+        statuses.append(json.loads(line)["status"])
+    writer.close()
+    return statuses
+
+
+def test_strangers_are_closed_and_keep_no_client_out(
+    robot_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Connections that never send the token have a time and a number of their own."""
+    monkeypatch.setattr(server, "_TOKEN_WAIT", 0.5)
+    monkeypatch.setattr(server, "_MOST_STRANGERS", 8)
+    monkeypatch.setattr(server, "_MOST_CLIENTS", 1)
+    token, served = b'{"token": "secret"}\n', server._Server(Answers.from_yaml(robot_file), "secret")
+
+    async def attacked() -> None:
+        async with await asyncio.start_server(served.connected, "127.0.0.1", 0) as listener:
+            port = listener.sockets[0].getsockname()[1]
+            silent = [await asyncio.open_connection("127.0.0.1", port) for _ in range(40)]
+            assert await lines_of(port, token, b'{"do": "describe"}\n') == ["done", "done"]
+            evicted, waited_for = await silent[0][0].read(), await silent[-1][0].read()
+            assert b"too many connections have not sent the token" in evicted
+            assert b"no token came within 0.5 s" in waited_for
+            assert await lines_of(port, token, b"\n") == ["done", "the line is no JSON document"]
+
+    asyncio.run(attacked())
+    assert served.served.refused == 40
+
+
+def test_a_line_on_which_the_server_fails_is_answered_too(capsys: pytest.CaptureFixture[str]) -> None:
+    class Broken(Answers):
+        def __init__(self) -> None:
+            pass
+
+        def of(self, line: bytes) -> bytes:
+            raise ArithmeticError("\x1b[31m\n")
+
+    served = server._Server(Broken(), None)
+    assert {json.loads(served._answer(b"{}\n"))["status"] for _ in range(3)} == {
+        "this line made the server fail, which is a fault of flexcal; it answers the next"
+    }
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "ArithmeticError: '\\x1b[31m\\n'" in said
+
+
 def test_no_client_disturbs_the_others(robot_file: Path, tmp_path: Path) -> None:
     """Long lines, half lines, clients that never read, that are killed, and a thousand at once."""
     with serving(robot_file, "--unix", tmp_path / "s") as (server, address), Client(address) as steady:
@@ -266,6 +409,9 @@ def test_places_that_cannot_be_listened_on_are_refused(
     (tmp_path / "file").write_text("\n")
     with refused("E-SERVE-007"):
         serve_tcp(answers, 0, tmp_path / "file", print)
+    os.mkfifo(tmp_path / "pipe", 0o600)
+    with refused("E-FILE-014", str(tmp_path / "pipe")):
+        serve_tcp(answers, 0, tmp_path / "pipe", print)
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -16,8 +17,18 @@ from flexcal.jobs.inputs import CalibratedRobot, held_at
 from flexcal.kernels import RuntimeRobot
 from flexcal.model.parts import rotation_wxyz, wxyz_rotation
 
-_DONE = "done"
+DONE = "done"
 _KEYS = ("id", "do", "q", "dq", "ddq", "near", "position", "quaternion_wxyz", "point", "payload")
+_LARGEST = {
+    "q": 1e5,
+    "dq": 1e5,
+    "ddq": 1e7,
+    "near": 1e5,
+    "position": 1e5,
+    "quaternion_wxyz": 2.0,
+    "payload": 1e6,
+}
+"""Sizes beyond any robot's, in SI units: 16 000 turns of a joint, 16 000 in a second, 1000 t."""
 
 
 class _UnclearError(Exception):
@@ -55,22 +66,19 @@ class Answers:
 
     def of(self, line: bytes) -> bytes:
         """Answer to a line, with its `id` where it has one, and a line feed at its end."""
-        number: object = None
+        answer: dict[str, Any] = {}
         try:
             asked = _parsed(line)
-            number = asked.get("id")
+            answer |= _identity(asked)
             verb = asked.get("do", "compensate")
             unknown = [key for key in asked if key not in _KEYS]
             if unknown:
                 raise _UnclearError(f"'{unknown[0]}' is unknown; there are {', '.join(_KEYS)}")
             if not isinstance(verb, str) or verb not in self._verbs:
                 raise _UnclearError(f"'do' must be one of {', '.join(self._verbs)}")
-            answer = self._verbs[verb](asked)
-        except _UnclearError as problem:
-            answer = {"status": str(problem)}
-        except FlexcalError as problem:
-            answer = {"status": str(problem)}
-        answer = answer if number is None else {"id": number, **answer}
+            answer |= self._verbs[verb](asked)
+        except (_UnclearError, FlexcalError) as problem:
+            answer |= {"status": str(problem)}
         return json.dumps(answer, allow_nan=False).encode() + b"\n"
 
     def _compensate(self, asked: Mapping[str, Any]) -> dict[str, Any]:
@@ -85,7 +93,7 @@ class Answers:
 
     def _commanded(self, command: np.ndarray, status: np.ndarray, joint: np.ndarray) -> dict[str, Any]:
         if status[0] == 0:
-            return {"status": _DONE, "command": command[0].tolist()}
+            return {"status": DONE, "command": command[0].tolist()}
         said = RuntimeRobot.describe(int(status[0]))
         return {"status": said, **({} if joint[0] < 0 else {"joint": self._joints[int(joint[0])]})}
 
@@ -107,10 +115,10 @@ class Answers:
         torque, status, _ = self._robot.torque(q, dq, ddq, _payload(asked))
         if status[0] != 0:
             return {"status": RuntimeRobot.describe(int(status[0]))}
-        return {"status": _DONE, "torque": torque[0].tolist()}
+        return {"status": DONE, "torque": torque[0].tolist()}
 
     def _describe(self, asked: Mapping[str, Any]) -> dict[str, Any]:
-        return {"status": _DONE, "robot": self._name, "joints": self._joints, "points": self._points}
+        return {"status": DONE, "robot": self._name, "joints": self._joints, "points": self._points}
 
     def _positions(self, asked: Mapping[str, Any], key: str) -> np.ndarray:
         return _numbers(asked, key, len(self._joints))[None]
@@ -132,26 +140,27 @@ def _parsed(line: bytes) -> dict[str, Any]:
     return asked
 
 
+def _identity(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """The `id` of a request that comes back with its answer."""
+    number = asked.get("id")
+    if number is None:
+        return {}
+    if not isinstance(number, str | int | float) or (isinstance(number, float) and not math.isfinite(number)):
+        raise _UnclearError("'id' must be a text or a finite number")
+    return {"id": number}
+
+
 def _numbers(asked: Mapping[str, Any], key: str, count: int) -> np.ndarray:
     values = asked.get(key)
-    if (
-        not isinstance(values, list)
-        or len(values) != count
-        or not all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
-    ):
+    if not isinstance(values, list) or len(values) != count or not all(map(_is_number, values)):
         raise _UnclearError(f"'{key}' must be a list of {count} numbers")
-    found = np.array([_real(value) for value in values])
-    if not np.isfinite(found).all():
-        raise _UnclearError(f"'{key}' has a number that is not finite")
-    return found
+    if not all(abs(value) <= _LARGEST[key] for value in values):  # NaN is not
+        raise _UnclearError(f"'{key}' has a number that is not finite, or beyond ±{_LARGEST[key]:g}")
+    return np.array(values, dtype=float)
 
 
-def _real(value: float) -> float:
-    """A number as a float, infinite where it is too large for one."""
-    try:
-        return float(value)
-    except OverflowError:
-        return np.inf
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _payload(asked: Mapping[str, Any]) -> np.ndarray:
@@ -159,9 +168,9 @@ def _payload(asked: Mapping[str, Any]) -> np.ndarray:
     mass = asked.get("payload")
     if mass is None:
         return np.array([np.nan])
-    if not isinstance(mass, int | float) or isinstance(mass, bool) or not 0 <= _real(mass) < np.inf:
-        raise _UnclearError("'payload' must be a mass in kg, not negative")
-    return np.array([_real(mass)])
+    if not _is_number(mass) or not 0 <= mass <= _LARGEST["payload"]:
+        raise _UnclearError(f"'payload' must be a mass in kg, from 0 to {_LARGEST['payload']:g}")
+    return np.array([mass], dtype=float)
 
 
 def _pose(asked: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
@@ -175,7 +184,7 @@ def _pose(asked: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
 
 def _placed(position: np.ndarray, rotation: np.ndarray) -> dict[str, Any]:
     return {
-        "status": _DONE,
+        "status": DONE,
         "position": position.tolist(),
         "quaternion_wxyz": rotation_wxyz(rotation).tolist(),
     }

@@ -12,16 +12,22 @@ import signal
 import socket
 import stat
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from flexcal.errors import InputError
-from flexcal.jobs.serving.answers import Answers
+from flexcal.files.transaction import open_regular
+from flexcal.jobs.serving.answers import DONE, Answers
+from flexcal.jobs.serving.first_problems import FirstProblems
 
 LONGEST_LINE = 1 << 16
 """Bytes of a line."""
 _MOST_CLIENTS = 4096
+_MOST_STRANGERS = 256
+"""Connections that have not sent the token yet."""
+_TOKEN_WAIT = 5.0
+"""Seconds in which a connection sends the token."""
 _BACKLOG = 1024
 _LOOPBACK = "127.0.0.1"
 _LONGEST_PATH = 107
@@ -45,49 +51,76 @@ class _Server:
 
     def __init__(self, answers: Answers, token: str | None) -> None:
         self.answers, self.token = answers, token
-        self.served = Served()
-        self.open = 0
+        self.served, self.problems = Served(), FirstProblems()
+        self._clients = 0
+        self._strangers: dict[asyncio.StreamWriter, None] = {}  # in the order of their arrival
 
     async def connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Serve a client until it goes; whatever it does, the others are not concerned."""
-        self.open += 1
         self.served.connections += 1
-        try:
-            with suppress(ConnectionError):
+        with suppress(ConnectionError), closing(writer):
+            if self.token is None or await self._has_token(reader, writer):
                 await self._serve(reader, writer)
+
+    async def _has_token(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> bool:
+        """Whether the first line has the token; it is waited for only so long, and of so many connections at once."""
+        if len(self._strangers) == _MOST_STRANGERS:
+            # a client sends its token at once: the one that has been silent for longest is none
+            longest = next(iter(self._strangers))
+            del self._strangers[longest]
+            self._refuse(longest, "too many connections have not sent the token")
+            longest.close()
+        self._strangers[writer] = None
+        try:
+            async with asyncio.timeout(_TOKEN_WAIT):
+                line = await self._line(reader, writer)
+        except TimeoutError:
+            self._refuse(writer, f"no token came within {_TOKEN_WAIT:g} s")
+            return False
         finally:
-            self.open -= 1
-            writer.close()
+            self._strangers.pop(writer, None)
+        if line is None:
+            return False
+        if not self._is_token(line):
+            self._refuse(writer, 'the first line must be {"token": "…"} with the token of the server\'s file')
+            return False
+        return True
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        if self.open > _MOST_CLIENTS:
-            await self._refuse(writer, f"{_MOST_CLIENTS} clients are connected; try again later")
+        if self._clients == _MOST_CLIENTS:
+            self._refuse(writer, f"{_MOST_CLIENTS} clients are connected; try again later")
             return
-        known = self.token is None
-        while True:
-            try:
-                line = await reader.readline()
-            except ValueError:
-                await self._refuse(writer, f"the line is longer than {LONGEST_LINE} bytes")
-                return
-            if not line.endswith(b"\n"):
-                return
-            if known:
-                writer.write(self.answers.of(line))
+        self._clients += 1
+        try:
+            if self.token is not None:
+                writer.write(_said(DONE))
+            while (line := await self._line(reader, writer)) is not None:
+                writer.write(self._answer(line))
                 self.served.answers += 1
-            elif not (known := self._is_token(line)):
-                await self._refuse(
-                    writer, 'the first line must be {"token": "…"} with the token of the server\'s file'
-                )
-                return
-            else:
-                writer.write(_said("done"))
-            await writer.drain()
+                await writer.drain()
+        finally:
+            self._clients -= 1
 
-    async def _refuse(self, writer: asyncio.StreamWriter, why: str) -> None:
+    async def _line(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> bytes | None:
+        """The next line; None at the end of the connection, and for a line that is too long."""
+        try:
+            line = await reader.readline()
+        except ValueError:
+            self._refuse(writer, f"the line is longer than {LONGEST_LINE} bytes")
+            return None
+        return line if line.endswith(b"\n") else None
+
+    def _answer(self, line: bytes) -> bytes:
+        """The answer to a line, also where computing it fails: requests behind it wait for theirs."""
+        try:
+            return self.answers.of(line)
+        except Exception as problem:
+            self.problems.say(problem)
+            return _said("this line made the server fail, which is a fault of flexcal; it answers the next")
+
+    def _refuse(self, writer: asyncio.StreamWriter, why: str) -> None:
         self.served.refused += 1
         writer.write(_said(why))
-        await writer.drain()
 
     def _is_token(self, line: bytes) -> bool:
         try:
@@ -155,8 +188,7 @@ async def _run(server: _Server, listening: socket.socket, ready: Callable[[], No
         # not in the main thread, signals are not for this loop
         with suppress(ValueError, RuntimeError):
             loop.add_signal_handler(number, stop.set)
-    # where descriptors run out, accepting is tried again after a second: nothing to be said each time
-    loop.set_exception_handler(lambda _loop, _context: None)
+    loop.set_exception_handler(server.problems.of_loop)
     listener = await asyncio.start_server(
         server.connected, sock=listening, limit=LONGEST_LINE, backlog=_BACKLOG
     )
@@ -196,11 +228,13 @@ def _token(path: Path) -> str:
     try:
         handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     except FileExistsError:
-        if path.stat().st_mode & 0o077:
-            raise InputError(
-                "E-SERVE-006", f"others may read the token in {path}; make it yours alone: chmod 600 {path}."
-            ) from None
-        token = path.read_text("utf-8", errors="replace").strip()
+        with open_regular(path, limit=LONGEST_LINE) as file:
+            if os.fstat(file.fileno()).st_mode & 0o077:
+                raise InputError(
+                    "E-SERVE-006",
+                    f"others may read the token in {path}; make it yours alone: chmod 600 {path}.",
+                ) from None
+            token = file.read(LONGEST_LINE).decode("utf-8", errors="replace").strip()
         if not token:
             raise InputError("E-SERVE-007", f"{path} is empty; remove it for a new token.") from None
         return token
