@@ -7,9 +7,9 @@ import os
 import signal
 import subprocess
 import sys
-import urllib.error
-import urllib.request
 from pathlib import Path
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 import pytest
 from browser import studio
@@ -58,7 +58,7 @@ def test_without_viser(tmp_path: Path) -> None:
 
 
 def test_browser_is_not_given_the_token(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The program that `BROWSER` names is started with an address that is good once, and leads to the window."""
+    """The program that `BROWSER` names is started with a file that its owner alone can read, and that leads to the window."""
     pytest.importorskip("viser", reason="viser is absent: pip install 'flexcal[studio]'")
     browser = tmp_path / "browser.sh"
     browser.write_text(
@@ -70,8 +70,9 @@ def test_browser_is_not_given_the_token(tmp_path: Path, monkeypatch: pytest.Monk
     with studio(tmp_path, browser=True) as running:
         until((tmp_path / "seen").exists)
         seen = (tmp_path / "seen").read_text().strip()
-        assert running.url not in seen
-        with urllib.request.urlopen(seen) as response:
-            assert response.url == running.url and response.status == 200
-        with pytest.raises(urllib.error.HTTPError, match="403"):
-            urllib.request.urlopen(seen)
+        page = Path(url2pathname(urlsplit(seen).path))
+        assert urlsplit(running.url).path.strip("/") not in seen
+        assert page.stat().st_mode & 0o077 == page.parent.stat().st_mode & 0o077 == 0
+        assert f'content="0; url={running.url}"' in page.read_text()
+        running.stop(signal.SIGINT)
+    assert not page.parent.exists()

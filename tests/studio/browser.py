@@ -42,12 +42,13 @@ _LOADED.set_forkserver_preload(
 
 @dataclass
 class Running:
-    """A studio in a process of its own, what it has said on standard error at its start, and the file of its standard output."""
+    """A studio in a process of its own, what it has said on standard error at its start, and the files of its output and errors."""
 
     process: ForkServerProcess
     url: str
     said: list[str]
     output: Path
+    errors: Path
 
     @property
     def alive(self) -> bool:
@@ -93,7 +94,7 @@ def studio(folder: Path, *arguments: str, browser: bool = False) -> Iterator[Run
         errors.touch()
         process = _LOADED.Process(target=_serve, args=(command, dict(os.environ), output, errors))
         process.start()
-        running = Running(process, "", [], output)
+        running = Running(process, "", [], output, errors)
         try:
             deadline = time.monotonic() + PATIENCE
             while True:

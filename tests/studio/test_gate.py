@@ -6,8 +6,9 @@ import pytest
 
 from flexcal.studio.server.gate import Gate, own_hosts
 
-TOKEN, FILES, TICKET = "t" * 43, "f" * 43, "k" * 43
-GATE = Gate(TOKEN, FILES, TICKET, own_hosts(["127.0.0.1", "localhost", "::1"], 8080), 8080)
+TOKEN, SECRET = "t" * 43, b"s" * 32
+GATE = Gate(TOKEN, SECRET, own_hosts(["127.0.0.1", "localhost", "::1"], 8080), 8080)
+PAGE = GATE.page_token("files/report.html")
 HOST = ("Host", "127.0.0.1:8080")
 ORIGIN = ("Origin", "http://127.0.0.1:8080")
 UPGRADE = ("Upgrade", "websocket")
@@ -20,8 +21,8 @@ def test_own_page_and_websocket_are_let_in() -> None:
     assert socket is not None and socket.upgrade
     bare = GATE.passage(f"/{TOKEN}", [HOST])
     assert bare is not None and bare.path is None
-    files = GATE.passage(f"/{FILES}/files/report.html", [HOST])
-    assert files is not None and files.key == "files_token" and files.path == "files/report.html"
+    page = GATE.passage(f"/{PAGE}/files/report.html?a=1", [HOST])
+    assert page is not None and page.key == "page_token" and page.path == "files/report.html?a=1"
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1:8080", "LOCALHOST:8080", "[::1]:8080"])
@@ -118,18 +119,31 @@ def test_other_pages_may_lead_here_and_no_more(site: str) -> None:
     assert GATE.passage(f"/{TOKEN}/", [*leads, ORIGIN, UPGRADE]) is None
 
 
-def test_token_of_files_and_ticket_open_no_websocket() -> None:
-    for token in (FILES, TICKET):
-        assert GATE.passage(f"/{token}", [HOST, ORIGIN, UPGRADE]) is None
+@pytest.mark.parametrize(
+    "path",
+    [
+        "files/other.html",
+        "files/report.html/",
+        "files/./report.html",
+        "files/%72eport.html",
+        "files/",
+        "files",
+    ],
+)
+def test_token_of_a_page_opens_no_other(path: str) -> None:
+    assert GATE.passage(f"/{PAGE}/{path}", [HOST]) is None
+    assert GATE.passage(f"/{GATE.page_token(path)}/files/report.html", [HOST]) is None
 
 
-def test_ticket_is_told_from_the_token() -> None:
-    ticket = GATE.passage(f"/{TICKET}/", [HOST])
-    assert ticket is not None and ticket.key == "ticket"
+def test_token_of_a_page_opens_neither_window_nor_websocket() -> None:
+    for path in ("", "/", "/pick/1", "?files/report.html", "/?files/report.html"):
+        assert GATE.passage(f"/{PAGE}{path}", [HOST]) is None
+    assert GATE.passage(f"/{GATE.page_token('pick/1')}/pick/1", [HOST]) is None
+    assert GATE.passage(f"/{PAGE}/files/report.html", [HOST, ORIGIN, UPGRADE]) is None
 
 
 def test_any_address_but_no_other_name_where_all_interfaces_are_served() -> None:
-    gate = Gate(TOKEN, FILES, TICKET, own_hosts(["cell-pc"], 8080), 8080, any_address=True)
+    gate = Gate(TOKEN, SECRET, own_hosts(["cell-pc"], 8080), 8080, any_address=True)
     for host in ("192.168.1.7:8080", "[fe80::1]:8080", "cell-pc:8080"):
         assert gate.passage(f"/{TOKEN}/", [("Host", host)]) is not None, host
     for host in (
@@ -147,4 +161,4 @@ def test_the_port_80_is_left_out_by_browsers() -> None:
 
 
 def test_tokens_are_not_in_the_text_of_a_gate() -> None:
-    assert not [token for token in (TOKEN, FILES, TICKET) if token in repr(GATE)]
+    assert TOKEN not in repr(GATE) and "sss" not in repr(GATE)

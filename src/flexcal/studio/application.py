@@ -63,7 +63,7 @@ def _serve(project: Project, host: str, port: int | None, ready: Callable[[Studi
         def enter(text: str) -> Answer:
             try:
                 texts = json.loads(text)
-            except ValueError:
+            except (ValueError, RecursionError):
                 texts = None
             if (
                 not isinstance(texts, dict)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
@@ -51,23 +53,33 @@ class Studio:
         """Serve until stopped."""
         from flexcal.studio import run_studio
 
-        run_studio(self.folder, self.host, self.port, self._ready)
+        with ExitStack() as at_end:
+            run_studio(self.folder, self.host, self.port, partial(self._ready, at_end))
         console = Console(self.json)
         console.say("the studio is closed")
         console.finish({"folder": str(self.folder)}, f"flexcal studio {quoted(self.folder)}")
 
-    def _ready(self, server: StudioServer) -> None:
+    def _ready(self, at_end: ExitStack, server: StudioServer) -> None:
         lines = [f"the studio is open at {server.url}", "Ctrl-C stops it"]
         if self.host not in (_LOOPBACK, "localhost", "::1"):
             lines.insert(0, _WARNING)
         # standard output is shown when a verb has ended
         print("\n".join(lines), file=sys.stderr, flush=True)
         if not self.no_browser and _has_display():
-            import threading
-            import webbrowser
+            with suppress(OSError):  # without a place for the page, the printed address is left
+                _open_browser(server.url, at_end)
 
-            # some browsers are waited for until they are closed
-            threading.Thread(target=webbrowser.open, args=(server.ticket_url,), daemon=True).start()
+
+def _open_browser(url: str, at_end: ExitStack) -> None:
+    """Lead the browser to the studio by a page that is removed `at_end`."""
+    import threading
+    import webbrowser
+
+    from flexcal.studio.server import redirecting_page
+
+    page = at_end.enter_context(redirecting_page(url))
+    # some browsers are waited for until they are closed
+    threading.Thread(target=webbrowser.open, args=(page,), daemon=True).start()
 
 
 def _has_display() -> bool:

@@ -1,4 +1,5 @@
 from .answer import NO_CONTENT, Answer, Route, said
+from .browser_page import redirecting_page
 from .gate import Gate, Passage
 from .project_files import ProjectFiles
 from .studio_server import StudioServer
@@ -13,5 +14,6 @@ __all__ = [
     "Route",
     "StudioServer",
     "limit_uploads",
+    "redirecting_page",
     "said",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import hmac
 import ipaddress
 from collections.abc import Iterable
@@ -9,7 +10,9 @@ from dataclasses import dataclass, field
 from typing import Literal
 from urllib.parse import urlsplit
 
-Key = Literal["token", "files_token", "ticket"]
+Key = Literal["token", "page_token"]
+FILES = "files"
+"""First name of the paths of the project's files."""
 
 
 @dataclass(frozen=True)
@@ -33,10 +36,9 @@ class Gate:
     ----------
     token : str
         Opens everything.
-    files_token : str
-        Opens files of the project alone. Pages among them may be anybody's: they know their own address, hence not `token`.
-    ticket : str
-        Opens the way to `token`, once; whoever counts that is told.
+    page_secret : bytes
+        What the tokens of files of the project are made with. A page among them may be anybody's: it knows its own address, hence
+        neither `token` nor what opens another file.
     hosts : frozenset of str
         Allowed `Host` headers, as `127.0.0.1:8080`, in lower case. Other names are those of DNS rebinding.
     port : int
@@ -46,11 +48,15 @@ class Gate:
     """
 
     token: str = field(repr=False)
-    files_token: str = field(repr=False)
-    ticket: str = field(repr=False)
+    page_secret: bytes = field(repr=False)
     hosts: frozenset[str]
     port: int
     any_address: bool = False
+
+    def page_token(self, path: str) -> str:
+        """The token that opens one path below FILES, as it is in the request, without its query."""
+        digest = hmac.digest(self.page_secret, path.encode(), "sha256")
+        return base64.urlsafe_b64encode(digest).decode().rstrip("=")
 
     def passage(self, target: str, headers: Iterable[tuple[str, str]]) -> Passage | None:
         """What a request of a path and headers may have; None where it is to be refused."""
@@ -75,7 +81,7 @@ class Gate:
         if key != "token" and upgrade:
             return None
         if single.get("sec-fetch-site", "none").lower() not in ("none", "same-origin"):
-            to_page = key == "files_token" or not path or path.startswith("?")
+            to_page = key == "page_token" or not path or path.startswith("?")
             if upgrade or not to_page or not _is_navigation(single):
                 return None
         return Passage(path, host, key, upgrade)
@@ -89,15 +95,12 @@ class Gate:
         if question:  # /TOKEN?query has no slash behind the token
             slash, rest = "", f"?{query}"
         path = rest if slash else None
-        tokens: dict[Key, str] = {
-            "token": self.token,
-            "files_token": self.files_token,
-            "ticket": self.ticket,
-        }
-        opens: list[Key] = [
-            key for key, token in tokens.items() if hmac.compare_digest(given.encode(), token.encode())
-        ]
-        return (path, opens[0]) if opens else None
+        if hmac.compare_digest(given.encode(), self.token.encode()):
+            return path, "token"
+        name = rest.partition("?")[0]
+        if slash and name.startswith(f"{FILES}/") and hmac.compare_digest(given, self.page_token(name)):
+            return path, "page_token"
+        return None
 
     def _is_own(self, host: str) -> bool:
         if host in self.hosts:

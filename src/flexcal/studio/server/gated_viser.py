@@ -20,15 +20,13 @@ import websockets.asyncio.server
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
+from flexcal.jobs.serving import FirstProblems
 from flexcal.studio.server.answer import Answer, Route, said
-from flexcal.studio.server.gate import Gate, Passage
-from flexcal.studio.server.ticket import Ticket
+from flexcal.studio.server.gate import FILES, Gate, Passage
 from flexcal.studio.server.window_page import window_page
 
 REFUSAL = said(403, "This address is not open to you. Use the one that flexcal studio has printed.")
 _ABSENT = said(404, "There is nothing at this address.")
-
-FILES = "files"
 
 _COMMON = {
     "Referrer-Policy": "no-referrer",
@@ -42,13 +40,9 @@ _COMMON = {
 
 @dataclass(frozen=True)
 class Site:
-    """What is served beside viser's page, and the gate before all of it: `routes` by the first name of a path, and `files` below FILES.
-
-    `ticket` is that of the gate.
-    """
+    """What is served beside viser's page, and the gate before all of it: `routes` by the first name of a path, and `files` below FILES."""
 
     gate: Gate
-    ticket: Ticket
     routes: Mapping[str, Route]
     files: Route
 
@@ -77,6 +71,7 @@ def start_viser(listening: socket.socket, site: Site) -> GatedViser | None:
         handler: Callable[..., Any], host: str, port: int, *, process_request: Any = None, **options: Any
     ) -> Any:
         used.set()
+        asyncio.get_running_loop().set_exception_handler(_PROBLEMS.of_loop)
         return serve(
             handler,
             sock=listening,
@@ -121,9 +116,6 @@ def _gated(site: Site, inner: Any) -> Any:
             if request.headers.get("Upgrade", "").lower() != "websocket":
                 return _response(REFUSAL)
             return None
-        if passage.key == "ticket":
-            spent = not passage.path and site.ticket.spend()
-            return _response(Answer(302, location=f"/{site.gate.token}/") if spent else REFUSAL)
         if passage.path is None:
             return _response(Answer(308, location=request.path + "/"))
         answer = await _routed(site, passage)
@@ -146,16 +138,14 @@ async def _routed(site: Site, passage: Passage) -> Answer | None:
     """The answer of a route, None where viser is to answer."""
     assert passage.path is not None
     path = passage.path.partition("?")[0]
-    if not path and passage.key == "token":
+    if not path:
         return None  # the window is one page; viser has no other files
     name, _, rest = path.partition("/")
     if name == FILES:
         if passage.key == "token":
             # a page from the folder knows its own address: one that opens nothing else
-            return Answer(302, location=f"/{site.gate.files_token}/{passage.path}")
+            return Answer(302, location=f"/{site.gate.page_token(path)}/{path}")
         return await _call(site.files, rest)
-    if passage.key != "token":
-        return REFUSAL
     return await _call(site.routes[name], rest) if name in site.routes else _ABSENT
 
 
@@ -178,12 +168,19 @@ def _response(answer: Answer) -> Response:
     return Response(answer.status, http.HTTPStatus(answer.status).phrase, headers, answer.body)
 
 
-class _NoStrangers(logging.Filter):
-    """Leaves out what strangers cause: handshakes that failed or were refused."""
+class _FirstOnly(logging.Filter):
+    """Leaves out what strangers cause, handshakes that failed or were refused; of all else the first of each type is said."""
 
     def filter(self, record: logging.LogRecord) -> bool:
-        return not record.getMessage().startswith(("opening handshake failed", "connection rejected"))
+        if record.exc_info and not record.getMessage().startswith(
+            ("opening handshake failed", "connection rejected")
+        ):
+            problem = record.exc_info[1]
+            assert problem is not None
+            _PROBLEMS.say(problem)
+        return False
 
 
+_PROBLEMS = FirstProblems()
 _LOGGER = logging.getLogger("flexcal.studio.connections")
-_LOGGER.addFilter(_NoStrangers())
+_LOGGER.addFilter(_FirstOnly())

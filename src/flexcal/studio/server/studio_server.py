@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 from flexcal.errors import FlexcalError, InputError
 from flexcal.studio.server.answer import Route
 from flexcal.studio.server.gate import Gate, own_hosts
-from flexcal.studio.server.ticket import Ticket
 
 if TYPE_CHECKING:
     import viser
@@ -29,23 +28,21 @@ _PATIENCE, _TRIES = 10.0, 6
 class StudioServer:
     """A server for one user, who knows its `url`; the window is built on its `viser`.
 
-    `ticket_url` leads to `url` once, in the two minutes after the start: it is for the command line of a browser, which others can see.
     Everybody else is refused: requests without the token in their path, sent to another name, or by another site's page.
     """
 
     viser: viser.ViserServer
     url: str
-    ticket_url: str
 
-    def __init__(self, server: viser.ViserServer, url: str, ticket_url: str) -> None:
-        self.viser, self.url, self.ticket_url = server, url, ticket_url
+    def __init__(self, server: viser.ViserServer, url: str) -> None:
+        self.viser, self.url = server, url
 
     @classmethod
     def start(cls, host: str, port: int | None, routes: Mapping[str, Route], files: Route) -> StudioServer:
         """Listen on a host (`127.0.0.1`: for this machine alone) and a port (0: any free one; None: 8080 or one of those after it).
 
         Each of `routes` answers the paths below its name, so that `<a href="pick/12">` in the window calls `routes["pick"]("12")`;
-        `files` those below `files/`, with a token of their own. Raises `FlexcalError` without viser and where its version cannot be
+        `files` those below `files/`, each with a token of its own. Raises `FlexcalError` without viser and where its version cannot be
         protected, `InputError` for an address or port that cannot be had.
         """
         try:
@@ -58,9 +55,8 @@ class StudioServer:
             ) from problem
         listening = _listening(host, port)
         found, number = listening.getsockname()[:2]
-        ticket = Ticket()
-        gate = _gate(host, found, number, ticket)
-        server = gated_viser.start_viser(listening, gated_viser.Site(gate, ticket, routes, files))
+        gate = _gate(host, found, number)
+        server = gated_viser.start_viser(listening, gated_viser.Site(gate, routes, files))
         if server is None or not _refuses(found, number, gate.token):
             import viser
 
@@ -71,8 +67,7 @@ class StudioServer:
                 "E-STUDIO-002",
                 f"the studio cannot keep others out with viser {viser.__version__} and does not start; pip install 'flexcal[studio]'.",
             )
-        place = f"http://{_shown(host, found, number)}"
-        return cls(server, f"{place}/{gate.token}/", f"{place}/{ticket.code}/")
+        return cls(server, f"http://{_shown(host, found, number)}/{gate.token}/")
 
     def stop(self) -> None:
         """Close all connections, and free the port."""
@@ -110,14 +105,13 @@ def _listening(host: str, port: int | None) -> socket.socket:
     raise AssertionError
 
 
-def _gate(host: str, address: str, port: int, ticket: Ticket) -> Gate:
+def _gate(host: str, address: str, port: int) -> Gate:
     names = [LOOPBACK, "localhost", "::1", host, address]
     if not _is_loopback(address):
         names += [socket.gethostname(), f"{socket.gethostname()}.local"]
     return Gate(
         secrets.token_urlsafe(32),
-        secrets.token_urlsafe(32),
-        ticket.code,
+        secrets.token_bytes(32),
         own_hosts(names, port),
         port,
         any_address=ipaddress.ip_address(address).is_unspecified,
