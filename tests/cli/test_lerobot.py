@@ -134,7 +134,7 @@ def test_bad_calibrations_are_named(tmp_path: Path) -> None:
     path = calibration_file(tmp_path / "m.json")
     good, motors = path.read_text(), read_motor_calibrations(path)
     for text, code, *names in (
-        (good[:-3], "E-ROS-020", "m.json", "line"),
+        (good[:-3], "E-FILE-023", "m.json", "line"),
         ('{"motor_names": ["a"], "homing_offset": [1]}', "E-ROS-021", "m.json"),
         ("{}", "E-ROS-021", "m.json"),
         (good.replace('"id": 2', '"id": "two"'), "E-ROS-022", "9", "shoulder_lift", "id"),

@@ -15,6 +15,8 @@ from pathlib import Path
 from typing import Literal
 
 from flexcal.errors import InputError, unreadable
+from flexcal.files.formats import parse_json
+from flexcal.files.transaction import MEGABYTE, read_bytes
 
 TICKS = 4096
 """Ticks of a motor's turn."""
@@ -90,13 +92,7 @@ class JointMotor:
 def read_motor_calibrations(path: Path) -> dict[str, MotorCalibration]:
     """Motors of a LeRobot calibration file by name; raises `InputError` with the line where it is none."""
     text = _text(path)
-    try:
-        document = json.loads(text)
-    except json.JSONDecodeError as problem:
-        raise InputError(
-            "E-ROS-020",
-            f"{path} line {problem.lineno}, column {problem.colno}: this is no JSON ({problem.msg}); correct it.",
-        ) from None
+    document = parse_json(path, text, "correct it")
     if (
         not isinstance(document, dict)
         or not document
@@ -176,7 +172,7 @@ def _block(text: str, name: str) -> tuple[int, int]:
 
 def _text(path: Path) -> str:
     try:
-        return path.read_bytes().decode("utf-8")
+        return read_bytes(path, limit=MEGABYTE).decode("utf-8")
     except OSError as problem:
         raise unreadable(path, problem) from problem
     except UnicodeDecodeError:

@@ -13,9 +13,11 @@ from flexcal.export.following_joints import followed_joints, joint_values, mimic
 from flexcal.export.representation_error import AT_REST, ToolMap
 from flexcal.export.urdf_inertials import bodiless_remark, write_inertials
 from flexcal.export.written_file import ExportedFile, RenderedModel, write_rendered
+from flexcal.files.transaction import open_regular
 from flexcal.model.kinematics import link_placement, point_placement
 from flexcal.model.parts import rotation_rpy, rpy_rotation
 from flexcal.model.robot import RobotModel
+from flexcal.model.urdf import LARGEST_URDF
 
 
 def export_urdf(model: RobotModel, path: str | Path) -> ExportedFile:
@@ -56,7 +58,8 @@ def render_urdf(model: RobotModel) -> RenderedModel:
     The point links are named after the points. Offsets, misalignments and lengths (Eqs. 15-17) fit a URDF exactly. A link identified with
     inertials that no body has keeps those of the nominal URDF. Raises `FlexcalError` where a point's name is already a link's.
     """
-    tree = ET.parse(model.urdf, ET.XMLParser(target=ET.TreeBuilder(insert_comments=True)))
+    with open_regular(model.urdf, limit=LARGEST_URDF) as stream:
+        tree = ET.parse(stream, ET.XMLParser(target=ET.TreeBuilder(insert_comments=True)))
     root = tree.getroot()
     joints = {joint.get("name"): joint for joint in root.findall("joint")}
     for i, joint in enumerate(model.joints):

@@ -11,7 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from flexcal.errors import FlexcalError
 from flexcal.files.formats import read_yaml
+from flexcal.files.transaction import open_regular
 from flexcal.model.robot import RobotConfig
+from flexcal.model.urdf import LARGEST_URDF
 
 TYPICAL_RATIO = 100.0
 """Gear ratio where robot.yaml declares none."""
@@ -130,7 +132,8 @@ def read_description(robot_file: Path) -> ArmDescription:
 
 def _read_links(urdf: Path) -> tuple[Link, ...]:
     """The links beyond the base, parents before children."""
-    root = ElementTree.parse(urdf).getroot()
+    with open_regular(urdf, limit=LARGEST_URDF) as stream:
+        root = ElementTree.parse(stream).getroot()
     inertials = {str(link.get("name")): link.find("inertial") for link in root.findall("link")}
     joints = {_name(joint, "parent"): [] for joint in root.findall("joint")}
     for joint in root.findall("joint"):

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flexcal.errors import InputError
+from flexcal.files.transaction import read_text
 from flexcal.printable import quoted
 
 if TYPE_CHECKING:
@@ -71,4 +72,4 @@ def stored_lines(robot: Path, estimates: Path | None, out: Path | None) -> tuple
 
 
 def _lines(file: Path) -> list[str]:
-    return file.read_text("utf-8").splitlines()
+    return read_text(file).splitlines()

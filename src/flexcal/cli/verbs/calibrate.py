@@ -22,7 +22,7 @@ from flexcal.cli.arguments.shared_options import (
 )
 from flexcal.cli.arguments.suggested_commands import estimates_option
 from flexcal.cli.terminal.console import Console
-from flexcal.files.transaction import current_path, write_text
+from flexcal.files.transaction import read_text, write_text
 from flexcal.printable import quoted
 from flexcal.units import MILLIMETRE
 
@@ -212,7 +212,7 @@ class Calibrate:
         """Write the points to robot.yaml, and calibrate again: the estimates are relative to the declared points."""
         from flexcal.jobs.setup import write_point_position
 
-        text = current_path(self.robot).read_text(encoding="utf-8")
+        text = read_text(self.robot)
         try:
             for name, point in calibration.found_points.items():
                 write_point_position(self.robot, name, point["found_xyz_m"])

@@ -12,6 +12,7 @@ from flexcal.data.camera.board import board_corners
 from flexcal.data.camera.bundle import FEWEST_CORNERS, View
 from flexcal.data.camera.sharpness import edge_width
 from flexcal.errors import FlexcalError, InputError
+from flexcal.files.transaction import read_bytes
 
 if TYPE_CHECKING:
     from flexcal.model.robot import BoardConfig, CameraConfig
@@ -36,7 +37,7 @@ def detected_views(camera: CameraConfig, paths: Sequence[Path]) -> tuple[list[Vi
     find, board = _detector(cv2, camera.board), board_corners(camera.board)
     views = []
     for path in paths:
-        image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) if path.exists() else None
+        image = _gray(cv2, path)
         if image is None:
             raise InputError("E-POSES-053", f"{path} is no image that can be read; check the column 'image'.")
         width, height = camera.size
@@ -63,6 +64,15 @@ def detected_views(camera: CameraConfig, paths: Sequence[Path]) -> tuple[list[Vi
             f"that robot.yaml declares; {advice}",
         )
     return views, np.array(camera.size, dtype=float)
+
+
+def _gray(cv2: Any, path: Path) -> np.ndarray | None:
+    """Image (height, width); None where there is none, or nothing that OpenCV reads as one."""
+    try:
+        content = np.frombuffer(read_bytes(path), dtype=np.uint8)
+        return cv2.imdecode(content, cv2.IMREAD_GRAYSCALE)
+    except (OSError, cv2.error):
+        return None
 
 
 def _detector(cv2: Any, board: BoardConfig) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:

@@ -1,4 +1,5 @@
 from .joint_limits import check_joint_limits, check_joint_units
+from .parquet_sizes import require_decodable
 from .signals import (
     JOINT_QUANTITIES,
     TIMESTAMP,
@@ -12,11 +13,21 @@ from .signals import (
     timestamp_columns,
 )
 from .streaming import streamed_table
-from .tabular_file import Table, TableFile, open_table, require_table, tables_in, write_frame, write_table
+from .tabular_file import (
+    LARGEST_TABLE,
+    Table,
+    TableFile,
+    open_table,
+    require_table,
+    tables_in,
+    write_frame,
+    write_table,
+)
 from .timestamps import STAMP, seconds_of, with_seconds
 
 __all__ = [
     "JOINT_QUANTITIES",
+    "LARGEST_TABLE",
     "STAMP",
     "TIMESTAMP",
     "UNITS",
@@ -30,6 +41,7 @@ __all__ = [
     "check_joint_units",
     "mapped_signals",
     "open_table",
+    "require_decodable",
     "require_table",
     "seconds_of",
     "standard_columns",

@@ -15,7 +15,7 @@ from flexcal.data.tables.tabular_file import Table, TableFile
 from flexcal.errors import InputError, unreadable
 from flexcal.files.formats import read_yaml_file
 from flexcal.files.structuring import suggestion
-from flexcal.files.transaction import current_path
+from flexcal.files.transaction import MEGABYTE, read_text
 from flexcal.printable import excerpt
 from flexcal.units import COLDEST, DEGREE, HOTTEST, INCH, MILLIMETRE, temperature_fault
 
@@ -287,7 +287,7 @@ def read_matrix(path: str | Path) -> np.ndarray:
     """A matrix (m, k) from CSV without a header; raises `InputError` with line and column of what is no number."""
     path = Path(path)
     try:
-        lines = current_path(path).read_text(encoding="utf-8-sig").splitlines()
+        lines = read_text(path, encoding="utf-8-sig", limit=MEGABYTE).splitlines()
     except (OSError, UnicodeDecodeError) as problem:
         raise unreadable(path, problem) from problem
     rows: list[list[float]] = []

@@ -5,21 +5,35 @@ from __future__ import annotations
 import csv
 import io
 import os
-from collections.abc import Collection, Iterator, Mapping
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from io import BufferedReader
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flexcal.data.tables.parquet_sizes import require_decodable
 from flexcal.errors import InputError, unreadable
-from flexcal.files.transaction import atomic_path, current_path
+from flexcal.files.transaction import (
+    MEGABYTE,
+    atomic_path,
+    open_regular,
+    regular_path,
+    size_text,
+)
 from flexcal.printable import excerpt
 from flexcal.units import LARGEST
 
 if TYPE_CHECKING:
     import polars as pl
 
+LARGEST_TABLE = 1000 * MEGABYTE
+"""Bytes of a CSV file that is read whole."""
+_LARGEST_TEXTS = 256 * MEGABYTE
+_LONGEST_LINE = 16 * MEGABYTE
+_MOST_COLUMNS = 5000
 _SHOWN = 4
 """Largest number of a folder's tables that are named."""
 BLOCK_BYTES = 64 * 2**20
@@ -88,7 +102,7 @@ class TableFile:
         """All cells of one column as text; empty where there is nothing. Raises `InputError` as `read` does."""
         self._require_few_rows()
         if self.path.suffix == ".csv":
-            with _open(self.path) as stream:
+            with _open(self.path, LARGEST_TABLE) as stream:
                 lines = stream.read().rstrip().split(b"\n")[self.first - 1 :]
             place = self.columns.index(column)
             rows = [
@@ -99,17 +113,23 @@ class TableFile:
             return [row[place] if place < len(row) else "" for row in rows]
         import polars as pl
 
-        series = pl.read_parquet(current_path(self.path), columns=[column])[column]
-        return [str(value).strip() if value is not None else "" for value in series.cast(pl.String).to_list()]
+        require_decodable(self.path, [column], stream=False)
+        series = pl.read_parquet(regular_path(self.path, limit=None), columns=[column])[column]
+        texts = _texts(self.path, column, series.cast(pl.String))
+        return [text.strip() for text in texts.tolist()]
 
     def text_columns(self) -> tuple[str, ...]:
         """Columns whose first cell that is not empty, in the first rows, is no number."""
         if self.path.suffix == ".csv":
             with _open(self.path) as stream:
-                lines = stream.readlines(self.first * _PEEKED)[self.first - 1 :]
+                lines = []
+                for line in _lines(self.path, stream):
+                    lines.append(line)
+                    if stream.tell() >= self.first * _PEEKED:
+                        break
             rows = [
                 _row(self.path, self.first, raw.decode("utf-8", "replace").strip())
-                for raw in lines
+                for raw in lines[self.first - 1 :]
                 if raw.strip()
             ]
             filled = [
@@ -119,7 +139,7 @@ class TableFile:
             return tuple(n for n, cell in zip(self.columns, filled, strict=True) if not _is_number(cell))
         import polars as pl
 
-        schema = pl.read_parquet_schema(current_path(self.path))
+        schema = pl.read_parquet_schema(regular_path(self.path, limit=None))
         return tuple(name for name in self.columns if schema[name] == pl.String)
 
     def error(self, code: str, sentence: str) -> InputError:
@@ -133,18 +153,19 @@ class TableFile:
         Raises `InputError` with row and column of the first fault, and, before any is loaded, for more rows than `MOST_ROWS`.
         """
         self._require_few_rows()
-        blocks = list(self.blocks(texts, None))
+        is_csv = self.path.suffix == ".csv"
+        blocks = list(self._csv_blocks(texts, None) if is_csv else self._parquet_blocks(texts, None))
         if not blocks:
             raise self.error("E-TABLE-019", "the file has a header but no rows; add some.")
-        (table,) = blocks
+        table = Table(self, self.first, _joined([block.columns for block in blocks]))
         if not self.skipped:
             return table
         kept = np.delete(np.arange(len(table)), self.skipped)
         columns = {name: values[kept] for name, values in table.columns.items()}
         return Table(self, table.first, columns, table.first + kept)
 
-    def blocks(self, texts: Collection[str] = (), rows: int | None = 1_000_000) -> Iterator[Table]:
-        """The rows in blocks of about this many (None: all at once), in order; raises `InputError` as `read` does."""
+    def blocks(self, texts: Collection[str] = (), rows: int = 1_000_000) -> Iterator[Table]:
+        """The rows in blocks of about this many, in order; raises `InputError` as `read` does."""
         if self.path.suffix == ".csv":
             yield from self._csv_blocks(texts, rows)
         else:
@@ -165,22 +186,24 @@ class TableFile:
         if self.path.suffix != ".csv":
             import polars as pl
 
-            return pl.scan_parquet(current_path(self.path)).select(pl.len()).collect().item()
-        counted, read = 1 - self.first, 0
+            return pl.scan_parquet(regular_path(self.path, limit=None)).select(pl.len()).collect().item()
+        counted, read, beginning = 1 - self.first, 0, b""
         with _open(self.path) as stream:
             while part := stream.read(2**20):
                 counted, read = counted + part.count(b"\n"), read + len(part)
+                beginning = beginning + part if b"\n" not in part else part[part.rindex(b"\n") :]
+                _require_lines(self.path, beginning)
                 if counted > MOST_ROWS:
                     return max(counted, counted * os.fstat(stream.fileno()).st_size // read)
         return counted
 
     def _csv_blocks(self, texts: Collection[str], rows: int | None) -> Iterator[Table]:
         line = self.first
-        with _open(self.path) as stream:
+        with _open(self.path, LARGEST_TABLE if rows is None else None) as stream:
             for _ in range(self.first - 1):
                 stream.readline()
-            size = None if rows is None else max(1, min(BLOCK_BYTES, rows * 12 * len(self.columns)))
-            for content in _whole_lines(stream, size):
+            size = BLOCK_BYTES if rows is None else max(1, min(BLOCK_BYTES, rows * 12 * len(self.columns)))
+            for content in _whole_lines(self.path, stream, size):
                 table = Table(self, line, _parse(self, content, texts, line))
                 yield table
                 line += len(table)
@@ -188,10 +211,12 @@ class TableFile:
     def _parquet_blocks(self, texts: Collection[str], rows: int | None) -> Iterator[Table]:
         import polars as pl
 
-        scan = pl.scan_parquet(current_path(self.path))
+        unread = set(self.unread)
+        read = [column for column in self.columns if column not in unread]
+        require_decodable(self.path, set(read), stream=rows is not None)
+        scan = pl.scan_parquet(regular_path(self.path, limit=None))
         try:
             schema = scan.collect_schema()
-            read = [column for column in self.columns if column not in self.unread]
             for column in read:
                 if column not in texts and not schema[column].is_numeric():
                     raise self.error(
@@ -206,7 +231,7 @@ class TableFile:
                 if not len(frames):
                     return
                 for frame in frames.iter_slices(rows or len(frames)):
-                    table = Table(self, 1 + start, _arrays(frame))
+                    table = Table(self, 1 + start, _arrays(self.path, frame))
                     _check_finite(table, frame)
                     yield table
                     start += len(frame)
@@ -237,11 +262,14 @@ def open_table(path: str | Path) -> TableFile:
             file = TableFile(path, columns, first)
         else:
             file = TableFile(path, _parquet_columns(path), 1)
-    twice = [name for i, name in enumerate(file.columns) if name in file.columns[:i]]
-    if twice:
+    if len(file.columns) > _MOST_COLUMNS:
         raise file.error(
-            "E-TABLE-024", f"the column '{excerpt(twice[0])}' stands twice; rename or remove one."
+            "E-TABLE-050",
+            f"there are {len(file.columns)} columns, and a table has up to {_MOST_COLUMNS}; check that it is the right file.",
         )
+    twice = next((name for name, count in Counter(file.columns).items() if count > 1), None)
+    if twice is not None:
+        raise file.error("E-TABLE-024", f"the column '{excerpt(twice)}' stands twice; rename or remove one.")
     return file
 
 
@@ -285,9 +313,9 @@ def tables_in(folder: Path) -> str:
     return f" in it: {shown}"
 
 
-def _open(path: Path) -> BinaryIO:
+def _open(path: Path, limit: int | None = None) -> BufferedReader:
     try:
-        return current_path(path).open("rb")
+        return open_regular(path, limit=limit)
     except OSError as problem:
         raise unreadable(path, problem) from problem
 
@@ -302,15 +330,15 @@ def _parquet_columns(path: Path) -> tuple[str, ...]:
             "E-TABLE-026", f"{path}: the path of a Parquet file must be UTF-8; rename what is not."
         ) from None
     try:
-        return tuple(pl.read_parquet_schema(current_path(path)))
+        return tuple(pl.read_parquet_schema(regular_path(path, limit=None)))
     except (pl.exceptions.PolarsError, OSError) as problem:
         raise InputError(
             "E-TABLE-027", f"{path}: not a readable Parquet file ({_one_line(problem)}); export it again."
         ) from problem
 
 
-def _csv_header(path: Path, stream: BinaryIO) -> tuple[tuple[str, ...], int]:
-    for number, raw in enumerate(stream, start=1):
+def _csv_header(path: Path, stream: BufferedReader) -> tuple[tuple[str, ...], int]:
+    for number, raw in enumerate(_lines(path, stream), start=1):
         text = _decoded(path, raw, number).lstrip("\ufeff").strip()
         if not text or text.startswith("#"):
             continue
@@ -349,62 +377,96 @@ def _decoded(path: Path, raw: bytes, line: int) -> str:
         ) from problem
 
 
-def _whole_lines(stream: BinaryIO, size: int | None) -> Iterator[bytes]:
+def _lines(path: Path, stream: BufferedReader) -> Iterator[bytes]:
+    """Lines of a stream, of bounded length."""
+    while line := stream.readline(_LONGEST_LINE + 1):
+        _require_lines(path, line)
+        yield line
+
+
+def _require_lines(path: Path, beginning: bytes) -> None:
+    if len(beginning) > _LONGEST_LINE:
+        raise InputError(
+            "E-TABLE-048",
+            f"{path} has a line of more than {size_text(_LONGEST_LINE)}, so it is no table; check that it is the right file.",
+        )
+
+
+def _whole_lines(path: Path, stream: BufferedReader, size: int) -> Iterator[bytes]:
     """The rest of the stream in parts that end with a line; blank lines at its very end are left out."""
     rest = b""
-    while True:
-        content = stream.read() if size is None else stream.read(size)
-        if size is None or not content:
-            last = (rest + content).rstrip()
-            if last:
-                yield last
-            return
+    while content := stream.read(size):
         cut = content.rfind(b"\n") + 1
-        if cut:
-            part = rest + content[:cut]
-            kept = part.rstrip(b"\r\n \t")
-            end = (
-                part.find(b"\n", len(kept)) + 1
-            )  # blank lines at the end of a part wait for what follows them
-            if kept:
-                yield part[:end]
-                rest = part[end:] + content[cut:]
-            else:
-                rest = part + content[cut:]
-        else:
-            rest += content
+        part, rest = rest + content[:cut], content[cut:] if cut else rest + content
+        kept = part.rstrip(b"\r\n \t") if cut else b""
+        if kept:
+            # blank lines at the end of a part wait for what follows them
+            end = part.find(b"\n", len(kept)) + 1
+            yield part[:end]
+            rest = part[end:] + rest
+        elif cut:
+            rest = part + rest
+        _require_lines(path, rest)
+    if last := rest.rstrip():
+        yield last
 
 
 def _parse(file: TableFile, content: bytes, texts: Collection[str], line: int) -> dict[str, np.ndarray]:
-    texts = {*texts, *file.unread}
+    """Columns of whole lines; where they are not numbers, a half at a time, until a small part can be read cell by cell."""
     if len(content) < _SMALL:
         return _read_cells(file, content, texts, line)
     import polars as pl
 
-    schema = {name: pl.String if name in texts else pl.Float64 for name in file.columns}
+    unmeasured = {*texts, *file.unread}
+    schema = {name: pl.String if name in unmeasured else pl.Float64 for name in file.columns}
     try:
-        frame = pl.read_csv(io.BytesIO(content), has_header=False, schema=schema)
+        frame = pl.read_csv(io.BytesIO(content), has_header=False, schema=schema).drop(file.unread)
     except pl.exceptions.PolarsError:
+        frame = None
+    if frame is not None and not any(series.null_count() for series in frame.get_columns()):
+        arrays = _arrays(file.path, frame)
+        if all(name in unmeasured or _measurable(values).all() for name, values in arrays.items()):
+            return arrays
+    half = content.find(b"\n", len(content) // 2) + 1
+    if not 0 < half < len(content):
         return _read_cells(file, content, texts, line)
-    frame = frame.drop(file.unread)
-    arrays = _arrays(frame)
-    if any(frame[c].null_count() or (c not in texts and not _measurable(v).all()) for c, v in arrays.items()):
-        return _read_cells(file, content, texts, line)
-    return arrays
+    first = _parse(file, content[:half], texts, line)
+    return _joined([first, _parse(file, content[half:], texts, line + content.count(b"\n", 0, half))])
 
 
-def _arrays(frame: pl.DataFrame) -> dict[str, np.ndarray]:
-    return {name: _array(frame[name]) for name in frame.columns}
+def _joined(parts: Sequence[Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    """Columns of consecutive parts, joined."""
+    if len(parts) == 1:
+        return dict(parts[0])
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-def _array(series: pl.Series) -> np.ndarray:
-    if not series.dtype.is_numeric():
-        return np.array([value or "" for value in series.to_list()], dtype=str)
-    return series.to_numpy()
+def _arrays(path: Path, frame: pl.DataFrame) -> dict[str, np.ndarray]:
+    return {
+        name: frame[name].to_numpy() if frame[name].dtype.is_numeric() else _texts(path, name, frame[name])
+        for name in frame.columns
+    }
+
+
+def _texts(path: Path, name: str, series: pl.Series) -> np.ndarray:
+    """Texts (N,), empty where there is none."""
+    longest = series.str.len_bytes().max()
+    _require_short(path, name, len(series), longest if isinstance(longest, int) else 0)
+    return np.array([value or "" for value in series.to_list()], dtype=str)
+
+
+def _require_short(path: Path, name: str, rows: int, longest: int) -> None:
+    """NumPy's texts all take the place of the longest."""
+    if 4 * rows * longest > _LARGEST_TEXTS:
+        raise InputError(
+            "E-TABLE-049",
+            f"{path}, column {excerpt(name)}: {rows} texts of up to {longest} characters are more than {size_text(_LARGEST_TEXTS)}; shorten them.",
+        )
 
 
 def _read_cells(file: TableFile, content: bytes, texts: Collection[str], line: int) -> dict[str, np.ndarray]:
     """Read cell by cell, which tells where the first fault is; raises `InputError` there."""
+    unread = set(file.unread)
     cells: dict[str, list[Any]] = {name: [] for name in file.columns}
     for number, raw in enumerate(content.split(b"\n"), start=line):
         text = _decoded(file.path, raw, number).strip("\r")
@@ -420,14 +482,16 @@ def _read_cells(file: TableFile, content: bytes, texts: Collection[str], line: i
                 "complete the line or remove it.",
             )
         for name, cell in zip(file.columns, row, strict=True):
-            fault = None if name in file.unread else _fault(cell, name in texts)
+            fault = None if name in unread else _fault(cell, name in texts)
             if fault:
                 raise InputError("E-TABLE-036", f"{file.path} line {number}, column {name}: {fault}")
-            cells[name].append(cell if name in texts else float(cell))
+            cells[name].append(cell if name in texts or name in unread else float(cell))
+    for name in cells.keys() & set(texts):
+        _require_short(file.path, name, len(cells[name]), max(map(len, cells[name]), default=0))
     return {
         name: np.array(values, dtype=str if name in texts else np.float64)
         for name, values in cells.items()
-        if name not in file.unread
+        if name not in unread
     }
 
 

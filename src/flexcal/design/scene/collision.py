@@ -16,7 +16,7 @@ from flexcal.model.kinematics import (
     point_kinematics,
 )
 from flexcal.model.robot import RobotModel
-from flexcal.model.urdf import locked_joints, pinocchio_model, read_elements
+from flexcal.model.urdf import locked_joints, pinocchio_model, pinocchio_shapes, read_elements
 
 _SAMPLES = 200
 _FLOOR = "floor"
@@ -216,12 +216,7 @@ def _shapes(pin_model: Any, urdf: Path) -> Any:
     import pinocchio as pin
 
     try:
-        geometry = pin.buildGeomFromUrdfString(
-            pin_model,
-            read_elements(urdf).text(),
-            pin.GeometryType.COLLISION,
-            package_dirs=[str(above) for above in urdf.absolute().parents],
-        )
+        geometry = pinocchio_shapes(pin_model, urdf, pin.GeometryType.COLLISION)
     except (ValueError, RuntimeError) as problem:
         reason = str(problem).strip().splitlines()[0]
         raise InputError(

@@ -17,6 +17,7 @@ from flexcal.dynamics.signals.gravity_torque_check import GravityTorqueCheck
 from flexcal.dynamics.signals.log_faults import MOVES, LogFaults
 from flexcal.dynamics.signals.motion import FilteredPositions, Motion, filtered_positions
 from flexcal.errors import FlexcalError, InputError
+from flexcal.files.transaction import open_regular
 from flexcal.model.robot import RobotModel
 
 _ROWS = 20_000
@@ -152,7 +153,7 @@ class JointLog:
     def blocks(self) -> Iterator[Motion]:
         """Filtered motion in consecutive parts."""
         seen = 0
-        with self.filtered.open("rb") as stream:
+        with open_regular(self.filtered, limit=None) as stream:
             for start in self.starts:
                 q, torque, external = (np.load(stream).T for _ in range(3))
                 yield self.settled(FilteredPositions(start, self.time_step, q, torque, external).motion())

@@ -9,6 +9,7 @@ from .estimates_file import (
     write_estimates,
 )
 from .json_conversion import json_values
+from .json_reader import parse_json, read_json
 from .npz_reader import ArrayForm, NpzFile, refuse_foreign
 from .npz_writer import write_npz
 from .yaml_document import parse_document
@@ -31,8 +32,10 @@ __all__ = [
     "edited_yaml",
     "json_values",
     "parse_document",
+    "parse_json",
     "provenance",
     "read_estimates",
+    "read_json",
     "read_yaml",
     "read_yaml_file",
     "refuse_foreign",

@@ -22,7 +22,7 @@ from flexcal.estimation import Dropped, Estimate, Misfit, Parameter, Parameters
 from flexcal.files.formats.npz_reader import ArrayForm, NpzFile, refuse_foreign
 from flexcal.files.formats.yaml_reader import YamlFile, read_yaml_file
 from flexcal.files.formats.yaml_writer import to_plain, yaml_text
-from flexcal.files.transaction import atomic_paths, current_path, recover, refuse_irregular
+from flexcal.files.transaction import atomic_paths, current_path, open_regular, recover, refuse_irregular
 
 Block = Literal["dynamics", "stiffness", "calibration", "payload", "actuators"]
 BLOCKS: tuple[Block, ...] = get_args(Block)
@@ -201,7 +201,7 @@ def sha256_of(path: str | Path) -> str:
             for file in sorted(file for file in path.rglob("*") if file.is_file()):
                 digest.update(f"{file.relative_to(path).as_posix()}\0{sha256_of(file)}\n".encode())
         else:
-            with current_path(path).open("rb") as stream:
+            with open_regular(path, limit=None) as stream:
                 while content := stream.read(2**20):
                     digest.update(content)
     except OSError as problem:

@@ -8,13 +8,13 @@ from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import IO, Literal
 
 import numpy as np
 from numpy.lib.npyio import NpzFile as NpzArrays
 
 from flexcal.errors import InputError
-from flexcal.files.transaction import current_path
+from flexcal.files.transaction import MEGABYTE, current_path, open_regular, size_text
 from flexcal.units import LARGEST
 
 Kind = Literal["real", "complex", "whole", "truth", "text"]
@@ -26,6 +26,9 @@ _KINDS: dict[Kind, tuple[str, str]] = {
     "text": ("U", "texts"),
 }
 
+_LARGEST = 1000 * MEGABYTE
+_LARGEST_READ = 500 * MEGABYTE
+"""Bytes of the arrays that are read together, once they are unpacked."""
 _UNREADABLE = (
     OSError, ValueError, EOFError, KeyError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
@@ -72,58 +75,60 @@ class NpzFile:
     def read(self, forms: Mapping[str, ArrayForm]) -> dict[str, np.ndarray]:
         """The arrays of these names and forms."""
         with self._opened() as stored:
-            return {
-                name: self._checked(name, self._array(stored, name), form) for name, form in forms.items()
-            }
+            size = sum(self._checked_form(stored, name, form) for name, form in forms.items())
+            if size > _LARGEST_READ:
+                raise self.error(
+                    "E-FILE-026",
+                    f"holds arrays of {size_text(size)}, and such a file is read up to {size_text(_LARGEST_READ)}",
+                )
+            return {name: self._checked(name, stored[name], form) for name, form in forms.items()}
 
     @contextmanager
     def _opened(self) -> Iterator[NpzArrays]:
         try:
-            stored = np.load(current_path(self.path), allow_pickle=False)
-            if not isinstance(stored, NpzArrays):
-                raise self.error("E-FILE-002", "is no .npz file")
-            with stored:
-                yield stored
+            with open_regular(self.path, limit=_LARGEST) as stream:
+                if not zipfile.is_zipfile(stream):
+                    stream.seek(0)
+                    _header(stream)
+                    raise self.error("E-FILE-002", "is no .npz file")
+                stream.seek(0)
+                with np.load(stream, allow_pickle=False) as stored:
+                    yield stored
         except _UNREADABLE as problem:
             told = isinstance(problem, OSError) and problem.strerror
             raise self.error("E-FILE-003", f"cannot be read ({told or type(problem).__name__})") from problem
 
-    def _array(self, stored: NpzArrays, name: str) -> np.ndarray:
+    def _checked_form(self, stored: NpzArrays, name: str, form: ArrayForm) -> int:
+        """Bytes of an array whose kind and shape, by its header, are those of `form`."""
         if name not in stored.files:
             raise self.error("E-FILE-004", f"lacks the array '{name}'")
         archive = stored.zip
         assert archive is not None  # it is open
         member = archive.getinfo(f"{name}.npy" if f"{name}.npy" in archive.namelist() else name)
         with archive.open(member) as stream:
-            version = np.lib.format.read_magic(stream)
-            read = (
-                np.lib.format.read_array_header_1_0
-                if version == (1, 0)
-                else np.lib.format.read_array_header_2_0
-            )
-            shape, _, dtype = read(stream)
+            shape, dtype = _header(stream)
             count = 1
             for extent in shape:
                 count *= extent
             if dtype.hasobject or min(shape, default=0) < 0 or count * dtype.itemsize > member.file_size:
                 raise self.error("E-FILE-005", f"holds no array of numbers or texts as '{name}'")
-        return stored[name]
-
-    def _checked(self, name: str, array: np.ndarray, form: ArrayForm) -> np.ndarray:
         kinds, what = _KINDS[form.kind]
-        if array.dtype.kind not in kinds:
-            raise self.error("E-FILE-006", f"holds {array.dtype} as '{name}', not {what}")
+        if dtype.kind not in kinds:
+            raise self.error("E-FILE-006", f"holds {dtype} as '{name}', not {what}")
         extents = [self._lengths.get(axis) if isinstance(axis, str) else axis for axis in form.axes]
-        fits = array.ndim == len(extents) and all(
-            extent in (None, length) for extent, length in zip(extents, array.shape, strict=True)
+        fits = len(shape) == len(extents) and all(
+            extent in (None, length) for extent, length in zip(extents, shape, strict=True)
         )
         if not fits:
             raise self.error(
-                "E-FILE-007", f"holds '{name}' with the shape {array.shape}, which does not fit the rest"
+                "E-FILE-007", f"holds '{name}' with the shape {shape}, which does not fit the rest"
             )
-        for axis, length in zip(form.axes, array.shape, strict=True):
+        for axis, length in zip(form.axes, shape, strict=True):
             if isinstance(axis, str):
                 self._lengths[axis] = length
+        return count * dtype.itemsize
+
+    def _checked(self, name: str, array: np.ndarray, form: ArrayForm) -> np.ndarray:
         if form.kind in ("real", "complex"):
             with np.errstate(over="ignore"):
                 size = np.abs(array)
@@ -132,6 +137,14 @@ class NpzFile:
             if float(np.max(size, initial=0.0, where=np.isfinite(size))) > LARGEST:
                 raise self.error("E-FILE-009", f"holds numbers beyond {LARGEST:g} in '{name}'")
         return array
+
+
+def _header(stream: IO[bytes]) -> tuple[tuple[int, ...], np.dtype]:
+    """Shape and type of the array that a stream in NumPy's format begins with; raises `ValueError` where it does not."""
+    first = np.lib.format.read_magic(stream) == (1, 0)
+    read = np.lib.format.read_array_header_1_0 if first else np.lib.format.read_array_header_2_0
+    shape, _, dtype = read(stream)
+    return shape, dtype
 
 
 def refuse_foreign(path: Path, ours: Set[str]) -> None:

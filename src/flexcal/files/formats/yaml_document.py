@@ -1,7 +1,7 @@
 """One YAML document as plain Python data with the line of every value, built from libyaml's events.
 
-Bounded, so that no file exhausts the stack or the memory: values nest at most `DEEPEST` deep, and aliases repeat at most `MOST_REPEATED`
-values.
+Bounded, so that no file exhausts the stack, the memory or the patience: a document has at most `MOST_VALUES` values, nested at most
+`DEEPEST` deep, and aliases repeat at most `MOST_REPEATED` values.
 """
 
 from __future__ import annotations
@@ -13,11 +13,15 @@ from typing import TYPE_CHECKING, Any
 
 from flexcal.errors import InputError
 from flexcal.files.structuring import Keys
+from flexcal.files.transaction import MEGABYTE
 from flexcal.printable import excerpt
 
 if TYPE_CHECKING:
     from yaml import CSafeLoader, Event, ScalarEvent
 
+LARGEST_YAML = 16 * MEGABYTE
+MOST_VALUES = 100_000
+"""Largest number of values of a document."""
 DEEPEST = 50
 """Largest depth of nested lists and mappings."""
 MOST_REPEATED = 100_000
@@ -41,12 +45,13 @@ def parse_document(path: Path, text: str) -> tuple[Any, dict[Keys, int]]:
     Scalars follow the core schema of YAML 1.2. Raises `InputError` with `path` and line for text that is not one YAML document, a key
     that is no plain name or stands twice, a tag, an alias of something that contains it, and what exceeds the bounds.
     """
+    import yaml
     from yaml import CSafeLoader, MarkedYAMLError, YAMLError
 
     loader = None
     try:
         loader = CSafeLoader(text)
-        document = _Document(path, loader)
+        document = _Document(path, loader, yaml)
         return document.read(), document.lines
     except MarkedYAMLError as problem:
         mark = problem.problem_mark or problem.context_mark
@@ -77,25 +82,25 @@ class _Anchored:
 class _Document:
     path: Path
     loader: CSafeLoader
+    yaml: Any
+    """The package, which is imported where there is something to read."""
     lines: dict[Keys, int] = field(default_factory=dict)
     anchors: dict[str, _Anchored] = field(default_factory=dict)
     values: int = 0
     repeated: int = 0
 
     def read(self) -> Any:
-        from yaml import DocumentStartEvent, StreamEndEvent
-
         self._next()  # the stream's start
-        if isinstance(self._next(), StreamEndEvent):
+        if isinstance(self._next(), self.yaml.StreamEndEvent):
             raise InputError("E-YAML-006", f"{self.path} line 1: the file is empty; write at least one key.")
         data = self._value(self._next(), ())
         self._next()  # the document's end
         following = self._next()
-        if isinstance(following, DocumentStartEvent):
+        if isinstance(following, self.yaml.DocumentStartEvent):
             raise self._error("E-YAML-007", following, "a second document begins; keep one in the file.")
         return data
 
-    def _next(self) -> Event:
+    def _next(self) -> Any:
         event = self.loader.get_event()
         assert event is not None  # no more is asked for after the stream's end
         return event
@@ -104,11 +109,15 @@ class _Document:
         return InputError(code, f"{self.path} line {event.start_mark.line + 1}: {sentence}")
 
     def _value(self, event: Any, keys: Keys) -> Any:
-        from yaml import AliasEvent, ScalarEvent, SequenceStartEvent
-
         self.values += 1
+        if self.values - self.repeated > MOST_VALUES:
+            raise self._error(
+                "E-YAML-039",
+                event,
+                f"the file holds more than {MOST_VALUES} values; check that it is the right one.",
+            )
         self.lines.setdefault(keys, event.start_mark.line + 1)
-        if isinstance(event, AliasEvent):
+        if isinstance(event, self.yaml.AliasEvent):
             return self._repeated(event)
         if event.tag not in (None, "!") and event.tag not in _TAGS:
             raise self._error(
@@ -120,9 +129,9 @@ class _Document:
         if event.anchor is not None:
             self.anchors[event.anchor] = anchored
         before = self.values
-        if isinstance(event, ScalarEvent):
+        if isinstance(event, self.yaml.ScalarEvent):
             anchored.value = self._scalar(event)
-        elif isinstance(event, SequenceStartEvent):
+        elif isinstance(event, self.yaml.SequenceStartEvent):
             anchored.value = self._list(keys)
         else:
             anchored.value = self._mapping(keys)
@@ -148,19 +157,15 @@ class _Document:
         return anchored.value
 
     def _list(self, keys: Keys) -> list[Any]:
-        from yaml import SequenceEndEvent
-
         data: list[Any] = []
-        while not isinstance(event := self._next(), SequenceEndEvent):
+        while not isinstance(event := self._next(), self.yaml.SequenceEndEvent):
             data.append(self._value(event, (*keys, len(data))))
         return data
 
     def _mapping(self, keys: Keys) -> dict[str, Any]:
-        from yaml import MappingEndEvent, ScalarEvent
-
         data: dict[str, Any] = {}
-        while not isinstance(event := self._next(), MappingEndEvent):
-            if not isinstance(event, ScalarEvent):
+        while not isinstance(event := self._next(), self.yaml.MappingEndEvent):
+            if not isinstance(event, self.yaml.ScalarEvent):
                 raise self._error("E-YAML-013", event, "a key must be a plain name, not a list or a mapping.")
             key = str(event.value)
             if key in data:

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from flexcal.errors import InputError, unreadable
-from flexcal.files.formats.yaml_document import parse_document
+from flexcal.files.formats.yaml_document import LARGEST_YAML, parse_document
 from flexcal.files.formats.yaml_writer import write_yaml
 from flexcal.files.structuring import UNQUOTED, Keys, StructureError, dotted, structure
-from flexcal.files.transaction import current_path
+from flexcal.files.transaction import read_text
 
 __all__ = ["YamlFile", "read_yaml", "read_yaml_file", "write_yaml"]
 
@@ -86,7 +86,7 @@ def read_yaml_file(path: str | Path) -> YamlFile:
     """Read a YAML file as plain data, keeping the lines; raises `InputError` as `read_yaml` does."""
     path = Path(path)
     try:
-        text = current_path(path).read_text(encoding="utf-8-sig")
+        text = read_text(path, encoding="utf-8-sig", limit=LARGEST_YAML)
     except OSError as problem:
         raise unreadable(path, problem) from problem
     except UnicodeDecodeError as problem:

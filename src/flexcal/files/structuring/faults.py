@@ -10,6 +10,9 @@ from flexcal.files.structuring.keys import Keys, dotted, file_key, known_keys
 from flexcal.files.structuring.wording import suggestion
 from flexcal.printable import excerpt
 
+_MOST_SUGGESTIONS = 100
+"""Unknown keys of one mapping above which no similar ones are looked for."""
+
 
 class Failure(NamedTuple):
     """Invalid value: code and sentence as of `FlexcalError`, and the keys that lead to the value."""
@@ -63,9 +66,9 @@ def failures(problem: BaseException, keys: Keys) -> list[Failure | None]:
     if isinstance(problem, Nested):
         return failures(problem.cause, (*keys, problem.key))
     if isinstance(problem, ForbiddenExtraKeysError):
-        known = known_keys(problem.cl)
+        known, suggest = known_keys(problem.cl), len(problem.extra_fields) <= _MOST_SUGGESTIONS
         return [
-            Failure("E-YAML-001", (*keys, key), _unknown_key(key, keys, known))
+            Failure("E-YAML-001", (*keys, key), _unknown_key(key, keys, known, suggest=suggest))
             for key in problem.extra_fields
         ]
     if isinstance(problem, BaseExceptionGroup):
@@ -110,8 +113,8 @@ def _key_of(problem: BaseExceptionGroup, name: str) -> str:
     return next((file_key(field) for field in fields if field.name == name), name)
 
 
-def _unknown_key(key: str, keys: Keys, known: list[str]) -> str:
-    near = suggestion(key, known)
+def _unknown_key(key: str, keys: Keys, known: list[str], *, suggest: bool) -> str:
+    near = suggestion(key, known) if suggest else ""
     hint = near or f"; known are {', '.join(known)}."
     return f"unknown key '{excerpt(key)}'{_inside(keys)}{hint}"
 

@@ -2,11 +2,12 @@ from .atomic_writing import atomic_path, atomic_paths, write_text
 from .file_kinds import refuse_irregular, refuse_stream
 from .locks import lock_file
 from .publication import FileTransaction, current_path
-from .reading import open_regular, read_bytes, read_text
+from .reading import MEGABYTE, open_regular, read_bytes, read_text, regular_path, size_text
 from .recovery import recover
 from .staging_folder import Stage, age, living_owner, stages_in
 
 __all__ = [
+    "MEGABYTE",
     "FileTransaction",
     "Stage",
     "age",
@@ -21,6 +22,8 @@ __all__ = [
     "recover",
     "refuse_irregular",
     "refuse_stream",
+    "regular_path",
+    "size_text",
     "stages_in",
     "write_text",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
-from io import FileIO
+from io import BufferedReader
 from pathlib import Path
 
 from flexcal.errors import InputError
@@ -16,32 +16,32 @@ LARGEST = 64 * MEGABYTE
 """Bytes of a file that is read whole, where its reader does not say another bound."""
 
 
-def open_regular(path: str | Path, *, limit: int | None) -> FileIO:
-    """Open a regular file to be read, unbuffered; of a running transaction the file that waits for this place.
+def open_regular(path: str | Path, *, limit: int | None) -> BufferedReader:
+    """Open a regular file to be read; of a running transaction the file that waits for this place.
 
     Opening never waits, as that of a pipe does. `limit` bounds its size in bytes; None is for what is read as a stream, in constant
     memory. Raises `InputError` where it is a pipe, socket or device, or larger, and `OSError` as `open` does.
     """
     place = current_path(path)
-    handle = os.open(
-        place,
-        os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0),
-    )
-    stream = FileIO(handle, "rb")  # of a folder this raises IsADirectoryError
+    flags = ("O_NONBLOCK", "O_CLOEXEC", "O_BINARY")
+    handle = os.open(place, os.O_RDONLY | sum(getattr(os, flag, 0) for flag in flags))
     try:
         status = os.fstat(handle)
-        if not stat.S_ISREG(status.st_mode):
-            refuse_stream(place)
-        if limit is not None and status.st_size > limit:
-            raise InputError(
-                "E-FILE-020",
-                f"{path} has {_megabytes(status.st_size)}, and such a file is read up to {_megabytes(limit)}; "
-                "check that it is the right one.",
-            )
+        if not stat.S_ISDIR(status.st_mode):  # of a folder `fdopen` raises IsADirectoryError
+            _require_readable(path, place, status, limit)
+        return os.fdopen(handle, "rb")
     except BaseException:
-        stream.close()
+        os.close(handle)
         raise
-    return stream
+
+
+def regular_path(path: str | Path, *, limit: int | None) -> Path:
+    """Path of a regular file, for a library that opens it by its name; checked, and raises, as `open_regular` does."""
+    place = current_path(path)
+    status = os.stat(place)
+    if not stat.S_ISDIR(status.st_mode):
+        _require_readable(path, place, status, limit)
+    return place
 
 
 def read_bytes(path: str | Path, *, limit: int = LARGEST) -> bytes:
@@ -52,7 +52,7 @@ def read_bytes(path: str | Path, *, limit: int = LARGEST) -> bytes:
             content += more
     if len(content) > limit:
         raise InputError(
-            "E-FILE-021", f"{path} grew beyond {_megabytes(limit)} while it was read; run it again."
+            "E-FILE-021", f"{path} grew beyond {size_text(limit)} while it was read; run it again."
         )
     return bytes(content)
 
@@ -65,5 +65,17 @@ def read_text(
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def _megabytes(size: int) -> str:
-    return f"{size / MEGABYTE:.3g} MB"
+def size_text(size: int) -> str:
+    """Size of a file in MB or GB."""
+    return f"{size / 1e9:.3g} GB" if size >= 1e9 else f"{size / MEGABYTE:.3g} MB"
+
+
+def _require_readable(path: str | Path, place: Path, status: os.stat_result, limit: int | None) -> None:
+    if not stat.S_ISREG(status.st_mode):
+        refuse_stream(place)
+    if limit is not None and status.st_size > limit:
+        raise InputError(
+            "E-FILE-020",
+            f"{path} has {size_text(status.st_size)}, and such a file is read up to {size_text(limit)}; "
+            "check that it is the right one.",
+        )

@@ -10,7 +10,6 @@ import numpy as np
 
 from flexcal.data.tables import Table, seconds_of, tables_in
 from flexcal.errors import InputError
-from flexcal.files.transaction import refuse_stream
 from flexcal.importing.tables import ForeignTable
 
 
@@ -52,8 +51,6 @@ def _read(path: Path, joints: Sequence[str], sheet: str | None, topic: str | Non
     suffix = path.suffix.lower()
     if not path.exists():
         raise InputError("E-IMPORT-022", f"{path}: there is no such file; check the name and the folder.")
-    for file in (path, *(sorted(path.iterdir()) if path.is_dir() else ())):
-        refuse_stream(file)
     if suffix in _ROS or (path.is_dir() and (path / "metadata.yaml").is_file()):
         from flexcal.importing.readers.ros import read_ros
 

@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
+import re
+import zlib
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile, ZipFile, is_zipfile
 
 import numpy as np
 
 from flexcal.data.tables import Table, TableFile
-from flexcal.errors import InputError
+from flexcal.errors import InputError, unreadable
+from flexcal.files.transaction import MEGABYTE, open_regular, regular_path, size_text
 from flexcal.importing.readers.separated_text import values
 from flexcal.importing.tables import ForeignTable, find_header
+
+_LARGEST = 64 * MEGABYTE
+_LARGEST_UNPACKED = 1000 * MEGABYTE
+_MOST_CELLS = 20_000_000
+"""Largest number of cells between the first and the last of a sheet: all of them are held, filled or not."""
+_PLACE = re.compile(rb"""\br\s*=\s*["']([A-Z]{0,3})([0-9]{1,7})["']""")
+"""Column and row of a cell, or the row of a row."""
+_OVERLAP = 64
+"""Bytes of a part of a sheet that are looked at again with the next one."""
 
 
 def read_excel(path: Path, sheet: str | None) -> ForeignTable:
@@ -25,8 +38,9 @@ def read_excel(path: Path, sheet: str | None) -> ForeignTable:
             "E-IMPORT-025",
             f"{path}: Excel files need fastexcel: pip install fastexcel; or save the sheet as CSV.",
         ) from None
+    _require_size(path)
     try:
-        book = fastexcel.read_excel(path)
+        book = fastexcel.read_excel(regular_path(path, limit=_LARGEST))
         names = book.sheet_names
         if sheet is not None and sheet not in names:
             raise InputError(
@@ -54,6 +68,45 @@ def read_excel(path: Path, sheet: str | None) -> ForeignTable:
     )
     table = Table(TableFile(path, header.names, first), first, columns)
     return ForeignTable(table, header.units, header.named, notes)
+
+
+def _require_size(path: Path) -> None:
+    """Raise `InputError` for a file that is too large when it is unpacked, or has a cell too far from the first one."""
+    try:
+        with open_regular(path, limit=_LARGEST) as stream:
+            if not is_zipfile(stream):  # as the .xls of old
+                return
+            with ZipFile(stream) as book:
+                size = 0
+                for member in book.infolist():
+                    rows = columns = 1
+                    beginning = b""
+                    with book.open(member) as part:
+                        while content := part.read(2**20):
+                            size += len(content)
+                            for column, row in _PLACE.findall(beginning + content):
+                                rows, columns = max(rows, int(row)), max(columns, _number(column))
+                            if size > _LARGEST_UNPACKED or rows * columns > _MOST_CELLS:
+                                raise InputError(
+                                    "E-IMPORT-073",
+                                    f"{path}: {member.filename} in it is too large (a sheet has up to {_MOST_CELLS} cells, and a file "
+                                    f"{size_text(_LARGEST_UNPACKED)}); save the sheet as CSV.",
+                                )
+                            beginning = content[-_OVERLAP:]
+    except OSError as problem:
+        raise unreadable(path, problem) from problem
+    except (BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError) as problem:
+        raise InputError(
+            "E-IMPORT-074", f"{path}: not a readable Excel file (its parts are damaged); save it again."
+        ) from problem
+
+
+def _number(column: bytes) -> int:
+    """Number of a column that is called by letters; 0 of none."""
+    number = 0
+    for letter in column:
+        number = 26 * number + letter - 64
+    return number
 
 
 def _columns(sheet: Any) -> list[list[Any]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -9,8 +10,16 @@ from typing import Any
 import numpy as np
 
 from flexcal.data.tables import Table, TableFile
-from flexcal.errors import InputError
+from flexcal.errors import InputError, unreadable
+from flexcal.files.transaction import MEGABYTE, open_regular, regular_path, size_text
 from flexcal.importing.tables import ForeignTable
+
+_LARGEST = 1000 * MEGABYTE
+"""Bytes of a file, and of its values once they are unpacked."""
+_MOST_VARIABLES = 10_000
+_DEEPEST = 20
+_COMPRESSED = 15
+"""Type of a data element that is packed by zlib."""
 
 
 def read_hdf5_mat(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
@@ -28,26 +37,43 @@ def read_hdf5_mat(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
     variables: dict[str, np.ndarray] = {}
     others: list[str] = []
 
+    visited: list[str] = []
+    size = 0
+
+    def is_own(group: Any, name: str) -> bool:
+        """Whether a link leads to something in this file."""
+        return isinstance(group.get(name, getlink=True), h5py.HardLink)
+
     def collect(name: str, item: Any) -> None:
         kind = item.attrs.get("MATLAB_class", b"")
         kind = kind.decode() if isinstance(kind, bytes) else str(kind)
+        nonlocal size
+        visited.append(name)
+        if len(visited) > _MOST_VARIABLES or name.count(".") > _DEEPEST:
+            raise InputError(
+                "E-IMPORT-071",
+                f"{path}: its structs hold more than {_MOST_VARIABLES} variables or nest more than {_DEEPEST} deep; save the columns.",
+            )
         if isinstance(item, h5py.Group) and kind in ("", "struct") and "MATLAB_sparse" not in item.attrs:
             for field in item:
-                collect(f"{name}.{field}", item[field])
+                if is_own(item, str(field)):
+                    collect(f"{name}.{field}", item[field])
         elif isinstance(item, h5py.Dataset) and kind in _NUMBERS and "MATLAB_empty" not in item.attrs:
-            value = np.asarray(item[()])
-            if value.dtype.kind in "fiub" and value.ndim == 2:
-                variables[name] = np.squeeze(value.T).astype(float)
+            stored_here = item.external is None and not item.is_virtual
+            if stored_here and item.dtype.kind in "fiub" and item.ndim == 2:
+                size += 8 * int(item.size or 0)
+                _require_size(path, size)
+                variables[name] = np.squeeze(np.asarray(item[()]).T).astype(float)
             else:
                 others.append(name)
         else:
             others.append(name)
 
     try:
-        with h5py.File(path, "r") as file:
-            for name, item in file.items():
-                if not str(name).startswith("#"):
-                    collect(str(name), item)
+        with h5py.File(regular_path(path, limit=_LARGEST), "r") as file:
+            for name in file:
+                if not str(name).startswith("#") and is_own(file, str(name)):
+                    collect(str(name), file[name])
     except (OSError, RuntimeError) as problem:
         reason = " ".join(str(problem).split())
         raise InputError(
@@ -94,11 +120,12 @@ def _variables(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
     """Variables (N,) or (N, M) of numbers by name, and the names of all others."""
     from scipy.io import loadmat
 
+    _require_size(path, _unpacked(path))
     try:
-        content = loadmat(path, squeeze_me=True, struct_as_record=False, mat_dtype=True)
+        content = loadmat(
+            regular_path(path, limit=_LARGEST), squeeze_me=True, struct_as_record=False, mat_dtype=True
+        )
     except NotImplementedError:  # version 7.3
-        from flexcal.importing.readers.matlab import read_hdf5_mat
-
         return read_hdf5_mat(path)
     except Exception as problem:  # a reader of a broken file may raise anything
         reason = " ".join(str(problem).split()) or type(problem).__name__
@@ -111,6 +138,38 @@ def _variables(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
         if not name.startswith("__"):
             _collect(name, value, variables, others)
     return variables, others
+
+
+def _unpacked(path: Path) -> int:
+    """Bytes of a MAT-file of version 5 with its packed elements unpacked, as far as they can be; at least the size of any other."""
+    size = 0
+    try:
+        with open_regular(path, limit=_LARGEST) as stream:
+            order = {b"IM": "little", b"MI": "big"}.get(stream.read(128)[126:])
+            while order is not None and len(tag := stream.read(8)) == 8:
+                kind, length = (int.from_bytes(part, order) for part in (tag[:4], tag[4:]))  # type: ignore[arg-type]
+                if kind != _COMPRESSED:
+                    stream.seek(length, 1)
+                    continue
+                unpacking, left = zlib.decompressobj(), length
+                while left > 0 and (packed := stream.read(min(left, 2**16))) and size <= _LARGEST:
+                    left -= len(packed)
+                    while packed and size <= _LARGEST:
+                        size += len(unpacking.decompress(packed, 2**20))
+                        packed = unpacking.unconsumed_tail
+            return size
+    except OSError as problem:
+        raise unreadable(path, problem) from problem
+    except zlib.error:  # the reader says what is wrong
+        return size
+
+
+def _require_size(path: Path, size: int) -> None:
+    if size > _LARGEST:
+        raise InputError(
+            "E-IMPORT-072",
+            f"{path} holds more than {size_text(_LARGEST)} of values, which are not read at once; save fewer of them.",
+        )
 
 
 def _collect(name: str, value: Any, variables: dict[str, np.ndarray], others: list[str]) -> None:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.data.tables import Table, TableFile
+from flexcal.data.tables import Table, TableFile, require_decodable
 from flexcal.errors import InputError
+from flexcal.files.transaction import regular_path
 from flexcal.importing.tables import ForeignTable
 
 if TYPE_CHECKING:
@@ -58,7 +59,9 @@ def read_parquet(path: Path) -> ForeignTable:
     import polars as pl
 
     try:
-        frame = pl.read_parquet(path)
+        pl.read_parquet_schema(regular_path(path, limit=None))
+        require_decodable(path, stream=False)
+        frame = pl.read_parquet(regular_path(path, limit=None))
     except (pl.exceptions.PolarsError, OSError) as problem:
         reason = " ".join(str(problem).split())
         raise InputError(

@@ -13,6 +13,7 @@ import numpy as np
 from flexcal.data.tables import Table, TableFile
 from flexcal.errors import InputError
 from flexcal.files.formats import read_yaml_file
+from flexcal.files.transaction import regular_path
 from flexcal.importing.readers.standstill import points_at_rest
 from flexcal.importing.tables import ForeignTable
 
@@ -49,6 +50,8 @@ def read_ros(path: Path, joints: Sequence[str], topic: str | None) -> ForeignTab
         ) from None
     if path.is_dir():
         read_yaml_file(path / _METADATA)  # its errors name the line
+    for file in path.iterdir() if path.is_dir() else (path,):
+        regular_path(file, limit=None)
     notes: list[str] = []
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:

@@ -12,8 +12,10 @@ import numpy as np
 
 from flexcal.data.tables import Table, TableFile
 from flexcal.errors import InputError, unreadable
+from flexcal.files.transaction import MEGABYTE, read_bytes
 from flexcal.importing.tables import NUMBER, ForeignTable, find_header
 
+_LARGEST = 512 * MEGABYTE
 _SEPARATORS = ("\t", ";", ",", " ")
 _LOOKED_AT = 200
 """Number of rows searched for the header, and of the last ones that determine the separator."""
@@ -90,7 +92,7 @@ def values(cells: Sequence[str], comma: bool = False) -> np.ndarray:
 
 def _decoded(path: Path) -> str:
     try:
-        content = path.read_bytes()
+        content = read_bytes(path, limit=_LARGEST)
     except OSError as problem:
         raise unreadable(path, problem) from problem
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):

@@ -11,12 +11,16 @@ import numpy as np
 
 from flexcal.data.tables import Table, TableFile
 from flexcal.errors import InputError, unreadable
+from flexcal.files.transaction import MEGABYTE, read_bytes, regular_path
 from flexcal.importing.tables import ForeignTable
 
+_LARGEST = 512 * MEGABYTE
 _FUNCTION, _TIME_RESPONSE = 58, 1
 _DIRECTIONS = ("", "X", "Y", "Z", "RX", "RY", "RZ")
 _DELIMITER = re.compile(rb"    -1(?=[\r\n]|\Z| {74})")
 """As pyuff finds it: after binary values it does not begin a line."""
+_ANNOUNCED = re.compile(rb"    -1[^\n]*\n    58[^\n]*\n(?:[^\n]*\n){6}.{10} *([0-9]+)")
+"""Number of values, in the second field of the seventh line of a data set 58."""
 _SAME_CLOCK = 1e-6
 """Share of a step by which two histories may be sampled apart."""
 
@@ -34,7 +38,7 @@ def read_uff(path: Path) -> ForeignTable:
         raise InputError("E-IMPORT-046", f"{path}: universal files need pyuff: pip install pyuff.") from None
     _require_whole(path)
     try:
-        file = pyuff.UFF(str(path))
+        file = pyuff.UFF(str(regular_path(path, limit=_LARGEST)))
         kinds = [int(kind) for kind in file.get_set_types()]
     except Exception as problem:  # of no class of its own
         raise InputError(
@@ -68,9 +72,14 @@ def read_uff(path: Path) -> ForeignTable:
 def _require_whole(path: Path) -> None:
     """Raise `InputError` for a file that cannot be read, or whose last data set has no end: what pyuff leaves out."""
     try:
-        content = path.read_bytes()
+        content = read_bytes(path, limit=_LARGEST)
     except OSError as problem:
         raise unreadable(path, problem) from problem
+    if any(int(count) > len(content) for count in _ANNOUNCED.findall(content)):
+        raise InputError(
+            "E-IMPORT-070",
+            f"{path}: a data set announces more values than the file can hold; export it again.",
+        )
     if len(_DELIMITER.findall(content)) % 2:
         raise InputError(
             "E-IMPORT-049", f"{path}: its last data set has no end, so the file was cut off; export it again."

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from flexcal.errors import InputError, naming
-from flexcal.files.transaction import atomic_paths
+from flexcal.files.transaction import MEGABYTE, atomic_paths, read_bytes
 from flexcal.programs import Program, ProgramFile, dialect_of
 
+_LARGEST = 16 * MEGABYTE
 _ENCODINGS = ("utf-8", "latin-1")
 """Every byte stands for a character in the second, and comes back as it was."""
 
@@ -119,7 +120,8 @@ def write_program(program: Sequence[ProgramFile], out: Path) -> list[Path]:
     files = [file for file in program if Path(file.name) in sources]
     places = output_places(sources, out)
     contents = [
-        file.text.encode(_encoding(source.read_bytes())) for file, source in zip(files, sources, strict=True)
+        file.text.encode(_encoding(read_bytes(source, limit=_LARGEST)))
+        for file, source in zip(files, sources, strict=True)
     ]
     with atomic_paths(*places) as temporaries:
         for temporary, content in zip(temporaries, contents, strict=True):
@@ -128,7 +130,7 @@ def write_program(program: Sequence[ProgramFile], out: Path) -> list[Path]:
 
 
 def _text(file: Path) -> str:
-    written = file.read_bytes()
+    written = read_bytes(file, limit=_LARGEST)
     return written.decode(_encoding(written))
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from flexcal.errors import InputError, unreadable
 from flexcal.export import XacroExport, XacroSource, Zeros, render_xacro, shifted_limits
-from flexcal.files.transaction import atomic_path
+from flexcal.files.transaction import atomic_path, read_bytes
 from flexcal.jobs.deployment.export import identified_robot
 from flexcal.jobs.inputs import held_at, use_remarks
 from flexcal.jobs.pages import Result
@@ -121,7 +121,7 @@ def export_xacro(
     if joint_limits is not None:
         offsets = dict(zip(model.joint_names, model.joint_offsets.tolist(), strict=True))
         try:
-            content = joint_limits.read_bytes()
+            content = read_bytes(joint_limits)
         except OSError as problem:
             raise unreadable(joint_limits, problem) from problem
         own = Path(os.path.abspath(joint_limits))

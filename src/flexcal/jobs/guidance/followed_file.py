@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import BinaryIO
 
+from flexcal.data.tables import LARGEST_TABLE
 from flexcal.errors import InputError, unreadable
+from flexcal.files.transaction import open_regular
 from flexcal.jobs.guidance.measured_rows import split_line
 from flexcal.jobs.guidance.row_cells import RowReader
 from flexcal.model.robot import RobotModel
@@ -52,7 +54,7 @@ class FollowedFile:
         a line that went on after it was read.
         """
         try:
-            with self.path.open("rb") as stream:
+            with open_regular(self.path, limit=LARGEST_TABLE) as stream:
                 size = stream.seek(0, 2)
                 if size < self.end:
                     self._start, self._columns, self._skipped = 0, (), 0

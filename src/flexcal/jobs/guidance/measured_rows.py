@@ -13,7 +13,8 @@ from typing import Any
 
 from flexcal.data.poses import EXCLUDED
 from flexcal.errors import InputError, unreadable
-from flexcal.files.transaction import atomic_paths, current_path
+from flexcal.files.formats import parse_json
+from flexcal.files.transaction import atomic_paths, read_text
 
 ROWS, STATION = "poses.csv", "station"
 
@@ -188,8 +189,8 @@ class MeasuredRows:
     def _entries(self) -> list[dict[str, Any]]:
         text = _text(self.history)
         try:
-            return [json.loads(line) for line in text.splitlines() if line.strip()]
-        except ValueError as problem:
+            return [parse_json(self.history, line, "") for line in text.splitlines() if line.strip()]
+        except InputError as problem:
             raise InputError(
                 "E-STUDIO-013",
                 f"{self.history} is not the journal of {self.name} ({problem}); move it away, and go on without undo.",
@@ -261,7 +262,7 @@ def split_line(line: str) -> list[str]:
 
 def _text(path: Path) -> str:
     try:
-        return current_path(path).read_text(encoding="utf-8")
+        return read_text(path)
     except FileNotFoundError:
         return ""
     except (OSError, UnicodeDecodeError) as problem:

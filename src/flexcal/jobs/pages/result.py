@@ -14,7 +14,7 @@ import numpy as np
 
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, write_estimates
-from flexcal.files.transaction import write_text
+from flexcal.files.transaction import read_text, write_text
 from flexcal.jobs.result_files import ESTIMATES, write_results
 from flexcal.model.robot import RobotModel
 from flexcal.report.layout import Page, write_page
@@ -148,7 +148,7 @@ class WrittenResult(SummarisedResult):
         path = Path(path)
         with TemporaryDirectory() as folder:
             self.write(folder)
-            write_text(path, (Path(folder) / REPORT).read_text("utf-8"))
+            write_text(path, read_text(Path(folder) / REPORT))
         return path
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -13,7 +12,8 @@ import numpy as np
 
 from flexcal.calibration.recheck import ShiftAtVisit
 from flexcal.data.poses import PoseSet
-from flexcal.errors import FlexcalError, InputError, unreadable
+from flexcal.errors import FlexcalError, InputError
+from flexcal.files.formats import read_json
 from flexcal.files.structuring import structure
 from flexcal.files.transaction import current_path, write_text
 from flexcal.jobs.result_files import json_text
@@ -147,10 +147,7 @@ def read_visits(folder: Path, robot: str) -> tuple[Visit, ...]:
     path = folder / VISITS
     if not current_path(path).is_file():
         return ()
-    try:
-        content = json.loads(current_path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as problem:
-        raise unreadable(path, problem, _ADVICE) from problem
+    content = read_json(path, _ADVICE)
     known = (
         isinstance(content, Mapping) and content.get("kind") == "visits" and content.get("schema") == _SCHEMA
     )

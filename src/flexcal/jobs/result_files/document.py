@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from flexcal.errors import InputError, unreadable
+from flexcal.errors import InputError
 from flexcal.estimation import Dropped, Estimate, Identifiability
-from flexcal.files.formats import json_values
-from flexcal.files.transaction import current_path, recover, write_text
+from flexcal.files.formats import json_values, read_json
+from flexcal.files.transaction import recover, write_text
 
 RESULTS = "results.json"
 
@@ -84,10 +84,7 @@ def read_results(folder: Path) -> dict[str, Any]:
     """Document in `folder`; raises `InputError` if there is none, and for one of another schema."""
     recover(folder)
     path = folder / RESULTS
-    try:
-        document = json.loads(current_path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as problem:
-        raise unreadable(path, problem, AGAIN) from problem
+    document = read_json(path, AGAIN)
     if not isinstance(document, dict):
         raise InputError("E-RUN-079", f"{path} holds no results of a verb; {AGAIN}.")
     if document.get("kind") not in get_args(Kind) or document.get("schema") != SCHEMA:

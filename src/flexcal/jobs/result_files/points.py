@@ -18,9 +18,10 @@ from flexcal.calibration.verification import (
     MeasuredPoints,
 )
 from flexcal.data.poses import PoseSet
+from flexcal.data.tables import LARGEST_TABLE
 from flexcal.errors import InputError, unreadable
 from flexcal.files.formats import ArrayForm, NpzFile, write_npz
-from flexcal.files.transaction import atomic_path, current_path
+from flexcal.files.transaction import atomic_path, current_path, read_bytes
 from flexcal.jobs.result_files.document import AGAIN
 from flexcal.units import LARGEST
 
@@ -71,7 +72,7 @@ def read_points(folder: Path, *, sigma: float) -> MeasuredPoints:
     path = folder / POINTS
     try:
         table = pl.read_csv(
-            current_path(path).read_bytes(), schema_overrides=dict.fromkeys(_TEXTS, pl.String)
+            read_bytes(path, limit=LARGEST_TABLE), schema_overrides=dict.fromkeys(_TEXTS, pl.String)
         )
         joints = [name for name in table.columns if name.startswith("q") and name[1:].isdigit()]
 

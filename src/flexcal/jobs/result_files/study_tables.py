@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexcal.errors import unreadable
-from flexcal.files.transaction import atomic_path, current_path
+from flexcal.data.tables import require_decodable
+from flexcal.errors import InputError, unreadable
+from flexcal.files.transaction import atomic_path, current_path, regular_path
 
 if TYPE_CHECKING:
     import polars
@@ -38,8 +39,9 @@ def read_study_rows(folder: Path) -> StudyRows:
     frames, damaged = [], []
     for path in _tables(folder):
         try:
-            frames.append(polars.read_parquet(current_path(path), memory_map=False))
-        except (OSError, polars.exceptions.PolarsError) as problem:
+            require_decodable(path, stream=False)
+            frames.append(polars.read_parquet(regular_path(path, limit=None), memory_map=False))
+        except (OSError, InputError, polars.exceptions.PolarsError) as problem:
             if isinstance(problem, PermissionError):
                 raise unreadable(path, problem) from problem
             damaged.append(path)

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from flexcal.calibration.verification import MeasuredTilts
+from flexcal.data.tables import LARGEST_TABLE
 from flexcal.errors import unreadable
-from flexcal.files.transaction import atomic_path, current_path
+from flexcal.files.transaction import atomic_path, current_path, read_bytes
 from flexcal.jobs.result_files.document import AGAIN
 
 TILTS = "tilts.csv"
@@ -36,7 +37,9 @@ def read_tilts(folder: Path) -> MeasuredTilts | None:
     if not current_path(path).is_file():
         return None
     try:
-        table = pl.read_csv(current_path(path).read_bytes(), schema_overrides={"inclinometer": pl.String})
+        table = pl.read_csv(
+            read_bytes(path, limit=LARGEST_TABLE), schema_overrides={"inclinometer": pl.String}
+        )
         joints = [name for name in table.columns if name.startswith("q") and name[1:].isdigit()]
 
         def numbers(columns: list[str]) -> np.ndarray:

@@ -9,8 +9,9 @@ import numpy as np
 
 from flexcal.calibration.verification import CALIBRATED, NOMINAL, OWN, RIGID, MeasuredPoints
 from flexcal.data.poses import PoseSet
+from flexcal.data.tables import LARGEST_TABLE
 from flexcal.errors import unreadable
-from flexcal.files.transaction import atomic_path, current_path
+from flexcal.files.transaction import atomic_path, read_bytes
 from flexcal.jobs.result_files.document import AGAIN
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ def read_verification(path: Path) -> tuple[MeasuredPoints, MeasuredPoints]:
     import polars as pl
 
     try:
-        table = pl.read_csv(current_path(path).read_bytes())
+        table = pl.read_csv(read_bytes(path, limit=LARGEST_TABLE))
 
         def vectors(prefix: str) -> np.ndarray:
             return table.select([f"{prefix}{axis}" for axis in "xyz"]).cast(pl.Float64).to_numpy()

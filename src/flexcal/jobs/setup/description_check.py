@@ -11,7 +11,7 @@ from typing import Any
 from flexcal.errors import FlexcalError, InputError
 from flexcal.files.formats import Place, YamlFile, read_yaml_file, yaml_nodes
 from flexcal.files.structuring import Keys, StructureError, structure
-from flexcal.files.transaction import current_path
+from flexcal.files.transaction import read_bytes
 from flexcal.model.robot import RobotConfig, RobotModel, read_robot
 
 _INDEPENDENT = (
@@ -54,7 +54,7 @@ def description_problems(robot_file: Path) -> list[FileProblem]:
         file = read_yaml_file(robot_file)
     except InputError as problem:
         return [_placed(problem, robot_file, {})]
-    places = yaml_nodes(current_path(robot_file).read_bytes().decode("utf-8-sig")).places()
+    places = yaml_nodes(read_bytes(robot_file).decode("utf-8-sig")).places()
     try:
         structure(file.data, RobotConfig)
     except StructureError as problem:

@@ -9,7 +9,7 @@ from typing import Any
 from flexcal.errors import FlexcalError, InputError
 from flexcal.files.formats import edited_yaml, parse_document, read_yaml_file
 from flexcal.files.structuring import Keys, StructureError, structure
-from flexcal.files.transaction import current_path, write_text
+from flexcal.files.transaction import read_bytes, write_text
 from flexcal.model.robot import RobotConfig
 
 
@@ -31,7 +31,7 @@ def edit_robot(robot_file: Path, changes: Mapping[Keys, Any]) -> None:
         file would not read as robot.yaml though it did before.
     """
     before = read_yaml_file(robot_file)
-    text = current_path(robot_file).read_bytes().decode("utf-8")
+    text = read_bytes(robot_file).decode("utf-8")
     try:
         for keys, value in changes.items():
             text = edited_yaml(text, keys, value)

@@ -9,7 +9,7 @@ from typing import Any
 
 from flexcal.errors import InputError
 from flexcal.files.formats import read_yaml_file
-from flexcal.files.transaction import current_path, write_text
+from flexcal.files.transaction import read_text, write_text
 from flexcal.model.robot import RobotModel
 
 
@@ -35,7 +35,7 @@ def add_signals(robot_file: Path, signals: Mapping[str, Mapping[str, Any]]) -> N
         raise InputError(
             "E-RUN-092", f"{robot_file} has `signals:` already, which is not changed; replace it by: {block}"
         )
-    text = current_path(robot_file).read_text(encoding="utf-8")
+    text = read_text(robot_file)
     write_text(robot_file, f"{text}{'' if text.endswith(chr(10)) else chr(10)}\n{block}")
     try:
         RobotModel.from_yaml(robot_file, estimates=False)

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 from flexcal.design.scene import CollisionChecker
 from flexcal.files.formats import provenance
+from flexcal.files.transaction import read_bytes
 from flexcal.jobs.study.measured_values import error_columns, fit_columns, parameter_columns
 from flexcal.jobs.study.options import TwoStageOptions, structured
 from flexcal.jobs.study.rows import StudyRow
@@ -46,7 +47,7 @@ class TwoStageRuns(StudyTasks):
         )
         # package://name/ is in a folder of its name
         common = Path(os.path.commonpath([path.parent for path in paths])).parent
-        contents = {path.relative_to(common).as_posix(): path.read_bytes() for path in paths}
+        contents = {path.relative_to(common).as_posix(): read_bytes(path) for path in paths}
         return cls(paths[0].relative_to(common).as_posix(), contents, settings, provenance(paths))
 
     @property

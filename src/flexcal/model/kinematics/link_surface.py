@@ -12,7 +12,7 @@ from flexcal.model.kinematics.link_poses import link_frames
 from flexcal.model.kinematics.placements import joint_placement, point_placement
 from flexcal.model.kinematics.triangle_meshes import box, capsule, cylinder, decimated, ellipsoid
 from flexcal.model.robot import RobotModel
-from flexcal.model.urdf import locked_joints, pinocchio_model, read_elements
+from flexcal.model.urdf import locked_joints, pinocchio_model, pinocchio_shapes, read_elements
 
 _MOST = 6000
 """Largest number of triangles of the whole arm."""
@@ -62,15 +62,14 @@ def _urdf_shapes(model: RobotModel) -> list[tuple[int, np.ndarray, np.ndarray]]:
     if not any(link.find(shape) for link in read_elements(model.urdf).all("link") for shape in _SHAPES):
         return []
     try:
-        urdf, whole = pinocchio_model(model.urdf)
+        _, whole = pinocchio_model(model.urdf)
     except InputError:
         return []
     import pinocchio as pin
 
-    folders = [str(above) for above in model.urdf.absolute().parents]
     for kind in (pin.GeometryType.VISUAL, pin.GeometryType.COLLISION):
         try:
-            shapes = pin.buildGeomFromUrdfString(whole, urdf, kind, package_dirs=folders)
+            shapes = pinocchio_shapes(whole, model.urdf, kind)
         except (ValueError, RuntimeError):
             continue
         reduced, shapes = pin.buildReducedModel(whole, shapes, *locked_joints(whole, model.config.locked))

@@ -1,9 +1,10 @@
 from .description import Description, Frame, read_urdf
-from .elements import Element, macro_in, read_elements, xacro_error
-from .in_pinocchio import locked_joints, pinocchio_model
+from .elements import LARGEST_URDF, Element, macro_in, read_elements, xacro_error
+from .in_pinocchio import locked_joints, pinocchio_model, pinocchio_shapes
 from .serial_arm import AmbiguousArm, Arm, find_arm
 
 __all__ = [
+    "LARGEST_URDF",
     "AmbiguousArm",
     "Arm",
     "Description",
@@ -13,6 +14,7 @@ __all__ = [
     "locked_joints",
     "macro_in",
     "pinocchio_model",
+    "pinocchio_shapes",
     "read_elements",
     "read_urdf",
     "xacro_error",

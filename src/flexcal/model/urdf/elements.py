@@ -11,10 +11,15 @@ from xml.parsers import expat
 import numpy as np
 
 from flexcal.errors import InputError, unreadable
-from flexcal.files.transaction import current_path
+from flexcal.files.transaction import MEGABYTE, open_regular
 from flexcal.printable import excerpt, name_fault, quoted
 from flexcal.units import LARGEST
 
+LARGEST_URDF = 16 * MEGABYTE
+MOST_PARTS = 1000
+"""Largest number of links, and of joints."""
+_BEGINNING = 100
+"""Bytes by which a file that is no XML at all is told."""
 _DEEPEST = 50
 _MACRO = re.compile(r"\$[{(]")
 _REFERENCES = str.maketrans(
@@ -40,6 +45,13 @@ class Element:
     def find(self, tag: str) -> Element | None:
         """First child with this tag."""
         return next(self.all(tag), None)
+
+    def mesh_names(self) -> Iterator[str]:
+        """Files of the meshes in the element, as it calls them."""
+        if self.tag == "mesh" and "filename" in self.attributes:
+            yield self.attributes["filename"]
+        for child in self.children:
+            yield from child.mesh_names()
 
     def text(self) -> str:
         """XML text of the element with attributes and children alone: no text, comments, entities or encoding."""
@@ -106,10 +118,11 @@ def read_elements(path: Path) -> Element:
 
     Raises `InputError`, with line and column if possible, for a file that is not well-formed or has macros.
     """
-    parser = expat.ParserCreate()
+    parser, beginning = expat.ParserCreate(), b""
     above: list[Element] = []
     roots: list[Element] = []
     prefixes = {"xacro"}
+    counts = {"link": 0, "joint": 0}
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         element = Element(path, tag, attributes, parser.CurrentLineNumber)
@@ -126,19 +139,27 @@ def read_elements(path: Path) -> Element:
                 "E-URDF-045",
                 f"the name '{excerpt(attributes['name'])}' of a <{tag}> holds the character {fault}, which no name may; rename it.",
             )
-        (above[-1].children if above else roots).append(element)
+        siblings = above[-1].children if above else roots
+        if len(above) == 1 and tag in ("link", "joint"):
+            counts[tag] += 1
+            if counts[tag] > MOST_PARTS:
+                raise element.error(
+                    "E-URDF-046",
+                    f"there are more than {MOST_PARTS} elements <{tag}>, which no robot has; name the robot's URDF.",
+                )
+        siblings.append(element)
         above.append(element)
 
     parser.StartElementHandler = start
     parser.EndElementHandler = lambda tag: above.pop()
     try:
-        content = current_path(path).read_bytes()
+        with open_regular(path, limit=LARGEST_URDF) as stream:
+            beginning = stream.peek(_BEGINNING)
+            parser.ParseFile(stream)
     except OSError as problem:
         raise unreadable(path, problem, "check the file") from problem
-    try:
-        parser.Parse(content, True)
     except expat.ExpatError as problem:
-        if not content.lstrip(b"\xef\xbb\xbf\xff\xfe\x00 \t\r\n").startswith(b"<"):
+        if not beginning.lstrip(b"\xef\xbb\xbf\xff\xfe\x00 \t\r\n").startswith(b"<"):
             raise InputError(
                 "E-URDF-030", f"{path}: this is no XML, so no URDF; name the robot's URDF."
             ) from problem

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import unquote
 
 from flexcal.errors import InputError
-from flexcal.model.urdf import Element, read_elements
+from flexcal.model.urdf import read_elements
 from flexcal.studio.project import Project
 
 
@@ -20,7 +19,7 @@ def mesh_places(project: Project) -> dict[Path, str]:
     for name in project.files(".urdf"):
         urdf = project.folder / name
         try:
-            names = list(dict.fromkeys(_mesh_names(read_elements(urdf))))
+            names = list(dict.fromkeys(read_elements(urdf).mesh_names()))
         except InputError:
             continue
         for mesh in names:
@@ -30,13 +29,6 @@ def mesh_places(project: Project) -> dict[Path, str]:
                 continue
             places[place] = mesh
     return places
-
-
-def _mesh_names(element: Element) -> Iterator[str]:
-    if element.tag == "mesh" and "filename" in element.attributes:
-        yield element.attributes["filename"]
-    for child in element.children:
-        yield from _mesh_names(child)
 
 
 def _place(urdf: Path, name: str) -> Path:
