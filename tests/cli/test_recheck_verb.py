@@ -123,7 +123,7 @@ def test_what_cannot_be_done_is_said_in_a_sentence(
 @pytest.mark.parametrize(
     ("content", "code"),
     [
-        ("{", "E-FILE-001"),
+        ("{", "E-FILE-023"),
         ('{"kind": "visits", "schema": 2}', "E-RECHECK-003"),
         ('{"kind": "visits", "schema": 1, "robot": "ur5", "visits": [{"date": 3}]}', "E-RECHECK-004"),
         ('{"kind": "visits", "schema": 1, "robot": "kr6", "visits": []}', "E-RECHECK-005"),

@@ -64,7 +64,7 @@ def test_folders_without_anything_to_report(run, ur5_folder: Path, tmp_path: Pat
     (tmp_path / "measured" / "results.json").write_text('{"kind": "measurement", "schema": 1, "poses": 3}\n')
     assert_refusal(refused_run(run, tmp_path, "report", tmp_path / "measured"), "E-REPORT-009")
     (tmp_path / "measured" / "results.json").write_text("{")
-    assert_refusal(refused_run(run, tmp_path, "report", tmp_path / "measured"), "E-FILE-001")
+    assert_refusal(refused_run(run, tmp_path, "report", tmp_path / "measured"), "E-FILE-023")
 
 
 def test_two_calibrations_are_compared(run, calibrated: Path, tmp_path: Path) -> None:

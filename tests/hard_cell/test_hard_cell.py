@@ -55,6 +55,7 @@ def test_it_shares_no_robot_with_the_identification() -> None:
         "flexcal.data.recordings",
         "flexcal.errors",
         "flexcal.files.formats",
+        "flexcal.files.transaction",
         "flexcal.frequency.periodic",
         "flexcal.model.robot",
         "flexcal.mujoco_library",

@@ -11,12 +11,13 @@ from scipy.spatial.transform import Rotation
 
 from flexcal.errors import FlexcalError
 from flexcal.files.formats import read_yaml
-from flexcal.files.transaction import open_regular
+from flexcal.files.transaction import MEGABYTE, open_regular
 from flexcal.model.robot import RobotConfig
-from flexcal.model.urdf import LARGEST_URDF
 
 TYPICAL_RATIO = 100.0
 """Gear ratio where robot.yaml declares none."""
+
+_LARGEST_URDF = 16 * MEGABYTE
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +133,7 @@ def read_description(robot_file: Path) -> ArmDescription:
 
 def _read_links(urdf: Path) -> tuple[Link, ...]:
     """The links beyond the base, parents before children."""
-    with open_regular(urdf, limit=LARGEST_URDF) as stream:
+    with open_regular(urdf, limit=_LARGEST_URDF) as stream:
         root = ElementTree.parse(stream).getroot()
     inertials = {str(link.get("name")): link.find("inertial") for link in root.findall("link")}
     joints = {_name(joint, "parent"): [] for joint in root.findall("joint")}
