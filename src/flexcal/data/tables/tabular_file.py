@@ -460,7 +460,7 @@ def _require_short(path: Path, name: str, rows: int, longest: int) -> None:
     if 4 * rows * longest > _LARGEST_TEXTS:
         raise InputError(
             "E-TABLE-049",
-            f"{path}, column {excerpt(name)}: {rows} texts of up to {longest} characters are more than {size_text(_LARGEST_TEXTS)}; shorten them.",
+            f"{path}, column {excerpt(name)}: {rows} texts of up to {longest} characters exceed {size_text(_LARGEST_TEXTS)}; shorten them.",
         )
 
 
