@@ -21,6 +21,7 @@ from waiting import PATIENCE, until
 from worker_tasks import failing, killing, least_squares
 
 from flexcal.parallel import TaskError, ThisProcess, Workers, open_workers
+from flexcal.parallel.worker_processes import signals_wait
 
 
 @pytest.fixture(scope="module")
@@ -87,6 +88,22 @@ def test_workers_that_are_killed_between_two_calls_are_started_again() -> None:
             os.kill(process.pid, signal.SIGKILL)
         until(lambda: pool._flags.broken is not None)  # from here on the pool refuses tasks
         assert list(workers.values(failing, [0, 1, 5])) == [0, 1, 5]
+
+
+def test_no_more_processes_than_tasks_and_two_a_core() -> None:
+    with open_workers(None, 300) as workers:
+        for tasks in (1, 2):
+            assert list(workers.values(failing, range(tasks))) == list(range(tasks))
+            assert len(workers._pool._processes) == tasks  # type: ignore[attr-defined]
+        assert workers.count == 2 * (os.cpu_count() or 1)
+
+
+def test_a_signal_waits_until_processes_have_started() -> None:
+    reached = []
+    with pytest.raises(KeyboardInterrupt), signals_wait():
+        signal.raise_signal(signal.SIGINT)
+        reached.append("the end of the block")
+    assert reached
 
 
 def test_a_task_that_kills_every_worker_is_an_error_and_the_others_go_on(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import gc
 import io
 import os
 import shutil
+import signal
 import sys
 import textwrap
 from collections.abc import Sequence
@@ -16,7 +17,7 @@ from flexcal.cli.arguments.invocation import record_command_line
 from flexcal.cli.arguments.verb_table import Verb, command_class, find_verb, overview, unknown_verb
 from flexcal.cli.terminal.encoding import substitute_unencodable
 from flexcal.cli.terminal.standard_streams import buffered_output, replace_closed_streams
-from flexcal.cli.terminal.stop_signals import StopSignal, raise_on_stop_signals
+from flexcal.cli.terminal.stop_signals import StopSignal, noted_stop_signals
 from flexcal.errors import FlexcalError
 from flexcal.printable import sentence
 
@@ -40,11 +41,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     gc.set_threshold(300_000)
     atexit.register(gc.freeze)  # nor does it at exit, which took a tenth of a second
     substitute_unencodable()
-    with raise_on_stop_signals() as stopping:
+    with noted_stop_signals() as stopping:
         try:
+            stopping.begin()
             with buffered_output():
-                return _run(given)
+                status = _run(given)
+            stopping.end()
+            return status
         except BaseException as problem:
+            stopping.end()
             told, status = _told(problem, stopping)
             with suppress(OSError):
                 print(f"flexcal: {told}", file=sys.stderr)
@@ -59,7 +64,7 @@ def _told(problem: BaseException, stopping: StopSignal) -> tuple[str, int]:
     if error is not None:
         return f"{sentence(error)} [{error.code}]", FAILED
     if _was_interrupted(problem):
-        return "interrupted; no file is left half-written.", INTERRUPTED
+        return StopSignal(signal.SIGINT).sentence, INTERRUPTED
     raise problem
 
 

@@ -4,7 +4,6 @@ from .opening import open_workers
 from .ordered import consecutive_groups
 from .outcome import Outcome, TaskError
 from .this_process import ThisProcess
-from .worker_processes import WorkerTask
 from .workers import Workers
 
 __all__ = [
@@ -13,7 +12,6 @@ __all__ = [
     "Outcome",
     "TaskError",
     "ThisProcess",
-    "WorkerTask",
     "Workers",
     "consecutive_groups",
     "open_workers",

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from dataclasses import dataclass
+from itertools import chain, islice
 from typing import Any, TypeVar
 
 from flexcal.parallel.common_values import CommonValues
 from flexcal.parallel.outcome import Outcome, TaskError, run_task
-from flexcal.parallel.worker_processes import WorkerTask, interrupts_left_to_this_process
+from flexcal.parallel.worker_processes import end_with, signals_wait
 from flexcal.parallel.workers import Workers
 
 V = TypeVar("V")
@@ -30,7 +32,7 @@ class _Numbered:
 
 
 class LocalProcesses(Workers):
-    """Runs tasks in `jobs` processes, which end with this one, and linear algebra in one thread each.
+    """Runs tasks in up to `jobs` processes, no more than tasks, which end with this one, and linear algebra in one thread each.
 
     Where a worker is killed, all of its tasks and of those beside it run again, one at a time, so that one that kills its worker is known
     for certain: after `LIVES` workers it is an error, and the others go on.
@@ -39,6 +41,7 @@ class LocalProcesses(Workers):
     def __init__(self, jobs: int):
         self._jobs = jobs
         self._pool: Any = None
+        self._started = 0
 
     @property
     def count(self) -> int:
@@ -58,7 +61,13 @@ class LocalProcesses(Workers):
     ) -> Generator[Outcome[V] | None, None, None]:
         """None once the first tasks are sent, then the outcomes."""
         shared = CommonValues.of((function, *common))
-        waiting = (_Numbered(index, task) for index, task in enumerate(tasks))
+        numbered = (_Numbered(index, task) for index, task in enumerate(tasks))
+        first = list(islice(numbered, _AHEAD * self._jobs))
+        needed = min(self._jobs, len(first))
+        if needed > self._started:
+            self.close()
+            self._started = needed
+        waiting = chain(first, numbered)
         suspects: deque[_Numbered] = deque()
         deaths: Counter[int] = Counter()
         running: dict[Future[Outcome[V]], _Numbered] = {}
@@ -96,18 +105,21 @@ class LocalProcesses(Workers):
 
     def close(self) -> None:
         """As `Workers.close`; what still runs is killed."""
-        if self._pool is not None:
-            self._pool.shutdown(wait=True, kill_workers=True)
-            self._pool = None
+        with signals_wait():
+            if self._pool is not None:
+                self._pool.shutdown(wait=True, kill_workers=True)
+                self._pool = None
 
     def _submit(self, shared: CommonValues, numbered: _Numbered) -> Future[Any]:
-        with interrupts_left_to_this_process():
+        with signals_wait():
             if self._pool is None:
                 from joblib.externals.loky.process_executor import ProcessPoolExecutor
 
-                self._pool = ProcessPoolExecutor(self._jobs, env=_ENVIRONMENT)
+                self._pool = ProcessPoolExecutor(
+                    self._started, initializer=end_with, initargs=(os.getpid(),), env=_ENVIRONMENT
+                )
             try:
-                return self._pool.submit(WorkerTask(_run_numbered), shared, numbered)
+                return self._pool.submit(_run_numbered, shared, numbered)
             except _errors_of_the_pool() as problem:  # a worker was killed since the last future ended
                 broken: Future[Any] = Future()
                 broken.set_exception(problem)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -24,7 +25,8 @@ def open_workers(on: str | None, jobs: int) -> Iterator[Workers]:
     on : str or None
         Address of a Dask scheduler, as `DaskCluster` has it; None: this machine.
     jobs : int
-        Processes on this machine; with 1, tasks run in this process. Of no meaning on a cluster.
+        Processes on this machine, of which more than two a core are not started; with 1, tasks run in this process. Of no meaning on a
+        cluster.
 
     Raises
     ------
@@ -44,4 +46,4 @@ def open_workers(on: str | None, jobs: int) -> Iterator[Workers]:
 
 
 def _here(jobs: int) -> Workers:
-    return ThisProcess() if jobs == 1 else LocalProcesses(jobs)
+    return ThisProcess() if jobs == 1 else LocalProcesses(min(jobs, 2 * (os.cpu_count() or 1)))

@@ -1,4 +1,4 @@
-"""Worker processes that end with their parent process and ignore Ctrl-C."""
+"""Worker processes that end with their parent process and ignore Ctrl-C, and signals that wait while such processes start or end."""
 
 from __future__ import annotations
 
@@ -6,39 +6,45 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from typing import Generic, ParamSpec, TypeVar
-
-P = ParamSpec("P")
-T = TypeVar("T")
+from types import FrameType
 
 _EVERY = 0.5
 """Seconds between two checks that the parent is alive."""
-_watched = threading.Lock()
+_STOPPING = ("SIGINT", "SIGTERM", "SIGHUP")
+"""Names of the signals that ask a program to stop, where the system has them."""
 
 
-@dataclass(frozen=True)
-class WorkerTask(Generic[P, T]):
-    """Function to be called in a worker process, which ends within a second of its parent, even if that is killed."""
+def end_with(parent: int) -> None:
+    """Let this worker process end within a second of its parent process, even if that is killed."""
+    threading.Thread(target=_watch, args=(parent,), daemon=True).start()
 
-    function: Callable[P, T]
-    _asked_by: int = field(default_factory=os.getpid)
 
-    def __call__(self, *arguments: P.args, **options: P.kwargs) -> T:
-        if os.getpid() != self._asked_by and _watched.acquire(blocking=False):  # once in a process
-            threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
-        return self.function(*arguments, **options)
+def _watch(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(_EVERY)
+    os._exit(1)
 
 
 @contextmanager
-def interrupts_left_to_this_process() -> Iterator[None]:
-    """Within the block, processes are started that ignore Ctrl-C."""
+def signals_wait() -> Iterator[None]:
+    """Within the block, handlers of signals that ask this process to stop are not called, but at its end.
+
+    A pool of processes that is half started, or half ended, by an exception from a handler would wait for ever. Processes that are started
+    within the block ignore Ctrl-C.
+    """
     from multiprocessing import resource_tracker
 
     from joblib.externals.loky.backend import resource_tracker as loky_tracker
 
+    came: list[tuple[int, FrameType | None]] = []
+    handlers = {}
+    if threading.current_thread() is threading.main_thread():
+        for number in (getattr(signal, name) for name in _STOPPING if hasattr(signal, name)):
+            if callable(handler := signal.getsignal(number)):
+                handlers[number] = handler
+                signal.signal(number, lambda number, frame: came.append((number, frame)))
     for tracker in (resource_tracker, loky_tracker):  # their start would let signals through again
         tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # which is handed down
@@ -46,9 +52,7 @@ def interrupts_left_to_this_process() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _end_with(parent: int) -> None:
-    while os.getppid() == parent:
-        time.sleep(_EVERY)
-    os._exit(1)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        for number, frame in came:
+            handlers[number](number, frame)

@@ -21,6 +21,7 @@ class StopSignal:
 
     number: int | None = None
     _since: float = 0.0
+    _raises: bool = False
 
     @property
     def status(self) -> int:
@@ -31,21 +32,32 @@ class StopSignal:
     def sentence(self) -> str:
         """What is said of it."""
         what = "interrupted" if self.number == signal.SIGINT else "stopped by a signal"
-        return f"{what}; no file is left half-written."
+        return f"{what}; every file is as before, or whole as this run wrote it."
+
+    def begin(self) -> None:
+        """From here on a signal raises `KeyboardInterrupt`; at once where it came before."""
+        self._raises = True
+        if self.number is not None:
+            raise KeyboardInterrupt
+
+    def end(self) -> None:
+        """From here on a signal raises nothing."""
+        self._raises = False
 
     def ask(self, number: int, _frame: FrameType | None) -> None:
         """Raise `KeyboardInterrupt`; end the process at once where that was asked for before."""
         now = time.monotonic()
         if self.number is None:
             self.number, self._since = number, now
-            raise KeyboardInterrupt
-        if now - self._since > _IMPATIENT:
+            if self._raises:
+                raise KeyboardInterrupt
+        elif now - self._since > _IMPATIENT:
             os._exit(128 + number)
 
 
 @contextmanager
-def raise_on_stop_signals() -> Iterator[StopSignal]:
-    """Within the block, these signals raise `KeyboardInterrupt`, but those that were ignored from the start (nohup) stay so."""
+def noted_stop_signals() -> Iterator[StopSignal]:
+    """Within the block, these signals are noted, but those that were ignored from the start (nohup) stay so."""
     stopping = StopSignal()
     before: dict[int, object] = {}
     if threading.current_thread() is threading.main_thread():
