@@ -10,7 +10,9 @@ import pytest
 from refusals import refused
 
 from flexcal.errors import InputError
-from flexcal.studio.project import Choices, Project, pose_files, sole_studio
+from flexcal.studio.project import Choices, Project, pose_files, read_plan_file, sole_studio
+from flexcal.studio.steps.plan.plan_files import _says
+from flexcal.studio.steps.plan.plan_results import plan_results
 
 
 @pytest.fixture
@@ -86,6 +88,21 @@ def test_choices_survive_and_a_damaged_file_is_no_obstacle(project: Project) -> 
     for damaged in ('{"step": ', "[1, 2]", "\xff", "x" * 200_000, json.dumps({"step": None})):
         (project.folder / ".studio.json").write_text(damaged)
         assert Choices.read(project.folder).get("step", "Robot") == "Robot"
+
+
+def test_pipes_are_no_files_of_the_folder(project: Project) -> None:
+    """Nothing waits for what comes out of them, whatever they are called."""
+    for name in (".studio.json", "robot.yaml", "poses.csv", "poses.yaml", "poses.html"):
+        os.mkfifo(project.folder / name)
+    assert project.files(".csv", ".yaml", ".json") == []
+    assert Choices.read(project.folder).values == {} and pose_files(project) == []
+    plan = project.folder / "poses.yaml"
+    assert read_plan_file(plan) is None and plan_results(plan) == {} and not _says(plan, "poses")
+
+
+def test_choices_that_nest_too_deep_are_ignored(project: Project) -> None:
+    (project.folder / ".studio.json").write_text(90_000 * "[")
+    assert Choices.read(project.folder).values == {}
 
 
 def test_a_folder_that_is_not_there(tmp_path: Path) -> None:

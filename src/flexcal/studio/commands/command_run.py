@@ -126,7 +126,7 @@ class CommandRun:
             try:
                 told = json.loads(text)
                 stage, share = str(told["stage"]), float(told["share"])
-            except (ValueError, KeyError, TypeError):
+            except (ValueError, RecursionError, KeyError, TypeError):
                 return
             self.stages.pop(stage, None)
             self.stages[stage] = share

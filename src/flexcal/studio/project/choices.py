@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from flexcal.errors import FlexcalError
-from flexcal.files.transaction import write_text
+from flexcal.files.transaction import read_text, write_text
 
 FILE = ".studio.json"
 _LARGEST = 100_000
@@ -29,10 +29,9 @@ class Choices:
     @classmethod
     def read(cls, folder: Path) -> Choices:
         """Choices of a project's folder."""
-        path = folder / FILE
         try:
-            values = json.loads(path.read_text(encoding="utf-8")) if path.stat().st_size < _LARGEST else {}
-        except (OSError, ValueError):
+            values = json.loads(read_text(folder / FILE, limit=_LARGEST))
+        except (FlexcalError, OSError, ValueError, RecursionError):
             values = {}
         return cls(folder, values if isinstance(values, dict) else {})
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from flexcal.errors import InputError
+from flexcal.files.transaction import open_regular, read_text
 from flexcal.studio.project.project import MEASURED, Project
 
 _HEADER = 4096
@@ -28,8 +30,8 @@ def pose_files(project: Project) -> list[str]:
 
 def _declares_columns(project: Project) -> bool:
     try:
-        return "\nsignals:" in project.robot_file.read_text(encoding="utf-8", errors="replace")
-    except OSError:
+        return "\nsignals:" in read_text(project.robot_file, errors="replace")
+    except (InputError, OSError):
         return False
 
 
@@ -43,9 +45,9 @@ def _has_readings(path: Path) -> bool:
     if path.suffix == ".parquet":
         return True
     try:
-        with path.open("rb") as stream:
+        with open_regular(path, limit=None) as stream:
             head = stream.read(_HEADER).decode("utf-8", "replace").splitlines()
-    except OSError:
+    except (InputError, OSError):
         return False
     columns = {cell.strip().strip('"') for cell in head[0].split(",")} if head else set()
     return (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -98,7 +99,10 @@ class Project:
         return self.folder / os.path.normpath(name)
 
     def files(self, *endings: str) -> list[str]:
-        """Names of the project's files with one of these endings (as '.csv'), sorted; hidden ones and links are left out."""
+        """Names of the project's files with one of these endings (as '.csv'), sorted.
+
+        Hidden ones are left out, and what is no file of its own, such as links and pipes.
+        """
         found: list[str] = []
         seen = 0
         for place, folders, names in os.walk(self.folder):
@@ -107,7 +111,7 @@ class Project:
             for name in sorted(names):
                 seen += 1
                 path = Path(place, name)
-                if name.endswith(endings) and not name.startswith(".") and not path.is_symlink():
+                if name.endswith(endings) and not name.startswith(".") and _is_regular(path):
                     found.append(path.relative_to(self.folder).as_posix())
             if seen > _MANY:
                 break
@@ -136,6 +140,13 @@ class Project:
                 continue
             stamps.append((name, status.st_mtime_ns, status.st_size))
         return tuple(stamps)
+
+
+def _is_regular(path: Path) -> bool:
+    try:
+        return stat.S_ISREG(path.lstat().st_mode)
+    except OSError:  # it has just been removed
+        return False
 
 
 def _kind(folder: Path) -> str | None:

@@ -9,6 +9,9 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from flexcal.errors import InputError
+from flexcal.files.transaction import read_bytes
+
 FORMATS = ("stl", "obj", "dae")
 """Endings of the files that are read."""
 _LARGEST = 100_000_000
@@ -67,16 +70,16 @@ class MeshFolder:
 def _triangles(name: str, path: Path, ending: str) -> tuple[np.ndarray, np.ndarray] | MeshNotDrawn:
     import trimesh
 
-    if path.stat().st_size > _LARGEST:
-        return MeshNotDrawn(name, f"it is larger than {_LARGEST // 1_000_000} MB")
     try:
         # from memory, so that textures and materials beside the file are not looked for
-        content = io.BytesIO(path.read_bytes())
+        content = io.BytesIO(read_bytes(path, limit=_LARGEST))
         loaded = trimesh.load_scene(content, file_type=ending, process=False, skip_materials=True)
         mesh = loaded.to_mesh()
         vertices, faces = np.array(mesh.vertices, dtype=float), np.array(mesh.faces, dtype=int)
     except ImportError as problem:
         return MeshNotDrawn(name, f"reading .{ending} needs the package {problem.name}")
+    except InputError:
+        return MeshNotDrawn(name, f"it is larger than {_LARGEST // 1_000_000} MB")
     except Exception as problem:  # whatever a parser raises on a broken file
         return MeshNotDrawn(name, f"it cannot be read ({type(problem).__name__})")
     if not len(faces) or not np.isfinite(vertices).all():

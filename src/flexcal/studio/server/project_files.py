@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-import stat
 from pathlib import Path
 
+from flexcal.errors import InputError
+from flexcal.files.transaction import open_regular
 from flexcal.studio.server.answer import PLAIN, Answer, said
 
 _KINDS = {
@@ -24,7 +25,10 @@ _POLICY = (
     "style-src 'unsafe-inline'; img-src data: blob:; font-src data:; worker-src blob:; form-action 'none'; base-uri 'none'; "
     "frame-ancestors 'none'"
 )
-"""A page may be anybody's: it runs its own scripts, as figures need, in an origin of its own, and can load and send nothing."""
+"""A page may be anybody's: it runs its own scripts, as figures need, in an origin of its own, and loads nothing.
+
+It can still lead the window elsewhere, and send there what it knows: its own content, and its address, which opens nothing else.
+"""
 _LARGEST = 1 << 26
 """Bytes of a file."""
 
@@ -51,7 +55,7 @@ class ProjectFiles:
             if not found.is_relative_to(self._folder) or found.suffix != Path(path).suffix:
                 return None
             content = _read(found)
-        except (OSError, ValueError, RuntimeError):
+        except (InputError, OSError, ValueError, RuntimeError):
             return None
         if content is None:
             return said(413, f"The file is larger than {_LARGEST >> 20} MiB; open it from the folder.")
@@ -60,11 +64,8 @@ class ProjectFiles:
 
 def _read(path: Path) -> bytes | None:
     """What a regular file holds, None where that is too much; raises `OSError` where it is none."""
-    # a pipe must not be waited for, nor a link followed that took the file's place
-    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
-    with os.fdopen(handle, "rb") as file:
-        found = os.fstat(handle)
-        if not stat.S_ISREG(found.st_mode):
-            raise OSError(f"{path} is no file")
+    with open_regular(path, limit=None) as file:
+        if not os.path.samestat(os.fstat(file.fileno()), path.lstat()):
+            raise OSError(f"{path} has been replaced by a link")
         content = file.read(_LARGEST + 1)
     return content if len(content) <= _LARGEST else None

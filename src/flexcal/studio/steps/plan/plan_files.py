@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from flexcal.errors import InputError
+from flexcal.files.transaction import open_regular
 from flexcal.studio.project import ROBOT, Project, read_plan_file
 
 _HEAD = 200_000
@@ -25,8 +27,8 @@ def plan_files(project: Project, kind: str) -> list[str]:
 def _says(path: Path, kind: str) -> bool:
     """Whether a line of the file says that it is of this kind, which most files of a folder do not."""
     try:
-        with path.open("rb") as stream:
+        with open_regular(path, limit=None) as stream:
             head = stream.read(_HEAD)
-    except OSError:
+    except (InputError, OSError):
         return False
     return any(line.strip() == f"kind: {kind}".encode() for line in head.splitlines())

@@ -8,28 +8,27 @@ from pathlib import Path
 from typing import Any
 
 from flexcal.data.plans import page_beside
+from flexcal.errors import InputError
+from flexcal.files.transaction import read_text
 
 _RESULTS = re.compile(r'<script type="application/json" id="results">(.*?)</script>', re.DOTALL)
-_LARGEST = 1 << 26
-"""Bytes of a page."""
 
 
 def plan_results(plan: Path) -> dict[str, Any]:
     """The JSON document in the page beside a plan; empty where there is no page, or one older than the plan."""
     page = page_beside(plan)
     try:
-        written, status = plan.stat().st_mtime, page.stat()
-        if status.st_size > _LARGEST or status.st_mtime < written - _PATIENCE:
+        if page.stat().st_mtime < plan.stat().st_mtime - _PATIENCE:
             return {}
-        text = page.read_text(encoding="utf-8")
-    except (OSError, UnicodeError):
+        text = read_text(page)
+    except (InputError, OSError, UnicodeError):
         return {}
     match = _RESULTS.search(text)
     if match is None:
         return {}
     try:
         document = json.loads(match.group(1))
-    except ValueError:
+    except (ValueError, RecursionError):
         return {}
     return document if isinstance(document, dict) else {}
 

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
+from flexcal.errors import InputError
+from flexcal.files.transaction import read_text
 from flexcal.jobs.setup import FileProblem
 from flexcal.studio.window import paragraph
 
@@ -51,6 +53,6 @@ def _line(number: int, text: str, problem: FileProblem) -> str:
 
 def _lines(path: Path) -> list[str]:
     try:
-        return path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
-    except OSError:
+        return read_text(path, encoding="utf-8-sig", errors="replace").splitlines()
+    except (InputError, OSError):
         return []

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from flexcal.errors import InputError
 from flexcal.files.structuring import Keys
-from flexcal.files.transaction import write_text
+from flexcal.files.transaction import read_bytes, write_text
 from flexcal.studio.window import Window
 
 
@@ -47,6 +48,6 @@ class RobotFile:
 
     def _content(self) -> bytes:
         try:
-            return self._window.project.robot_file.read_bytes()
-        except OSError:
+            return read_bytes(self._window.project.robot_file)
+        except (InputError, OSError):
             return b""

@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 from flexcal.errors import InputError
-from flexcal.files.transaction import atomic_path
+from flexcal.files.transaction import atomic_path, read_bytes
 from flexcal.model.urdf import read_elements, xacro_error
 from flexcal.studio.project import Project
 from flexcal.studio.steps.robot.mesh_places import mesh_places
@@ -60,7 +60,7 @@ def write_upload(project: Project, name: str, content: bytes, *, replace: bool) 
             "E-STUDIO-023",
             f"{name} is neither a URDF nor a mesh ({', '.join(_MESHES)}); upload one of these, and put tables into the folder.",
         )
-    if place.exists() and place.read_bytes() != content and not replace:
+    if place.exists() and read_bytes(place) != content and not replace:
         raise InputError(
             "E-STUDIO-024",
             f"{place.relative_to(project.folder)} is there already with other content; rename the new one, or tick 'Replace a file of "
