@@ -27,7 +27,7 @@ _POLICY = (
 )
 """A page may be anybody's: it runs its own scripts, as figures need, in an origin of its own, and loads nothing.
 
-It can still lead the window elsewhere, and send there what it knows: its own content, and its address, which opens nothing else.
+It can still send away what it knows, by leading the window elsewhere or by WebRTC: its content, and its address, which opens nothing else.
 """
 _LARGEST = 1 << 26
 """Bytes of a file."""
