@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from refusals import refused
 
 from flexcal.model.parts import axis_rotation
-from flexcal.model.urdf import locked_joints, read_urdf
+from flexcal.model.urdf import locked_joints, pinocchio_model_of, read_urdf
 
 ARM = """<?xml version="1.0"?>
 <robot name="arm">
@@ -213,3 +214,18 @@ def test_an_unlimited_joint_about_a_skew_axis(tmp_path: Path) -> None:
     np.testing.assert_allclose(free.axis, np.array([0, 2, -1]) / np.sqrt(5), rtol=1e-15)
     np.testing.assert_array_equal(free.axis, joint.axis)
     assert np.isinf(free.upper) and free.kind == "revolute"
+
+
+def test_what_pinocchio_says_is_one_printable_line(capfd: pytest.CaptureFixture[str]) -> None:
+    """It quotes the file, from C++: escape sequences do not reach the terminal, nor do lines that look like others' messages."""
+    text = (
+        '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="revolute"><parent link="a"/><child link="b"/>'
+        '<axis xyz="0 0 1"/><limit effort="1" lower="0" upper="1" velocity="&#10;flexcal: done&#x9b;2J&#x2028;"/></joint></robot>'
+    )
+    with pytest.raises(ValueError):
+        pinocchio_model_of(text)
+    said = capfd.readouterr().err
+    assert said.count("\n") == 1 and said.startswith("Pinocchio: Error:")
+    assert r"flexcal: done\x9b2J" in said and not set("\x9b\u2028") & set(said)
+    os.write(2, b"afterwards\n")
+    assert capfd.readouterr().err == "afterwards\n"

@@ -84,9 +84,9 @@ def link_placements(model: RobotModel, text: str, link: str, q: np.ndarray) -> t
     """Positions (N, 3), m, and rotations (N, 3, 3) of a link at the motors' `q` (N, n) in Pinocchio, from the URDF `text`."""
     import pinocchio as pin
 
-    from flexcal.model.urdf import locked_joints
+    from flexcal.model.urdf import locked_joints, pinocchio_model_of
 
-    read = pin.buildModelFromXML(text)
+    read = pinocchio_model_of(text)
     read = pin.buildReducedModel(read, *locked_joints(read, model.config.locked))
     data, frame = read.createData(), read.getFrameId(link, pin.FrameType.BODY)
     joints = [read.joints[read.getJointId(name)] for name in model.joint_names]

@@ -16,7 +16,13 @@ from flexcal.model.kinematics import (
     point_kinematics,
 )
 from flexcal.model.robot import RobotModel
-from flexcal.model.urdf import locked_joints, pinocchio_model, pinocchio_shapes, read_elements
+from flexcal.model.urdf import (
+    locked_joints,
+    pinocchio_model,
+    pinocchio_model_of,
+    pinocchio_shapes,
+    read_elements,
+)
 
 _SAMPLES = 200
 _FLOOR = "floor"
@@ -239,7 +245,7 @@ def _add_obstacle(geometry: Any, path: Path) -> None:
             "E-DESIGN-037", f"{path}: there is no such obstacle; correct `obstacles:` in robot.yaml."
         )
     try:
-        model = pin.buildModelFromXML(read_elements(path).text())
+        model = pinocchio_model_of(read_elements(path).text())
     except (ValueError, RuntimeError) as problem:
         raise InputError(
             "E-DESIGN-038", f"{path}: not a valid URDF; correct it or remove it from `obstacles:`."

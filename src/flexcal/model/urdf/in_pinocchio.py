@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from contextlib import suppress
+import os
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -12,22 +16,29 @@ import numpy as np
 from flexcal.errors import InputError
 from flexcal.files.transaction import MEGABYTE, regular_path
 from flexcal.model.urdf.elements import read_elements
+from flexcal.printable import sentence
 
 LARGEST_MESH = 100 * MEGABYTE
 
 
 def pinocchio_model(path: Path) -> tuple[str, Any]:
     """Text of a URDF that `read_urdf` reads, and Pinocchio's model of it; raises `InputError` for shapes that Pinocchio cannot read."""
-    import pinocchio as pin
-
     text = read_elements(path).text()
     try:
-        return text, pin.buildModelFromXML(text)
+        return text, pinocchio_model_of(text)
     except (ValueError, RuntimeError) as problem:
         raise InputError(
             "E-URDF-044",
             f"{path}: Pinocchio, which reads the shapes of links, cannot load this URDF; correct its <visual> and <collision> elements.",
         ) from problem
+
+
+def pinocchio_model_of(text: str) -> Any:
+    """Pinocchio's model of the text of a URDF; raises `ValueError` or `RuntimeError` where it cannot read it."""
+    import pinocchio as pin
+
+    with _printable_errors():
+        return pin.buildModelFromXML(text)
 
 
 def pinocchio_shapes(model: Any, path: Path, kind: Any) -> Any:
@@ -44,7 +55,29 @@ def pinocchio_shapes(model: Any, path: Path, kind: Any) -> Any:
         for folder in ("", *folders):
             with suppress(OSError, ValueError):  # not every place has one, and Pinocchio says where none has
                 regular_path(Path(folder, place), limit=LARGEST_MESH)
-    return pin.buildGeomFromUrdfString(model, root.text(), kind, package_dirs=folders)
+    with _printable_errors():
+        return pin.buildGeomFromUrdfString(model, root.text(), kind, package_dirs=folders)
+
+
+_REDIRECTING = Lock()
+_MOST_QUOTED = 100_000
+"""Bytes of messages that are looked at."""
+
+
+@contextmanager
+def _printable_errors() -> Iterator[None]:
+    """What C++ writes to standard error in the block stands there on one printable line: it quotes names, which can hold anything."""
+    with _REDIRECTING, tempfile.TemporaryFile() as written:
+        stderr = os.dup(2)
+        os.dup2(written.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(stderr, 2)
+            os.close(stderr)
+            written.seek(0)
+            if told := sentence(written.read(_MOST_QUOTED).decode("utf-8", "replace")):
+                print(f"Pinocchio: {told}", file=sys.stderr)
 
 
 def locked_joints(model: Any, locked: Mapping[str, float]) -> tuple[list[int], np.ndarray]:
