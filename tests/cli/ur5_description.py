@@ -36,6 +36,7 @@ def write_description(urdf: Path, folder: Path) -> Path:
     main = folder / "urdf" / "ur5.urdf.xacro"
     (folder / "config").mkdir(parents=True)
     main.parent.mkdir()
+    (folder / "package.xml").write_text("<package><name>ur5</name></package>\n")
     (folder / "config" / "ur5_kinematics.yaml").write_text("\n".join([*lines, ""]))
     (folder / "config" / "joint_limits.yaml").write_text(
         "joint_limits:\n"

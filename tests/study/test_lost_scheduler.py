@@ -56,7 +56,7 @@ def free_port() -> int:
 
 @pytest.mark.parametrize("recount", [1e9, 0.0], ids=["missed_results", "asked_for_its_workers"])
 def test_a_study_goes_on_when_the_scheduler_is_back(
-    recount: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    recount: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("flexcal.jobs.study.store._EVERY", 0.0)
     monkeypatch.setattr("flexcal.jobs.study.store._SHARE", 0.0)
@@ -75,7 +75,6 @@ def test_a_study_goes_on_when_the_scheduler_is_back(
             open_workers(f"dask://127.0.0.1:{port}", 1) as workers,
         ):
             run_study(plan, out, workers, progress=kill_at_the_second)
-        assert "distributed.client" not in capfd.readouterr().err  # its log says nothing beside the error
         assert 2 <= len(list((out / "parts").glob("*.parquet"))) < 4
         cluster = Cluster(port)
         with open_workers(f"dask://127.0.0.1:{port}", 1) as workers:

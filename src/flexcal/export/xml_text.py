@@ -11,8 +11,8 @@ from xml.sax.saxutils import escape, quoteattr
 
 from flexcal.errors import InputError
 
-MARK = "flexcal-place"
-"""Attribute by which an element is found again after macros have copied it."""
+_MOST_ELEMENTS = 100_000
+"""Largest number of elements and attributes of a file."""
 _ATTRIBUTE = re.compile(rb"""\s+([^\s=<>/"']+)\s*=\s*(?:"([^"]*)"|'([^']*)')""")
 _SPACE = re.compile(rb"\s*")
 
@@ -64,15 +64,6 @@ class XmlText:
     content: bytes
     elements: tuple[SourceElement, ...]
 
-    def marked(self, number: int) -> bytes:
-        """Content with a mark in every element that is none of xacro's: the `number` of the file and that of the element."""
-        parts, at = [], 0
-        for k, element in enumerate(self.elements):
-            if k and not element.tag.startswith("xacro:"):
-                parts += [self.content[at : element.named], f' {MARK}="{number} {k}"'.encode()]
-                at = element.named
-        return b"".join([*parts, self.content[at:]])
-
     def indent(self, element: SourceElement) -> str:
         """White space between the start tag of an element and its first child."""
         found = _SPACE.match(self.content, element.opened)
@@ -86,11 +77,20 @@ class XmlText:
 
 def read_xml_text(path: Path, content: bytes) -> XmlText:
     """Elements of an XML file in UTF-8; raises `InputError` with the line where it is not well-formed."""
-    parser = expat.ParserCreate()
+    parser = expat.ParserCreate("utf-8")
+    parser.buffer_text, parser.buffer_size = True, 2**20
+    count = 0
     elements: list[SourceElement] = []
     above: list[SourceElement] = []
 
     def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal count
+        count += 1 + len(attributes)
+        if count > _MOST_ELEMENTS:
+            raise InputError(
+                "E-ROS-039",
+                f"{path}: it has more than {_MOST_ELEMENTS:,} elements and attributes, which no robot needs; name the robot's description.",
+            )
         at = parser.CurrentByteIndex + 1 + len(tag.encode())
         places, end = {}, at
         while found := _ATTRIBUTE.match(content, end):
@@ -112,6 +112,13 @@ def read_xml_text(path: Path, content: bytes) -> XmlText:
     def text(said: str) -> None:
         above[-1].text += said
 
+    def refuse_entities(*_: object) -> None:
+        raise InputError(
+            "E-ROS-040",
+            f"{path} line {parser.CurrentLineNumber}: <!DOCTYPE> is not read in a description; write what its entities stand for.",
+        )
+
+    parser.StartDoctypeDeclHandler = refuse_entities
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.CharacterDataHandler = text
     try:
