@@ -15,6 +15,7 @@ from .signals import (
 from .streaming import streamed_table
 from .tabular_file import (
     LARGEST_TABLE,
+    MOST_COLUMNS,
     Table,
     TableFile,
     open_table,
@@ -28,6 +29,7 @@ from .timestamps import STAMP, seconds_of, with_seconds
 __all__ = [
     "JOINT_QUANTITIES",
     "LARGEST_TABLE",
+    "MOST_COLUMNS",
     "STAMP",
     "TIMESTAMP",
     "UNITS",

@@ -33,7 +33,7 @@ LARGEST_TABLE = 1000 * MEGABYTE
 """Bytes of a CSV file that is read whole."""
 _LARGEST_TEXTS = 256 * MEGABYTE
 _LONGEST_LINE = 16 * MEGABYTE
-_MOST_COLUMNS = 5000
+MOST_COLUMNS = 5000
 _SHOWN = 4
 """Largest number of a folder's tables that are named."""
 BLOCK_BYTES = 64 * 2**20
@@ -262,10 +262,10 @@ def open_table(path: str | Path) -> TableFile:
             file = TableFile(path, columns, first)
         else:
             file = TableFile(path, _parquet_columns(path), 1)
-    if len(file.columns) > _MOST_COLUMNS:
+    if len(file.columns) > MOST_COLUMNS:
         raise file.error(
             "E-TABLE-050",
-            f"there are {len(file.columns)} columns, and a table has up to {_MOST_COLUMNS}; check that it is the right file.",
+            f"there are {len(file.columns)} columns, and a table has up to {MOST_COLUMNS}; check that it is the right file.",
         )
     twice = next((name for name, count in Counter(file.columns).items() if count > 1), None)
     if twice is not None:

@@ -20,7 +20,7 @@ _LARGEST = 64 * MEGABYTE
 _LARGEST_UNPACKED = 1000 * MEGABYTE
 _MOST_CELLS = 20_000_000
 """Largest number of cells between the first and the last of a sheet: all of them are held, filled or not."""
-_PLACE = re.compile(rb"""\br\s*=\s*["']([A-Z]{0,3})([0-9]{1,7})["']""")
+_PLACE = re.compile(rb"""r(?<=\sr)\s*=\s*["']([A-Z]{0,3})([0-9]{1,7})["']""")
 """Column and row of a cell, or the row of a row."""
 _OVERLAP = 64
 """Bytes of a part of a sheet that are looked at again with the next one."""
@@ -78,7 +78,9 @@ def _require_size(path: Path) -> None:
                 return
             with ZipFile(stream) as book:
                 size = 0
-                for member in book.infolist():
+                members = book.infolist()
+                declared = sum(member.file_size for member in members)
+                for member in members:
                     rows = columns = 1
                     beginning = b""
                     with book.open(member) as part:
@@ -86,7 +88,7 @@ def _require_size(path: Path) -> None:
                             size += len(content)
                             for column, row in _PLACE.findall(beginning + content):
                                 rows, columns = max(rows, int(row)), max(columns, _number(column))
-                            if size > _LARGEST_UNPACKED or rows * columns > _MOST_CELLS:
+                            if max(size, declared) > _LARGEST_UNPACKED or rows * columns > _MOST_CELLS:
                                 raise InputError(
                                     "E-IMPORT-073",
                                     f"{path}: {member.filename} in it is too large (a sheet has up to {_MOST_CELLS} cells, and a file "

@@ -14,7 +14,7 @@ from flexcal.errors import InputError, unreadable
 from flexcal.files.transaction import MEGABYTE, open_regular, regular_path, size_text
 from flexcal.importing.tables import ForeignTable
 
-_LARGEST = 1000 * MEGABYTE
+_LARGEST = 500 * MEGABYTE
 """Bytes of a file, and of its values once they are unpacked."""
 _MOST_VARIABLES = 10_000
 _DEEPEST = 20

@@ -50,11 +50,13 @@ def read_ros(path: Path, joints: Sequence[str], topic: str | None) -> ForeignTab
         ) from None
     if path.is_dir():
         read_yaml_file(path / _METADATA)  # its errors name the line
-    for file in path.iterdir() if path.is_dir() else (path,):
-        regular_path(file, limit=None)
+        for file in path.iterdir():
+            regular_path(file, limit=None)
     notes: list[str] = []
     try:
-        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        with AnyReader(
+            [regular_path(path, limit=None)], default_typestore=get_typestore(Stores.ROS2_HUMBLE)
+        ) as reader:
             kinds = {c.topic: c.msgtype for c in reader.connections}
             chosen = _point_topic(path, kinds, topic)
             states = _joint_states(reader, notes)

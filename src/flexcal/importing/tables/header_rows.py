@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from flexcal.data.tables import STAMP
+from flexcal.data.tables import MOST_COLUMNS, STAMP
 from flexcal.errors import InputError
 from flexcal.importing.tables.column_names import is_unit
 
@@ -30,6 +31,11 @@ def find_header(path: Path, rows: Sequence[Sequence[str]], width: int, row_word:
 
     Raises `InputError` where there is no row of numbers, the names are not as many as the values, or one stands twice.
     """
+    if width > MOST_COLUMNS:
+        raise InputError(
+            "E-IMPORT-075",
+            f"{path}: its rows have {width} values, and a table has up to {MOST_COLUMNS} columns; check that it is the right file.",
+        )
     first = next((i for i, cells in enumerate(rows) if len(cells) == width and _is_data(cells)), None)
     if first is None:
         raise InputError(
@@ -49,7 +55,7 @@ def find_header(path: Path, rows: Sequence[Sequence[str]], width: int, row_word:
             f"{place}: the header has {len(rows[at])} names, but the rows have {width} values; make them as many.",
         )
     names = tuple(name or f"c{k + 1}" for k, name in enumerate(rows[at]))
-    twice = [name for k, name in enumerate(names) if name in names[:k]]
+    twice = [name for name, count in Counter(names).items() if count > 1]
     if twice:
         raise InputError(
             "E-IMPORT-055", f"{place}: the column '{twice[0]}' stands twice; rename or remove one."
