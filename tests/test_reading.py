@@ -36,9 +36,7 @@ ELSEWHERE = {
     "cli/folders": "digests of what is on the disk",
     "cli/terminal/standard_streams.py": "the null device in the place of a closed stream",
     "data/tables/streaming.py": "parts in a folder that was just made",
-    "export/xacro_expansion.py": "shows xacro the files that it has read",
-    "jobs/serving": "a socket of its own",
-    "studio": "files of a project",
+    "studio/steps/verify/verify_step.py": "opens a part of the window",
 }
 """Files and folders that open otherwise, and why."""
 

@@ -7,6 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from flexcal.data.tables import LARGEST_TABLE, require_decodable
+from flexcal.errors import InputError
+from flexcal.files.transaction import regular_path
 from flexcal.studio.project import CALIBRATION, CHECKED, Project, pose_files
 from flexcal.studio.steps.results import ResultSource
 
@@ -51,9 +54,15 @@ def _rows(path: Path, most: int | None) -> list[tuple[int, ...]]:
 
     try:
         if path.suffix == ".parquet":
-            table = pl.scan_parquet(path)
+            require_decodable(path, stream=most is not None)
+            table = pl.scan_parquet(regular_path(path, limit=None))
         else:
-            table = pl.scan_csv(path, infer_schema=False, comment_prefix="#", truncate_ragged_lines=True)
+            table = pl.scan_csv(
+                regular_path(path, limit=LARGEST_TABLE),
+                infer_schema=False,
+                comment_prefix="#",
+                truncate_ragged_lines=True,
+            )
         columns = [
             name
             for name in table.collect_schema().names()
@@ -61,7 +70,7 @@ def _rows(path: Path, most: int | None) -> list[tuple[int, ...]]:
         ]
         numbers = table.select(sorted(columns)).cast(pl.Float64, strict=False)
         values = (numbers if most is None else numbers.head(most)).collect().to_numpy()
-    except (pl.exceptions.PolarsError, OSError):
+    except (pl.exceptions.PolarsError, OSError, InputError):
         return []
     values = values[np.isfinite(values).all(axis=1)]
     return [tuple(row) for row in np.round(values / _RESOLUTION).astype(np.int64).tolist()]
