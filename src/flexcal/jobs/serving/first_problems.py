@@ -27,6 +27,7 @@ class FirstProblems:
         )
 
     def of_loop(self, _: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-        """Handler of exceptions for an event loop."""
-        if "exception" in context:
-            self.say(context["exception"])
+        """Handler of exceptions for an event loop; connections that are open at its end are no problem."""
+        problem = context.get("exception")
+        if problem is not None and not isinstance(problem, asyncio.CancelledError):
+            self.say(problem)
