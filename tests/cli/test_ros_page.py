@@ -114,6 +114,12 @@ def test_what_is_written_again_replaces_what_was_written_and_nothing_else(run, r
     (out / "config" / "ur5_kinematics.yaml").write_text("mine\n")
     assert_refusal(run(*arguments).err, "E-CLI-013", "ur5_kinematics.yaml")
     assert (out / "config" / "ur5_kinematics.yaml").read_text() == "mine\n"
+    linked = robot_folder / "linked"
+    linked.mkdir()
+    (linked / "config").symlink_to(robot_folder / "config")
+    before = (robot_folder / "config" / "ur5_kinematics.yaml").read_bytes()
+    assert_refusal(run(*arguments[:-1], linked).err, "E-ROS-045", "linked/config")
+    assert (robot_folder / "config" / "ur5_kinematics.yaml").read_bytes() == before
     own = (*arguments[:-1], robot_folder)
     assert_refusal(run(*own).err, "E-CLI-013")
 

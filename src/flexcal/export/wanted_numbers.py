@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -120,12 +121,11 @@ def same_numbers(one: Sequence[float], other: Sequence[float]) -> bool:
 
 
 def is_number(word: str) -> bool:
-    """Whether a word is a number."""
+    """Whether a word is a finite number."""
     try:
-        float(word)
+        return math.isfinite(float(word))
     except ValueError:
         return False
-    return True
 
 
 def number_text(value: float) -> str:

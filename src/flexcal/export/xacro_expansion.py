@@ -19,7 +19,7 @@ from flexcal.export.xacro_expressions import LARGEST_VALUE, Evaluator, Exhausted
 from flexcal.export.xacro_files import DescriptionFiles
 from flexcal.export.xacro_functions import METHODS, functions
 from flexcal.export.xml_text import XmlText
-from flexcal.model.urdf import macro_in
+from flexcal.model.urdf import Element, macro_in
 
 XACRO = "http://www.ros.org/wiki/xacro"
 _PLACE = "flexcal-place"
@@ -77,6 +77,17 @@ class Expansion:
     contents: Mapping[Path, bytes]
     sources: Mapping[Path, XmlText]
     packages: frozenset[Path]
+
+    def located(self, element: ExpandedElement) -> Element:
+        """An element and all in it as those of a URDF, with the file and line from which each comes."""
+        place, at = element.place, element
+        while place is None and at.parent is not None:
+            at = at.parent
+            place = at.place
+        path, number = place or (next(iter(self.contents)), 0)
+        source = self.sources[path]
+        children = [self.located(child) for child in element.children]
+        return Element(source.path, element.tag, element.attributes, source.elements[number].line, children)
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,6 +5,7 @@ What a definition makes is not read from expressions but measured: with another 
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -32,6 +33,8 @@ _BUILT_IN = (
     "attribute",
     "call",
 )
+_MOST_VALUES = 100_000
+"""Largest number of values of a YAML file."""
 _STEP = 2.0**-10
 """Change of a definition by which what it makes is measured."""
 _SAME = 1e-9
@@ -78,21 +81,30 @@ def definitions(expansion: Expansion) -> Iterator[Definition]:
 def yaml_numbers(path: Path, content: bytes) -> Iterator[tuple[tuple[str, ...], Definition]]:
     """Keys and numbers of the mappings of a YAML file; raises `InputError` with its line where it is none."""
     text = content.decode("utf-8", "replace")
+    bytes_before = range(len(text) + 1)
+    if not text.isascii():
+        bytes_before = [0, *itertools.accumulate(len(letter.encode()) for letter in text)]
     try:
         root = yaml.compose(text, Loader=yaml.SafeLoader)
-    except yaml.YAMLError as problem:
+    except (yaml.YAMLError, RecursionError) as problem:
         mark = getattr(problem, "problem_mark", None)
         at = "" if mark is None else f" line {mark.line + 1}"
         raise InputError(
             "E-ROS-006", f"{path}{at}: this is no YAML ({getattr(problem, 'problem', '')}); correct it."
         ) from None
     waiting: list[tuple[tuple[str, ...], yaml.Node]] = [] if root is None else [((), root)]
+    count = 0
     while waiting:
         keys, node = waiting.pop()
+        count += 1
+        if count > _MOST_VALUES:  # aliases repeat values
+            raise InputError(
+                "E-ROS-043", f"{path}: it has more than {_MOST_VALUES} values; leave out others than limits."
+            )
         if isinstance(node, yaml.MappingNode):
             waiting += [((*keys, str(key.value)), value) for key, value in node.value]
         elif isinstance(node, yaml.ScalarNode) and (value := _number(node.value)) is not None:
-            end = len(text[: node.end_mark.index].encode())
+            end = bytes_before[node.end_mark.index]
             first = end - len(node.value.encode())
             if content[first:end].decode("utf-8", "replace") == node.value:
                 name = ".".join(keys)

@@ -21,7 +21,7 @@ from flexcal.export.xacro_zeros import wanted_zeros
 from flexcal.model.kinematics import joint_placement, link_placement, point_placement
 from flexcal.model.parts import rotation_rpy, rpy_rotation
 from flexcal.model.robot import RobotModel
-from flexcal.model.urdf import read_elements, read_urdf
+from flexcal.model.urdf import carried_links, read_elements, read_urdf
 
 Zeros = Literal["origins", "ros2_control"]
 _SAME = 1e-6
@@ -62,7 +62,7 @@ def render_xacro(model: RobotModel, nominal: RobotModel, source: XacroSource, ze
         wanted += wanted_zeros(source.path, expansion, joints, model)
     inertials, kept = wanted_inertials(model, expansion)
     description = patched_description(source, expansion, [*wanted, *inertials])
-    loss = measure_export_error(model, _tool_map(model, description.expansion.text, zeros), AT_REST)
+    loss = measure_export_error(model, _tool_map(source, model, description.expansion.text, zeros), AT_REST)
     left = bodiless_links(model, read_urdf(model.urdf, model.config.locked).inertias)
     remarks = [*bodiless_remark(left), *relation_remarks(model, "URDF")]
     if kept:
@@ -106,7 +106,8 @@ def _nearest_rpy(rpy: np.ndarray, before: np.ndarray) -> np.ndarray:
 
 
 def _require_same_robot(source: XacroSource, expansion: Expansion, nominal: RobotModel) -> None:
-    """Raise `InputError` where a joint of the URDF is not in the expanded description, or stands elsewhere."""
+    """Raise `InputError` where the description makes no complete URDF, where a joint of that of the robot is missing, or is another."""
+    carried_links(expansion.located(expansion.root), nominal.config.locked)
     joints = _joints(expansion)
     for element in read_elements(nominal.urdf).all("joint"):
         name = element.attributes["name"]
@@ -116,6 +117,12 @@ def _require_same_robot(source: XacroSource, expansion: Expansion, nominal: Robo
                 "E-ROS-012",
                 f"{source.path}: there is no joint '{name}', which {nominal.urdf.name} has; give the file that the URDF was made of, "
                 "and its --arguments.",
+            )
+        if own.attributes.get("type") != element.attributes["type"]:
+            raise InputError(
+                "E-ROS-041",
+                f"{source.path}: joint '{name}' is {own.attributes.get('type')}, but {element.attributes['type']} in {nominal.urdf.name}, "
+                "with which the robot was calibrated; give the file that this was made of, and its --arguments.",
             )
         ends = [(tag, "link", None) for tag in ("parent", "child")]
         numbers = [("origin", "xyz", _NONE), ("origin", "rpy", _NONE), ("axis", "xyz", (1.0, 0.0, 0.0))]
@@ -137,13 +144,19 @@ def _require_same_robot(source: XacroSource, expansion: Expansion, nominal: Robo
                 )
 
 
-def _tool_map(model: RobotModel, text: str, zeros: Zeros) -> ToolMap:
+def _tool_map(source: XacroSource, model: RobotModel, text: str, zeros: Zeros) -> ToolMap:
     """Position of the first point by the expanded description, in which no point has a link."""
     shift = model.joint_offsets if zeros == "ros2_control" else 0.0
 
     def positions(q: np.ndarray) -> np.ndarray:
         carrier, point, _ = point_placement(model, model.point().name)
-        position, rotation = link_placements(model, text, model.joints[carrier].link, q + shift)
+        try:
+            position, rotation = link_placements(model, text, model.joints[carrier].link, q + shift)
+        except (ValueError, RuntimeError) as problem:
+            raise InputError(
+                "E-ROS-042",
+                f"{source.path}: Pinocchio cannot load what it makes; correct its <visual>, <collision>, <mimic> or <safety_controller>.",
+            ) from problem
         return position + rotation @ point
 
     return positions

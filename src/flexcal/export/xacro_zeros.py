@@ -62,7 +62,7 @@ def wanted_zeros(
         for tag, key in _LIMITS:
             element = joints[name].find(tag)
             if element is not None and key in element.attributes:
-                value = (float(element.attributes[key]) + offset,)
+                value = (float(expansion.located(element).numbers(key, 1, f"joint '{name}'")[0]) + offset,)
                 wanted.append(Wanted(joints[name], key, joints[name], element, tag, key, value, (0.0,)))
     return wanted
 

@@ -13,6 +13,7 @@ from flexcal.errors import FlexcalError
 from flexcal.files.formats import read_yaml
 from flexcal.files.transaction import MEGABYTE, open_regular
 from flexcal.model.robot import RobotConfig
+from flexcal.model.urdf import read_elements
 
 TYPICAL_RATIO = 100.0
 """Gear ratio where robot.yaml declares none."""
@@ -133,6 +134,7 @@ def read_description(robot_file: Path) -> ArmDescription:
 
 def _read_links(urdf: Path) -> tuple[Link, ...]:
     """The links beyond the base, parents before children."""
+    read_elements(urdf)  # refuses what is no URDF
     with open_regular(urdf, limit=_LARGEST_URDF) as stream:
         root = ElementTree.parse(stream).getroot()
     inertials = {str(link.get("name")): link.find("inertial") for link in root.findall("link")}

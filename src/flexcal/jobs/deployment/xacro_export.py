@@ -10,7 +10,7 @@ from typing import Any
 
 from flexcal.errors import InputError, unreadable
 from flexcal.export import XacroExport, XacroSource, Zeros, render_xacro, shifted_limits
-from flexcal.files.transaction import atomic_path, read_bytes
+from flexcal.files.transaction import MEGABYTE, atomic_path, read_bytes
 from flexcal.jobs.deployment.export import identified_robot
 from flexcal.jobs.inputs import held_at, use_remarks
 from flexcal.jobs.pages import Result
@@ -121,7 +121,7 @@ def export_xacro(
     if joint_limits is not None:
         offsets = dict(zip(model.joint_names, model.joint_offsets.tolist(), strict=True))
         try:
-            content = read_bytes(joint_limits)
+            content = read_bytes(joint_limits, limit=MEGABYTE)
         except OSError as problem:
             raise unreadable(joint_limits, problem) from problem
         own = Path(os.path.abspath(joint_limits))
@@ -132,10 +132,27 @@ def export_xacro(
             remarks.append(
                 f"{joint_limits.name} has no positions of {', '.join(left)}: MoveIt takes those of the URDF, which have moved."
             )
+    for path in files:
+        _require_own_place(out, path)
     for path, content in files.items():
         with atomic_path(out / path) as temporary:
             temporary.write_bytes(content)
     return ExportedXacro(model, export, files, main, changes, tuple(remarks), "calibration" in robot.blocks)
+
+
+def _require_own_place(out: Path, path: Path) -> None:
+    """Raise `InputError` for a file that would be hidden, and where a link in the folder `out` leads out of it."""
+    if any(part.startswith(".") for part in path.parts):
+        raise InputError(
+            "E-ROS-044",
+            f"{path}, which the description reads, is hidden, and no such file is written; rename it.",
+        )
+    for folder in list(path.parents)[:-1]:
+        if (out / folder).is_symlink():
+            raise InputError(
+                "E-ROS-045",
+                f"{out / folder} is a link, through which no file of a description is written; remove it, or give another --out.",
+            )
 
 
 def _below_one_folder(

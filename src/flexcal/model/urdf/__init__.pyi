@@ -1,3 +1,4 @@
+from .checks import carried_links
 from .description import Description, Frame, read_urdf
 from .elements import LARGEST_URDF, Element, macro_in, read_elements, xacro_error
 from .in_pinocchio import locked_joints, pinocchio_model, pinocchio_model_of, pinocchio_shapes
@@ -10,6 +11,7 @@ __all__ = [
     "Description",
     "Element",
     "Frame",
+    "carried_links",
     "find_arm",
     "locked_joints",
     "macro_in",
