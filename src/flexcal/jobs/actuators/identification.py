@@ -76,7 +76,14 @@ def identify_actuators(
     fit = fit_actuators(model, logs, servo, hold_out=hold_out, threads=jobs, progress=progress)
     if ((fit.fitted.simulated > _EXPLAINED * fit.noise) & (fit.fitted.share > _EXACT)).any():
         balanced = replace(servo, compensates_gravity=True)
-        other = fit_actuators(model, logs, balanced, hold_out=hold_out, threads=jobs, progress=progress)
+        other = fit_actuators(
+            model,
+            logs,
+            balanced,
+            hold_out=hold_out,
+            threads=jobs,
+            progress=lambda stage, share: progress(f"{stage} with compensated gravity", share),
+        )
         if other.fitted.share.max() < _BETTER * fit.fitted.share.max():
             servo, fit = balanced, other
     return ActuatorIdentification(
