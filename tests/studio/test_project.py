@@ -90,6 +90,12 @@ def test_choices_survive_and_a_damaged_file_is_no_obstacle(project: Project) -> 
         assert Choices.read(project.folder).get("step", "Robot") == "Robot"
 
 
+@pytest.mark.parametrize("value", ["1e999", "-1", "11", "null", '"3"', "[3]"])
+def test_numbers_that_no_field_takes_are_no_choices(project: Project, value: str) -> None:
+    (project.folder / ".studio.json").write_text(f'{{"count": {value}}}')
+    assert Choices.read(project.folder).number("count", 3.0, most=10) == 3.0
+
+
 def test_pipes_are_no_files_of_the_folder(project: Project) -> None:
     """Nothing waits for what comes out of them, whatever they are called."""
     for name in (".studio.json", "robot.yaml", "poses.csv", "poses.yaml", "poses.html"):

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from flexcal.errors import FlexcalError
+from flexcal.files.formats import parse_json
 from flexcal.files.transaction import read_text, write_text
 
 FILE = ".studio.json"
@@ -30,8 +31,8 @@ class Choices:
     def read(cls, folder: Path) -> Choices:
         """Choices of a project's folder."""
         try:
-            values = json.loads(read_text(folder / FILE, limit=_LARGEST))
-        except (FlexcalError, OSError, ValueError, RecursionError):
+            values = parse_json(folder / FILE, read_text(folder / FILE, limit=_LARGEST), "remove it")
+        except (FlexcalError, OSError, UnicodeDecodeError):
             values = {}
         return cls(folder, values if isinstance(values, dict) else {})
 
@@ -39,6 +40,11 @@ class Choices:
         """A choice, of the type of `default`; that where it was not made."""
         value = self.values.get(name, default)
         return value if isinstance(value, type(default)) else default
+
+    def number(self, name: str, default: float, least: float = 0.0, most: float | None = None) -> float:
+        """A choice of a number, of the type of `default`; that where it was not made, or is not from `least` to `most`."""
+        value = self.get(name, default)
+        return value if least <= value <= (1e9 if most is None else most) else default
 
     def among(self, name: str, options: Sequence[str], default: str | None = None) -> str:
         """A choice among texts, where it is still one of them; else `default`, by default the first."""

@@ -55,7 +55,7 @@ class ImportedSource(RowSource):
         )
         self._sigma = gui.add_number(
             "1σ / mm",
-            window.choices.get("import sigma", 0.0),
+            window.choices.number("import sigma", 0.0),
             min=0.0,
             step=0.001,
             hint="of the instrument, a coordinate; 0: as the file states it",

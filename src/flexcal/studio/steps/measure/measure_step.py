@@ -86,7 +86,7 @@ class MeasureStep(Step):
                 self._add_choice("Next pose", "pose order", list(ORDERS))
                 self._wanted = gui.add_number(
                     "Stop at p90 / mm",
-                    window.choices.get("wanted p90", 0.0),
+                    window.choices.number("wanted p90", 0.0),
                     min=0.0,
                     step=0.001,
                     hint="0: stop where ten more poses bring less than 5 %",

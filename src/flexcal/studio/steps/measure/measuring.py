@@ -73,12 +73,13 @@ class Measuring:
     @property
     def wanted(self) -> float | None:
         """Predicted error, m, at which to stop; None for where more poses bring little."""
-        return self.choices.get("wanted p90", 0.0) * MILLIMETRE or None
+        return self.choices.number("wanted p90", 0.0) * MILLIMETRE or None
 
     @property
     def skipped(self) -> frozenset[int]:
         """Numbers of planned poses that are left out."""
-        return frozenset(self.choices.get(f"skipped {self.purpose.rows}", []))
+        kept = self.choices.get(f"skipped {self.purpose.rows}", [])
+        return frozenset(number for number in kept if isinstance(number, int))
 
     # what is known
     @property

@@ -39,7 +39,7 @@ class VirtualSource(RowSource):
         """Add the seed, and buttons for one pose and for all."""
         gui = self.window.gui
         choices = self.window.choices
-        self._seed = gui.add_number("Seed of the hidden truth", choices.get("cell seed", 1), min=0, step=1)
+        self._seed = gui.add_number("Seed of the hidden truth", choices.number("cell seed", 1), min=0, step=1)
         self._seed.on_update(
             lambda _: self.window.post(lambda: choices.put("cell seed", int(self._seed.value)))
         )

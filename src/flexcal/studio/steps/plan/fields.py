@@ -39,7 +39,7 @@ class Fields:
         most: float | None = None,
     ) -> viser.GuiNumberHandle[Any]:
         """A number; a whole one where `default` is."""
-        value = self._window.choices.get(f"plan.{self._form}.{name}", default)
+        value = self._window.choices.number(f"plan.{self._form}.{name}", default, least, most)
         field = self._window.gui.add_number(label, value, min=least, max=most, step=step, hint=hint)
         return self._kept(field, name, type(default))
 

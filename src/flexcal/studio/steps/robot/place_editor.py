@@ -97,12 +97,15 @@ class PlaceEditor:
             )
             of = "centre of mass " if place.kind == "payload" else ""
             self._xyz = [
-                gui.add_number(f"{of}{axis} / mm", value, min=-_FARTHEST, max=_FARTHEST, step=0.1)
+                gui.add_number(
+                    f"{of}{axis} / mm", value, min=min(-_FARTHEST, value), max=max(_FARTHEST, value), step=0.1
+                )
                 for axis, value in zip("xyz", place.xyz, strict=True)
             ]
             self._mass = None
             if place.mass is not None:
-                self._mass = gui.add_number("Mass / kg", place.mass, min=0.0, max=_HEAVIEST, step=0.1)
+                heaviest = max(_HEAVIEST, place.mass)
+                self._mass = gui.add_number("Mass / kg", place.mass, min=0.0, max=heaviest, step=0.1)
                 self._mass.on_update(lambda _: window.post(self._edited))
             self._frame.on_update(lambda _: window.post(self._reframed))
             for number in self._xyz:
@@ -118,15 +121,17 @@ class PlaceEditor:
     def _begun(self) -> Place:
         """The place that is edited, with what was typed and not written yet."""
         saved, frames = self._saved, (BASE, *self._frames)
-        frame, *numbers = self._window.choices.get(_BEGUN, {}).get(saved.title, [saved.frame])
+        begun = self._window.choices.get(_BEGUN, {}).get(saved.title)
+        frame, *numbers = begun if isinstance(begun, list) and begun else [saved.frame]
+        values = [float(n) for n in numbers if isinstance(n, int | float) and abs(n) <= _FARTHEST]
         count = 3 + (saved.mass is not None)
         if (
             frame not in frames
-            or len(numbers) != count
-            or not all(isinstance(n, (int, float)) for n in numbers)
+            or not len(numbers) == len(values) == count
+            or min(values[3:], default=0.0) < 0
         ):
             return saved
-        x, y, z, *mass = (float(number) for number in numbers)
+        x, y, z, *mass = values
         return replace(saved, frame=frame, xyz=(x, y, z), mass=mass[0] if mass else None)
 
     def _forget(self) -> None:
