@@ -115,10 +115,12 @@ class XacroSource:
         limit = sys.getrecursionlimit()
         sys.setrecursionlimit(max(limit, _STACK))
         try:
-            document = (
-                self._processed(main, files) if _has_macros(first) else _document(main, first, self.work)
-            )
-            text, root = document.toxml(), _element(document.documentElement, None)
+            if _has_macros(first):
+                document, text = self._processed(main, files)
+            else:
+                document = _document(main, first, self.work)
+                text = document.toxml()
+            root = _element(document.documentElement, None)
         except Exhausted:
             raise InputError(
                 "E-ROS-036",
@@ -134,8 +136,8 @@ class XacroSource:
             sys.setrecursionlimit(limit)
         return Expansion(root, text, files.contents, files.sources, frozenset(files.packages))
 
-    def _processed(self, main: Path, files: DescriptionFiles) -> Any:
-        """The document that the package xacro makes, with evaluation, reading and messages of flexcal's own in the place of its own."""
+    def _processed(self, main: Path, files: DescriptionFiles) -> tuple[Any, str]:
+        """Document of the package xacro, which evaluates, reads and says nothing by itself, and its text."""
         try:
             import xacro
             from xacro import substitution_args
@@ -144,7 +146,8 @@ class XacroSource:
         try:
             hooks = _Hooks(xacro, files, self.work, self.arguments)
             with _replaced(self.path, substitution_args, {}), _replaced(self.path, xacro, hooks.names()):
-                return xacro.process_file(str(main), mappings=dict(self.arguments), verbosity=0)
+                document: Any = xacro.process_file(str(main), mappings=dict(self.arguments), verbosity=0)
+            return document, document.toxml()  # fails for what an expression made and XML cannot hold
         except (FlexcalError, Exhausted, RecursionError):
             raise
         except Exception as problem:  # whatever the package raises about a foreign file
