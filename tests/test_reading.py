@@ -297,11 +297,15 @@ def test_a_mat_file_takes_nothing_from_other_files(tmp_path: Path) -> None:
     assert list(table.table.columns) == ["own"]
 
 
-def test_meshes_of_a_urdf_are_regular_files(tmp_path: Path) -> None:
+@pytest.mark.parametrize("pipe", ["arm.obj", "paint.mtl", "arm.mtl"])
+def test_meshes_of_a_urdf_are_regular_files(tmp_path: Path, pipe: str) -> None:
+    """So are the files that they name, and those that Assimp looks for beside them."""
     import pinocchio as pin
 
-    os.mkfifo(tmp_path / "arm.stl")
-    mesh = f'<visual><geometry><mesh filename="package://{tmp_path.name}/arm.stl"/></geometry></visual>'
+    (tmp_path / "arm.obj").write_text("mtllib paint.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    (tmp_path / pipe).unlink(missing_ok=True)
+    os.mkfifo(tmp_path / pipe)
+    mesh = f'<visual><geometry><mesh filename="package://{tmp_path.name}/arm.obj"/></geometry></visual>'
     urdf = text_of(tmp_path / "r.urdf", f'<robot name="r"><link name="a">{mesh}</link></robot>')
-    with refused("E-FILE-014", "arm.stl"):
+    with refused("E-FILE-014", pipe):
         pinocchio_shapes(pin.buildModelFromXML(urdf.read_text()), urdf, pin.GeometryType.VISUAL)

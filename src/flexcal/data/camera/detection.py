@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,8 @@ from flexcal.files.transaction import read_bytes
 if TYPE_CHECKING:
     from flexcal.model.robot import BoardConfig, CameraConfig
 
+_MOST_PIXELS = 100_000_000
+"""Largest number of pixels of an image, by its header."""
 _BLURRED = 3.0
 """Width of edges, pixels, from which hardly any board is found."""
 
@@ -27,6 +30,7 @@ def detected_views(camera: CameraConfig, paths: Sequence[Path]) -> tuple[list[Vi
     Raises `FlexcalError` without OpenCV, and `InputError` for an image that is not there, is of another size, and where most of them do
     not show the board.
     """
+    os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(_MOST_PIXELS))  # OpenCV reads it once, now
     try:
         import cv2
     except ImportError:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -14,11 +15,15 @@ from typing import Any
 import numpy as np
 
 from flexcal.errors import InputError
-from flexcal.files.transaction import MEGABYTE, regular_path
+from flexcal.files.transaction import MEGABYTE, read_bytes, regular_path
 from flexcal.model.urdf.elements import read_elements
-from flexcal.printable import sentence
+from flexcal.printable import excerpt, sentence
 
 LARGEST_MESH = 100 * MEGABYTE
+_MESHES = (".stl", ".dae", ".obj", ".ply")
+"""Endings of meshes that are read; of the others some name further files."""
+_MATERIALS = re.compile(rb"^[ \t]*mtllib[ \t]+([^\r\n]+)", re.MULTILINE)
+"""Files that an .obj names."""
 
 
 def pinocchio_model(path: Path) -> tuple[str, Any]:
@@ -44,7 +49,8 @@ def pinocchio_model_of(text: str) -> Any:
 def pinocchio_shapes(model: Any, path: Path, kind: Any) -> Any:
     """Shapes of a `kind` (a `GeometryType`) of a URDF and Pinocchio's `model` of it; packages are looked for in the folders above it.
 
-    Raises `InputError` for a mesh that is a pipe or a device or larger than `LARGEST_MESH`, else what Pinocchio does.
+    Raises `InputError` for a mesh, or a file that it names, that is a pipe or a device or larger than `LARGEST_MESH`, else what Pinocchio
+    does.
     """
     import pinocchio as pin
 
@@ -52,9 +58,14 @@ def pinocchio_shapes(model: Any, path: Path, kind: Any) -> Any:
     folders = [str(above) for above in path.absolute().parents]
     for name in root.mesh_names():
         place = name.rpartition("://")[2]
+        if Path(place).suffix.lower() not in _MESHES:
+            raise ValueError(f"a mesh must end in {', '.join(_MESHES)}, unlike '{excerpt(name)}'")
         for folder in ("", *folders):
-            with suppress(OSError, ValueError):  # not every place has one, and Pinocchio says where none has
-                regular_path(Path(folder, place), limit=LARGEST_MESH)
+            for mesh in {Path(folder, place), Path(folder, place.lstrip("/"))}:
+                with suppress(
+                    OSError, ValueError
+                ):  # not every place has one, and Pinocchio says where none has
+                    _require_readable(regular_path(mesh, limit=LARGEST_MESH))
     with _printable_errors():
         return pin.buildGeomFromUrdfString(model, root.text(), kind, package_dirs=folders)
 
@@ -78,6 +89,17 @@ def _printable_errors() -> Iterator[None]:
             written.seek(0)
             if told := sentence(written.read(_MOST_QUOTED).decode("utf-8", "replace")):
                 print(f"Pinocchio: {told}", file=sys.stderr)
+
+
+def _require_readable(mesh: Path) -> None:
+    """Raise `InputError` where a mesh names a file that is a pipe or a device, or a large one."""
+    if mesh.suffix.lower() != ".obj":
+        return
+    named = [os.fsdecode(line) for line in _MATERIALS.findall(read_bytes(mesh, limit=LARGEST_MESH))]
+    words = {word for line in named for word in (line.strip(), *line.split())}
+    for material in {mesh.with_suffix(".mtl"), *(mesh.parent / word for word in words)}:
+        with suppress(OSError, ValueError):
+            regular_path(material, limit=LARGEST_MESH)
 
 
 def locked_joints(model: Any, locked: Mapping[str, float]) -> tuple[list[int], np.ndarray]:
