@@ -19,6 +19,7 @@ from refusals import assert_refusal
 from waiting import PATIENCE, until
 
 from flexcal.cli.folders.ledger import LEDGER
+from flexcal.cli.terminal.stop_signals import StopSignal
 from flexcal.files.transaction.staging_folder import PREFIX
 
 PLAN = ("--random", "--count", "3")
@@ -95,6 +96,25 @@ def test_a_signal_changes_nothing(folder: Path, number: int, status: int, said: 
     assert (process.returncode, out) == (status, "results\n")
     assert err.startswith(f"flexcal: {said}") and err.count("\n") == 1
     assert not (folder / "out").exists() and not list(folder.glob(PREFIX + "*"))
+
+
+def test_ctrl_c_while_the_program_loads_ends_it_quietly() -> None:
+    program = "import os, signal, sys; sys.argv[0] = 'bin/flexcal'; import flexcal; os.kill(os.getpid(), signal.SIGINT)"
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, preexec_fn=heed_signals, check=False
+    )
+    assert (done.returncode, done.stderr) == (-signal.SIGINT, "")
+
+
+def test_a_signal_raises_between_begin_and_end_alone() -> None:
+    early, late = StopSignal(), StopSignal()
+    early.ask(signal.SIGTERM, None)
+    with pytest.raises(KeyboardInterrupt):
+        early.begin()
+    late.begin()
+    late.end()
+    late.ask(signal.SIGINT, None)
+    assert (early.status, late.status) == (143, 130)
 
 
 def test_killed_and_run_again(folder: Path) -> None:
