@@ -70,7 +70,8 @@ def _sum(values: Any, first: float = 0) -> float:
 
 
 def _tokenize(text: str, sep: str = ",; ", skip_empty: bool = True) -> list[str]:
-    parts = re.split(f"[{re.escape(sep)}]", text)
+    _texts(text, sep)
+    parts = re.split(f"[{re.escape(sep)}]", text) if sep else [text]
     return [part for part in parts if part] if skip_empty else parts
 
 
