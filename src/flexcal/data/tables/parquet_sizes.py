@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from flexcal.errors import InputError, unreadable
-from flexcal.files.transaction import MEGABYTE, open_regular, size_text
+from flexcal.files.transaction import MEGABYTE, open_regular, size_text, unpacked_limit
 
 LARGEST_DECODED = 1000 * MEGABYTE
 """Bytes of decoded values that are in memory together: of a whole table, and of a row group of one that is read as a stream."""
@@ -30,6 +30,7 @@ def require_decodable(path: str | Path, columns: Collection[str] | None = None, 
     """
     try:
         with open_regular(path, limit=None) as file:
+            limit = unpacked_limit(os.fstat(file.fileno()).st_size, LARGEST_DECODED)
             sizes = [sum(group) for group in _row_groups(file, columns)]
     except OSError as problem:
         raise unreadable(Path(path), problem) from problem
@@ -38,11 +39,11 @@ def require_decodable(path: str | Path, columns: Collection[str] | None = None, 
             "E-TABLE-046", f"{path}: not a readable Parquet file (damaged headers); export it again."
         ) from problem
     size = max(sizes, default=0) if stream else sum(sizes)
-    if size > LARGEST_DECODED:
+    if size > limit:
         what = "a row group of it" if stream else "it"
         raise InputError(
             "E-TABLE-047",
-            f"{path}: {what} has {size_text(size)} when it is decoded, and such a table is read up to {size_text(LARGEST_DECODED)}; "
+            f"{path}: {what} has {size_text(size)} when it is decoded, and such a table is read up to {size_text(limit)}; "
             "check that it is the right one, or export fewer rows at a time.",
         )
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.lib.npyio import NpzFile as NpzArrays
 
 from flexcal.errors import InputError
-from flexcal.files.transaction import MEGABYTE, current_path, open_regular, size_text
+from flexcal.files.transaction import MEGABYTE, current_path, open_regular, size_text, unpacked_limit
 from flexcal.units import LARGEST
 
 Kind = Literal["real", "complex", "whole", "truth", "text"]
@@ -76,10 +76,14 @@ class NpzFile:
         """The arrays of these names and forms."""
         with self._opened() as stored:
             size = sum(self._checked_form(stored, name, form) for name, form in forms.items())
-            if size > _LARGEST_READ:
+            packed = (
+                0 if stored.zip is None else sum(member.compress_size for member in stored.zip.infolist())
+            )
+            limit = unpacked_limit(packed, _LARGEST_READ)
+            if size > limit:
                 raise self.error(
                     "E-FILE-026",
-                    f"holds arrays of {size_text(size)}, and such a file is read up to {size_text(_LARGEST_READ)}",
+                    f"holds arrays of {size_text(size)}, and such a file is read up to {size_text(limit)}",
                 )
             return {name: self._checked(name, stored[name], form) for name, form in forms.items()}
 

@@ -12,6 +12,7 @@ from flexcal.files.transaction.file_kinds import refuse_stream
 from flexcal.files.transaction.publication import current_path
 
 MEGABYTE = 10**6
+_LEAST_UNPACKED, _MOST_PACKED = 120 * MEGABYTE, 100
 LARGEST = 64 * MEGABYTE
 """Bytes of a file that is read whole, where its reader does not say another bound."""
 
@@ -63,6 +64,11 @@ def read_text(
     """Text of a regular file, with newlines as `\\n`; raises as `read_bytes` does, and `UnicodeDecodeError`."""
     text = read_bytes(path, limit=limit).decode(encoding, errors)
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def unpacked_limit(packed: int, largest: int) -> int:
+    """Largest size of what a file of `packed` bytes unpacks to: `largest`, or less where measurements cannot be packed as small."""
+    return min(largest, max(_LEAST_UNPACKED, _MOST_PACKED * packed))
 
 
 def size_text(size: int) -> str:

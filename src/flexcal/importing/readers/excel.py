@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import zlib
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 
 from flexcal.data.tables import Table, TableFile
 from flexcal.errors import InputError, unreadable
-from flexcal.files.transaction import MEGABYTE, open_regular, regular_path, size_text
+from flexcal.files.transaction import MEGABYTE, open_regular, regular_path, size_text, unpacked_limit
 from flexcal.importing.readers.separated_text import values
 from flexcal.importing.tables import ForeignTable, find_header
 
@@ -77,7 +78,7 @@ def _require_size(path: Path) -> None:
             if not is_zipfile(stream):  # as the .xls of old
                 return
             with ZipFile(stream) as book:
-                size = 0
+                size, limit = 0, unpacked_limit(os.fstat(stream.fileno()).st_size, _LARGEST_UNPACKED)
                 members = book.infolist()
                 declared = sum(member.file_size for member in members)
                 for member in members:
@@ -88,11 +89,11 @@ def _require_size(path: Path) -> None:
                             size += len(content)
                             for column, row in _PLACE.findall(beginning + content):
                                 rows, columns = max(rows, int(row)), max(columns, _number(column))
-                            if max(size, declared) > _LARGEST_UNPACKED or rows * columns > _MOST_CELLS:
+                            if max(size, declared) > limit or rows * columns > _MOST_CELLS:
                                 raise InputError(
                                     "E-IMPORT-073",
                                     f"{path}: {member.filename} in it is too large (a sheet has up to {_MOST_CELLS} cells, and a file "
-                                    f"{size_text(_LARGEST_UNPACKED)}); save the sheet as CSV.",
+                                    f"{size_text(limit)}); save the sheet as CSV.",
                                 )
                             beginning = content[-_OVERLAP:]
     except OSError as problem:
