@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from threading import Lock
 
 LONGEST_SENTENCE = 1000
 _LONGEST_EXCERPT = 40
@@ -59,3 +64,29 @@ def quoted(path: str | Path) -> str:
 
 def _written_out(match: re.Match[str]) -> str:
     return ascii(match.group())[1:-1]
+
+
+_REDIRECTING = Lock()
+_MOST_QUOTED = 100_000
+"""Bytes of messages that are looked at."""
+
+
+@contextmanager
+def printable_errors(library: str) -> Iterator[None]:
+    """What C or C++ writes to standard error in the block stands there on one printable line after the name of the `library`.
+
+    Parsers quote names, which can hold anything.
+    """
+    import tempfile
+
+    with _REDIRECTING, tempfile.TemporaryFile() as written:
+        stderr = os.dup(2)
+        os.dup2(written.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(stderr, 2)
+            os.close(stderr)
+            written.seek(0)
+            if told := sentence(written.read(_MOST_QUOTED).decode("utf-8", "replace")):
+                print(f"{library}: {told}", file=sys.stderr)

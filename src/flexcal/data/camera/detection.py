@@ -14,6 +14,7 @@ from flexcal.data.camera.bundle import FEWEST_CORNERS, View
 from flexcal.data.camera.sharpness import edge_width
 from flexcal.errors import FlexcalError, InputError
 from flexcal.files.transaction import read_bytes
+from flexcal.printable import printable_errors
 
 if TYPE_CHECKING:
     from flexcal.model.robot import BoardConfig, CameraConfig
@@ -74,7 +75,8 @@ def _gray(cv2: Any, path: Path) -> np.ndarray | None:
     """Image (height, width); None where there is none, or nothing that OpenCV reads as one."""
     try:
         content = np.frombuffer(read_bytes(path), dtype=np.uint8)
-        return cv2.imdecode(content, cv2.IMREAD_GRAYSCALE)
+        with printable_errors("OpenCV"):
+            return cv2.imdecode(content, cv2.IMREAD_GRAYSCALE)
     except (OSError, cv2.error):
         return None
 

@@ -74,8 +74,10 @@ def read_hdf5_mat(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
             for name in file:
                 if not str(name).startswith("#") and is_own(file, str(name)):
                     collect(str(name), file[name])
-    except (OSError, RuntimeError) as problem:
-        reason = " ".join(str(problem).split())
+    except InputError:
+        raise
+    except Exception as problem:  # of a damaged file, such as KeyError of a name that its own list has
+        reason = " ".join(str(problem).split()) or type(problem).__name__
         raise InputError(
             "E-IMPORT-030", f"{path}: not a readable MAT-file ({reason}); save it again with '-v7'."
         ) from problem

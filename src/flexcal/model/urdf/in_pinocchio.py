@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import os
 import re
-import sys
-import tempfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
-from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -17,7 +14,7 @@ import numpy as np
 from flexcal.errors import InputError
 from flexcal.files.transaction import MEGABYTE, read_bytes, regular_path
 from flexcal.model.urdf.elements import read_elements
-from flexcal.printable import excerpt, sentence
+from flexcal.printable import excerpt, printable_errors
 
 LARGEST_MESH = 100 * MEGABYTE
 _MESHES = (".stl", ".dae", ".obj", ".ply")
@@ -42,7 +39,7 @@ def pinocchio_model_of(text: str) -> Any:
     """Pinocchio's model of the text of a URDF; raises `ValueError` or `RuntimeError` where it cannot read it."""
     import pinocchio as pin
 
-    with _printable_errors():
+    with printable_errors("Pinocchio"):
         return pin.buildModelFromXML(text)
 
 
@@ -66,29 +63,8 @@ def pinocchio_shapes(model: Any, path: Path, kind: Any) -> Any:
                     OSError, ValueError
                 ):  # not every place has one, and Pinocchio says where none has
                     _require_readable(regular_path(mesh, limit=LARGEST_MESH))
-    with _printable_errors():
+    with printable_errors("Pinocchio"):
         return pin.buildGeomFromUrdfString(model, root.text(), kind, package_dirs=folders)
-
-
-_REDIRECTING = Lock()
-_MOST_QUOTED = 100_000
-"""Bytes of messages that are looked at."""
-
-
-@contextmanager
-def _printable_errors() -> Iterator[None]:
-    """What C++ writes to standard error in the block stands there on one printable line: it quotes names, which can hold anything."""
-    with _REDIRECTING, tempfile.TemporaryFile() as written:
-        stderr = os.dup(2)
-        os.dup2(written.fileno(), 2)
-        try:
-            yield
-        finally:
-            os.dup2(stderr, 2)
-            os.close(stderr)
-            written.seek(0)
-            if told := sentence(written.read(_MOST_QUOTED).decode("utf-8", "replace")):
-                print(f"Pinocchio: {told}", file=sys.stderr)
 
 
 def _require_readable(mesh: Path) -> None:
