@@ -7,6 +7,8 @@ MILLIMETRE = 1e-3
 INCH = 25.4e-3
 LARGEST = 1e50
 """No quantity in SI units is as large: beyond, products of a few overflow."""
+LEAST_STD = 1e-12
+"""No instrument's standard deviation is as small, m or rad."""
 
 COLDEST, HOTTEST = -50.0, 150.0
 """Temperatures of an arm, °C: no robot works beyond."""

@@ -1,6 +1,6 @@
 from .candidate_pool import PosePool
 from .checks import check_metres, check_same_pose
-from .columns import check_positive, unit_quaternions, whole_numbers
+from .columns import check_positive, last_digit, unit_quaternions, whole_numbers
 from .excluded_rows import EXCLUDED
 from .frame_touches import FrameMethod, FrameTouches
 from .image_folders import images_of, tables_of
@@ -31,6 +31,7 @@ __all__ = [
     "concatenate",
     "images_of",
     "kind_of_face",
+    "last_digit",
     "read_commands",
     "read_frame_touches",
     "read_grouped_poses",

@@ -8,12 +8,18 @@ import numpy as np
 
 from flexcal.data.tables import Signal, Table, TableFile
 from flexcal.files.structuring import suggestion
+from flexcal.units import LEAST_STD
 
 if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
 
 _HIGHEST = 2.0**53
 """Largest integer that is exact in a table."""
+_FEWEST, _SEVERAL = 20, 1000
+"""Different numbers from which they have a last digit, and rows that are looked at."""
+_DECIMALS = 16
+_ROUNDING = 4
+"""Distance of a number in a table from its decimals, in units of its last binary digit, after a conversion of its unit."""
 
 
 def first_point(file: TableFile, model: RobotModel) -> str:
@@ -61,6 +67,40 @@ def check_positive(table: Table, signal: Signal, values: np.ndarray, *, zero: bo
             row,
             signal.column_of(column),
             f"{signal.quantity} is {values[row, column]:g}, but must be {word}; correct it.",
+        )
+
+
+def last_digit(values: np.ndarray) -> float:
+    """Place of the last decimal of numbers, as 1e-6; that of double precision where they have no common one, or are too few to tell."""
+    several = np.unique(values[np.linspace(0, len(values) - 1, min(len(values), _SEVERAL)).astype(int)])
+    finest = np.spacing(np.abs(several))
+    for decimals in range(_DECIMALS if len(several) >= _FEWEST else 0):
+        if (np.abs(several - np.round(several, decimals)) <= _ROUNDING * finest).all():
+            return 10.0**-decimals
+    return float(finest.max())
+
+
+def check_noise(table: Table, signal: Signal, sigma: np.ndarray, measured: np.ndarray) -> None:
+    """Raise `InputError` at the first standard deviation `sigma` (N, k) that is not positive, or less than the digits of the `measured`
+    numbers (N, m) can carry.
+    """
+    check_positive(table, signal, sigma, zero=False)
+    digit = last_digit(measured)
+    rounding = digit / np.sqrt(12)  # standard deviation of a uniform distribution over one digit
+    wrong = sigma < max(rounding, LEAST_STD)
+    if wrong.any():
+        row, column = (int(i) for i in np.argwhere(wrong)[0])
+        reason = (
+            f"the measured numbers end at {digit:.0e}, whose rounding alone has a standard deviation of {rounding:.1e}"
+            if rounding > LEAST_STD
+            else f"no instrument's is below {LEAST_STD:.0e}"
+        )
+        raise table.error(
+            "E-POSES-083",
+            row,
+            signal.column_of(column),
+            f"{signal.quantity} is {sigma[row, column]:g} in SI units, but {reason}; state the instrument's noise, or leave the column "
+            "out.",
         )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from flexcal.data.poses.checks import check_metres, check_same_pose
 from flexcal.data.poses.columns import (
+    check_noise,
     check_positive,
     first_point,
     payload_column,
@@ -69,9 +70,10 @@ def read_distances(file: TableFile, model: RobotModel, further: Sequence[str] = 
     values = {name: signal.values(table) for name, signal in signals.items()}
     check_joint_units(model, table, signals["q"], values["q"])
     rows = len(table)
-    for name in ("sigma", LENGTH):
-        if name in values:
-            check_positive(table, signals[name], values[name], zero=False)
+    if LENGTH in values:
+        check_positive(table, signals[LENGTH], values[LENGTH], zero=False)
+    if "sigma" in values:
+        check_noise(table, signals["sigma"], values["sigma"], values.get(value, values["q"]))
     declared = _declared(file, model, touched=touched)
     names = _names(table, declared, name_column, rows)
     kind = np.array([kind_of_face(declared[name].kind) for name in names.tolist()])

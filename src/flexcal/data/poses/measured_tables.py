@@ -14,7 +14,7 @@ from flexcal.data.poses.camera_tables import CAMERA_COLUMNS, measures_images, re
 from flexcal.data.poses.candidate_pool import PosePool
 from flexcal.data.poses.checks import check_metres, check_motion, check_same_pose
 from flexcal.data.poses.columns import (
-    check_positive,
+    check_noise,
     first_point,
     payload_column,
     target_column,
@@ -295,9 +295,9 @@ def _read_kind(file: TableFile, model: RobotModel, further: tuple[str, ...]) -> 
     check_joint_units(model, table, signals["q"], values["q"])
     rows = len(table)
     sigma = values.get("sigma_xyz", values.get("sigma"))
-    for name in ("sigma", "sigma_xyz", "sigma_angle"):
+    for name, measured in (("sigma", "xyz"), ("sigma_xyz", "xyz"), ("sigma_angle", "quaternion")):
         if name in values:
-            check_positive(table, signals[name], values[name], zero=False)
+            check_noise(table, signals[name], values[name], values.get(measured, values["xyz"]))
     target = target_column(table, model) if "target" in texts else np.full(rows, first_point(file, model))
     station = table.columns["station"] if "station" in texts else np.full(rows, _first_station(model))
     poses = PoseSet(

@@ -26,6 +26,7 @@ from flexcal.calibration.verification import uncalibrated_model, uncalibrated_or
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.files.formats import provenance
+from flexcal.jobs.calibration.copied_rows import distinct_rows, without_copies
 from flexcal.jobs.calibration.deviating_parameters import without_deviating
 from flexcal.jobs.calibration.fits import Fits, FitSettings, sampled
 from flexcal.jobs.calibration.fitted_measurements import measurement_digests
@@ -108,9 +109,11 @@ def calibrate(
     0.1 mm at 77 poses
     """
     _require_uncalibrated(model)
+    distinct = distinct_rows(poses)
+    poses = without_copies(poses, distinct)
     plausible = plausible_temperatures(poses)
     if hold_out is not None:
-        hold_out = (hold_out[0], hold_out[1][plausible])
+        hold_out = (hold_out[0], hold_out[1][distinct][plausible])
     nominal, measured = model, with_plausible_temperatures(poses, plausible)
     sample = StratifiedSample.of(measured)
     poses = measured if sample is None else measured.subset(sample.rows)

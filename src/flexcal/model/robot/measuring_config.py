@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from flexcal.errors import FlexcalError
+from flexcal.units import LEAST_STD
 
 Triple = tuple[float, float, float]
 
@@ -124,8 +125,10 @@ class SocketsConfig:
             raise FlexcalError(
                 "E-ROBOT-050", "sockets need at least one position, as `sockets: {a: [0, 0, 0]}`."
             )
-        if not self.std > 0:
-            raise FlexcalError("E-ROBOT-051", f"std must be positive, not {self.std:g} m.")
+        if not self.std >= LEAST_STD:
+            raise FlexcalError(
+                "E-ROBOT-051", f"std must be positive, at least {LEAST_STD:g}, not {self.std:g} m."
+            )
 
     @property
     def extent(self) -> float:
@@ -160,8 +163,10 @@ class BoardConfig:
                 "E-ROBOT-053",
                 f"the markers of a board are smaller than its squares of {self.square:g} m; correct `marker:` ({self.marker:g} m).",
             )
-        if not self.std > 0:
-            raise FlexcalError("E-ROBOT-054", f"std of a board must be positive, not {self.std:g}.")
+        if not self.std >= LEAST_STD:
+            raise FlexcalError(
+                "E-ROBOT-054", f"std of a board must be positive, at least {LEAST_STD:g}, not {self.std:g}."
+            )
 
 
 @dataclass(frozen=True)
@@ -274,5 +279,7 @@ class InclinometerConfig:
 
 
 def _require_std(std: float | None, unit: str = "m") -> None:
-    if std is not None and not std > 0:
-        raise FlexcalError("E-ROBOT-056", f"std must be positive, not {std:g} {unit}.")
+    if std is not None and not std >= LEAST_STD:
+        raise FlexcalError(
+            "E-ROBOT-056", f"std must be positive, at least {LEAST_STD:g}, not {std:g} {unit}."
+        )
