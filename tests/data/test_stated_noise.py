@@ -52,3 +52,20 @@ def test_a_noise_below_the_digits_is_refused(
             read_poses(file, ur5)
     else:
         assert read_poses(file, ur5).sigma_given
+
+
+def test_a_noise_of_tilts_below_their_digits_is_refused(examples: Path, tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").write_text(
+        f"robot: {examples / 'ur5_tracker' / 'ur5.urdf'}\nmeasurements: {{level: {{kind: inclinometer, frame: tool0}}}}\n"
+    )
+    model = RobotModel.from_yaml(tmp_path / "robot.yaml", estimates=False)
+    rng = np.random.default_rng(3)
+    for sigma in ("-1e-4", "1e-300", "1e-9"):
+        rows = [
+            [*rng.uniform(-1, 1, 6).round(6), *rng.uniform(-0.5, 0.5, 2).round(5), sigma] for _ in range(30)
+        ]
+        lines = [",".join(map(str, row)) for row in rows]
+        file = tmp_path / "tilts.csv"
+        file.write_text("\n".join(["q1,q2,q3,q4,q5,q6,tilt_x,tilt_y,sigma_angle", *lines]))
+        with refused("E-POSES-011" if sigma[0] == "-" else "E-POSES-083", "line 2, column sigma_angle"):
+            read_poses(file, model)

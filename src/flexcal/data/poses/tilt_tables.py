@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexcal.data.poses.checks import check_same_pose
-from flexcal.data.poses.columns import payload_column, whole_numbers
+from flexcal.data.poses.columns import check_noise, payload_column, whole_numbers
 from flexcal.data.poses.pose_set import DIRECTION, PoseSet
 from flexcal.data.tables import Table, TableFile, assign, check_joint_units, timestamp_columns, with_seconds
 from flexcal.files.structuring import suggestion
@@ -61,6 +61,10 @@ def read_tilts(file: TableFile, model: RobotModel, further: Sequence[str] = ()) 
         if name in values:
             tilt[:, k] = values[name][:, 0]
             _check_range(table, declared, names, signals[name], tilt[:, k])
+    if "sigma_angle" in values:
+        check_noise(
+            table, signals["sigma_angle"], values["sigma_angle"], tilt[:, ~np.isnan(tilt).all(axis=0)]
+        )
     stds = {name: declared[name].std for name in dict.fromkeys(names.tolist())}
     given = "sigma_angle" in values or None not in stds.values()
     sigma = (
