@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from flexcal.calibration.fit import TOLERANCE, GeometricFit, fit_geometry, plausible_size
+from flexcal.calibration.kinds import wrong_readings
 from flexcal.calibration.measurement import predict_measurements, predicted_positions, register
 from flexcal.data.poses import PoseSet
 from flexcal.model.kinematics import motor_motion
@@ -73,8 +74,9 @@ def undeclared_coupling(nominal: RobotModel, fit: GeometricFit) -> Coupling | No
     The best of all pairs to first order is tried, else the best with a ratio of ±1: with it, the geometry is fitted anew, and has to meet
     the points three times as well. Orientations do not count, and views of a camera, which scatter by more than a bad fit, are not judged.
     """
-    poses = fit.poses.without_orientations()
-    small = _size(fit.residuals) < np.sqrt(3) * TOLERANCE["m"]
+    near = ~wrong_readings(np.linalg.norm(fit.residuals, axis=1))
+    poses, left = fit.poses.without_orientations().subset(near), _size(fit.residuals[near])
+    small = left < np.sqrt(3) * TOLERANCE["m"]
     if (
         (small and not _large_waves(fit))
         or poses.kind is not None
@@ -100,7 +102,7 @@ def undeclared_coupling(nominal: RobotModel, fit: GeometricFit) -> Coupling | No
         model = _coupled(model, joint, motor, float(_explained(found)[1][joint, motor]))
         found = fit_geometry(model, poses, terms=("kinematic",), loss="squares")
     before, after = _size(first.residuals), _size(found.residuals)
-    enough = after < _BETTER * before and (not small or after < _AS_GOOD * _size(fit.residuals))
+    enough = after < _BETTER * before and (not small or after < _AS_GOOD * left)
     return _told(model, joint, motor, before, after) if enough else None
 
 

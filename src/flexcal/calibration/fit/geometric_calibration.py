@@ -242,21 +242,27 @@ def fit_geometry(
         progress=progress,
         fleet=fleet,
     )
-    first, plain = _rough(fit), "squares" if loss == "auto" else loss
+    choose = loss == "auto" and elasticity == "reestimated"
+    if choose and fit.has_wrong_readings:
+        # of points that are metres off the squares would be least where the arm is folded over
+        found = _polished(_settled(_rough(fit, "huber"), "cauchy"), "cauchy", tolerance)
+        if found.estimate.outliers:
+            return _calibration(found)
+    first, plain = _rough(fit, "squares"), "squares" if loss == "auto" else loss
     fitted = _settled(first, plain)
-    if loss == "auto" and elasticity == "reestimated" and fitted.suspects_outliers:
+    if choose and fitted.suspects_outliers:
         again = _polished(_settled(first, "cauchy"), "cauchy", tolerance)
         if again.estimate.outliers:
             return _calibration(again)
     return _calibration(_polished(fitted, plain, tolerance))
 
 
-def _rough(fit: PointFit) -> FittedPoints:
-    """Fit by squares that is close enough to estimate its errors, or has converged where these are no noise."""
-    fitted = fit.solved(fit.first_scatter, "squares", tolerance=_ROUGH)
+def _rough(fit: PointFit, loss: PlainLoss) -> FittedPoints:
+    """Fit that is close enough to estimate its errors, or has converged where these are no noise."""
+    fitted = fit.solved(fit.first_scatter, loss, tolerance=_ROUGH)
     if fitted.robust_scatter().robot < _NOISE:
         return fitted
-    return fit.solved(fit.first_scatter, "squares", fitted)
+    return fit.solved(fit.first_scatter, loss, fitted)
 
 
 def _settled(fitted: FittedPoints, loss: Loss | PlainLoss) -> FittedPoints:

@@ -36,7 +36,7 @@ from flexcal.calibration.fit.terms import (
     random_waves,
 )
 from flexcal.calibration.fit.thermal_terms import THERMAL, with_reference_temperature
-from flexcal.calibration.kinds import KINDS
+from flexcal.calibration.kinds import KINDS, wrong_readings
 from flexcal.calibration.measurement import (
     ROBOT,
     PredictedMeasurements,
@@ -193,6 +193,14 @@ class PointFit:
     def straight(self) -> PredictedMeasurements:
         """Points of the undeflected robot at the start of the fit."""
         return predict_measurements(self.start, self.poses, elastic=False, jacobians=True)
+
+    @property
+    def has_wrong_readings(self) -> bool:
+        """Whether single points are at the start of the fit far farther off than the others, as of a wrong reading."""
+        if not self.poses.located.all():
+            return False
+        distance = np.linalg.norm(self.straight.residual[: len(self.poses)], axis=1)
+        return bool(wrong_readings(distance).any())
 
     @property
     def first_scatter(self) -> ErrorComponents:

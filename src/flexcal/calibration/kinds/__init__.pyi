@@ -1,7 +1,7 @@
 from .directions import Directions, declared_level, inclinometer, is_inclinometer
 from .kind import Kind
 from .registry import ANGULAR, KINDS, LOCATING, kind_of, tells_lengths
-from .rigid_motions import best_motion, rigid_motion
+from .rigid_motions import best_motion, rigid_motion, wrong_readings
 from .robust_start import turn_to_z
 
 __all__ = [
@@ -18,4 +18,5 @@ __all__ = [
     "rigid_motion",
     "tells_lengths",
     "turn_to_z",
+    "wrong_readings",
 ]

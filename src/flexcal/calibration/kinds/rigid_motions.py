@@ -12,6 +12,15 @@ from flexcal.model.robot import STATION
 
 ALREADY_ALIGNED = 0.010
 """Median distance, m, between nominal and measured points below which instrument and base frame are the same."""
+_GROSS = 10.0
+"""Ratio to the median misfit beyond which a point's, if it is more than `ALREADY_ALIGNED` larger, is that of a wrong reading."""
+_FEWEST, _REFERENCES = 4, 200
+"""Number of points that are registered at least, and of those that each is compared with."""
+
+
+def wrong_readings(misfit: np.ndarray) -> np.ndarray:
+    """Mask (N,) of the points whose misfit (N,), m, is far larger than that of most."""
+    return misfit > _GROSS * np.median(misfit) + ALREADY_ALIGNED
 
 
 def registered(
@@ -26,9 +35,19 @@ def registered(
     """
     if np.median(np.linalg.norm(readings - targets, axis=1)) < ALREADY_ALIGNED:
         return dict.fromkeys(STATION, 0.0)
-    rotation, offset = motion(targets, readings, station)
+    kept = _consistent(targets, readings)
+    rotation, offset = motion(targets[kept], readings[kept], station)
     numbers = zip(STATION, (*offset, *rotation_vector(rotation)), strict=True)
     return {key: float(value) for key, value in numbers}
+
+
+def _consistent(source: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Mask (N,) of the points whose distances to most others are the same in both sets, so that no gross outlier turns the frame."""
+    some = np.linspace(0, len(source) - 1, min(len(source), _REFERENCES)).astype(int)
+    before, after = (np.linalg.norm(points[:, None] - points[some], axis=2) for points in (source, target))
+    misfit = np.median(np.abs(after - before), axis=1)
+    kept = ~wrong_readings(misfit)
+    return kept if kept.sum() >= _FEWEST else np.ones(len(source), dtype=bool)
 
 
 def rigid_motion(source: np.ndarray, target: np.ndarray, name: str = "") -> tuple[np.ndarray, np.ndarray]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from flexcal.calibration.kinds import wrong_readings
 from flexcal.calibration.measurement.prediction import predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.model.robot import STATION, RobotModel
@@ -32,7 +33,9 @@ def register_with_zeros(registered: RobotModel, poses: PoseSet) -> RobotModel | 
     if not poses.located.all():
         return None
     poses = poses.without_orientations()
-    first = float(np.mean(predict_measurements(registered, poses, elastic=False).residual ** 2))
+    residual = predict_measurements(registered, poses, elastic=False).residual
+    near = ~wrong_readings(np.linalg.norm(residual, axis=1))
+    poses, first = poses.subset(near), float(np.mean(residual[near] ** 2))
     extent = poses.position - poses.position.mean(axis=0)
     if first <= max(_FAR**2 * float(np.mean(extent**2)), (_FAR_OF_REACH * registered.reach) ** 2):
         return None
