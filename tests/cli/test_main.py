@@ -203,3 +203,12 @@ def test_reader_that_goes_away_is_no_error() -> None:
         f"set -o pipefail; {FLEXCAL} --help | true", shell=True, executable="/bin/bash", capture_output=True
     )
     assert done.returncode == 0 and done.stderr == b""
+
+
+def test_names_of_files_may_begin_with_dashes_behind_two(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for words in (["--", "--robot.yaml", "x.csv"], ["--terms", "kinematic", "--", "--robot.yaml", "x.csv"]):
+        assert cli.main(["calibrate", *words]) == 2
+        assert "--robot.yaml cannot be read" in capsys.readouterr().err

@@ -24,6 +24,8 @@ def base_errors(model: RobotModel) -> tuple[str, ...]:
     """
     first = [i for i, joint in enumerate(model.joints) if joint.parent < 0]
     names = [f"{model.joints[i].name}.{key}" for i in first for key in GEOMETRY]
+    if not model.points:
+        return tuple(names)
     columns = [model.geometry_columns[name] for name in names]
     reach = np.where([joint.kind == "prismatic" for joint in model.motor_joints], 1.0, np.pi)
     lower, upper = (np.clip(limit, -reach, reach) for limit in joint_limits(model))

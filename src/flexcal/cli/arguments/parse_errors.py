@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import takewhile
 
 from flexcal.cli.arguments.verb_options import options_of
 from flexcal.cli.arguments.verb_table import Verb
@@ -15,9 +16,9 @@ _FRAME = str.maketrans("│|", "  ")
 
 
 def refuse_unknown_options(verb: Verb, arguments: Sequence[str]) -> None:
-    """Raise `InputError` at the first argument that looks like an option of the verb and is none, with the nearest."""
+    """Raise `InputError` at the first argument before `--` that looks like an option of the verb and is none, with the nearest."""
     known = [option.name for option in options_of(verb)]
-    for argument in arguments:
+    for argument in takewhile(lambda argument: argument != "--", arguments):
         name = argument.partition("=")[0]
         if not name.startswith("--") or name == "--help":
             continue

@@ -8,6 +8,8 @@ from typing import Any, NoReturn
 
 from flexcal.errors import InputError, unreadable
 from flexcal.files.transaction import MEGABYTE, read_bytes
+from flexcal.printable import excerpt
+from flexcal.units import LARGEST
 
 LARGEST_JSON = 64 * MEGABYTE
 MOST_VALUES = 3_000_000
@@ -30,7 +32,7 @@ def parse_json(path: Path, text: str, remedy: str) -> Any:
     if text.count(",") + text.count("[") + text.count("{") > MOST_VALUES:
         raise InputError("E-FILE-022", f"{path} holds more than {MOST_VALUES} values of JSON; {remedy}.")
     try:
-        content = json.loads(text, parse_constant=_refused)
+        content = json.loads(text, parse_int=_integer, parse_float=_number, parse_constant=_refused)
     except json.JSONDecodeError as problem:
         raise InputError(
             "E-FILE-023",
@@ -52,6 +54,17 @@ def parse_json(path: Path, text: str, remedy: str) -> Any:
         if not inner:
             return content
     raise _too_deep(path, remedy)
+
+
+def _number(digits: str) -> float:
+    if abs(number := float(digits)) > LARGEST:
+        raise ValueError(f"{excerpt(digits)} is beyond {LARGEST:.0e}")
+    return number
+
+
+def _integer(digits: str) -> int:
+    _number(digits)
+    return int(digits)
 
 
 def _refused(constant: str) -> NoReturn:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
 import zipfile
-import zlib
 from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -29,10 +29,6 @@ _KINDS: dict[Kind, tuple[str, str]] = {
 _LARGEST = 1000 * MEGABYTE
 _LARGEST_READ = 500 * MEGABYTE
 """Bytes of the arrays that are read together, once they are unpacked."""
-_UNREADABLE = (
-    OSError, ValueError, EOFError, KeyError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error,
-)  # fmt: skip
-"""Exceptions of NumPy and zipfile for a file that is no archive, cut short, encrypted or changed."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +94,9 @@ class NpzFile:
                 stream.seek(0)
                 with np.load(stream, allow_pickle=False) as stored:
                     yield stored
-        except _UNREADABLE as problem:
+        except InputError:
+            raise
+        except Exception as problem:  # whatever NumPy, zipfile and tokenize raise for a broken file
             told = isinstance(problem, OSError) and problem.strerror
             raise self.error("E-FILE-003", f"cannot be read ({told or type(problem).__name__})") from problem
 
@@ -147,7 +145,9 @@ def _header(stream: IO[bytes]) -> tuple[tuple[int, ...], np.dtype]:
     """Shape and type of the array that a stream in NumPy's format begins with; raises `ValueError` where it does not."""
     first = np.lib.format.read_magic(stream) == (1, 0)
     read = np.lib.format.read_array_header_1_0 if first else np.lib.format.read_array_header_2_0
-    shape, _, dtype = read(stream)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # NumPy's, of headers as Python 2 wrote them
+        shape, _, dtype = read(stream)
     return shape, dtype
 
 

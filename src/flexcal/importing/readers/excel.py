@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 import zlib
@@ -40,9 +41,12 @@ def read_excel(path: Path, sheet: str | None) -> ForeignTable:
             f"{path}: Excel files need fastexcel: pip install fastexcel; or save the sheet as CSV.",
         ) from None
     _require_size(path)
+    logging.getLogger("fastexcel").setLevel(logging.CRITICAL)  # it tells what the sentences here tell
     try:
         book = fastexcel.read_excel(regular_path(path, limit=_LARGEST))
         names = book.sheet_names
+        if not names:
+            raise InputError("E-IMPORT-076", f"{path} has no sheet; save the measurements again.")
         if sheet is not None and sheet not in names:
             raise InputError(
                 "E-IMPORT-026", f"{path}: there is no sheet '{sheet}'; there are {', '.join(names)}."
@@ -56,7 +60,9 @@ def read_excel(path: Path, sheet: str | None) -> ForeignTable:
             )
         header = find_header(path, rows, len(texts), "row")
         exact = _columns(book.load_sheet(chosen, header_row=None, skip_rows=header.first))
-    except fastexcel.FastExcelError as problem:
+    except InputError:
+        raise
+    except Exception as problem:  # whatever a reader of a broken file may raise
         reason = " ".join(str(problem).split())[:200]
         raise InputError(
             "E-IMPORT-028", f"{path}: not a readable Excel file ({reason}); save it again."

@@ -90,11 +90,13 @@ def alike(members: Sequence[Member]) -> list[tuple[str, str, float]]:
     """
     _, sizes, measured = _measured(members)
     found = {}
+    if not len(sizes):
+        return []
     for (i, one), (k, other) in combinations(enumerate(measured), 2):
         rows = np.concatenate([one.rows, other.rows]) * sizes
         observed = np.concatenate([one.observed, other.observed])
         basis, values, _ = np.linalg.svd(rows, full_matrices=False)
-        basis = basis[:, values > _SAME * values[0]]
+        basis = basis[:, values > _SAME * values.max(initial=0.0)]
         left = observed - basis @ (basis.T @ observed)
         freedom = len(left) - basis.shape[1]
         if freedom >= _FEWEST_COMBINATIONS:

@@ -18,6 +18,9 @@ from flexcal.jobs.fleet_prior.model_prior import ModelPrior
 from flexcal.jobs.fleet_prior.pooled_values import PooledValues
 from flexcal.model.robot import RobotModel, unit_in
 
+_LEAST = 1e-12
+"""Standard deviations below which no numbers are known, in any unit."""
+
 
 @dataclass(frozen=True)
 class StoredParameter:
@@ -55,8 +58,10 @@ class StoredValue:
 
 
 def _require_positive(item: StoredParameter | StoredValue) -> None:
-    if not min(item.std, item.mean_std, item.spread, item.freedom) > 0:
-        raise FlexcalError("E-PRIOR-006", "std, mean_std, spread and freedom must be positive.")
+    if not min(item.std, item.mean_std, item.spread, item.freedom) > _LEAST:
+        raise FlexcalError(
+            "E-PRIOR-006", f"std, mean_std, spread and freedom must be positive, above {_LEAST:g}."
+        )
 
 
 @dataclass(frozen=True)
@@ -183,6 +188,12 @@ def read_model_prior(path: Path, model: RobotModel) -> ModelPrior:
                 ("parameters", name),
                 f"{name} is no geometric error of {model.name}; make the prior again with 'flexcal fleet'.",
             )
+    if stored.parameters and not stored.terms:
+        raise file.error(
+            "E-PRIOR-020",
+            ("terms",),
+            "the terms of the parameters are missing; make the prior again with 'flexcal fleet'.",
+        )
     items, size = list(stored.parameters.values()), len(stored.parameters)
     if [len(row) for row in stored.correlation] != list(range(1, size)):
         raise file.error(
