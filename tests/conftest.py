@@ -43,6 +43,14 @@ def no_waiting_for_the_disk() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session", autouse=True)
+def locks_of_the_tests(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Locks are files of a cache folder that goes with the tests, in their processes too."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
 def figures_are_plotly_s() -> Iterator[None]:
     """Each figure of the pages that this process writes is what Plotly makes of it, which knows each property: flexcal does not ask it."""
     from flexcal.report.layout import rendering

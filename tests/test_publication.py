@@ -1,4 +1,4 @@
-"""Files of one run take their places together, wherever the run is killed.
+"""Files of one run take their places together; where it is killed meanwhile, readers say so, and the next run works.
 
 Processes that are to be killed are forked, some thousand of them, by one that has little memory to copy.
 """
@@ -7,17 +7,31 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 import signal
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from refusals import refused
 
-from flexcal.files.transaction import FileTransaction, Stage, atomic_path, current_path, recover, write_text
-from flexcal.files.transaction.staging_folder import PREFIX
+from flexcal.cli.folders.overwrite_protection import outputs
+from flexcal.errors import InputError
+from flexcal.estimation import Estimate, Parameter, Parameters
+from flexcal.files.formats import read_estimates, write_estimates
+from flexcal.files.transaction import (
+    FileTransaction,
+    append_lines,
+    atomic_path,
+    current_path,
+    left_over,
+    refuse_mixture,
+    whole_lines,
+    write_text,
+)
 
 STEPS = {
     "os.rename",
@@ -77,94 +91,213 @@ def in_small_process(action: Callable[[Path], None], folder: Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
-def whole(folder: Path) -> str:
-    """Which run the files of a folder are of; fails where they are of several, or something else is left."""
-    names = sorted(os.listdir(folder))
-    texts = {(folder / name).read_text() for name in names if name != "mine"}
-    assert len(texts) == 1 and (folder / "mine").read_text() == "mine"
+def run_in(folder: Path) -> str:
+    """Which run the files of a folder are of, as a reader finds them; empty without files. Raises `InputError` for those of two."""
+    names = {
+        name for name in (os.listdir(folder) if folder.exists() else ()) if not name.startswith(".flexcal")
+    }
+    if not names:
+        return ""
+    refuse_mixture(folder)
+    texts = {(folder / name).read_text() for name in names - {"mine"}}
+    assert len(texts) == 1
     (text,) = texts
-    assert names == (["a", "b", "mine", "old"] if text == "old" else ["a", "b", "mine", "new"])
+    assert names - {"mine"} == {"a", "b", text}
     return text
 
 
 def write_run(folder: Path, text: str) -> None:
     """Three files, one of which the other run does not write."""
-    with FileTransaction() as run:
+    with outputs("demo", folder, ("a", "b", "old", "new")):
         for name in ("a", text, "b"):
             write_text(folder / name, text)
-        gone = folder / ("old" if text == "new" else "new")
-        if gone.exists():
-            run.remove(gone)
+
+
+def bytes_of(folder: Path) -> dict[str, bytes]:
+    return {
+        path.name: path.read_bytes() for path in folder.iterdir() if not path.name.startswith(".flexcal-")
+    }
 
 
 def test_killed_at_any_step(tmp_path: Path) -> None:
-    """A reader that opens the folder finds one run; so does the next run, which works."""
+    """A reader finds one run or is told of two; users' files stay, and after the next run all is as if none had been killed."""
     in_small_process(kill_at_any_step, tmp_path)
 
 
 def kill_at_any_step(tmp_path: Path) -> None:
-    ended = {"old": 0, "new": 0}
-    for step in range(400):
+    found = {"old": 0, "new": 0, "two": 0}
+    reference = tmp_path / "reference"
+    for text in ("old", "new"):
+        write_run(reference, text)
+    expected = bytes_of(reference)
+    for step in range(1000):
         folder = tmp_path / str(step)
-        folder.mkdir()
-        (folder / "mine").write_text("mine")
         write_run(folder, "old")
+        (folder / "mine").write_text("mine")
         if not killed_at(step, lambda folder=folder: write_run(folder, "new")):
             break
-        recover(folder)
-        ended[whole(folder)] += 1
+        try:
+            found[run_in(folder)] += 1
+        except InputError as problem:
+            assert problem.code == "E-FILE-025" and "'flexcal demo'" in str(problem)
+            found["two"] += 1
+        if step % 2:  # once more, while it is put right
+            killed_at(step - 3, lambda folder=folder: write_run(folder, "new"))
+        left = left_over(folder)
         write_run(folder, "new")
-        assert whole(folder) == "new"
+        assert bytes_of(folder) == {**expected, "mine": b"mine"}
+        assert left_over(folder) == left, (left_over(folder), left, step)
+        shutil.rmtree(folder)
     else:
         raise AssertionError("the run never ended")
-    assert ended["old"] > 10 and ended["new"] > 5
+    assert found["old"] > 10 and found["new"] >= 1 and found["two"] == 3, found
 
 
-def test_killed_while_the_rest_is_finished(tmp_path: Path) -> None:
-    """What is finished after a kill may be killed too."""
-    in_small_process(kill_while_the_rest_is_finished, tmp_path)
+def test_a_new_folder_appears_whole(tmp_path: Path) -> None:
+    in_small_process(kill_before_a_new_folder, tmp_path)
 
 
-def kill_while_the_rest_is_finished(tmp_path: Path) -> None:
-    for step in range(20, 200):
-        folder = tmp_path / str(step)
-        folder.mkdir()
-        (folder / "mine").write_text("mine")
-        write_run(folder, "old")
+def kill_before_a_new_folder(tmp_path: Path) -> None:
+    found = {"": 0, "new": 0}
+    for step in range(1000):
+        folder = tmp_path / str(step) / "out" / "inner"
         if not killed_at(step, lambda folder=folder: write_run(folder, "new")):
             break
-        for again in range(100):
-            if not killed_at(again, lambda folder=folder: recover(folder)):
-                break
-        recover(folder)
-        whole(folder)
+        found[run_in(folder)] += 1
+        write_run(folder, "new")
+        assert run_in(folder) == "new"
+    assert found[""] > 10 and found["new"] >= 1, found
 
 
-def test_two_folders_change_together(tmp_path: Path) -> None:
-    in_small_process(kill_between_two_folders, tmp_path)
+def estimate(value: float) -> Estimate:
+    return Estimate(
+        parameters=Parameters([Parameter("joint_1.offset", "rad", value)]),
+        covariance=np.array([[value]]),
+        rank=1,
+        cost=0.0,
+        chi2=0.0,
+        degrees_of_freedom=1,
+        status="converged",
+        message="",
+        iterations=1,
+        dropped=(),
+        identifiable=(True,),
+    )
 
 
-def kill_between_two_folders(tmp_path: Path) -> None:
-    def write(text: str) -> None:
+def test_estimates_are_never_lost(tmp_path: Path) -> None:
+    in_small_process(kill_while_estimates_are_written, tmp_path)
+
+
+def kill_while_estimates_are_written(tmp_path: Path) -> None:
+    """Killed anywhere, also after several blocks were written in one run, the file holds what it held, or the new estimates."""
+
+    def write(path: Path) -> None:
         with FileTransaction():
-            for folder in ("one", "two"):
-                write_text(tmp_path / folder / "a", text)
+            write_estimates(path, "stiffness", estimate(3.0))
+            write_estimates(path, "calibration", estimate(4.0))
+            write_estimates(path, "stiffness", estimate(5.0))
 
-    seen = set()
-    write("0")
-    for step in range(400):
-        before = (tmp_path / "one" / "a").read_text()
-        if not killed_at(step, lambda step=step: write(str(step + 1))):
+    def state(path: Path) -> tuple[float, ...]:
+        return tuple(float(one.covariance[0, 0]) for one in read_estimates(path).values())
+
+    found = set()
+    for step in range(1000):
+        path = tmp_path / str(step) / "estimates.yaml"
+        write_estimates(path, "stiffness", estimate(1.0))
+        write_estimates(path, "calibration", estimate(2.0))
+        if not killed_at(step, lambda path=path: write(path)):
             break
-        first, second = ("one", "two") if step % 2 else ("two", "one")
-        recover(tmp_path / first)
-        text = (tmp_path / first / "a").read_text()
-        assert text in (before, str(step + 1))
-        recover(tmp_path / second)
-        assert (tmp_path / second / "a").read_text() == text
-        assert os.listdir(tmp_path / "one") == os.listdir(tmp_path / "two") == ["a"]
-        seen.add(text == before)
-    assert seen == {True, False}
+        found.add(state(path))
+        write(path)
+        assert state(path) == (5.0, 4.0)
+    assert found == {(1.0, 2.0), (5.0, 4.0)}
+
+
+def test_blocks_that_are_written_at_once(tmp_path: Path) -> None:
+    """Two processes that write different blocks of one file lose neither."""
+    path = tmp_path / "estimates.yaml"
+    for _ in range(4):
+        path.unlink(missing_ok=True)
+        children = []
+        for block in ("stiffness", "calibration", "dynamics", "payload"):
+            child = os.fork()
+            if child == 0:
+                try:
+                    write_estimates(path, block, estimate(1.0))
+                finally:
+                    os._exit(0)
+            children.append(child)
+        for child in children:
+            os.waitpid(child, 0)
+        assert len(read_estimates(path)) == 4
+
+
+def test_lines_that_are_appended(tmp_path: Path) -> None:
+    """Killed anywhere, the file has its whole lines; what is torn goes with the next line."""
+    path = tmp_path / "rows"
+    append_lines(path, ["1", "2"])
+    with path.open("a") as stream:
+        stream.write("torn" * 30_000)
+    assert list(whole_lines(path)) == ["1", "2"]
+    append_lines(path, ["3"])
+    assert path.read_text() == "1\n2\n3\n"
+    path.unlink()
+    path.symlink_to(tmp_path / "elsewhere")
+    with refused("E-FILE-013", "a link"):
+        append_lines(path, ["4"])
+    assert not (tmp_path / "elsewhere").exists()
+
+
+HOSTILE = {
+    "owner": "calibrate\n1\n*",
+    "journal.json": '{"changes": [["1.sh", "../../home/.profile", null]], "stages": ["../../home/docs", "."]}',
+    "1.sh": "echo",
+    "primary": "../.flexcal-run-other",
+}
+"""What finished a run that had been cut off, in earlier versions."""
+
+
+def test_nothing_that_is_found_acts(tmp_path: Path) -> None:
+    """No file of a folder, however it is named, causes a write or a deletion, and the folder's own files stay."""
+    home, folder = tmp_path / "home", tmp_path / "project"
+    (home / "docs").mkdir(parents=True)
+    (home / "docs" / "thesis.tex").write_text("mine")
+    stage = folder / ".flexcal-run-1"
+    stage.mkdir(parents=True)
+    for name, content in HOSTILE.items():
+        (stage / name).write_text(content)
+    (folder / ".flexcal-0123456789abcdef").symlink_to(home)
+    before = {path: path.lstat() for path in sorted(tmp_path.rglob("*"))}
+    write_run(folder, "new")
+    write_run(folder / "out", "new")
+    after = {path: path.lstat() for path in sorted(tmp_path.rglob("*"))}
+    assert all(after[path].st_mtime_ns == stat.st_mtime_ns for path, stat in before.items() if path.is_file())
+    assert {path.relative_to(folder).parts[0] for path in after.keys() - before.keys()} == {
+        "a",
+        "b",
+        "new",
+        ".flexcal",
+        "out",
+    }
+
+
+@pytest.mark.parametrize(("target", "code"), [("elsewhere", "E-FILE-024"), ("nowhere", "E-FILE-013")])
+def test_no_link_below_the_named_folder_is_followed(tmp_path: Path, target: str, code: str) -> None:
+    """The folder that was named may be one; folders and files in it may not."""
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "a").write_text("mine")
+    (tmp_path / "real").mkdir()
+    (tmp_path / "out").symlink_to("real")
+    (tmp_path / "real" / "inner").symlink_to(tmp_path / target)
+    with refused(code, "inner"), outputs("demo", tmp_path / "out", ("**",)):
+        write_text(tmp_path / "out" / "inner" / "a", "new")
+    with outputs("verify", tmp_path / "out", ("a",)):
+        write_text(tmp_path / "out" / "a", "new")
+    assert (tmp_path / "real" / "a").read_text() == "new"
+    assert (
+        os.listdir(tmp_path / "elsewhere") == ["a"] and (tmp_path / "elsewhere" / "a").read_text() == "mine"
+    )
 
 
 def test_current_leads_to_what_waits(tmp_path: Path) -> None:
@@ -197,49 +330,22 @@ def test_a_file_of_ours_that_somebody_changed_meanwhile_stays(tmp_path: Path) ->
     assert path.read_text() == "theirs, and longer" and os.listdir(tmp_path) == ["estimates.yaml"]
 
 
-def test_what_somebody_wrote_after_the_kill_is_not_replaced(tmp_path: Path) -> None:
-    write_run(tmp_path, "old")
-    for step in range(400):
-        assert killed_at(step, lambda: write_run(tmp_path, "new"))
-        if any((stage / "journal.json").exists() for stage in tmp_path.glob(PREFIX + "*")):
-            break
-        recover(tmp_path)
-    (tmp_path / "b").write_text("written by hand")
-    with refused("E-FILE-015", "b"):
-        recover(tmp_path)
-    assert (tmp_path / "b").read_text() == "written by hand"
-
-
-def test_leftovers_go_but_nothing_else(tmp_path: Path) -> None:
-    """A folder of a similar name that flexcal did not make stays, and so does that of a run that is alive."""
-    alive = Stage.open(tmp_path, "flexcal demo", ("x",))
-    theirs = tmp_path / f"{PREFIX}notes"
-    theirs.mkdir()
-    (theirs / "thesis.tex").write_text("mine")
-    in_child(lambda: Stage.open(tmp_path, "flexcal demo", ("x",)) and None)
-    assert len(os.listdir(tmp_path)) == 3
-    recover(tmp_path)
-    assert sorted(os.listdir(tmp_path)) == sorted([alive.path.name, theirs.name])
-    assert (theirs / "thesis.tex").read_text() == "mine"
-
-
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT, errno.EIO])
 def test_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int) -> None:
-    write_run(tmp_path, "old")
+    write_run(tmp_path / "out", "old")
 
     def full(_handle: int) -> None:
         raise OSError(number, os.strerror(number))
 
     monkeypatch.setattr(os, "fsync", full)
-    with refused("E-FILE-011", str(tmp_path / "a"), os.strerror(number)):
-        write_run(tmp_path, "new")
-    (tmp_path / "mine").write_text("mine")
-    assert whole(tmp_path) == "old"
+    with refused("E-FILE-011", str(tmp_path / "out" / "a"), os.strerror(number)):
+        write_run(tmp_path / "out", "new")
+    assert run_in(tmp_path / "out") == "old"
 
 
-def test_renaming_that_fails_is_finished_later(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "mine").write_text("mine")
-    write_run(tmp_path, "old")
+def test_renaming_that_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The error says how much has changed; the next run puts it right."""
+    write_run(tmp_path / "out", "old")
     renamed = Path.replace
 
     def fails(self: Path, target: Path) -> Path:
@@ -249,10 +355,12 @@ def test_renaming_that_fails_is_finished_later(tmp_path: Path, monkeypatch: pyte
 
     with monkeypatch.context() as patch:
         patch.setattr(Path, "replace", fails)
-        with refused("E-FILE-016"):
-            write_run(tmp_path, "new")
-    recover(tmp_path)
-    assert whole(tmp_path) == "new"
+        with refused("E-FILE-016", "3 of 6 changes"):
+            write_run(tmp_path / "out", "new")
+    with refused("E-FILE-025", "'flexcal demo'"):
+        refuse_mixture(tmp_path / "out")
+    write_run(tmp_path / "out", "new")
+    assert run_in(tmp_path / "out") == "new" and not left_over(tmp_path / "out")
 
 
 def test_no_file_of_flexcals_own(tmp_path: Path) -> None:

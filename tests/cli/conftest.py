@@ -16,7 +16,8 @@ import pytest
 from cli_files import copied
 
 from flexcal.cli.main import main
-from flexcal.files.transaction import FileTransaction
+from flexcal.errors import FlexcalError
+from flexcal.files.transaction import current_path
 
 
 @dataclass(frozen=True)
@@ -38,11 +39,17 @@ _stale: list[str] = []
 
 
 def _watch(event: str, arguments: tuple[Any, ...]) -> None:
-    running = FileTransaction.running() if event == "open" and isinstance(arguments[0], str | Path) else None
-    if running is None or running.waiting(Path(arguments[0])) is None:
-        return
-    if sys._getframe(2).f_code.co_name != "_digest_on_disk":  # the ledger is about the old one
-        _stale.append(str(arguments[0]))
+    path = arguments[0] if event == "open" else None
+    if isinstance(path, str | Path) and waits(Path(path)):
+        _stale.append(str(path))
+
+
+def waits(path: Path) -> bool:
+    """Whether a newer file waits for this place, other than where the one in its place is meant."""
+    try:
+        return current_path(path) != path
+    except (FlexcalError, OSError, ValueError):
+        return False
 
 
 sys.addaudithook(_watch)

@@ -10,10 +10,9 @@ from cli_files import snapshot
 from refusals import assert_refusal, refused
 from test_bad_input import refused_run
 
-from flexcal.cli.folders.ledger import LEDGER
 from flexcal.cli.folders.overwrite_protection import outputs
 from flexcal.errors import InputError
-from flexcal.files.transaction import write_text
+from flexcal.files.transaction import LEDGER, write_text
 
 
 def sha256(path: Path) -> str:

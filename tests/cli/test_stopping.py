@@ -18,9 +18,8 @@ from cli_files import FLEXCAL, snapshot
 from refusals import assert_refusal
 from waiting import PATIENCE, until
 
-from flexcal.cli.folders.ledger import LEDGER
 from flexcal.cli.terminal.stop_signals import StopSignal
-from flexcal.files.transaction.staging_folder import PREFIX
+from flexcal.files.transaction import LEDGER, left_over
 
 PLAN = ("--random", "--count", "3")
 AT_WORK = """
@@ -95,7 +94,7 @@ def test_a_signal_changes_nothing(folder: Path, number: int, status: int, said: 
     out, err = process.communicate(timeout=PATIENCE)
     assert (process.returncode, out) == (status, "results\n")
     assert err.startswith(f"flexcal: {said}") and err.count("\n") == 1
-    assert not (folder / "out").exists() and not list(folder.glob(PREFIX + "*"))
+    assert not (folder / "out").exists() and not left_over(folder)
 
 
 def test_ctrl_c_while_the_program_loads_ends_it_quietly() -> None:
@@ -131,7 +130,7 @@ def test_killed_and_run_again(folder: Path) -> None:
     assert_refusal(second.stderr, "E-CLI-012", "'flexcal repeatability'", f"process {process.pid}")
     process.kill()
     process.communicate()
-    assert [path.name.startswith(PREFIX) for path in (folder / "out").iterdir()] == [True]
+    assert not os.listdir(folder / "out") and len(left_over(folder)) == 1
     again = subprocess.run(
         [sys.executable, "-c", AT_WORK.replace("sleep(1000)", "sleep(0)")],
         capture_output=True,
@@ -265,7 +264,7 @@ def test_what_is_no_regular_file(folder: Path, kind: str) -> None:
     assert done.returncode == 2 and done.stderr.count("\n") == 1
     assert_refusal(done.stderr, "E-CLI-010" if kind == "folder" else "E-FILE-013", named)
     assert os.path.lexists(out) == (kind != "device") and target.exists() == (kind == "link")
-    assert not list(folder.glob(PREFIX + "*"))
+    assert not left_over(folder)
 
 
 @pytest.mark.parametrize("kind", ["link", "pipe"])

@@ -1,4 +1,4 @@
-"""Worker processes do not outlive the process that asked them, nor scratch files the next run."""
+"""Worker processes do not outlive the process that asked them."""
 
 from __future__ import annotations
 
@@ -53,14 +53,3 @@ def alive(process: int) -> bool:
     except FileNotFoundError:
         return False
     return state != "Z"
-
-
-def test_scratch_files_of_a_killed_run_go_with_the_next(tmp_path: Path) -> None:
-    program = "from flexcal.jobs.logs.scratch import scratch_folder\nimport os, signal, sys\n"
-    program += "with scratch_folder() as folder:\n (folder / 'log').touch()\n sys.argv[1] and os.kill(os.getpid(), signal.SIGKILL)\n"
-    (tmp_path / "flexcal_scratch_notes").mkdir()
-    environment = os.environ | {"TMPDIR": str(tmp_path)}
-    for killed, left in (("yes", 2), ("yes", 2), ("", 1)):
-        subprocess.run([sys.executable, "-c", program, killed], env=environment, check=False)
-        assert len(os.listdir(tmp_path)) == left
-    assert os.listdir(tmp_path) == ["flexcal_scratch_notes"]

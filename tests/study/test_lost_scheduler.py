@@ -58,8 +58,6 @@ def free_port() -> int:
 def test_a_study_goes_on_when_the_scheduler_is_back(
     recount: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("flexcal.jobs.study.store._EVERY", 0.0)
-    monkeypatch.setattr("flexcal.jobs.study.store._SHARE", 0.0)
     monkeypatch.setattr("flexcal.parallel.dask_cluster._RECOUNT", recount)
     port = free_port()
     plan, out = read_study(write_study(tmp_path)), tmp_path / "out"
@@ -75,7 +73,7 @@ def test_a_study_goes_on_when_the_scheduler_is_back(
             open_workers(f"dask://127.0.0.1:{port}", 1) as workers,
         ):
             run_study(plan, out, workers, progress=kill_at_the_second)
-        assert 2 <= len(list((out / "parts").glob("*.parquet"))) < 4
+        assert 2 <= len((out / "tasks.jsonl").read_text().splitlines()) < 4
         cluster = Cluster(port)
         with open_workers(f"dask://127.0.0.1:{port}", 1) as workers:
             run_study(plan, out, workers, resume=True)

@@ -11,15 +11,15 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
-import polars
 import pytest
 from polars.testing import assert_frame_equal
 from refusals import assert_refusal, refused
 from small_study import UR5, stored, write_study
 
 from flexcal.cli.main import main
-from flexcal.jobs.study import read_study, run_study
+from flexcal.jobs.study import read_study, run_study, store
 from flexcal.jobs.study.tasks import run_row
 from flexcal.parallel import ThisProcess, open_workers
 
@@ -67,7 +67,7 @@ def test_a_row_a_task_and_a_page(whole: Path) -> None:
     assert document["coverage"]["parameters"][name]["inside"] == held.sum()
     page = (whole / "report.html").read_text()
     assert "Coverage of the 95 % intervals" in page and "What drives the error" in page
-    assert not (whole / "parts").exists()
+    assert not (whole / "tasks.jsonl").exists()
 
 
 def test_a_task_that_fails_is_a_row(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -98,34 +98,34 @@ def test_ctrl_c_says_how_to_go_on(
     assert "--resume" in capsys.readouterr().out
 
 
-KILLED_AT_THE_THIRD_PART = """
+KILLED_AT_THE_THIRD_ROW = """
 import os, signal, sys
 import flexcal.jobs.study.store as store
 from flexcal.cli.main import main
 
-parts, write_part = iter(range(4)), store.write_part
+rows, append_rows = iter(range(4)), store.append_rows
 
-def write(*given):
-    if next(parts) == 2:
+def append(*given, **options):
+    if next(rows) == 2:
         os.kill(os.getpid(), signal.SIGKILL)
-    write_part(*given)
+    append_rows(*given, **options)
 
-store.write_part = write
-store._EVERY = store._SHARE = 0.0
+store.append_rows = append
 sys.exit(main(sys.argv[1:]))
 """
-"""A study that stores every row at once."""
 
 
 def test_a_killed_study_goes_on_where_it_stopped(whole: Path, tmp_path: Path) -> None:
     study = write_study(tmp_path)
     arguments = ["study", str(study), "--out", str(tmp_path / "out"), "--jobs", "1"]
-    killed = subprocess.run([sys.executable, "-c", KILLED_AT_THE_THIRD_PART, *arguments], check=False)
+    killed = subprocess.run([sys.executable, "-c", KILLED_AT_THE_THIRD_ROW, *arguments], check=False)
     assert killed.returncode == -signal.SIGKILL
-    parts = list((tmp_path / "out" / "parts").glob("*.parquet"))
-    assert len(parts) == 2 and not (tmp_path / "out" / "report.html").exists()
+    rows = (tmp_path / "out" / "tasks.jsonl").read_text().splitlines()
+    assert len(rows) == 2 and not (tmp_path / "out" / "report.html").exists()
     assert main(["report", str(tmp_path / "out")]) == 0  # of what there is
     assert "the study is not complete" in (tmp_path / "out" / "report.html").read_text()
+    with (tmp_path / "out" / "tasks.jsonl").open("a") as stream:
+        stream.write(rows[0][:100])  # torn
     assert counted(tmp_path / "out", study, resume=True) == 2
     assert_frame_equal(stored(tmp_path / "out"), stored(whole), check_exact=True)
 
@@ -144,23 +144,21 @@ def counted(folder: Path, study: Path, *, resume: bool) -> int:
 
 
 @pytest.mark.parametrize("damage", ["cut", "other", "empty"])
-def test_a_damaged_part_is_named_and_its_tasks_run_again(
+def test_a_damaged_row_is_named_and_its_task_runs_again(
     damage: str, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    study = interrupted(tmp_path, monkeypatch, after=3)
-    part = sorted((tmp_path / "out" / "parts").glob("*.parquet"))[1]
-    content = part.read_bytes()
-    part.write_bytes({"cut": content[: len(content) // 2], "other": b"x" * 100, "empty": b""}[damage])
+    study, rows = interrupted(tmp_path, after=3), tmp_path / "out" / "tasks.jsonl"
+    first, second, third = rows.read_text().splitlines()
+    second = {"cut": second[: len(second) // 2], "other": "x" * 100, "empty": ""}[damage]
+    rows.write_text(f"{first}\n{second}\n{third}\n")
     document = run_study(read_study(study), tmp_path / "out", ThisProcess(), resume=True)
-    assert len(document["remarks"]) == 1 and str(part) in document["remarks"][0]
+    assert len(document["remarks"]) == 1 and str(rows) in document["remarks"][0]
     assert_frame_equal(stored(tmp_path / "out"), stored(whole), check_exact=True)
 
 
-def interrupted(folder: Path, monkeypatch: pytest.MonkeyPatch, after: int) -> Path:
-    """A study that Ctrl-C ends after so many tasks, with a part for each."""
+def interrupted(folder: Path, after: int) -> Path:
+    """A study that Ctrl-C ends after so many tasks."""
     study = write_study(folder)
-    monkeypatch.setattr("flexcal.jobs.study.store._EVERY", 0.0)
-    monkeypatch.setattr("flexcal.jobs.study.store._SHARE", 0.0)
     calls = iter(range(100))
 
     def stop(stage: str, share: float) -> None:
@@ -175,16 +173,14 @@ def interrupted(folder: Path, monkeypatch: pytest.MonkeyPatch, after: int) -> Pa
 def test_a_full_disk_loses_nothing_that_was_stored(
     whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    write, calls = polars.DataFrame.write_parquet, iter(range(100))
+    append, calls = store.append_rows, iter(range(100))
 
-    def full(frame: polars.DataFrame, *given: object, **options: object) -> None:
+    def full(*given: Any, **options: Any) -> None:
         if next(calls) == 2:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        write(frame, *given, **options)  # type: ignore[arg-type]
+        append(*given, **options)
 
-    monkeypatch.setattr("flexcal.jobs.study.store._EVERY", 0.0)
-    monkeypatch.setattr("flexcal.jobs.study.store._SHARE", 0.0)
-    monkeypatch.setattr(polars.DataFrame, "write_parquet", full)
+    monkeypatch.setattr("flexcal.jobs.study.store.append_rows", full)
     study = write_study(tmp_path)
     with refused("E-STUDY-017", "No space left on device", "2", "4", "--resume"):
         run_study(read_study(study), tmp_path / "out", ThisProcess())
@@ -195,7 +191,7 @@ def test_a_full_disk_loses_nothing_that_was_stored(
 def test_a_study_goes_on_with_further_rows_only(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    study, out = interrupted(tmp_path, monkeypatch, after=2), tmp_path / "out"
+    study, out = interrupted(tmp_path, after=2), tmp_path / "out"
     with refused("E-STUDY-019", "--resume"):
         run_study(read_study(study), out, ThisProcess())
     write_study(tmp_path, options={"verification_poses": 11})

@@ -12,6 +12,7 @@ import sys
 import textwrap
 from collections.abc import Sequence
 from contextlib import redirect_stderr, suppress
+from pathlib import Path
 
 from flexcal.cli.arguments.invocation import record_command_line
 from flexcal.cli.arguments.verb_table import Verb, command_class, find_verb, overview, unknown_verb
@@ -124,7 +125,7 @@ def _carry_out(verb: Verb, arguments: list[str]) -> int:
 
     from flexcal.cli.arguments.parse_errors import parse_error, refuse_unknown_options
     from flexcal.cli.arguments.verb_options import check_ranges
-    from flexcal.cli.folders.overwrite_protection import complete_interrupted_runs, outputs
+    from flexcal.cli.folders.overwrite_protection import outputs
 
     _keep_freed_memory()
     command = command_class(verb)
@@ -147,7 +148,8 @@ def _carry_out(verb: Verb, arguments: list[str]) -> int:
     if verb.interactive:
         parsed.run()
         return 0
-    complete_interrupted_runs(parsed)
+    if any(isinstance(value, Path) and not value.is_absolute() for value in vars(parsed).values()):
+        os.getcwd()  # raises where it has been removed
     leaves = getattr(parsed, "leaves", verb.leaves)
     with outputs(verb.name, parsed.out, leaves, page=verb.page, beside=verb.beside):
         refusal = parsed.run()

@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from flexcal.cli.folders.ledger import Ledger
 from flexcal.errors import FlexcalError, InputError
-from flexcal.files.formats import sha256_of
+from flexcal.files.transaction import Ledger, digest_on_disk
 
 _OF_OTHER_CONTENT = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError)
 """What showing a document raises whose keys and values are of other kinds than flexcal writes."""
@@ -42,5 +41,5 @@ def _changed(folder: Path) -> Iterator[Path]:
         yield folder
     for name, digest in written.items():
         path = folder / name
-        if path.is_file() and sha256_of(path) != digest:
+        if path.is_file() and digest_on_disk(path) != digest:
             yield path

@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import glob
-import hashlib
 import os
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
 
-from flexcal.cli.folders.ledger import LEDGER, Ledger
+from flexcal.cli.terminal.escaping import sentence
 from flexcal.data.plans import page_beside
 from flexcal.errors import InputError, unreadable
 from flexcal.files.transaction import (
+    LEDGER,
     FileTransaction,
-    Stage,
-    age,
-    living_owner,
-    recover,
+    Ledger,
+    Record,
+    digest_on_disk,
+    left_over,
+    locked,
     refuse_irregular,
-    stages_in,
+    refuse_linked_folder,
+    refuse_mixture,
+    sole_holder,
 )
 
 _ALL = "**"
@@ -57,14 +60,19 @@ def outputs(
     folder = out if names else out.parent
     own = [glob.escape(path.name) for path in (out, *([page_beside(out)] if page else []))]
     patterns = names or [*own, *(glob.escape(out.stem) + ending for ending in beside)]
-    if folder.is_dir():
-        recover(folder)
     place = _Place(verb, folder, patterns, whole_folder=bool(names))
-    place.own_files()
-    with FileTransaction() as run:
-        place.refuse_others(place.stage(run))
-        yield
-        run.publish(lambda: place.enter(run))
+    with sole_holder(out, "run", f"'flexcal {verb}' (process {os.getpid()})") as other:
+        if other is not None:
+            raise InputError(
+                "E-CLI-012", f"{other} is writing {out} just now; wait for its end, or give another --out."
+            )
+        place.own_files()
+        place.name_left_overs()
+        with FileTransaction(folder) as run:
+            place.reserve(run)
+            yield
+            with locked(folder / LEDGER):
+                run.publish(place.record(run))
 
 
 class _Place:
@@ -74,10 +82,10 @@ class _Place:
         self.verb, self.folder, self.patterns = verb, folder, tuple(patterns)
         self.kind = "a folder" if whole_folder else "a file"
 
-    def stage(self, run: FileTransaction) -> Stage:
-        """Stage of the run; raises `InputError` if the folder cannot be made or written to."""
+    def reserve(self, run: FileTransaction) -> None:
+        """Raise `InputError` if the folder cannot be made or written to."""
         try:
-            return run.stage(self.folder, f"flexcal {self.verb}", self.patterns)
+            run.reserve(self.folder)
         except OSError as problem:
             reason = problem.strerror or str(problem)
             if isinstance(problem, FileExistsError | NotADirectoryError):
@@ -86,25 +94,28 @@ class _Place:
                 "E-CLI-011", f"{self.folder} cannot be written to ({reason}); choose another --out."
             ) from problem
 
-    def refuse_others(self, own: Stage) -> None:
-        """Raise `InputError` where another run is at work on some of the same files."""
-        for stage in stages_in(own.folder):
-            owner = living_owner(stage) if age(stage) < age(own.path) else None
-            if owner is not None and self._overlap(owner.names):
-                raise InputError(
-                    "E-CLI-012",
-                    f"'{owner.verb}' (process {owner.process}) is writing into {self.folder} just now; wait for its end, or give another "
-                    f"--out; or, where no such process runs, remove {stage}.",
-                )
+    def name_left_overs(self) -> None:
+        """Say on standard error what runs that were cut off have left here: only a person removes it."""
+        left = [place / name for place in (self.folder, self.folder.parent) for name in left_over(place)]
+        if left:
+            more = f" and {len(left) - 1} more" if len(left) > 1 else ""
+            print(
+                f"note: {sentence(str(left[0]))}{more}: left by a run that was cut off, or of one that is at work; may be removed when no "
+                "flexcal is",
+                file=sys.stderr,
+            )
 
-    def own_files(self) -> dict[Path, str]:
-        """Files there that this verb may write over, with their SHA-256; raises `InputError` for the first that it may not."""
-        known = Ledger.read(self.folder).entries if self.folder.is_dir() else {}
-        digests: dict[Path, str] = {}
-        for path in self._present():
+    def own_files(self) -> list[Path]:
+        """Files there that this verb may write over; raises `InputError` for the first that it may not."""
+        ledger = Ledger.read(self.folder) if self.folder.is_dir() else Ledger({})
+        if ledger.change and ledger.verb != self.verb:
+            refuse_mixture(self.folder)
+        present = self._present()
+        for path in present:
+            refuse_linked_folder(path, self.folder)
             refuse_irregular(path)
-            digest, writer = known.get(self._name(path), ("", ""))
-            if digest != _digest_on_disk(path):
+            writer = ledger.written_by(self._name(path), _digest(path))
+            if writer is None:
                 raise InputError(
                     "E-CLI-013",
                     f"{path} was not written by flexcal, or has been changed since, and such a file is never changed; "
@@ -116,23 +127,25 @@ class _Place:
                     f"{path} was written by 'flexcal {writer}', which another verb does not write over; "
                     f"give 'flexcal {self.verb}' {self.kind} of its own with --out.",
                 )
-            digests[path] = digest
-        return digests
+        return present
 
-    def enter(self, run: FileTransaction) -> None:
-        """Add to the files of a run the ledger with them, and remove those of an earlier one that it did not write again."""
+    def record(self, run: FileTransaction) -> Record | None:
+        """The ledger while the files of a run are put in place, and afterwards; those of an earlier run that it did not write again go."""
         home = Path(os.path.realpath(self.folder))
         written = {place: file for place, file in run.files.items() if self._is_mine(place, home)}
-        for path in self.own_files():
-            if home / self._name(path) not in written:
-                run.remove(path)
-        if written:
-            digests = {
-                place.relative_to(home).as_posix(): _digest_on_disk(file) for place, file in written.items()
-            }
-            ledger = run.temporary(self.folder / LEDGER)
-            ledger.write_bytes(Ledger.read(self.folder).with_files(self.verb, digests).content())
-            run.put(self.folder / LEDGER, ledger)
+        digests = {place.relative_to(home).as_posix(): _digest(file) for place, file in written.items()}
+        gone = [path for path in self.own_files() if self._name(path) not in digests]
+        for path in gone:
+            run.remove(path)
+        if not written:
+            return None
+        ledger = Ledger.read(self.folder).settled(self.folder)
+        change = digests | {self._name(path): "" for path in gone}
+        return Record(
+            home / LEDGER,
+            ledger.changing(self.verb, change).content(),
+            ledger.with_files(self.verb, change).content(),
+        )
 
     def _present(self) -> list[Path]:
         if _ALL in self.patterns:
@@ -158,26 +171,9 @@ class _Place:
             return not any(part.startswith(".") for part in name.split("/"))
         return any(fnmatchcase(name, pattern) for pattern in self.patterns)
 
-    def _overlap(self, others: Sequence[str]) -> bool:
-        return any(fnmatchcase(one, two) or fnmatchcase(two, one) for one in self.patterns for two in others)
 
-
-def _digest_on_disk(path: Path) -> str:
+def _digest(path: Path) -> str:
     try:
-        with path.open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
+        return digest_on_disk(path)
     except OSError as problem:
         raise unreadable(path, problem, "give another --out") from problem
-
-
-def complete_interrupted_runs(parsed: Any) -> None:
-    """Finish what a run that was cut off has left in the folders of all paths among the arguments, so that files of one run are read there.
-
-    Raises `InputError` where that is not possible.
-    """
-    given = [
-        item for value in vars(parsed).values() for item in (value if isinstance(value, tuple) else (value,))
-    ]
-    paths = [item for item in given if isinstance(item, Path)]
-    for folder in {path if path.is_dir() else path.parent for path in paths}:
-        recover(folder)

@@ -27,7 +27,7 @@ class Study:
 
     study: Annotated[Positional[Path], arg(metavar="STUDY", help="STUDY.yaml: robot, kind of task, options")]
     out: Annotated[Path, arg(metavar="DIR")] = Path("study")
-    """Folder for tasks.parquet, results.json and report.html, and, while the study runs, parts."""
+    """Folder for tasks.parquet, results.json and report.html, and, while the study runs, tasks.jsonl."""
     on: Annotated[MaybeText, arg(metavar="ADDRESS", help_behavior_hint="(default: this machine)")] = None
     """Dask scheduler, dask://host:port or tls://host:port. Its workers need the same flexcal, and run whatever they are sent: use only a
     cluster of your own."""

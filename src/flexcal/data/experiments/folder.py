@@ -60,7 +60,6 @@ def write_recordings(
     there.
     """
     folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
     left = set(labels(plan))
     for recording in recordings:
         if recording.label is None or recording.label not in left:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal, get_args
@@ -22,11 +22,21 @@ from flexcal.estimation import Dropped, Estimate, Misfit, Parameter, Parameters
 from flexcal.files.formats.npz_reader import ArrayForm, NpzFile, refuse_foreign
 from flexcal.files.formats.yaml_reader import YamlFile, read_yaml_file
 from flexcal.files.formats.yaml_writer import to_plain, yaml_text
-from flexcal.files.transaction import atomic_paths, current_path, open_regular, recover, refuse_irregular
+from flexcal.files.transaction import (
+    FileTransaction,
+    current_path,
+    files_on_disk,
+    open_regular,
+    refuse_irregular,
+)
 
 Block = Literal["dynamics", "stiffness", "calibration", "payload", "actuators"]
 BLOCKS: tuple[Block, ...] = get_args(Block)
 """Blocks of the file, in the order of their application to a robot."""
+_BEFORE = "before"
+"""Part of the names of arrays that belong to the block as it was before it was written last."""
+Matrices = dict[Block, tuple[tuple[str, ...], np.ndarray]]
+"""Names and covariance of blocks."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +128,6 @@ def read_estimates(path: str | Path, *, without: Block | None = None) -> dict[Bl
     Raises `InputError` with file and line where the YAML does not fit, and where the npz is missing, has other names
     or shapes, or belongs to another YAML.
     """
-    recover(Path(path).parent)
     file = read_yaml_file(path)
     stored = file.structure(StoredEstimates)
     estimates: dict[Block, Estimate] = {}
@@ -132,7 +141,8 @@ def read_estimates(path: str | Path, *, without: Block | None = None) -> dict[Bl
 def write_estimates(path: str | Path, block: Block, estimate: Estimate) -> None:
     """Put an estimate into its block of the file, made where it is not there; the other blocks stay as they are.
 
-    The two files appear whole and together; the YAML carries the SHA-256 of its covariance.
+    No other run writes the file from its reading to the end of the running transaction. The npz file takes its place first, and has beside
+    each new covariance that of the YAML file which is there still: wherever the process is killed, the YAML finds the one of its SHA-256.
     Raises `InputError` where another block of the file cannot be read, and where the npz is of another program, and `FlexcalError` where
     the estimate holds a number that is not finite.
     """
@@ -141,31 +151,33 @@ def write_estimates(path: str | Path, block: Block, estimate: Estimate) -> None:
         raise FlexcalError(
             "E-EST-004", f"there is no block '{block}' in an estimates file; there are {', '.join(BLOCKS)}."
         )
-    stored, arrays = _kept(path, block)
-    covariance = np.asarray(estimate.covariance, dtype=np.float64)
-    size = len(estimate.parameters)
-    if covariance.shape != (size, size) or not np.isfinite(covariance).all():
-        raise FlexcalError(
-            "E-EST-005",
-            f"the covariance of the {block} must be finite and ({size}, {size}), not {covariance.shape}.",
-        )
-    arrays[block] = (estimate.parameters.names, covariance)
-    stored = replace(stored, **{block: _stored(estimate, covariance)})
-    text = yaml_text(stored)
-    named: dict[str, np.ndarray] = {}
-    for name in BLOCKS:
-        if name in arrays:
-            named[f"{name}.names"] = np.array(arrays[name][0], dtype=str)
-            named[f"{name}.covariance"] = arrays[name][1]
-    with atomic_paths(path.with_suffix(".npz"), path) as (binary, plain):
-        with binary.open("wb") as stream:
-            np.savez(stream, allow_pickle=False, **named)
-        plain.write_text(text, encoding="utf-8", newline="")
+    with FileTransaction.joined() as run:
+        binary = path.with_suffix(".npz")
+        run.hold(path)
+        run.hold(binary)
+        stored, arrays = _kept(path, block)
+        covariance = np.asarray(estimate.covariance, dtype=np.float64)
+        size = len(estimate.parameters)
+        if covariance.shape != (size, size) or not np.isfinite(covariance).all():
+            raise FlexcalError(
+                "E-EST-005",
+                f"the covariance of the {block} must be finite and ({size}, {size}), not {covariance.shape}.",
+            )
+        arrays[block] = (estimate.parameters.names, covariance)
+        stored = replace(stored, **{block: _stored(estimate, covariance)})
+        replaced = _replaced(path, arrays)
+        named: dict[str, np.ndarray] = {}
+        for name in BLOCKS:
+            for prefix, kept in ((name, arrays), (f"{name}.{_BEFORE}", replaced)):
+                named |= _members(prefix, *kept[name]) if name in kept else {}
+        with run.writing(binary, path) as (matrices, plain):
+            with matrices.open("wb") as stream:
+                np.savez(stream, allow_pickle=False, **named)
+            plain.write_text(yaml_text(stored), encoding="utf-8", newline="")
 
 
 def require_place(path: str | Path, block: Block) -> None:
     """Raise `InputError` if `write_estimates` could not put a block into this file, before the work begins."""
-    recover(Path(path).parent)
     for file in (Path(path), Path(path).with_suffix(".npz")):
         refuse_irregular(file)
     _kept(Path(path), block)
@@ -222,9 +234,7 @@ def block_sha256(path: str | Path, block: Block) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def _kept(
-    path: Path, block: Block
-) -> tuple[StoredEstimates, dict[Block, tuple[tuple[str, ...], np.ndarray]]]:
+def _kept(path: Path, block: Block) -> tuple[StoredEstimates, Matrices]:
     """Content to be kept when `block` is written: the file's content, and names and covariance of the other blocks."""
     if path.suffix not in (".yaml", ".yml"):
         raise InputError(
@@ -232,8 +242,8 @@ def _kept(
             f"{path}: estimates are written to a .yaml file (with an .npz beside it); give such a name.",
         )
     stored, arrays = StoredEstimates(), {}
-    ours = {f"{name}.{part}" for name in BLOCKS for part in ("names", "covariance")}
-    refuse_foreign(path.with_suffix(".npz"), ours)
+    prefixes = [f"{name}{before}" for name in BLOCKS for before in ("", f".{_BEFORE}")]
+    refuse_foreign(path.with_suffix(".npz"), {f"{one}.{part}" for one in prefixes for part in _PARTS})
     if current_path(path).exists():
         file = read_yaml_file(path)
         stored = file.structure(StoredEstimates)
@@ -244,6 +254,46 @@ def _kept(
     return stored, arrays
 
 
+_PARTS = ("names", "covariance")
+
+
+def _members(prefix: str, names: tuple[str, ...], covariance: np.ndarray) -> dict[str, np.ndarray]:
+    return dict(
+        zip((f"{prefix}.{part}" for part in _PARTS), (np.array(names, dtype=str), covariance), strict=True)
+    )
+
+
+def _replaced(path: Path, arrays: Matrices) -> Matrices:
+    """What is replaced: of blocks that change, the covariance that the YAML file on the disk has; of others, what was replaced before."""
+    replaced: Matrices = {}
+    try:
+        with files_on_disk():
+            stored = read_yaml_file(path).structure(StoredEstimates)
+            file = NpzFile(path.with_suffix(".npz"), "")
+            for name, (_, covariance) in arrays.items():
+                found = {_sha256(one): (names, one) for names, one in _versions(file, name)}
+                block = stored.block(name)
+                kept = found.pop(block.covariance_sha256 or "", None) if block is not None else None
+                if kept is not None and not np.array_equal(kept[1], covariance):
+                    replaced[name] = kept
+                elif found:
+                    replaced[name] = next(iter(found.values()))
+    except InputError:  # there are none yet, or none that can be read
+        return replaced
+    return replaced
+
+
+def _versions(file: NpzFile, name: Block) -> Iterator[tuple[tuple[str, ...], np.ndarray]]:
+    """Names and covariances of a block, the present one first."""
+    for prefix in (name, f"{name}.{_BEFORE}"):
+        names, covariance = (f"{prefix}.{part}" for part in _PARTS)
+        if names in file and covariance in file:
+            size = f"names of {prefix}"
+            forms = {names: ArrayForm("text", (size,)), covariance: ArrayForm("real", (size, size))}
+            read = file.read(forms)
+            yield tuple(read[names].tolist()), read[covariance]
+
+
 def _covariance(file: YamlFile, name: Block, block: StoredBlock) -> np.ndarray:
     """The covariance (p, p) of a block, checked against the YAML."""
     path = file.path.with_suffix(".npz")
@@ -252,31 +302,27 @@ def _covariance(file: YamlFile, name: Block, block: StoredBlock) -> np.ndarray:
         raise file.error(
             "E-EST-008", (name,), f"the block '{name}' has values only, so it is no estimate; {again}."
         )
-    forms = {
-        f"{name}.names": ArrayForm("text", ("names",)),
-        f"{name}.covariance": ArrayForm("real", ("names", "names")),
-    }
-    stored = NpzFile(path, f"it belongs to {file.path.name}: {again}")
-    if f"{name}.names" not in stored or f"{name}.covariance" not in stored:
+    versions = list(_versions(NpzFile(path, f"it belongs to {file.path.name}: {again}"), name))
+    if not versions:
         raise InputError(
             "E-EST-009", f"{path}: the names and covariance of the block '{name}' are missing; {again}."
         )
-    names, covariance = stored.read(forms).values()
     size = len(block.values)
+    for names, covariance in versions:
+        fits = covariance.shape == (size, size) and list(names) == list(block.values)
+        if fits and covariance.dtype == np.float64 and _sha256(covariance) == block.covariance_sha256:
+            return covariance
+    names, covariance = versions[0]
     if covariance.shape != (size, size):
         raise InputError(
             "E-EST-010",
             f"{path}: {name}.covariance has the shape {covariance.shape}, not ({size}, {size}); {again}.",
         )
-    if names.tolist() != list(block.values):
+    if list(names) != list(block.values):
         raise InputError(
             "E-EST-011", f"{path}: {name}.names are not the values of {file.path.name}; {again}."
         )
-    if covariance.dtype != np.float64 or _sha256(covariance) != block.covariance_sha256:
-        raise InputError(
-            "E-EST-012", f"{path}: {name}.covariance does not belong to {file.path.name}; {again}."
-        )
-    return covariance
+    raise InputError("E-EST-012", f"{path}: {name}.covariance does not belong to {file.path.name}; {again}.")
 
 
 def _estimate(file: YamlFile, name: Block, block: StoredBlock, covariance: np.ndarray) -> Estimate:

@@ -1,4 +1,4 @@
-"""Files of one run that are put in place together or not at all, with recovery after interruption."""
+"""Files of one run: written whole and put in place together; read where they are regular and of bounded size."""
 
 import lazy_loader
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import stat
 from pathlib import Path
 
@@ -42,4 +43,17 @@ def refuse_stream(path: Path) -> None:
         if holds(mode):
             raise InputError(
                 "E-FILE-014", f"{path} is {kind}, not a file; write its content to a file, and name that."
+            )
+
+
+def refuse_linked_folder(path: Path, root: Path) -> None:
+    """Raise `InputError` where a folder between `root`, which the user has named, and a file below it is a link."""
+    top, folder = Path(os.path.abspath(root)), Path(os.path.abspath(path)).parent
+    for between in (folder, *folder.parents) if top in folder.parents else ():
+        if between == top:
+            return
+        if between.is_symlink():
+            raise InputError(
+                "E-FILE-024",
+                f"{between} is a link, behind which nothing is written; replace it by a folder, or give another name.",
             )

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from flexcal.errors import InputError
 from flexcal.files.transaction.file_kinds import refuse_stream
-from flexcal.files.transaction.publication import current_path
+from flexcal.files.transaction.file_transaction import current_path
 
 MEGABYTE = 10**6
 _LEAST_UNPACKED, _MOST_PACKED = 120 * MEGABYTE, 100

@@ -34,8 +34,8 @@ def identify_robot_actuators(
     folder. Raises `FlexcalError` as `identify_actuators` and reading do; nothing is written then.
     """
     nominal = RobotModel.from_yaml(robot_file, estimates=False)
-    source = nominal.path.parent / nominal.config.estimates
-    target = estimates_target(source, out, "actuators")
+    source = nominal.estimates_file
+    target = estimates_target(nominal, out, "actuators")
     require_distinct_files(logs)
     blocks = read_estimates(source, without="actuators") if source.exists() else {}
     model = with_blocks(nominal, blocks, source)

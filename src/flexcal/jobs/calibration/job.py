@@ -50,9 +50,9 @@ def calibrate_robot(
     files = tables_of(files)
     require_distinct_files(files)
     bare = RobotModel.from_yaml(robot_file, estimates=False)
-    source = bare.path.parent / bare.config.estimates
+    source = bare.estimates_file
     blocks = read_estimates(source, without="calibration") if source.exists() else {}
-    target = estimates_target(source, out, "calibration")
+    target = estimates_target(bare, out, "calibration")
     model = with_blocks(bare, blocks, source)
     labels = None
     if hold_out is None:

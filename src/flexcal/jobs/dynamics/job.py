@@ -42,9 +42,9 @@ def identify_robot_dynamics(
     and where the place of a file is taken; nothing is written then.
     """
     bare = RobotModel.from_yaml(robot_file, estimates=False)
-    source = bare.path.parent / bare.config.estimates
+    source = bare.estimates_file
     blocks = read_estimates(source, without="dynamics") if source.exists() else {}
-    target = estimates_target(source, out, "dynamics")
+    target = estimates_target(bare, out, "dynamics")
     if learn_residual:
         from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
 

@@ -52,7 +52,7 @@ def _copy(address: str, target: Path) -> None:
         files = system.find(root, detail=True)
         for name, about in files.items():
             part = Path(os.path.relpath(name, root))
-            if not _is_wanted(part):
+            if not _is_wanted(part) or ".." in part.parts or part.is_absolute():
                 continue
             file = target / part
             file.parent.mkdir(parents=True, exist_ok=True)

@@ -36,7 +36,7 @@ class Member:
     def read(cls, name: str, robot_file: Path, estimates: Path | None = None) -> dict[Block, Member]:
         """The robot of a robot.yaml, by the blocks that an estimates file, by default its own, has of those that can be pooled."""
         model = RobotModel.from_yaml(robot_file, estimates=False)
-        source = estimates or model.path.parent / model.config.estimates
+        source = estimates or model.estimates_file
         blocks = read_estimates(source) if source.exists() else {}
         return {block: cls(name, model, blocks[block], source, block) for block in POOLED if block in blocks}
 

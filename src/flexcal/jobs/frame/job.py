@@ -35,6 +35,5 @@ def identify_frame(
     found = identify_work_object(model, given, point=point, name=name, tip_radius=tip_radius)
     found = replace(found, record=RunRecord(provenance([robot_file, model.urdf, *files]), command))
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
         write_results(out, found.document())
     return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 import json
 from collections.abc import Mapping, Sequence
@@ -14,9 +15,11 @@ from typing import Any
 from flexcal.data.poses import EXCLUDED
 from flexcal.errors import InputError, unreadable
 from flexcal.files.formats import parse_json
-from flexcal.files.transaction import atomic_paths, read_text
+from flexcal.files.transaction import append_lines, read_text, whole_lines, write_text
 
 ROWS, STATION = "poses.csv", "station"
+_DONE = '{"do": "done"}'
+"""Line of the journal after a change of the table."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +42,8 @@ class Source:
 class MeasuredRows:
     """A table of a project, as poses.csv, and its journal, as poses.history.jsonl, in a `folder`.
 
-    Both are written together, all or nothing: when the process is killed, one change at most is lost. The texts of cells are kept as they
-    are. A row that an undo takes out of the table stays in the journal.
+    A change is appended to the journal, and then made in the table; when the process is killed between, it does not count. The texts of
+    cells are kept as they are. A row that an undo takes out of the table stays in the journal.
     """
 
     folder: Path
@@ -180,21 +183,42 @@ class MeasuredRows:
         self._write(_Table(table.columns, tuple(rows), table.head), entry)
 
     def _write(self, table: _Table, entry: Mapping[str, Any]) -> None:
-        before = _text(self.history)
-        journal = f"{before.rstrip()}\n".lstrip() + json.dumps(entry, ensure_ascii=False) + "\n"
-        with atomic_paths(self.path, self.history) as (rows, history):
-            rows.write_bytes(table.text().encode())
-            history.write_bytes(journal.encode())
+        stored, line = self._stored(), json.dumps({**entry, "on": self._digest()}, ensure_ascii=False)
+        if self._has_open(stored):
+            kept = (json.dumps(one, ensure_ascii=False) for one in stored[:-1])
+            write_text(self.history, "".join(f"{one}\n" for one in (*kept, line)))
+        else:
+            append_lines(self.history, [line])
+        write_text(self.path, table.text())
+        append_lines(self.history, [_DONE], synchronised=False)
 
     def _entries(self) -> list[dict[str, Any]]:
-        text = _text(self.history)
+        stored = self._stored()
+        return [one for one in (stored[:-1] if self._has_open(stored) else stored) if one["do"] != "done"]
+
+    def _has_open(self, stored: Sequence[Mapping[str, Any]]) -> bool:
+        """Whether the process was killed between the last entry and the change of the table, so that the entry does not count."""
+        return bool(stored) and stored[-1]["do"] != "done" and stored[-1].get("on") == self._digest()
+
+    def _stored(self) -> list[dict[str, Any]]:
         try:
-            return [parse_json(self.history, line, "") for line in text.splitlines() if line.strip()]
-        except InputError as problem:
-            raise InputError(
-                "E-STUDIO-013",
-                f"{self.history} is not the journal of {self.name} ({problem}); move it away, and go on without undo.",
-            ) from problem
+            stored = [
+                parse_json(self.history, line, "") for line in whole_lines(self.history) if line.strip()
+            ]
+            if all(isinstance(one, dict) and isinstance(one.get("do"), str) for one in stored):
+                return stored
+            problem: Exception | str = "a line is no change"
+        except InputError as error:
+            problem = error
+        except OSError as error:
+            raise unreadable(self.history, error) from error
+        raise InputError(
+            "E-STUDIO-013",
+            f"{self.history} is not the journal of {self.name} ({problem}); move it away, and go on without undo.",
+        )
+
+    def _digest(self) -> str:
+        return hashlib.sha256(_text(self.path).encode()).hexdigest()[:16]
 
     def _table(self) -> _Table:
         return _parsed(self.path, _text(self.path))

@@ -26,8 +26,8 @@ def identify_robot_inertials(
     `FlexcalError` as `identify_inertials` does, and where the folder does not hold trajectories of this robot; nothing is written then.
     """
     nominal = RobotModel.from_yaml(robot_file, estimates=False)
-    source = nominal.path.parent / nominal.config.estimates
-    target = estimates_target(source, out, "dynamics")
+    source = nominal.estimates_file
+    target = estimates_target(nominal, out, "dynamics")
     cell = FolderCell(folder, nominal)
     plan = cell.plan
     if not isinstance(plan, TrajectoryPlan):

@@ -183,7 +183,7 @@ def stored_estimates(nominal: RobotModel, estimates: Path | None) -> Path:
     Raises `InputError` where what is named is another kind of file, or a folder without one.
     """
     if estimates is None:
-        return nominal.path.parent / nominal.config.estimates
+        return nominal.estimates_file
     expected = f"--estimates takes the {ESTIMATES} that 'flexcal calibrate' or another identification wrote, or the folder with it"
     if estimates.is_dir():
         if not (estimates / ESTIMATES).is_file():

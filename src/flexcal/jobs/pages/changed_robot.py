@@ -84,7 +84,7 @@ def model_before(file: Path, estimates: Sequence[Estimate]) -> tuple[RobotModel,
     declared = RobotModel.from_yaml(file, estimates=False)
     if any(other != used[0] for other in used[1:]):
         return declared, False
-    stored = declared.path.parent / declared.config.estimates
+    stored = declared.estimates_file
     if not used[0]:
         return declared, True
     if not current_path(stored).exists():

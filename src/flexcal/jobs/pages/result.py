@@ -125,7 +125,6 @@ class WrittenResult(SummarisedResult):
         from flexcal.jobs.pages.report import report_folder
 
         folder = Path(folder)
-        folder.mkdir(parents=True, exist_ok=True)
         write_results(folder, self.document())
         self.write_arrays(folder)
         report_folder(folder)

@@ -49,7 +49,7 @@ def identify_robot_payload(
             "E-RUN-063", f"{source} does not exist; give the estimates.yaml of 'flexcal identify dynamics'."
         )
     blocks = read_estimates(source, without="payload") if source.exists() else {}
-    target = estimates_target(source, out, "payload")
+    target = estimates_target(bare, out, "payload", None if estimates is None else source)
     if "dynamics" not in blocks and not free:
         raise InputError(
             "E-RUN-064",

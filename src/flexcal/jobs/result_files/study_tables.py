@@ -1,8 +1,9 @@
-"""Results of a study on disk: one row a task, in Parquet."""
+"""Results of a study on disk: one row a task, in Parquet, and in JSON lines while the study runs."""
 
 from __future__ import annotations
 
 import errno
+import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,40 +12,53 @@ from typing import TYPE_CHECKING, Any
 
 from flexcal.data.tables import require_decodable
 from flexcal.errors import InputError, unreadable
-from flexcal.files.transaction import atomic_path, current_path, regular_path
+from flexcal.files.formats import parse_json
+from flexcal.files.transaction import (
+    append_lines,
+    atomic_path,
+    current_path,
+    refuse_irregular,
+    regular_path,
+    whole_lines,
+)
 
 if TYPE_CHECKING:
     import polars
 
 TASKS = "tasks.parquet"
 """All rows of a study that has ended."""
-PARTS = "parts"
-"""Folder of the rows of a study that runs, a file for each second or more of it."""
-_PATTERN = "part_*.parquet"
+ROWS = "tasks.jsonl"
+"""Rows of a study that runs, as its tasks end."""
 KEY, NUMBER = "task", "number"
 
 
 @dataclass(frozen=True)
 class StudyRows:
-    """Rows that are stored in a folder, by the number of the task, and the names of files that cannot be read."""
+    """Rows that are stored in a folder, by the number of the task, and what could not be read, in words."""
 
     frame: polars.DataFrame
-    damaged: tuple[Path, ...]
+    damaged: tuple[str, ...]
 
 
 def read_study_rows(folder: Path) -> StudyRows:
-    """Rows of all tables of a study. A part that was cut off or changed is among the `damaged`; there may be none."""
+    """Rows of all tables of a study. Lines and tables that were changed are among the `damaged`; there may be none."""
     import polars
 
     frames, damaged = [], []
-    for path in _tables(folder):
+    if current_path(folder / TASKS).is_file():
         try:
-            require_decodable(path, stream=False)
-            frames.append(polars.read_parquet(regular_path(path, limit=None), memory_map=False))
+            require_decodable(folder / TASKS, stream=False)
+            table = regular_path(folder / TASKS, limit=None)
+            frames.append(polars.read_parquet(table, memory_map=False))
         except (OSError, InputError, polars.exceptions.PolarsError) as problem:
             if isinstance(problem, PermissionError):
-                raise unreadable(path, problem) from problem
-            damaged.append(path)
+                raise unreadable(folder / TASKS, problem) from problem
+            damaged.append(str(folder / TASKS))
+    rows, odd = _read_rows(folder / ROWS)
+    if rows:
+        frames.append(polars.DataFrame(rows, infer_schema_length=None, strict=False))
+    if odd:
+        damaged.append(f"{odd} lines of {folder / ROWS}")
     frames = [frame for frame in frames if KEY in frame.columns and NUMBER in frame.columns]
     if not frames:
         return StudyRows(
@@ -55,45 +69,52 @@ def read_study_rows(folder: Path) -> StudyRows:
     return StudyRows(joined.sort(NUMBER), tuple(damaged))
 
 
-def write_part(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Store rows in a new part; raises `InputError` where that is not possible, and nothing that was stored changes."""
-    import polars
-
-    numbers = [int(path.stem.removeprefix("part_")) for path in (folder / PARTS).glob(_PATTERN)]
-    path = folder / PARTS / f"part_{max(numbers, default=0) + 1:06}.parquet"
-    with atomic_path(path) as temporary:
-        _written(polars.DataFrame(list(rows), infer_schema_length=None), temporary)
+def append_rows(folder: Path, rows: Sequence[Mapping[str, Any]], *, synchronised: bool) -> None:
+    """Store rows; raises `InputError` and `OSError` where that is not possible, and nothing that was stored changes."""
+    lines = (json.dumps(row, default=lambda value: value.item()) for row in rows)
+    append_lines(folder / ROWS, lines, synchronised=synchronised)
 
 
 def write_tasks(folder: Path, frame: polars.DataFrame) -> None:
     """Store all rows as one table, atomically."""
-    with atomic_path(folder / TASKS) as temporary:
-        _written(frame, temporary)
-
-
-def has_parts(folder: Path) -> bool:
-    """Whether a study has stored parts in a folder."""
-    return any((folder / PARTS).glob(_PATTERN))
-
-
-def remove_parts(folder: Path) -> None:
-    """Remove the parts of a study whose rows are all in one table, damaged ones too."""
-    for path in (folder / PARTS).glob(_PATTERN):
-        path.unlink()
-
-
-def _written(frame: polars.DataFrame, path: Path) -> None:
-    """Write a table; a full disk is an `OSError`, whatever Polars makes of it."""
     import polars
 
+    with atomic_path(folder / TASKS) as temporary:
+        try:
+            frame.write_parquet(temporary, compression="zstd")
+        except (
+            polars.exceptions.PolarsError
+        ) as problem:  # a full disk is an `OSError`, whatever Polars makes of it
+            if "os error 28" in str(problem):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)) from problem
+            raise
+
+
+def has_rows(folder: Path) -> bool:
+    """Whether a study has stored rows in a folder."""
+    return (folder / ROWS).is_file()
+
+
+def remove_rows(folder: Path) -> None:
+    """Remove the rows of a study that are all in one table."""
+    refuse_irregular(folder / ROWS)
+    (folder / ROWS).unlink(missing_ok=True)
+
+
+def _read_rows(path: Path) -> tuple[list[dict[str, Any]], int]:
+    """Rows of the whole lines of a file, and the number of lines that are none."""
+    rows, odd = [], 0
     try:
-        frame.write_parquet(path, compression="zstd")
-    except polars.exceptions.PolarsError as problem:
-        if "os error 28" in str(problem):
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)) from problem
-        raise
-
-
-def _tables(folder: Path) -> list[Path]:
-    whole = [folder / TASKS] if current_path(folder / TASKS).is_file() else []
-    return [*whole, *sorted((folder / PARTS).glob(_PATTERN))]
+        for line in whole_lines(path):
+            try:
+                row = parse_json(path, line, "")
+            except InputError:
+                row = None
+            known = (
+                isinstance(row, dict) and isinstance(row.get(KEY), str) and isinstance(row.get(NUMBER), int)
+            )
+            rows += [row] if known else []
+            odd += not known
+    except OSError as problem:
+        raise unreadable(path, problem) from problem
+    return rows, odd

@@ -59,9 +59,9 @@ def identify_robot_stiffness(
     written then.
     """
     bare = RobotModel.from_yaml(robot_file, estimates=False)
-    source = bare.path.parent / bare.config.estimates
+    source = bare.estimates_file
     blocks = read_estimates(source, without="stiffness") if source.exists() else {}
-    target = estimates_target(source, out, "stiffness")
+    target = estimates_target(bare, out, "stiffness")
     model = with_blocks(bare, {block: e for block, e in blocks.items() if block == "dynamics"}, source)
     calibrated = blocks.get("calibration")
     if calibrated is not None:

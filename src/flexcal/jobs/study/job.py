@@ -16,11 +16,11 @@ from flexcal.jobs.result_files import (
     NUMBER,
     RESULTS,
     TASKS,
-    has_parts,
+    has_rows,
     header,
     read_results,
     read_study_rows,
-    remove_parts,
+    remove_rows,
     write_results,
     write_tasks,
 )
@@ -126,7 +126,7 @@ def run_study(
     workers : Workers
         Where the tasks run.
     resume : bool
-        Whether rows that an interrupted study stored in the folder are taken; those of parts that cannot be read run again.
+        Whether rows that an interrupted study stored in the folder are taken; those that cannot be read run again.
     command : str
         The command line, if any.
     progress : Progress
@@ -150,7 +150,7 @@ def run_study(
     origin = {**plan.tasks.origin, "option.kind": plan.config.kind}
     declared = provenance([plan.path])
     with exclusive(folder):
-        there = any((folder / name).is_file() for name in (RESULTS, TASKS)) or has_parts(folder)
+        there = any((folder / name).is_file() for name in (RESULTS, TASKS)) or has_rows(folder)
         if there and not resume:
             raise InputError(
                 "E-STUDY-019",
@@ -161,7 +161,7 @@ def run_study(
         stored = read_study_rows(folder)
         known = set(stored.frame[KEY].to_list())
         _require_rows(plan, folder, known)
-        remarks = tuple(f"{path} could not be read; its tasks ran again" for path in stored.damaged)
+        remarks = tuple(f"{what} could not be read; its tasks ran again" for what in stored.damaged)
         run = StudyRun(plan, folder, command, remarks, {**declared, **origin})
         if not there:
             with publishing():
@@ -170,7 +170,7 @@ def run_study(
         _carry_out(plan, waiting, workers, StudyStore(folder, len(known), len(plan.rows)), progress)
         with publishing():
             document = run.finish()
-        remove_parts(folder)
+        remove_rows(folder)
     return document
 
 
@@ -183,13 +183,10 @@ def _carry_out(
 ) -> None:
     total, done = len(plan.rows), len(plan.rows) - len(waiting)
     progress(STAGE, done / total)
-    try:
-        for outcome in workers.results(run_row, [row for _, row in waiting], plan.tasks):
-            store.add(*waiting[outcome.index], outcome)
-            done += 1
-            progress(STAGE, done / total)
-    finally:
-        store.flush()
+    for outcome in workers.results(run_row, [row for _, row in waiting], plan.tasks):
+        store.add(*waiting[outcome.index], outcome)
+        done += 1
+        progress(STAGE, done / total)
 
 
 def _require_same(folder: Path, origin: Mapping[str, str]) -> None:

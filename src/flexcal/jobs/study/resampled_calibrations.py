@@ -54,7 +54,7 @@ class ResampledCalibrations(StudyTasks):
     ) -> ResampledCalibrations:
         """Tasks on files of measured poses; raises `InputError` as reading does, and for a column that makes no groups."""
         bare = RobotModel.from_yaml(robot, estimates=False)
-        source = bare.path.parent / bare.config.estimates
+        source = bare.estimates_file
         blocks = read_estimates(source, without="calibration") if source.exists() else {}
         model = with_blocks(bare, blocks, source)
         listed, labels = tables_of(paths), None

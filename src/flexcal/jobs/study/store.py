@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import fcntl
-import os
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from flexcal.errors import FlexcalError, InputError
-from flexcal.jobs.result_files import KEY, NUMBER, PARTS, write_part
+from flexcal.files.transaction import sole_holder
+from flexcal.jobs.result_files import KEY, NUMBER, append_rows
 from flexcal.jobs.study.rows import StudyRow
 from flexcal.parallel import Outcome
 
-_LOCK = ".lock"
 _EVERY, _SHARE = 1.0, 0.01
-"""Least seconds between two parts, and least share of the time that the study has run."""
+"""Least seconds between two synchronisations to disk, and least share of the time that the study has run."""
 FIRST = (KEY, NUMBER, "seed", "resample", "seconds", "error_code", "error")
 """Columns that every row has."""
 OPTION = "option."
@@ -25,34 +23,32 @@ OPTION = "option."
 
 
 class StudyStore:
-    """Writes outcomes to parts in the folder of a study; a second or more of work is lost at most where the process is killed."""
+    """Appends outcomes to the rows in the folder of a study; they are there where the process is killed, and a second or more of them is
+    lost at most where the machine stops."""
 
     def __init__(self, folder: Path, stored: int, total: int):
         self._folder, self.stored, self._total = folder, stored, total
-        self._rows: list[dict[str, Any]] = []
-        self._started = self._written = time.monotonic()
+        self._started = self._synchronised = time.monotonic()
 
     def add(self, number: int, row: StudyRow, outcome: Outcome[dict[str, Any]]) -> None:
-        """Take the outcome of the task of a row; raises `FlexcalError` where it cannot be stored, as on a full disk."""
-        self._rows.append(columns(number, row, outcome))
+        """Store the outcome of the task of a row; raises `FlexcalError` where it cannot be stored, as on a full disk."""
         now = time.monotonic()
-        if now - self._written > max(_EVERY, _SHARE * (now - self._started)):
-            self.flush()
-
-    def flush(self) -> None:
-        """Write what has not been written."""
-        if not self._rows:
-            return
-        waiting, self._rows = self._rows, []
+        due = now - self._synchronised > max(_EVERY, _SHARE * (now - self._started))
         try:
-            write_part(self._folder, waiting)
+            append_rows(self._folder, [columns(number, row, outcome)], synchronised=due)
         except (InputError, OSError) as problem:
+            reason = (
+                str(problem)
+                if isinstance(problem, InputError)
+                else f"{self._folder} could not be written ({problem.strerror})."
+            )
             raise FlexcalError(
                 "E-STUDY-017",
-                f"{problem} {self.stored} of {self._total} tasks are stored; make space, and go on with --resume.",
+                f"{reason} {self.stored} of {self._total} tasks are stored; make space, and go on with --resume.",
             ) from problem
-        self.stored += len(waiting)
-        self._written = time.monotonic()
+        self.stored += 1
+        if due:
+            self._synchronised = now
 
 
 def columns(number: int, row: StudyRow, outcome: Outcome[dict[str, Any]]) -> dict[str, Any]:
@@ -81,19 +77,10 @@ def option_cell(value: Any) -> Any:
 @contextmanager
 def exclusive(folder: Path) -> Iterator[None]:
     """Within it, no other process runs the study of this folder; raises `InputError` where one does."""
-    (folder / PARTS).mkdir(parents=True, exist_ok=True)
-    handle = os.open(folder / PARTS / _LOCK, os.O_RDWR | os.O_CREAT, 0o666)
-    try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as problem:
+    with sole_holder(folder, "study", "another 'flexcal study'") as other:
+        if other is not None:
             raise InputError(
-                "E-STUDY-018",
-                f"another 'flexcal study' is at work in {folder}; wait for its end, or give another --out.",
-            ) from problem
+                "E-STUDY-018", f"{other} is at work in {folder}; wait for its end, or give another --out."
+            )
+        folder.mkdir(parents=True, exist_ok=True)
         yield
-        with suppress(OSError):  # there are parts
-            (folder / PARTS / _LOCK).unlink()
-            (folder / PARTS).rmdir()
-    finally:
-        os.close(handle)

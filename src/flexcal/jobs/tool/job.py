@@ -33,6 +33,5 @@ def identify_tool(
     found = identify_tip(model, read_touches(list(files), model), frame=frame, name=name)
     found = replace(found, record=RunRecord(provenance([robot_file, model.urdf, *files]), command))
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
         write_results(out, found.document())
     return found

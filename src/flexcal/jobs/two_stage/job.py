@@ -139,7 +139,6 @@ def run_two_stage(
     with closing(LocalProcesses(1) if (os.cpu_count() or 1) > 1 else ThisProcess()) as beside:
         watch = Stopwatch()
         nominal = RobotModel.from_yaml(robot_file, estimates=False)
-        out.mkdir(parents=True, exist_ok=True)
         hidden = out / "truth.yaml"
         robot_in_cell = open_cell(
             cell, robot_file, nominal, truth=truth, hidden=hidden, seed=seed, config=config

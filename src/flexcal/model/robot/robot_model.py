@@ -167,12 +167,17 @@ class RobotModel:
         from flexcal.model.robot.stored_estimates import apply_estimates
 
         model = read_robot(cls, read_yaml_file(path))
-        stored = model.path.parent / model.config.estimates
+        stored = model.estimates_file
         return (
             apply_estimates(model, stored, without=without)
             if estimates and current_path(stored).exists()
             else model
         )
+
+    @property
+    def estimates_file(self) -> Path:
+        """The file of estimates that robot.yaml names, by default estimates.yaml beside it."""
+        return self.path.parent / self.config.estimates
 
     def __getstate__(self) -> dict[str, Any]:
         """State for pickling, without what is derived from it."""

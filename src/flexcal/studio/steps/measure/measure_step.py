@@ -47,10 +47,7 @@ class MeasureStep(Step):
 
     def open(self) -> None:
         """Add the next pose, the judgement, the source of rows, and the poses with the accuracy on the left."""
-        from flexcal.files.transaction import recover
-
         window, gui = self.window, self.window.gui
-        recover(window.project.folder)
         if self._measuring is None:
             self._measuring = Measuring(
                 window.project,
