@@ -139,7 +139,7 @@ def kill_at_any_step(tmp_path: Path) -> None:
         try:
             found[run_in(folder)] += 1
         except InputError as problem:
-            assert problem.code == "E-FILE-025" and "'flexcal demo'" in str(problem)
+            assert problem.code == "E-FILE-030" and "'flexcal demo'" in str(problem)
             found["two"] += 1
         if step % 2:  # once more, while it is put right
             killed_at(step - 3, lambda folder=folder: write_run(folder, "new"))
@@ -282,7 +282,7 @@ def test_nothing_that_is_found_acts(tmp_path: Path) -> None:
     }
 
 
-@pytest.mark.parametrize(("target", "code"), [("elsewhere", "E-FILE-024"), ("nowhere", "E-FILE-013")])
+@pytest.mark.parametrize(("target", "code"), [("elsewhere", "E-FILE-029"), ("nowhere", "E-FILE-013")])
 def test_no_link_below_the_named_folder_is_followed(tmp_path: Path, target: str, code: str) -> None:
     """The folder that was named may be one; folders and files in it may not."""
     (tmp_path / "elsewhere").mkdir()
@@ -357,7 +357,7 @@ def test_renaming_that_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         patch.setattr(Path, "replace", fails)
         with refused("E-FILE-016", "3 of 6 changes"):
             write_run(tmp_path / "out", "new")
-    with refused("E-FILE-025", "'flexcal demo'"):
+    with refused("E-FILE-030", "'flexcal demo'"):
         refuse_mixture(tmp_path / "out")
     write_run(tmp_path / "out", "new")
     assert run_in(tmp_path / "out") == "new" and not left_over(tmp_path / "out")

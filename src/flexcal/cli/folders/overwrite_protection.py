@@ -10,7 +10,6 @@ from contextlib import contextmanager
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from flexcal.cli.terminal.escaping import sentence
 from flexcal.data.plans import page_beside
 from flexcal.errors import InputError, unreadable
 from flexcal.files.transaction import (
@@ -26,6 +25,7 @@ from flexcal.files.transaction import (
     refuse_mixture,
     sole_holder,
 )
+from flexcal.printable import sentence
 
 _ALL = "**"
 """Pattern of all files of a folder and of those in it, but hidden ones."""

@@ -54,6 +54,6 @@ def refuse_linked_folder(path: Path, root: Path) -> None:
             return
         if between.is_symlink():
             raise InputError(
-                "E-FILE-024",
+                "E-FILE-029",
                 f"{between} is a link, behind which nothing is written; replace it by a folder, or give another name.",
             )

@@ -412,7 +412,7 @@ def _sync_folder(folder: Path) -> None:
     except OSError as problem:
         if problem.errno not in (errno.EINVAL, errno.ENOTSUP):  # file systems that do it by themselves
             raise InputError(
-                "E-FILE-023",
+                "E-FILE-028",
                 f"all files of this run are in place in {folder}, but the disk has not confirmed it ({_reason(problem)}); check the disk.",
             ) from problem
     finally:

@@ -106,7 +106,7 @@ def refuse_mixture(folder: Path) -> None:
     ledger = Ledger.read(folder)
     if ledger.change and len(set(_sides(folder, ledger))) > 1:
         raise InputError(
-            "E-FILE-025",
+            "E-FILE-030",
             f"{folder} holds files of two runs, as 'flexcal {ledger.verb}' was cut off while it put its files in place; run it again.",
         )
 

@@ -27,7 +27,7 @@ def locked(place: Path) -> Iterator[None]:
         lock = _acquired(place, "write", _PATIENCE)
     except TimeoutError as problem:
         raise InputError(
-            "E-FILE-022",
+            "E-FILE-027",
             f"another flexcal has been writing {place} for {_PATIENCE:.0f} s; wait for its end, or end it.",
         ) from problem
     try:

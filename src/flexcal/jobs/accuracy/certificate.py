@@ -33,7 +33,7 @@ from flexcal.errors import InputError
 from flexcal.files.formats import sha256_of
 from flexcal.jobs.accuracy.verification import require_stations, verification_poses
 from flexcal.jobs.calibration import fitted_files, fitted_points
-from flexcal.jobs.inputs import CalibratedRobot, unmeasured_targets_remark, with_temperature
+from flexcal.jobs.inputs import CalibratedRobot, outdated_remarks, unmeasured_targets_remark, with_temperature
 from flexcal.jobs.pages import Result
 from flexcal.model.parts import vector_rotation
 from flexcal.model.robot import RobotModel
@@ -419,7 +419,7 @@ def _compared(
         verification=known,
         scale=error_scale(known, _measured_noise(there, covariance)),
         sample=sample,
-        uncalibrated=unmeasured_targets_remark(robot, end.targets),
+        uncalibrated=(*outdated_remarks(robot), *unmeasured_targets_remark(robot, end.targets)),
         temperatures=warm,
         fitted=fitted_points(robot, end),
     )

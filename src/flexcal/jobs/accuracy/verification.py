@@ -52,6 +52,7 @@ from flexcal.jobs.inputs import (
     image_provenance,
     is_station_identified,
     kelvin_outside,
+    outdated_remarks,
     require_distinct_files,
     with_temperature,
 )
@@ -92,6 +93,8 @@ class Verification(ReportedResult):
         Files or points among these that the calibration was made from.
     refused : str
         Why the verdict on the calibration itself was no; empty where it was not.
+    outdated : tuple of str
+        Remarks on blocks of the estimates that were computed from another robot than now.
     record : RunRecord
         What the result comes from.
     orientation : OrientationErrors or None
@@ -120,6 +123,7 @@ class Verification(ReportedResult):
     outside: str
     fitted: tuple[str, ...]
     refused: str = ""
+    outdated: tuple[str, ...] = ()
     record: RunRecord = NOT_RECORDED
     orientation: OrientationErrors | None = None
     orientation_before: OrientationErrors | None = None
@@ -175,6 +179,7 @@ class Verification(ReportedResult):
         """Remarks, one sentence each."""
         remarks = [
             *verification_subsample_remark(self.sample, self.everywhere),
+            *self.outdated,
             *self.poses.notes,
             *ignored_columns_remarks(self.poses, ("temperature",)),
             *self.temperatures,
@@ -336,6 +341,7 @@ def verify(
         outside=outside_ranges(robot, measured.q),
         fitted=fitted_points(robot, poses),
         refused=robot.refused,
+        outdated=outdated_remarks(robot),
         sample=sample,
         everywhere=None if sample is None else all_errors(standing, measured, progress),
         orientation=orientation_errors(standing, turned),

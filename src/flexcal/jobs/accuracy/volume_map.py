@@ -43,6 +43,7 @@ from flexcal.jobs.experiments import box_corners, working_file, working_volume
 from flexcal.jobs.inputs import (
     CalibratedRobot,
     is_station_identified,
+    outdated_remarks,
     refused_remark,
     require_distinct_files,
     require_temperature,
@@ -350,6 +351,7 @@ def _checked_map(
         None if check is None else check.errors,
         (
             *refused_remark(robot),
+            *outdated_remarks(robot),
             *unmeasured_targets_remark(robot, [reach.target]),
             *temperature_remarks(robot, None if temperature is None else np.array([temperature]), "errors"),
         ),

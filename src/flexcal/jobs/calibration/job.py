@@ -15,7 +15,7 @@ from flexcal.jobs.calibration.procedure import calibrate
 from flexcal.jobs.calibration.result import Calibration
 from flexcal.jobs.inputs import image_provenance, require_distinct_files
 from flexcal.jobs.result_files import estimates_target
-from flexcal.model.robot import RobotModel, with_blocks
+from flexcal.model.robot import DECLARED, RobotModel, declared_sha256, with_blocks
 from flexcal.progress import Progress, silent
 
 
@@ -77,7 +77,7 @@ def calibrate_robot(
         progress=progress,
     )
     origin = provenance([robot_file, bare.urdf, *files], None, source if blocks else None, tuple(blocks))
-    origin |= image_provenance(files)
+    origin |= image_provenance(files) | {DECLARED: declared_sha256(bare)}
     if prior is not None:
         origin[f"input.{fleet_prior.FLEET}"] = sha256_of(prior)
     pooled = None

@@ -11,9 +11,9 @@ from flexcal.calibration.fit import probable_robots, with_calibrated_points
 from flexcal.calibration.kinds import is_inclinometer
 from flexcal.errors import InputError
 from flexcal.estimation import Estimate
-from flexcal.files.formats import BLOCKS, Block, read_estimates, read_yaml_file
+from flexcal.files.formats import BLOCKS, Block, block_sha256, read_estimates, read_yaml_file
 from flexcal.jobs.result_files import ESTIMATES
-from flexcal.model.robot import RobotModel, with_blocks
+from flexcal.model.robot import DECLARED, RobotModel, declared_sha256, with_blocks
 from flexcal.printable import quoted
 
 TARGETS = "targets"
@@ -160,9 +160,46 @@ def unmeasured_lengths_remark(calibrated: CalibratedRobot) -> tuple[str, ...]:
     )
 
 
+_USED: Mapping[Block, tuple[Block, ...]] = {
+    "stiffness": ("dynamics",),
+    "calibration": ("dynamics", "stiffness", "payload"),
+}
+"""Blocks that an identification starts from, so that its result is of another robot where they change."""
+
+
+def outdated_remarks(calibrated: CalibratedRobot) -> tuple[str, ...]:
+    """Remarks on blocks that were computed from another robot or other blocks than are there now; none for others."""
+    remarks = []
+    for block, used in _USED.items():
+        if calibrated.stored is None or block not in calibrated.blocks:
+            continue
+        origin = calibrated.blocks[block].provenance
+        changed = [f"another block '{name}'" for name in used if _is_changed(calibrated, origin, name)]
+        if origin.get(DECLARED, "") not in ("", declared_sha256(calibrated.nominal)):
+            changed.insert(0, "other numbers in robot.yaml or its URDF")
+        if changed:
+            again = "calibrate" if block == "calibration" else f"identify {block}"
+            remarks.append(
+                f"the block '{block}' was computed from {' and '.join(changed)} than now, so that it does not belong to this robot: run "
+                f"'flexcal {again}' again"
+            )
+    return tuple(remarks)
+
+
+def _is_changed(calibrated: CalibratedRobot, origin: Mapping[str, str], name: Block) -> bool:
+    if "program" not in origin:  # not made by a verb
+        return False
+    now = block_sha256(calibrated.stored, name) if calibrated.stored and name in calibrated.blocks else None
+    return origin.get(f"block.{name}") != now
+
+
 def use_remarks(calibrated: CalibratedRobot) -> tuple[str, ...]:
-    """Remarks on the use of a calibration that was not trusted, or that read inclinometers alone; none for others."""
-    return (*refused_remark(calibrated), *unmeasured_lengths_remark(calibrated))
+    """Remarks on the use of a calibration that was not trusted, is outdated, or read inclinometers alone; none for others."""
+    return (
+        *refused_remark(calibrated),
+        *outdated_remarks(calibrated),
+        *unmeasured_lengths_remark(calibrated),
+    )
 
 
 def measured_points(nominal: RobotModel, blocks: Mapping[Block, Estimate]) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from flexcal.calibration.recheck import ShiftAtVisit, drift_sums
 from flexcal.data.poses import DEFAULT_SIGMA, read_poses, tables_of
 from flexcal.errors import InputError
 from flexcal.files.formats import block_sha256, provenance, sha256_of
-from flexcal.jobs.inputs import CalibratedRobot, image_provenance, require_distinct_files
+from flexcal.jobs.inputs import CalibratedRobot, image_provenance, outdated_remarks, require_distinct_files
 from flexcal.jobs.recheck.one_visit import recheck, without_implausible_temperatures
 from flexcal.jobs.recheck.result import Recheck
 from flexcal.jobs.recheck.visit_course import CourseOverVisits
@@ -98,7 +98,7 @@ def recheck_robot(
         again=again,
         repeated=_repeated(readings, before),
         succeeded=any(v.reference for v in later),
-        order=_order(when, robot.stored, later, becomes),
+        order=(*outdated_remarks(robot), *_order(when, robot.stored, later, becomes)),
         record=RunRecord(origin | image_provenance(files), command),
     )
     series = _series(judged, base, calibration)

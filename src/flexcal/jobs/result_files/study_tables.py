@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from flexcal.data.tables import require_decodable
 from flexcal.errors import InputError, unreadable
-from flexcal.files.formats import parse_json
+from flexcal.files.formats import json_values, parse_json
 from flexcal.files.transaction import (
     append_lines,
     atomic_path,
@@ -71,7 +71,7 @@ def read_study_rows(folder: Path) -> StudyRows:
 
 def append_rows(folder: Path, rows: Sequence[Mapping[str, Any]], *, synchronised: bool) -> None:
     """Store rows; raises `InputError` and `OSError` where that is not possible, and nothing that was stored changes."""
-    lines = (json.dumps(row, default=lambda value: value.item()) for row in rows)
+    lines = (json.dumps(json_values(row), allow_nan=False) for row in rows)
     append_lines(folder / ROWS, lines, synchronised=synchronised)
 
 

@@ -20,7 +20,7 @@ from flexcal.jobs.inputs import common_plan, plan_files, read_responses
 from flexcal.jobs.result_files import RunRecord, estimates_target
 from flexcal.jobs.stiffness.identification import identify_stiffness
 from flexcal.jobs.stiffness.result import StiffnessIdentification
-from flexcal.model.robot import GEOMETRY, RobotModel, with_blocks
+from flexcal.model.robot import DECLARED, GEOMETRY, RobotModel, declared_sha256, with_blocks
 from flexcal.progress import Progress, silent
 
 WeightingName = Literal["covariance", "paper", "uniform"]
@@ -86,6 +86,7 @@ def identify_robot_stiffness(
     origin = provenance(
         [robot_file, bare.urdf, *inputs, *plans], options, source if blocks else None, tuple(blocks)
     )
+    origin[DECLARED] = declared_sha256(bare)
     if prior is not None and identified.pooled is not None and identified.pooled.used:
         origin[f"input.{FLEET}"] = sha256_of(prior)
     result = replace(

@@ -61,11 +61,12 @@ from .prior_parameters import (
     uncertain_payload,
 )
 from .robot_model import RobotModel
-from .stored_estimates import NUISANCE, PAYLOAD_FRAME, with_blocks
+from .stored_estimates import DECLARED, NUISANCE, PAYLOAD_FRAME, declared_sha256, with_blocks
 
 __all__ = [
     "ANGLE_TOLERANCE",
     "BOARD_SCALE",
+    "DECLARED",
     "EXPANSION",
     "FACES",
     "FRICTION_LOG_STD",
@@ -112,6 +113,7 @@ __all__ = [
     "WireConfig",
     "carried_inertias",
     "declared_parameter",
+    "declared_sha256",
     "elastic_inertials",
     "geometric_errors",
     "last_frame",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Mapping
 from dataclasses import replace
@@ -30,6 +31,33 @@ NUISANCE = re.compile(
     r"|sensor\..+\.(sensitivity|delay|position_[xyz]|direction_[12])"
 )
 """Names of nuisance parameters: estimated for one experiment, or separable only by the flexible model; not applied to the robot."""
+
+
+DECLARED = "declared"
+"""Provenance key: SHA-256 of the numbers of the robot as declared, from which a block was computed."""
+
+
+def declared_sha256(nominal: RobotModel) -> str:
+    """SHA-256 of the numbers of a robot without estimates to which its estimates are relative: joints, points, springs, masses, gravity."""
+    digest = hashlib.sha256()
+    for joint in nominal.joints:
+        digest.update(f"{joint.name} {joint.link} {joint.parent} {joint.kind}".encode())
+        for array in (joint.rotation, joint.translation, joint.axis):
+            digest.update(_rounded(array))
+    for name, point in sorted(nominal.points.items()):
+        digest.update(f"{name} {point.joint}".encode())
+        for array in (point.rotation, point.translation, point.xyz):
+            digest.update(_rounded(array))
+    for name, value in sorted(nominal.values.items()):
+        if not name.startswith("station."):
+            digest.update(name.encode() + _rounded(np.array(value)))
+    digest.update(_rounded(np.array(nominal.config.gravity, dtype=float)))
+    return digest.hexdigest()
+
+
+def _rounded(values: np.ndarray) -> bytes:
+    """Ten digits or 1e-10, the less: the same on other processors."""
+    return ",".join(f"{round(float(value), 10) + 0.0:.10g}" for value in np.ravel(values)).encode()
 
 
 def apply_estimates(model: RobotModel, path: Path, *, without: Block | None = None) -> RobotModel:
