@@ -33,7 +33,6 @@ CHECKED = {"open_regular", "regular_path", "read_bytes", "read_text", "BytesIO",
 """What gives a library a path that is checked, a file that is open, or its content."""
 ELSEWHERE = {
     "files/transaction": "the one place, and its own files",
-    "cli/folders": "digests of what is on the disk",
     "cli/terminal/standard_streams.py": "the null device in the place of a closed stream",
     "data/tables/streaming.py": "parts in a folder that was just made",
     "studio/steps/verify/verify_step.py": "opens a part of the window",
