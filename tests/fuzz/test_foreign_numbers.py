@@ -76,7 +76,7 @@ def test_a_fleet_of_which_only_the_base_is_known(points: str, tmp_path: Path) ->
     ("old", "new", "code"),
     [
         ("mean_std: 0.0001", "mean_std: 1.0e-308", "E-PRIOR-006"),
-        ("terms: [kinematic]", "terms: []", "E-PRIOR-020"),
+        ("spread: 0.001", "spread: 9223372036854775808", "E-PRIOR-021"),
     ],
 )
 def test_a_prior_that_cannot_be(old: str, new: str, code: str, tmp_path: Path) -> None:

@@ -255,6 +255,11 @@ def _require_others(prior: FleetPrior, poses: PoseSet) -> None:
 
 def _with_prior(prior: FleetPrior, requested: Sequence[str] | None) -> tuple[str, ...]:
     """Terms of a fit with a prior: those of the prior, and those asked for beside them."""
+    if not prior.terms:
+        raise FlexcalError(
+            "E-PRIOR-020",
+            "the prior does not say with which terms its robots were calibrated; make it again with 'flexcal fleet'.",
+        )
     further = [term for term in requested or () if term not in prior.terms]
     levels = [term for term in further if term in LEVELS]
     if levels and levels[0] != "kinematic":

@@ -20,6 +20,8 @@ from flexcal.model.robot import RobotModel, unit_in
 
 _LEAST = 1e-12
 """Standard deviations below which no numbers are known, in any unit."""
+_MOST = 10.0
+"""Standard deviation of a geometric parameter, rad or m, beyond any robot's."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,8 @@ class StoredParameter:
 
     def __post_init__(self) -> None:
         _require_positive(self)
+        if max(self.std, self.mean_std, self.spread) > _MOST:
+            raise FlexcalError("E-PRIOR-021", f"std, mean_std and spread are in rad or m, below {_MOST:g}.")
 
 
 @dataclass(frozen=True)
@@ -188,12 +192,6 @@ def read_model_prior(path: Path, model: RobotModel) -> ModelPrior:
                 ("parameters", name),
                 f"{name} is no geometric error of {model.name}; make the prior again with 'flexcal fleet'.",
             )
-    if stored.parameters and not stored.terms:
-        raise file.error(
-            "E-PRIOR-020",
-            ("terms",),
-            "the terms of the parameters are missing; make the prior again with 'flexcal fleet'.",
-        )
     items, size = list(stored.parameters.values()), len(stored.parameters)
     if [len(row) for row in stored.correlation] != list(range(1, size)):
         raise file.error(
