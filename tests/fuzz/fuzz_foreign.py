@@ -35,9 +35,13 @@ def _write_mat(folder: Path, columns: dict[str, np.ndarray]) -> None:
         import h5py
     except ImportError:
         return
-    with h5py.File(folder / "measured_hdf5.mat", "w") as file:
+    path = folder / "measured_hdf5.mat"
+    with h5py.File(path, "w", userblock_size=512) as file:
         for name, values in columns.items():
-            file[name] = values
+            file[name] = values[None]
+            file[name].attrs["MATLAB_class"] = np.bytes_("double")
+    with path.open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
 
 
 def _write_excel(folder: Path, columns: dict[str, np.ndarray]) -> None:

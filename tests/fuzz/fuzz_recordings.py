@@ -5,11 +5,11 @@ from __future__ import annotations
 import sqlite3
 import struct
 import tempfile
-from collections.abc import Callable
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 
-from fuzz_mutations import ESCAPE, NUMBERS, ODD_TEXTS, SCRIPT, Broken
+from fuzz_mutations import ESCAPE, NUMBERS, ODD_TEXTS, SCRIPT, Ways
 
 _COUNTS = {
     "zero": 0,
@@ -59,10 +59,12 @@ _SQL = {
     "schema_text": "UPDATE schema SET schema_version = 'x'",
     "no_schema": "DROP TABLE schema",
     "column_gone": "ALTER TABLE messages DROP COLUMN data",
+    "all_messages_one_time": "UPDATE messages SET timestamp = 5",
+    "reversed": "UPDATE messages SET timestamp = 9e9 - timestamp",
 }
 
 
-def by_names(content: bytes) -> Broken:
+def by_names(content: bytes) -> Ways:
     """The names in a recording replaced by others of the same length, so that all that counts letters stays true."""
     for name in (
         b"/joint_states",
@@ -84,13 +86,13 @@ def by_names(content: bytes) -> Broken:
         }
         for label, other in others.items():
             changed = (other * len(name))[: len(name)]
-            yield f"{_word(name)}_{label}", content.replace(name, changed)
-            yield f"{_word(name)}_{label}_once", content.replace(name, changed, 1)
+            yield f"{_word(name)}_{label}", partial(content.replace, name, changed)
+            yield f"{_word(name)}_{label}_once", partial(content.replace, name, changed, 1)
             at = content.rindex(name)
-            yield f"{_word(name)}_{label}_last", content[:at] + changed + content[at + len(name) :]
+            yield f"{_word(name)}_{label}_last", partial(_put, content, at, changed)
 
 
-def by_counts(content: bytes) -> Broken:
+def by_counts(content: bytes) -> Ways:
     """Whole numbers of four and eight bytes in the first and the last thousand bytes and between, replaced by other ones."""
     ends = [
         *range(0, min(1000, len(content) - 8), 12),
@@ -98,37 +100,29 @@ def by_counts(content: bytes) -> Broken:
     ]
     for at in [*ends, *range(1000, len(content) - 1008, max(1, len(content) // 12))]:
         for label, count in _COUNTS.items():
-            yield f"count_{at}_{label}", content[:at] + struct.pack("<I", count) + content[at + 4 :]
+            yield f"count_{at}_{label}", partial(_put, content, at, struct.pack("<I", count))
         for label, count in (("int63", 2**63 - 1), ("tera", 2**40), ("minus_8", 2**64 - 1)):
-            yield f"count_{at}_{label}", content[:at] + struct.pack("<Q", count) + content[at + 8 :]
+            yield f"count_{at}_{label}", partial(_put, content, at, struct.pack("<Q", count))
 
 
-def by_values(content: bytes) -> Broken:
+def by_values(content: bytes) -> Ways:
     """Numbers of eight bytes along the file replaced by such as no joint has."""
     odd = {"nan": float("nan"), "infinite": float("inf"), "huge": 1e308, "tiny": 5e-324}
     for share in range(1, 10):
         at = share * len(content) // 10
         for label, value in odd.items():
             packed = struct.pack("<d", value)
-            yield f"value_{share}_{label}", content[:at] + packed + content[at + 8 :]
-            yield f"values_{share}_{label}", content[:at] + 30 * packed + content[at + 240 :]
+            yield f"value_{share}_{label}", partial(_put, content, at, packed)
+            yield f"values_{share}_{label}", partial(_put, content, at, 30 * packed)
 
 
-def by_statements(content: bytes) -> Broken:
+def by_statements(content: bytes) -> Ways:
     """A storage of SQLite after a statement: other topics, times and messages, and tables that are missing."""
     for label, statement in _SQL.items():
-        yield label, _changed(content, lambda base, text=statement: base.executescript(text))
-    yield (
-        "all_messages_one_time",
-        _changed(content, lambda base: base.execute("UPDATE messages SET timestamp = 5")),
-    )
-    yield (
-        "reversed",
-        _changed(content, lambda base: base.execute("UPDATE messages SET timestamp = 9e9 - timestamp")),
-    )
+        yield label, partial(_changed, content, statement)
 
 
-def by_universal_fields(content: bytes) -> Broken:
+def by_universal_fields(content: bytes) -> Ways:
     """The fields of the first data set of a universal file, one by one, its lines, and the ends of all data sets."""
     lines = content.split(b"\n")
     texts = {**NUMBERS, "minus_one": "-1", "word": "abc", "empty": " ", "many": "99999999", **ODD_TEXTS}
@@ -137,32 +131,37 @@ def by_universal_fields(content: bytes) -> Broken:
         for column, field in enumerate(line.split()):
             for label, text in texts.items():
                 changed = line.replace(field, text.encode().ljust(len(field)), 1)
-                yield f"line_{row}_field_{column}_{label}", b"\n".join([*before, changed, *after])
-        yield f"line_{row}_gone", b"\n".join([*before, *after])
-        yield f"line_{row}_twice", b"\n".join([*before, line, line, *after])
-        yield f"line_{row}_long", b"\n".join([*before, line + b"9" * 1_000_000, *after])
-        yield f"line_{row}_blank", b"\n".join([*before, b"", *after])
+                yield f"line_{row}_field_{column}_{label}", partial(b"\n".join, [*before, changed, *after])
+        yield f"line_{row}_gone", partial(b"\n".join, [*before, *after])
+        yield f"line_{row}_twice", partial(b"\n".join, [*before, line, line, *after])
+        yield f"line_{row}_long", lambda b=before, m=line, a=after: b"\n".join([*b, m + b"9" * 1_000_000, *a])
+        yield f"line_{row}_blank", partial(b"\n".join, [*before, b"", *after])
     end = b"    -1\n"
-    yield "last_end_gone", content.removesuffix(end)
-    yield "first_end_gone", end + content.removeprefix(end).replace(end, b"", 1)
-    yield "only_ends", 8 * end
-    yield "an_end_inside", content[: len(content) // 2] + b"\n" + 2 * end + content[len(content) // 2 :]
+    yield "last_end_gone", partial(content.removesuffix, end)
+    yield "first_end_gone", lambda: end + content.removeprefix(end).replace(end, b"", 1)
+    yield "only_ends", lambda: 8 * end
+    middle = len(content) // 2
+    yield "an_end_inside", lambda: content[:middle] + b"\n" + 2 * end + content[middle:]
     for kind in ("15", "55", "58b", "82", "151", "164", "2411", "2412", "2414", "2420", "17", "-58"):
-        yield f"all_of_kind_{kind}", content.replace(end + b"    58", end + kind.rjust(6).encode())
+        yield f"all_of_kind_{kind}", partial(content.replace, end + b"    58", end + kind.rjust(6).encode())
 
 
 def _word(name: bytes) -> str:
     return name.decode().strip("/").replace("/", "_")
 
 
-def _changed(content: bytes, change: Callable[[sqlite3.Connection], object]) -> bytes:
-    """A file of SQLite after a change."""
+def _put(content: bytes, at: int, new: bytes) -> bytes:
+    return content[:at] + new + content[at + len(new) :]
+
+
+def _changed(content: bytes, statement: str) -> bytes:
+    """A file of SQLite after a statement."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "changed"
         path.write_bytes(content)
         with closing(sqlite3.connect(path)) as base:
             try:
-                change(base)
+                base.executescript(statement)
             except sqlite3.Error:  # what the storage itself forbids cannot be in one
                 base.rollback()
             base.commit()

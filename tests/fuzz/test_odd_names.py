@@ -9,8 +9,9 @@ from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import pytest
-from fuzz_process import FlexcalProcesses
+from fuzz_room import fault_of
 from fuzz_seeds import write_files
+from fuzz_worker import Worker
 
 NAMES = {
     "axis_1": "<script>alert(1)</script>",
@@ -64,8 +65,8 @@ class Elements(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def flexcal() -> Iterator[FlexcalProcesses]:
-    with FlexcalProcesses() as processes:
+def flexcal() -> Iterator[Worker]:
+    with Worker() as processes:
         yield processes
 
 
@@ -91,10 +92,10 @@ def check_pages(folder: Path) -> int:
     return len(pages)
 
 
-def test_odd_names_in_a_calibration(flexcal: FlexcalProcesses, tmp_path: Path) -> None:
+def test_odd_names_in_a_calibration(flexcal: Worker, tmp_path: Path) -> None:
     renamed(tmp_path / "arm")
     ending = flexcal.run(CALIBRATE.split(), tmp_path / "arm")
-    assert ending.status == 0 and ending.fault([]) is None, ending
+    assert ending.status == 0 and fault_of(ending, None) is None, ending
     assert NAMES["axis_3"] in " ".join(
         (ending.out + (tmp_path / "arm/results/estimates.yaml").read_text()).split()
     )
@@ -102,11 +103,11 @@ def test_odd_names_in_a_calibration(flexcal: FlexcalProcesses, tmp_path: Path) -
 
 
 @pytest.mark.slow
-def test_odd_names_in_every_verb(flexcal: FlexcalProcesses, tmp_path: Path) -> None:
+def test_odd_names_in_every_verb(flexcal: Worker, tmp_path: Path) -> None:
     renamed(tmp_path / "arm")
     for line in LINES:
         ending = flexcal.run(line.split(), tmp_path / "arm")
-        assert ending.status == 0 and ending.fault([]) is None, (line, ending)
+        assert ending.status == 0 and fault_of(ending, None) is None, (line, ending)
     assert check_pages(tmp_path / "arm") >= 8
 
 
@@ -114,7 +115,7 @@ def test_odd_names_in_every_verb(flexcal: FlexcalProcesses, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     "name", [b"k\xe4se", b"\xff\xfe", b"[red]\x1b[31m", b"a'\"b <script>", "ζ ☃".encode(), b"{0} %s $HOME"]
 )
-def test_odd_file_names(name: bytes, flexcal: FlexcalProcesses, tmp_path: Path) -> None:
+def test_odd_file_names(name: bytes, flexcal: Worker, tmp_path: Path) -> None:
     """Folders and files of any name that the system allows: verbs read and write there, or say so in one sentence."""
     odd = os.fsdecode(name)
     folder = tmp_path / odd
@@ -136,6 +137,6 @@ def test_odd_file_names(name: bytes, flexcal: FlexcalProcesses, tmp_path: Path) 
         ["calibrate", f"{odd} none.yaml", f"{odd} poses.csv"],
     ):
         ending = flexcal.run(line, folder)
-        fault = ending.fault([".yaml", ".csv", ".html", ".urdf", "results"])
+        fault = fault_of(ending, [".yaml", ".csv", ".html", ".urdf", "results"])
         assert fault is None, (line, fault)
     assert check_pages(folder) >= 1
