@@ -138,7 +138,7 @@ def _run(arguments: list[str], folder: str, home: str | None, out: int, err: int
         os.dup2(out, 1)
         os.dup2(err, 2)
         if home is not None:
-            os.environ |= {"HOME": home, "TMPDIR": f"{home}/../tmp", "XDG_CACHE_HOME": f"{home}/../tmp"}
+            os.environ |= {"HOME": home, "TMPDIR": f"{home}/../tmp", "XDG_CACHE_HOME": f"{home}/../../cache"}
             tempfile.tempdir = None
         resource.setrlimit(resource.RLIMIT_CPU, (CPU_SECONDS, CPU_SECONDS + 5))
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
