@@ -25,8 +25,8 @@ MEGABYTES = 700.0
 """Of memory a case, of which 200 are the program."""
 CANARY = "canary-7f3a"
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
-_REMARK = re.compile(" …$|^(Pinocchio|OpenCV): ")
-"""Of progress, and what a native library says, on one line."""
+_REMARK = re.compile(" …$|^(Pinocchio|OpenCV): |^note: .* left by a run that was cut off")
+"""Of progress, what a native library says, on one line, and left-overs, which are named and stay."""
 Tree = dict[str, tuple[object, ...]]
 
 
