@@ -169,7 +169,8 @@ class Room:
             (self.work / file).unlink()
             KINDS[kind](self.work / file)
         for file, name in case.names.items():
-            (self.work / file).rename(self.work / name)
+            if os.path.lexists(self.work / file):
+                (self.work / file).rename(self.work / name)
         for place, what in case.intrusions:
             (self.work / place).mkdir(exist_ok=True)
             try:
