@@ -216,7 +216,10 @@ class Calibrate:
         try:
             for name, point in calibration.found_points.items():
                 write_point_position(self.robot, name, point["found_xyz_m"])
-            return self._calibrated(calibration.selected.terms, progress)
+            calibration = self._calibrated(calibration.selected.terms, progress)
+            # takes its place after the estimates: where the process is killed between, the next run starts as this one did
+            write_text(self.robot, read_text(self.robot))
+            return calibration
         except BaseException:
             write_text(self.robot, text)
             raise

@@ -14,6 +14,7 @@ from flexcal.data.poses import PoseSet, read_poses
 from flexcal.data.recordings import FILL, Recording, read_recording
 from flexcal.errors import InputError
 from flexcal.files.formats import to_plain
+from flexcal.files.transaction import refuse_mixture
 
 if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
@@ -34,6 +35,7 @@ class FolderCell:
                 "E-EXP-005",
                 f"{self.path} is no folder; give the folder that holds {PLAN} and the measurements.",
             )
+        refuse_mixture(self.path)
         self.plan: Plan = read_plan(self.path / PLAN)
         joints = self.plan.joint_count
         if joints != model.n:

@@ -20,8 +20,6 @@ from flexcal.files.transaction.locks import locked
 
 TEMPORARY = ".flexcal-"
 """Names of files and folders that wait for their places begin with it; only the run that made them removes them, or a person."""
-RESULTS = "results.json"
-"""Of the files of a folder it takes its place last, as readers begin with it."""
 _POSTPONED = (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM))
 
 Seen = tuple[int, int] | None
@@ -202,8 +200,9 @@ class FileTransaction:
         for new, home in self._new.items():
             steps.append((new, lambda new=new, home=home: _exchange(new, home)))
         steps += record_steps[:1]
-        standing = [place for place in self._waiting if not self.is_new(place.parent)]
-        for place in sorted(standing, key=lambda place: place.name == RESULTS):  # stable
+        for place in self._waiting:
+            if self.is_new(place.parent):
+                continue
             steps.append((place, lambda place=place: self._waiting[place].replace(place)))
         for place, was in self._removed.items():
             if was is not None and _seen(place) == was:
@@ -273,7 +272,7 @@ class FileTransaction:
         temporary.chmod(_mode_of(place))
         with temporary.open("rb") as stream:
             os.fsync(stream.fileno())
-        earlier = self._waiting.get(place)
+        earlier = self._waiting.pop(place, None)  # what is written last takes its place last
         if self.is_new(place.parent):
             named = temporary.with_name(place.name)
             temporary.replace(named)

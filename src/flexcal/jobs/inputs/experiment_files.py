@@ -9,6 +9,7 @@ from flexcal.data.experiments import PLAN
 from flexcal.data.plans import MultisinePlan, Plan, read_plan, read_plan_of
 from flexcal.errors import InputError
 from flexcal.files.formats import to_plain
+from flexcal.files.transaction import refuse_mixture
 from flexcal.frequency.periodic import FrequencyResponse
 from flexcal.jobs.inputs.distinct_files import require_distinct_files
 from flexcal.model.robot import RobotModel
@@ -57,6 +58,8 @@ def read_responses(paths: Sequence[Path], model: RobotModel) -> tuple[list[Path]
     """Frequency responses of a robot from files, or from the response_pose_<p>.npz of folders, by pose number; raises `InputError`."""
     files: list[Path] = []
     for path in paths:
+        if path.is_dir():
+            refuse_mixture(path)
         there = sorted(path.glob("response_pose_*.npz")) if path.is_dir() else [path]
         if not there:
             raise InputError(

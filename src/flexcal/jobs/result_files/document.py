@@ -11,7 +11,7 @@ from typing import Any, Literal, get_args
 from flexcal.errors import InputError
 from flexcal.estimation import Dropped, Estimate, Identifiability
 from flexcal.files.formats import json_values, read_json
-from flexcal.files.transaction import refuse_mixture, write_text
+from flexcal.files.transaction import current_path, refuse_mixture, write_text
 
 RESULTS = "results.json"
 
@@ -82,8 +82,9 @@ def write_results(folder: Path, document: Mapping[str, Any]) -> None:
 
 def read_results(folder: Path) -> dict[str, Any]:
     """Document in `folder`; raises `InputError` if there is none, and for one of another schema."""
-    refuse_mixture(folder)
     path = folder / RESULTS
+    if current_path(path) == path:  # else of the run that is at work
+        refuse_mixture(folder)
     document = read_json(path, AGAIN)
     if not isinstance(document, dict):
         raise InputError("E-RUN-079", f"{path} holds no results of a verb; {AGAIN}.")
