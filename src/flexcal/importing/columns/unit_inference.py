@@ -34,8 +34,8 @@ def joint_units(model: RobotModel, q: np.ndarray) -> tuple[str, ...]:
     chosen = {}
     for prismatic, (unit, other) in ((False, ("rad", "deg")), (True, ("m", "mm"))):
         values = np.abs(q[:, kinds == prismatic])
-        values[values > LARGEST] = 0.0  # what no position can be is refused later
-        largest = float(np.nanquantile(values, _NEARLY_ALL, axis=0).max(initial=0.0))
+        values[~(values <= LARGEST)] = 0.0  # what no position can be, or none is, is refused later
+        largest = float(np.quantile(values, _NEARLY_ALL, axis=0).max(initial=0.0))
         chosen[prismatic] = unit if largest <= _OVER * _widest(model, prismatic) else other
     return tuple(chosen[bool(prismatic)] for prismatic in kinds)
 
