@@ -38,14 +38,14 @@ def anywhere(count: int, seed: int = 0) -> PosePlan:
 
 
 def test_it_shares_no_robot_with_the_identification() -> None:
-    """Of the model it takes the words of robot.yaml alone; nothing of the export and of the virtual cell."""
+    """Of the model it takes the words of robot.yaml and the refusal of what is no URDF; nothing of export and virtual cell."""
     folder = Path(flexcal.hard_cell.__file__).parent
     taken, names = set(), set()
     for file in folder.glob("*.py"):
         for node in ast.walk(ast.parse(file.read_text())):
             if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("flexcal"):
                 taken.add(node.module)
-                names |= {alias.name for alias in node.names if node.module == "flexcal.model.robot"}
+                names |= {alias.name for alias in node.names if node.module.startswith("flexcal.model")}
             assert not isinstance(node, ast.Import) or "flexcal" not in {a.name for a in node.names}
     known = {
         "flexcal",
@@ -58,10 +58,11 @@ def test_it_shares_no_robot_with_the_identification() -> None:
         "flexcal.files.transaction",
         "flexcal.frequency.periodic",
         "flexcal.model.robot",
+        "flexcal.model.urdf",
         "flexcal.mujoco_library",
     }
     assert {name for name in taken if ".hard_cell" not in name} <= known
-    assert names == {"RobotConfig"}
+    assert names == {"RobotConfig", "read_elements"}
 
 
 def test_it_is_a_cell(robot: Path) -> None:

@@ -190,7 +190,7 @@ def test_poses_of_the_fit_are_not_called_fresh(fit: Calibration, folder: Path) -
         ("points.csv", "E-FILE-001", "E-FILE-001"),
         ("arm.npz", "E-FILE-003", "E-FILE-003"),
         ("estimates.yaml", "E-YAML-023", "E-FILE-001"),
-        ("results.json", "E-FILE-001", "E-REPORT-008"),
+        ("results.json", "E-FILE-023", "E-REPORT-008"),
     ],
 )
 def test_a_spoilt_folder_is_refused_in_one_sentence(
