@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -46,6 +47,8 @@ def _serve(project: Project, host: str, port: int | None, ready: Callable[[Studi
     from flexcal.studio.steps import CalibrateStep, CompareStep, MeasureStep, PlanStep, RobotStep, VerifyStep
     from flexcal.studio.window import Window
 
+    # what lies too far away for the window, as in a URDF with a wrong number, is not drawn; viser need not say so in its own words
+    warnings.filterwarnings("ignore", "overflow encountered in cast", RuntimeWarning)
     routes: dict[str, Route] = {}
     server = StudioServer.start(host, port, routes, ProjectFiles(project.folder))
     try:
