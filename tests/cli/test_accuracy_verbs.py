@@ -108,6 +108,7 @@ def test_map_of_given_poses(run, ur5: Path) -> None:
         (["--working", "0:1,a:b,0:1"], ["E-RUN-037"]),
         (["--working", "nowhere.csv"], ["E-FILE-001", "nowhere.csv"]),
         (["--count", "0"], ["E-CLI-008", "--count", "0", "1"]),
+        (["--on", "nowhere"], ["E-WORK-006", "nowhere"]),
         (["--payload", "2"], ["E-MODEL-004", "robot.yaml"]),
         (["--verification", "targets.csv"], ["E-POSES-020"]),
         (["--estimates", "elsewhere"], ["E-RUN-055", "elsewhere does not exist"]),

@@ -56,7 +56,7 @@ def free_port() -> int:
 
 @pytest.mark.parametrize("recount", [1e9, 0.0], ids=["missed_results", "asked_for_its_workers"])
 def test_a_study_goes_on_when_the_scheduler_is_back(
-    recount: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    recount: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("flexcal.parallel.dask_cluster._RECOUNT", recount)
     port = free_port()
@@ -73,6 +73,7 @@ def test_a_study_goes_on_when_the_scheduler_is_back(
             open_workers(f"dask://127.0.0.1:{port}", 1) as workers,
         ):
             run_study(plan, out, workers, progress=kill_at_the_second)
+        assert "distributed.client" not in capfd.readouterr().err  # its log says nothing beside the error
         assert 2 <= len((out / "tasks.jsonl").read_text().splitlines()) < 4
         cluster = Cluster(port)
         with open_workers(f"dask://127.0.0.1:{port}", 1) as workers:

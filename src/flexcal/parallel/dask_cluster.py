@@ -7,7 +7,7 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from itertools import islice
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -54,16 +54,20 @@ class DaskCluster(Workers):
     def __init__(self, address: str):
         try:
             from distributed import Client
+            from distributed.utils import silence_logging_cmgr
         except ImportError as problem:
             raise InputError(
                 "E-WORK-001", f"{address} needs Dask: pip install 'flexcal[cluster]'."
             ) from problem
         self.address = address
         self._threads, self._counted = 0, -math.inf
+        self._quiet = ExitStack()
+        self._quiet.enter_context(silence_logging_cmgr("critical"))  # of what is one sentence here
         place = address.replace("dask://", "tcp://", 1)
         try:
             self.client = Client(place, timeout=_PATIENCE, set_as_default=False)
         except (OSError, TypeError, ValueError) as problem:  # TypeError: no certificates
+            self._quiet.close()
             reason = " ".join(str(problem).split())
             raise InputError(
                 "E-WORK-002",
@@ -206,7 +210,7 @@ class DaskCluster(Workers):
 
     def close(self) -> None:
         """As `Workers.close`; the cluster goes on."""
-        with suppress(TimeoutError):
+        with self._quiet, suppress(TimeoutError):
             self.client.close()
 
     def _outcome(self, status: str, result: Any, index: int) -> Outcome[Any] | None:

@@ -103,6 +103,10 @@ class Map:
             )
         for remark in document["remarks"]:
             console.say(remark)
+        if self.on is not None and accuracy.whole is None:
+            console.say(
+                f"these poses are one block, which this process computed: {self.on} had nothing to do"
+            )
         console.say(accuracy.trust.sentence)
         pages = dict.fromkeys([self.out, page_beside(self.out)])
         console.say(f"wrote {' and '.join(str(path) for path in pages)}: {document['poses']} poses")

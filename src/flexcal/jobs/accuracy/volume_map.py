@@ -403,11 +403,10 @@ def map_accuracy(
         q = working_volume(CollisionChecker(robot.model), working, seed).q
     elif working is not None:
         box = box_corners(working)
-    first = _checked_map(robot, check, box, q, min(count, BLOCK), payload, temperature, seed, progress)
-    accuracy = first if q is not None or count <= BLOCK else None
-    if accuracy is None:
-        with open_workers(on, jobs) as workers:
-            accuracy = _of_blocks(first, robot, count, temperature, seed, out, workers, progress)
+    with open_workers(on, jobs) as workers:
+        accuracy = _checked_map(robot, check, box, q, min(count, BLOCK), payload, temperature, seed, progress)
+        if q is None and count > BLOCK:
+            accuracy = _of_blocks(accuracy, robot, count, temperature, seed, out, workers, progress)
     origin = provenance(
         [robot_file, robot.nominal.urdf, *verification, *(() if place is None else (place,))],
         {"seed": seed},
