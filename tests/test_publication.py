@@ -24,9 +24,11 @@ from flexcal.estimation import Estimate, Parameter, Parameters
 from flexcal.files.formats import read_estimates, write_estimates
 from flexcal.files.transaction import (
     FileTransaction,
+    Ledger,
     append_lines,
     atomic_path,
     current_path,
+    digest_on_disk,
     left_over,
     refuse_mixture,
     whole_lines,
@@ -280,6 +282,49 @@ def test_nothing_that_is_found_acts(tmp_path: Path) -> None:
         ".flexcal",
         "out",
     }
+
+
+def test_a_forged_ledger_reaches_nothing(tmp_path: Path) -> None:
+    """Names that lead out of the folder, or can be none, and verbs that there are not, do not count; nor does it have files removed."""
+    (tmp_path / "secret").write_text("mine")
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "kept.txt").write_text("kept")
+    digest = digest_on_disk(out / "kept.txt")
+    lines = [f"{0:064d}  {name}" for name in ("../secret", "/dev/zero", "a\0b", "", "x/../../secret")]
+    text = "\n".join(
+        [
+            "# flexcal demo",
+            f"{digest}  kept.txt",
+            "# being written: flexcal x; rm -rf ~",
+            *lines,
+            f"{0:064d}  b",
+        ]
+    )
+    (out / ".flexcal").write_text(text + "\n")
+    ledger = Ledger.read(out)
+    assert (
+        list(ledger.change) == ["b"]
+        and ledger.verb == "another verb"
+        and list(ledger.entries) == ["kept.txt"]
+    )
+    with outputs("demo", out, ("**",)):
+        write_text(out / "new.txt", "new")
+    assert sorted(os.listdir(out)) == [".flexcal", "kept.txt", "new.txt"]
+    with (out / "huge").open("wb") as stream:
+        stream.truncate(10**10)
+    with refused("E-FILE-020", "huge"), outputs("demo", out, ("**",)):
+        pass
+
+
+def test_a_link_in_the_place_of_an_output_folder_that_nobody_named(tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "recheck").symlink_to("mine")
+    with refused("E-FILE-029", "recheck"), outputs("recheck", tmp_path / "recheck", ("a",), is_named=False):
+        pass
+    with outputs("recheck", tmp_path / "recheck", ("a",)):
+        write_text(tmp_path / "recheck" / "a", "new")
+    assert (tmp_path / "mine" / "a").read_text() == "new"
 
 
 @pytest.mark.parametrize(("target", "code"), [("elsewhere", "E-FILE-029"), ("nowhere", "E-FILE-013")])

@@ -25,6 +25,8 @@ MEGABYTES = 700.0
 """Of memory a case, of which 200 are the program."""
 CANARY = "canary-7f3a"
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+_OF_THE_ROBOT = ("[E-MODEL-007]",)
+"""Sentences that name the robot instead of a file: what is wrong follows from several files together."""
 _REMARK = re.compile(" …$|^(Pinocchio|OpenCV): |^note: .* left by a run that was cut off")
 """Of progress, what a native library says, on one line, and left-overs, which are named and stay."""
 Tree = dict[str, tuple[object, ...]]
@@ -81,7 +83,7 @@ def fault_of(
         return f"memory is exhausted: {lines[-1]}"
     return (
         None
-        if files is None or any(name in lines[-1] for name in files)
+        if files is None or any(name in lines[-1] for name in (*files, *_OF_THE_ROBOT))
         else f"no file is named: {lines[-1]}"
     )
 

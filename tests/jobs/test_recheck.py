@@ -11,7 +11,7 @@ from dh_arm import postures, write_poses, write_robot
 from over_seeds import over_seeds
 from rechecked_arm import Workshop, judged_beside
 from refusals import refused
-from scipy.stats import binom, kstest, norm
+from scipy.stats import binom, f, kstest, ncf, norm
 
 from flexcal import CalibratedRobot, Recheck, RobotModel, calibrate, read_poses, recheck
 from flexcal.calibration.recheck import (
@@ -26,6 +26,7 @@ from flexcal.calibration.recheck import (
     possible_changes,
 )
 from flexcal.calibration.recheck.cumulative_sums import decision_limit, innovations, run_length
+from flexcal.calibration.recheck.detection import _noncentrality
 from flexcal.data.poses import PoseSet, concatenate
 from flexcal.jobs.inputs import reference_temperature
 from flexcal.jobs.recheck.visit_history import Readings
@@ -429,3 +430,24 @@ def test_false_alarms_are_one_in_a_hundred(tmp_path: Path) -> None:
     alarms = sum(over_seeds(false_alarms, range(11, 16), tmp_path))
     print(f"{alarms} of 500 visits")
     assert binom.sf(alarms - 1, 500, 0.01) > 1e-3, alarms
+
+
+def test_the_noncentrality_of_few_degrees_of_freedom() -> None:
+    """Where the distribution function cannot be computed far out, its root nearer by is found: as by a search from below."""
+    for freedom in (3.0, 8.0, 33.0, 300.0):
+        found = _noncentrality(0.01, freedom)
+        critical = f.isf(0.01, 1, freedom)
+        assert ncf.cdf(critical, 1, freedom, found**2) == pytest.approx(0.05, rel=1e-6)
+
+
+def test_readings_of_unequal_length_are_refused() -> None:
+    given = Readings([1], ["p"], ["s"], [[0.0, 0.1]], [[0.0, 0.0, 0.0]])
+    for changed in (
+        {"target": []},
+        {"q": []},
+        {"position": [[0.0, 0.0]]},
+        {"sigma": [[1e-5]]},
+        {"temperature": []},
+    ):
+        with refused("E-RECHECK-011"):
+            replace(given, **changed)

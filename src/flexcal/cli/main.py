@@ -151,7 +151,8 @@ def _carry_out(verb: Verb, arguments: list[str]) -> int:
     if any(isinstance(value, Path) and not value.is_absolute() for value in vars(parsed).values()):
         os.getcwd()  # raises where it has been removed
     leaves = getattr(parsed, "leaves", verb.leaves)
-    with outputs(verb.name, parsed.out, leaves, page=verb.page, beside=verb.beside):
+    is_named = any(argument.partition("=")[0] == "--out" for argument in arguments)
+    with outputs(verb.name, parsed.out, leaves, page=verb.page, beside=verb.beside, is_named=is_named):
         refusal = parsed.run()
     if refusal is not None:  # of a part of what was asked: the rest is written
         raise refusal

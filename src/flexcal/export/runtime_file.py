@@ -72,7 +72,7 @@ def _tool_map(robot: RuntimeRobot) -> ToolMap:
 
 def _header(text: str) -> str:
     """The document as a constant, line by line: compilers limit the length of one literal."""
-    lines = [json.dumps(line + "\n") for line in text.splitlines()]
+    lines = [json.dumps(line + "\n").replace("?", "\\?") for line in text.splitlines()]  # no trigraphs
     return "\n".join(
         [
             "#pragma once",

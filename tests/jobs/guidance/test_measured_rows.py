@@ -171,6 +171,36 @@ def test_a_killed_process_leaves_whole_rows(tmp_path: Path, ur5: RobotModel):
             assert rows.undo() == "1 row taken out"
 
 
+def test_values_with_odd_line_ends_are_read_back(tmp_path: Path, cells: list[dict[str, str]]) -> None:
+    """Only a line feed ends a row; a value that has one is refused."""
+    rows = MeasuredRows(tmp_path)
+    odd = {**cells[0], "operator": "a\u2028b\x0cc\x85d\x1ce"}
+    rows.append([odd])
+    assert rows.rows()[0].cells == odd
+    with refused("E-STUDIO-052"):
+        rows.append([{**odd, "operator": "a\nb"}])
+    assert rows.undo() == "1 row taken out"
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["5", "[]", '{"do": "append"}', '{"do": "append", "row": 0, "cells": 5}', '{"do": "append", "row": 0, "cells": [{"x": 1}]}',
+     '{"do": "append", "row": 0, "cells": [], "from": "a", "end": "x"}', '{"do": "exclude", "row": "0", "reason": "", "before": ""}',
+     '{"do": "exclude", "row": 0, "reason": "a", "before": {}}', '{"do": "station", "row": 0, "before": [], "after": [1], "new": true}',
+     '{"do": "other"}', "[" * 2000],
+)  # fmt: skip
+def test_a_journal_of_somebody_else_is_refused(
+    line: str, tmp_path: Path, cells: list[dict[str, str]]
+) -> None:
+    rows = MeasuredRows(tmp_path)
+    rows.append(cells[:1])
+    with rows.history.open("a") as stream:
+        stream.write(line + "\n")
+    for use in (rows.undo, rows.taken, rows.count_taken):
+        with refused("E-STUDIO-013"):
+            use()
+
+
 def test_a_followed_file_gives_complete_lines_only(
     tmp_path: Path, cells: list[dict[str, str]], ur5: RobotModel
 ):

@@ -86,6 +86,12 @@ def _noncentrality(level: float, freedom: float) -> float:
 
     if np.isfinite(freedom):
         critical = float(fdtri(1, freedom, 1 - level))
-        return float(brentq(lambda d: ncfdtr(1, freedom, d * d, critical) - (1 - FOUND), 0.5, 60.0))  # pyright: ignore
+
+        def missed(distance: float) -> float:
+            return np.nan_to_num(
+                ncfdtr(1, freedom, distance**2, critical)
+            )  # nan where it is too small to be computed
+
+        return float(brentq(lambda distance: missed(distance) - (1 - FOUND), 0.5, 60.0))  # pyright: ignore
     critical = float(chdtri(1, level))
     return float(brentq(lambda d: chndtr(critical, 1, d * d) - (1 - FOUND), 0.5, 60.0))  # pyright: ignore

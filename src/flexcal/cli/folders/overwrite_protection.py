@@ -41,14 +41,16 @@ def outputs(
     *,
     page: bool = False,
     beside: Sequence[str] = (),
+    is_named: bool = True,
 ) -> Iterator[None]:
     """Around `verb`, which writes the file `out`, or into the folder `out` the files `names` (glob patterns; `**`: all, those in its
     folders too); None writes nothing there.
 
     With `page`, it also writes an HTML file of the same name beside `out`, and files whose names end, after its stem, as `beside` says.
 
-    Raises `InputError` beforehand where the folder cannot be written to, where another run is at work on these files, and where one of them
-    is there already that flexcal did not write, that another verb wrote, or that was changed since. All that the verb writes, there and
+    Raises `InputError` beforehand where the folder cannot be written to, or is a link that the command line does not name (`is_named`),
+    where another run is at work on these files, and where one of them is there already that flexcal did not write, that another verb
+    wrote, or that was changed since. All that the verb writes, there and
     elsewhere, appears when it has succeeded, and what an earlier run left under these names goes; when it fails, nothing changes.
     """
     if out is None:
@@ -58,6 +60,8 @@ def outputs(
     if not names and out.is_dir():
         raise InputError("E-CLI-010", f"{out} is a folder; name a file in it with --out.")
     folder = out if names else out.parent
+    if names and not is_named:
+        refuse_linked_folder(out / names[0], out.parent)
     own = [glob.escape(path.name) for path in (out, *([page_beside(out)] if page else []))]
     patterns = names or [*own, *(glob.escape(out.stem) + ending for ending in beside)]
     place = _Place(verb, folder, patterns, whole_folder=bool(names))
@@ -134,7 +138,9 @@ class _Place:
         home = Path(os.path.realpath(self.folder))
         written = {place: file for place, file in run.files.items() if self._is_mine(place, home)}
         digests = {place.relative_to(home).as_posix(): _digest(file) for place, file in written.items()}
-        gone = [path for path in self.own_files() if self._name(path) not in digests]
+        own = self.own_files()
+        # of a verb whose input names its files, those that it does not write again stay: they may be named by somebody else
+        gone = [] if _ALL in self.patterns else [path for path in own if self._name(path) not in digests]
         for path in gone:
             run.remove(path)
         if not written:

@@ -47,7 +47,7 @@ def refuse_stream(path: Path) -> None:
 
 
 def refuse_linked_folder(path: Path, root: Path) -> None:
-    """Raise `InputError` where a folder between `root`, which the user has named, and a file below it is a link."""
+    """Raise `InputError` where a folder between `root`, which is not looked at, and a file below it is a link."""
     top, folder = Path(os.path.abspath(root)), Path(os.path.abspath(path)).parent
     for between in (folder, *folder.parents) if top in folder.parents else ():
         if between == top:

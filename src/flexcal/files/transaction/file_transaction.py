@@ -269,9 +269,9 @@ class FileTransaction:
 
     def _put(self, path: Path, temporary: Path) -> None:
         place = _place(path)
-        temporary.chmod(_mode_of(place))
-        with temporary.open("rb") as stream:
+        with temporary.open("r+b") as stream:
             os.fsync(stream.fileno())
+        temporary.chmod(_mode_of(place))
         earlier = self._waiting.pop(place, None)  # what is written last takes its place last
         if self.is_new(place.parent):
             named = temporary.with_name(place.name)
@@ -287,11 +287,11 @@ class FileTransaction:
     def _written(self, place: Path, content: bytes) -> Path:
         """Temporary file for a place, complete and synchronised, which does not wait."""
         temporary = self._fresh(self._home(place.parent), place.suffix)
-        temporary.chmod(_mode_of(place))
         with temporary.open("wb") as stream:
             stream.write(content)
             stream.flush()
             os.fsync(stream.fileno())
+        temporary.chmod(_mode_of(place))
         return temporary
 
     def _home(self, folder: Path) -> Path:

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import hashlib
+import os
+import re
+import stat
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from flexcal.errors import InputError, unreadable
 from flexcal.files.transaction.file_transaction import files_on_disk
-from flexcal.files.transaction.reading import open_regular, read_bytes
+from flexcal.files.transaction.reading import MEGABYTE, open_regular, read_bytes
 
 LEDGER = ".flexcal"
 """In every folder that `--out` named: SHA-256 and name of what flexcal wrote there, as sha256sum has it, each verb's lines under a comment
 that names it."""
 _COMMENT = "# flexcal "
 _CHANGE = "# being written: flexcal "
+_VERB = re.compile(r"[a-z]+(-[a-z]+)*( [a-z]+(-[a-z]+)*)?")
+_LARGEST, _LARGEST_LEDGER = 2 * 1000 * MEGABYTE, 10 * MEGABYTE
+"""Bytes of a file that a verb writes, and of a ledger, at most."""
 
 
 @dataclass(frozen=True)
@@ -37,23 +43,23 @@ class Ledger:
         entries: dict[str, tuple[str, str]] = {}
         change: dict[str, str] = {}
         try:
-            lines = read_bytes(path).decode("utf-8", "surrogateescape").split("\n")
+            lines = read_bytes(path, limit=_LARGEST_LEDGER).decode("utf-8", "surrogateescape").split("\n")
         except FileNotFoundError:
             return cls(entries)
         except OSError as problem:
             raise unreadable(path, problem, "give another --out") from problem
         for line in lines:
             if line.startswith(_CHANGE):
-                changing = line.removeprefix(_CHANGE)
+                changing = _verb(line.removeprefix(_CHANGE))
             elif line.startswith("#"):
-                verb = line.removeprefix(_COMMENT)
+                verb = _verb(line.removeprefix(_COMMENT))
             else:
                 digest, _, name = line.partition("  ")
                 if digest.startswith("\\"):
                     digest, name = digest[1:], name.replace("\\n", "\n").replace("\\\\", "\\")
-                if name and changing:
+                if _is_below(name) and changing:
                     change[name] = digest
-                elif name:
+                elif _is_below(name):
                     entries[name] = (digest, verb)
         return cls(entries, change, changing)
 
@@ -96,8 +102,8 @@ class Ledger:
 
 
 def digest_on_disk(path: Path) -> str:
-    """SHA-256 of the regular file that is in its place, whatever waits for it."""
-    with files_on_disk(), open_regular(path, limit=None) as stream:
+    """SHA-256 of the regular file that is in its place, whatever waits for it; raises `InputError` for one that no verb has written."""
+    with files_on_disk(), open_regular(path, limit=_LARGEST) as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
@@ -119,13 +125,22 @@ def _sides(folder: Path, ledger: Ledger) -> Iterator[str]:
 
 
 def _found(path: Path) -> str:
-    """SHA-256 of a file, empty where there is none."""
+    """SHA-256 of a file, empty where there is none that could have been written."""
     try:
-        return digest_on_disk(path)
-    except FileNotFoundError:
+        return digest_on_disk(path) if stat.S_ISREG(path.lstat().st_mode) else ""
+    except (FileNotFoundError, NotADirectoryError):
         return ""
     except OSError as problem:
         raise unreadable(path, problem) from problem
+
+
+def _verb(text: str) -> str:
+    return text if _VERB.fullmatch(text) else "another verb"
+
+
+def _is_below(name: str) -> bool:
+    """Whether a name is that of a file in the folder."""
+    return bool(name) and "\0" not in name and not os.path.isabs(name) and ".." not in name.split("/")
 
 
 def _line(name: str, digest: str) -> str:

@@ -40,6 +40,11 @@ def regular_path(path: str | Path, *, limit: int | None) -> Path:
     """Path of a regular file, for a library that opens it by its name; checked, and raises, as `open_regular` does."""
     place = current_path(path)
     status = os.stat(place)
+    if not str(place).isprintable() and "\udc80" <= max(str(place)) <= "\udcff":
+        raise InputError(
+            "E-FILE-031",
+            f"{path} has a name that is no UTF-8 text, as the library needs that reads it; rename it.",
+        )
     if not stat.S_ISDIR(status.st_mode):
         _require_readable(path, place, status, limit)
     return place

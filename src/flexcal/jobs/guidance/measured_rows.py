@@ -85,6 +85,11 @@ class MeasuredRows:
                     f"all rows of {self.path} must have its columns, but the new row {' and '.join(odd)}; go on as the rows before were "
                     "measured, or move the table away to begin another.",
                 )
+            if not all(map(_is_cell, cells.values())):
+                raise InputError(
+                    "E-STUDIO-052",
+                    f"a value of the new row of {self.path} has a line end in it; remove that.",
+                )
         added = tuple(MeasuredRow(dict(cells)) for cells in rows)
         entry = {"do": "append", "row": len(table.rows), "cells": [dict(cells) for cells in rows]}
         if source is not None:
@@ -205,7 +210,7 @@ class MeasuredRows:
             stored = [
                 parse_json(self.history, line, "") for line in whole_lines(self.history) if line.strip()
             ]
-            if all(isinstance(one, dict) and isinstance(one.get("do"), str) for one in stored):
+            if all(map(_is_change, stored)):
                 return stored
             problem: Exception | str = "a line is no change"
         except InputError as error:
@@ -241,7 +246,8 @@ class _Table:
     @classmethod
     def parsed(cls, path: Path, text: str) -> _Table:
         """Table of a text; raises `InputError` for a line with more or fewer cells than columns."""
-        lines = text.lstrip("\ufeff").splitlines()
+        text = text.lstrip("\ufeff")
+        lines = text.removesuffix("\n").split("\n") if text else []
         first = next((k for k, line in enumerate(lines) if line.strip() and not line.startswith("#")), None)
         if first is None:
             return cls((), (), tuple(lines))
@@ -271,6 +277,35 @@ class _Table:
         for row in self.rows:
             writer.writerow([row.excluded if name == EXCLUDED else row.cells[name] for name in columns])
         return stream.getvalue()
+
+
+def _is_change(entry: Any) -> bool:
+    """Whether an entry of the journal has what taking it back needs."""
+    if not isinstance(entry, dict) or not isinstance(entry.get("row", 0), int):
+        return False
+    match entry:
+        case {"do": "undo" | "done"}:
+            return True
+        case {"do": "append", "row": _, "cells": [*rows]}:
+            source = entry.get("from", ""), entry.get("end", 0)
+            cells = [cell for row in rows if isinstance(row, dict) for cell in row.values()]
+            return (
+                all(isinstance(row, dict) for row in rows)
+                and all(map(_is_cell, cells))
+                and isinstance(source[0], str)
+                and isinstance(source[1], int)
+            )
+        case {"do": "exclude", "row": _, "reason": reason, "before": before}:
+            return _is_cell(reason) and _is_cell(before)
+        case {"do": "station", "row": _, "before": [*before], "after": [*after], "new": bool()}:
+            return len(before) == len(after) and all(
+                one is None or _is_cell(one) for one in (*before, *after)
+            )
+    return False
+
+
+def _is_cell(value: Any) -> bool:
+    return isinstance(value, str) and "\n" not in value and "\r" not in value
 
 
 @lru_cache(maxsize=4)

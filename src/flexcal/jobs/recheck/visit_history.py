@@ -39,6 +39,25 @@ class Readings:
     payload: list[float] | None = None
     temperature: list[float] | None = None
 
+    def __post_init__(self) -> None:
+        columns = (
+            self.target,
+            self.station,
+            self.q,
+            self.position,
+            self.sigma,
+            self.payload,
+            self.temperature,
+        )
+        joints = {len(row) for row in self.q}
+        triples = {len(row) for column in (self.position, self.sigma or []) for row in column}
+        if (
+            any(len(column) != len(self.pose) for column in columns if column is not None)
+            or len(joints) > 1
+            or triples - {3}
+        ):
+            raise FlexcalError("E-RECHECK-011", "the readings of a visit are not of one length.")
+
     @classmethod
     def of(cls, poses: PoseSet) -> Readings:
         """Readings of a pose set of points."""

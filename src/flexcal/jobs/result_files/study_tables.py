@@ -111,7 +111,10 @@ def _read_rows(path: Path) -> tuple[list[dict[str, Any]], int]:
             except InputError:
                 row = None
             known = (
-                isinstance(row, dict) and isinstance(row.get(KEY), str) and isinstance(row.get(NUMBER), int)
+                isinstance(row, dict)
+                and isinstance(row.get(KEY), str)
+                and isinstance(row.get(NUMBER), int)
+                and all(value is None or isinstance(value, str | int | float) for value in row.values())
             )
             rows += [row] if known else []
             odd += not known

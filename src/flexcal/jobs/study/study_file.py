@@ -20,6 +20,7 @@ from flexcal.jobs.study.tasks import StudyTasks
 from flexcal.jobs.study.two_stage_runs import TwoStageRuns
 from flexcal.jobs.study.virtual_calibrations import VirtualCalibrations
 from flexcal.model.robot import RobotModel
+from flexcal.printable import excerpt
 from flexcal.virtual_cell import CellConfig
 
 
@@ -41,6 +42,12 @@ def read_study(path: Path) -> StudyPlan:
     """
     file = read_yaml_file(path)
     config: StudyConfig = file.structure(StudyConfig)  # type: ignore[arg-type]
+    if not (path.parent / config.robot).is_file():
+        raise file.error(
+            "E-STUDY-030",
+            ("robot",),
+            f"there is no file {excerpt(config.robot)} beside it; correct the name.",
+        )
     tasks = _tasks(path, config)
     _check_options(file, config, tasks)
     if isinstance(config, CalibrateConfig):

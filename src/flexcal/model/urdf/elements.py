@@ -73,7 +73,10 @@ class Element:
                 "E-URDF-027", f"<{self.tag}> of {owner} lacks the attribute '{attribute}'; add it."
             )
         try:
-            values = np.array([float(word) for word in text.split()])
+            # other readers take neither 1_0 nor digits of other scripts
+            values = np.array(
+                [float(word) if word.isascii() and "_" not in word else np.nan for word in text.split()]
+            )
         except ValueError:
             values = np.array([np.nan])
         if len(values) != count or not (np.abs(values) <= LARGEST).all():

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 from flexcal.errors import FlexcalError
+from flexcal.files.transaction import refuse_linked_folder
 from flexcal.studio.commands.command_run import CommandRun
 
 
@@ -36,13 +38,16 @@ class CommandRunner:
     def start(self, arguments: Sequence[str], then: Callable[[CommandRun], None]) -> CommandRun:
         """Start a command; `then` is called by `settle` when it has ended.
 
-        Raises `FlexcalError` while another one runs.
+        Raises `FlexcalError` while another one runs, and where its output would lie behind a link.
         """
         if self.is_busy:
             assert self.current is not None
             raise FlexcalError(
                 "E-STUDIO-042", f"'{self.current.line}' is still running; wait for its end or cancel it."
             )
+        for option, value in pairwise(arguments):
+            if option == "--out":  # the project's choice, not a person's
+                refuse_linked_folder(self.folder / value / value, self.folder)
         run = CommandRun(arguments, self.folder)
         self.runs.append(run)
         self._then = then

@@ -21,7 +21,7 @@ def keep_calibration(project: Project) -> str:
 
     Raises `InputError` where there is none, or the folder cannot be written.
     """
-    source = project.folder / CALIBRATION
+    source = project.path(CALIBRATION)
     if not source.is_dir():
         raise InputError(
             "E-STUDIO-019", f"there is no folder {CALIBRATION} to copy; calibrate first (step 4)."
