@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Lock
+from typing import TextIO
 
 LONGEST_SENTENCE = 1000
 _LONGEST_EXCERPT = 40
@@ -71,21 +72,33 @@ _MOST_QUOTED = 100_000
 """Bytes of messages that are looked at."""
 
 
+def _is_standard_error(stream: TextIO | None) -> bool:
+    try:
+        return stream is not None and stream.fileno() == 2
+    except (OSError, ValueError):
+        return False
+
+
 @contextmanager
 def printable_errors(library: str) -> Iterator[None]:
     """What C or C++ writes to standard error in the block stands there on one printable line after the name of the `library`.
 
-    Parsers quote names, which can hold anything.
+    Parsers quote names, which can hold anything. What other threads print from Python meanwhile goes to standard error as it is.
     """
+    import io
     import tempfile
 
     with _REDIRECTING, tempfile.TemporaryFile() as written:
-        stderr = os.dup(2)
+        stderr, python = os.dup(2), sys.stderr
+        if _is_standard_error(python):
+            direct = io.FileIO(stderr, "w", closefd=False)
+            sys.stderr = io.TextIOWrapper(direct, errors="backslashreplace", write_through=True)
         os.dup2(written.fileno(), 2)
         try:
             yield
         finally:
             os.dup2(stderr, 2)
+            sys.stderr = python
             os.close(stderr)
             written.seek(0)
             if told := sentence(written.read(_MOST_QUOTED).decode("utf-8", "replace")):
