@@ -58,9 +58,10 @@ def read_responses(paths: Sequence[Path], model: RobotModel) -> tuple[list[Path]
     """Frequency responses of a robot from files, or from the response_pose_<p>.npz of folders, by pose number; raises `InputError`."""
     files: list[Path] = []
     for path in paths:
+        there = [path]
         if path.is_dir():
             refuse_mixture(path)
-        there = sorted(path.glob("response_pose_*.npz")) if path.is_dir() else [path]
+            there = sorted(path.glob("response_pose_*.npz"))
         if not there:
             raise InputError(
                 "E-RUN-049",

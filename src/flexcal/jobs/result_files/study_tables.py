@@ -82,9 +82,8 @@ def write_tasks(folder: Path, frame: polars.DataFrame) -> None:
     with atomic_path(folder / TASKS) as temporary:
         try:
             frame.write_parquet(temporary, compression="zstd")
-        except (
-            polars.exceptions.PolarsError
-        ) as problem:  # a full disk is an `OSError`, whatever Polars makes of it
+        except polars.exceptions.PolarsError as problem:
+            # a full disk is an `OSError`, whatever Polars makes of it
             if "os error 28" in str(problem):
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)) from problem
             raise
