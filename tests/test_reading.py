@@ -220,8 +220,8 @@ def declared_large(path: Path) -> Path:
     header = b"\x93NUMPY\x01\x00" + len(described).to_bytes(2, "little") + described.encode()
     with ZipFile(path, "w") as archive:
         archive.writestr("x.npy", header)
-    content = path.read_bytes()
-    path.write_bytes(content.replace((128).to_bytes(4, "little"), (8 * 10**8 + 128).to_bytes(4, "little")))
+    stored, declared = ((128).to_bytes(4, "little"), (8 * 10**8 + 128).to_bytes(4, "little"))
+    path.write_bytes(path.read_bytes().replace(stored + stored, stored + declared))  # in the archive, and unpacked
     return path
 
 

@@ -113,7 +113,7 @@ class DaskCluster(Workers):
             while running:
                 future, result = next(waiting)
                 index, task = running.pop(future)
-                outcome = self._outcome(future.status, result, index)
+                outcome = self._outcome(result, index)
                 if outcome is None:
                     suspects.append((index, task))
                 else:
@@ -124,7 +124,7 @@ class DaskCluster(Workers):
                 send(index, task, "second")
                 future, result = next(waiting)
                 del running[future]
-                outcome = self._outcome(future.status, result, index)
+                outcome = self._outcome(result, index)
                 yield outcome or Outcome(index, None, TaskError(None, _GIVEN_UP), 0.0)
         finally:
             self._cancel([*running, shared])
@@ -213,13 +213,16 @@ class DaskCluster(Workers):
         with self._quiet, suppress(TimeoutError):
             self.client.close()
 
-    def _outcome(self, status: str, result: Any, index: int) -> Outcome[Any] | None:
-        """What a task gave; None where its workers were killed."""
+    def _outcome(self, result: Any, index: int) -> Outcome[Any] | None:
+        """What a task gave; None where its workers were killed.
+
+        The status of the future is of now: "lost" where the worker was killed after its result had come here.
+        """
         from distributed import KilledWorker
 
-        if status == "finished":
+        if isinstance(result, Outcome):
             return result
-        if status != "error":  # cancelled, as all are when the connection ends
+        if not isinstance(result, tuple):  # cancelled, as all are when the connection ends
             raise self._lost()
         problem = result[1]  # of type, exception, traceback
         if isinstance(problem, KilledWorker):
