@@ -221,7 +221,9 @@ def declared_large(path: Path) -> Path:
     with ZipFile(path, "w") as archive:
         archive.writestr("x.npy", header)
     stored, declared = ((128).to_bytes(4, "little"), (8 * 10**8 + 128).to_bytes(4, "little"))
-    path.write_bytes(path.read_bytes().replace(stored + stored, stored + declared))  # in the archive, and unpacked
+    path.write_bytes(
+        path.read_bytes().replace(stored + stored, stored + declared)
+    )  # in the archive, and unpacked
     return path
 
 
