@@ -49,7 +49,7 @@ class Estimate:
         Parameters that the data do not determine, held at fixed values.
     identifiable : tuple of bool
         False for dropped parameters, and for parameters on a log scale with a standard deviation above 0.255 (not known to a factor
-        of two).
+        of 1.65 at 95 %).
     cost : float
         Minimised objective, prior included.
     chi2 : float

@@ -14,9 +14,10 @@ from flexcal.estimation.objective import Objective
 from flexcal.estimation.parameter import Parameters
 
 LOG_STD_LIMIT = 0.5 / 1.96
-"""A parameter on a log scale with a larger posterior standard deviation s is not identifiable: its 95 % interval may reach twice its
-value. Responses are nearly linear in a compliance, whose interval (1 ± 1.96 s) / c then includes half of it: at twice the stiffness s
-is twice as large, and the data cannot tell that end of the interval from rigid. Intervals of the logarithm do not cover there."""
+"""A parameter on a log scale with a larger posterior standard deviation s is not identifiable: its 95 % interval reaches beyond a factor
+of exp(0.5) = 1.65. Responses are nearly linear in a compliance, whose interval (1 ± 1.96 s) / c then includes half of it: at twice the
+stiffness s is twice as large, and the data cannot tell that end of the interval from rigid. Intervals of the logarithm do not cover
+there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +54,7 @@ def uncertainty(
 
 
 def is_log_identified(parameters: Parameters, covariance: np.ndarray) -> tuple[bool, ...]:
-    """For every parameter whether `covariance` (p, p) leaves it known to a factor of two, `LOG_STD_LIMIT`; always so on a linear scale."""
+    """For every parameter whether `covariance` (p, p) leaves it known to `LOG_STD_LIMIT`; always so on a linear scale."""
     stds = np.sqrt(np.diag(covariance))
     return tuple(
         item.scale == "linear" or bool(std <= LOG_STD_LIMIT)

@@ -13,7 +13,7 @@ WELL_KNOWN = 0.1
 def profile_std_ratio(problem: Problem, fitted: Estimate) -> np.ndarray:
     """Ratio (p,) of the width of the profile likelihood to the posterior's curvature, at least 1; `fitted` is the optimum of `problem`.
 
-    A stiffness that counts as known to a factor of two is held at twice its value and all others are fitted again. The response is
+    A stiffness that counts as identifiable is held at twice its value and all others are fitted again. The response is
     nearly linear in the compliance, which is half there: where the cost rises by d, its relative standard deviation is 0.5/√(2 d).
     A soft and damped mode that follows the noise is found out so: giving it up costs little.
     """

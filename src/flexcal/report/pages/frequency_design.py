@@ -99,7 +99,8 @@ def _known(spring: str, std: float) -> Check:
     if std > LOG_STD_LIMIT:
         return Check(
             question,
-            f"No: {spring} is not known to a factor of two. Choose other poses, or a payload off the axis.",
+            f"No: the standard deviation of {spring} is {100 * std:.0f} %, above {100 * LOG_STD_LIMIT:.0f} %. Choose other poses, or a "
+            "payload off the axis.",
             "bad",
         )
     return Check(

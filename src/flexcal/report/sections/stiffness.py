@@ -35,8 +35,8 @@ def stiffness_section(study: TwoStageStudy) -> Section:
             "figure-springs",
             "Estimates and their 95 % intervals",
             spring_intervals(estimate, stiffness, damping, study.truth, "the truth"),
-            "Each dot is an estimate relative to the truth, each bar its 95 % interval: about 19 of 20 bars should reach zero. Bars "
-            "beyond the axis are cut.",
+            "Each dot is an estimate relative to the truth, each bar its 95 % interval. Over many robots 95 % of the bars "
+            "should reach zero; those of one fit are correlated, so it may be fewer or more here. Bars beyond the axis are cut.",
             f"Dot plot of {len(stiffness)} stiffnesses and {len(damping)} dampings relative to the truth, with 95 % intervals. "
             "The numbers are in the table.",
         ),
