@@ -26,7 +26,7 @@ from .errors import FlexcalError, InputError
 from .estimation import Estimate
 from .export import export_urdf
 from .files.formats import read_yaml
-from .frequency.periodic import FrequencyResponse, frequency_responses
+from .frequency.periodic import FrequencyResponse, PlayedSignal, frequency_responses, played_signals
 from .jobs.accuracy import (
     AccuracyMap,
     Certificate,
@@ -120,6 +120,7 @@ __all__ = [
     "MeasuringSetup",
     "MultisinePlan",
     "PayloadIdentification",
+    "PlayedSignal",
     "PosePlan",
     "PoseRequest",
     "PoseSet",
@@ -161,6 +162,7 @@ __all__ = [
     "identify_inertials",
     "identify_payload",
     "identify_stiffness",
+    "played_signals",
     "predict",
     "prediction_errors",
     "random_poses",

@@ -15,15 +15,24 @@ if TYPE_CHECKING:
 
 
 def measure_command(plan: Path, robot: Path, folder: str) -> str:
-    """The command line that carries out a plan in the virtual cell, with --robot where that verb would not find the robot by itself."""
+    """The command line that carries out a plan in the virtual cell."""
+    return f"flexcal measure {quoted(plan)}{robot_option(plan, robot)} --cell virtual --out {quoted(folder)}"
+
+
+def export_command(plan: Path, robot: Path) -> str:
+    """The command line that writes the signals of a frequency plan for a real robot."""
+    return f"flexcal export excitation {quoted(plan)}{robot_option(plan, robot)} --out excitation"
+
+
+def robot_option(plan: Path, robot: Path) -> str:
+    """The option --robot where a verb would not find the robot of a plan by itself."""
     from flexcal.jobs.inputs import robot_file
 
     try:
         near = robot_file(plan, None).samefile(robot)
     except InputError:
         near = False
-    named = "" if near else f" --robot {quoted(robot)}"
-    return f"flexcal measure {quoted(plan)}{named} --cell virtual --out {quoted(folder)}"
+    return "" if near else f" --robot {quoted(robot)}"
 
 
 def import_command(robot: Path, poses: str) -> str:

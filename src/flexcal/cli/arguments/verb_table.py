@@ -187,6 +187,14 @@ STEPS = (
                 page=True,
             ),
             Verb(
+                ("export", "excitation"),
+                "export_excitation",
+                "ExportExcitation",
+                "the signals of that plan as files that a robot's controller plays",
+                "flexcal export excitation frequency.yaml --out excitation --rate 4000",
+                ("plan.yaml", "manifest.csv", "moves.csv", "phases.csv", "move_*", "pose_*_realisation_*"),
+            ),
+            Verb(
                 ("measure",),
                 "measure",
                 "Measure",

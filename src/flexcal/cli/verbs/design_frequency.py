@@ -19,7 +19,7 @@ from flexcal.cli.arguments.shared_options import (
     Seed,
     require_robot,
 )
-from flexcal.cli.arguments.suggested_commands import measure_command
+from flexcal.cli.arguments.suggested_commands import export_command, measure_command
 from flexcal.cli.terminal.console import Console
 from flexcal.errors import InputError
 
@@ -125,5 +125,6 @@ class DesignFrequency:
             f"{document['seconds_on_the_robot'] / 60:.0f} minutes on a real robot"
         )
         console.finish(
-            document, f"{measure_command(self.out, self.robot, 'frequency')}, or record it on the robot"
+            document,
+            f"{measure_command(self.out, self.robot, 'frequency')}; or on the robot: {export_command(self.out, self.robot)}",
         )

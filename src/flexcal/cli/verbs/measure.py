@@ -23,7 +23,8 @@ class Measure:
 
     plan: Annotated[Positional[Path], arg(metavar="PLAN", help="the plan (YAML)")]
     cell: Annotated[str, arg(metavar="virtual|DIR")]
-    """virtual, or a folder with plan.yaml and the joint logs or poses.csv recorded for it."""
+    """virtual, or a folder with plan.yaml and the joint logs or poses.csv recorded for it. Logs of the signals of 'export excitation' may
+    have any names, rates and beginnings, and need no plan.yaml beside them."""
     out: Annotated[Path, arg(metavar="DIR")]
     """Folder for the measurements."""
     robot: Annotated[
@@ -61,6 +62,8 @@ class Measure:
                 truth=self.truth,
                 progress=progress,
             )
+        for remark in measurement.remarks:
+            console.say(remark)
         if measurement.kind == "trajectory":
             console.say(f"wrote {measurement.recordings} recordings to {self.out}")
             verb = "payload" if measurement.loaded else "inertials"

@@ -30,12 +30,7 @@ class FolderCell:
         """Raises `InputError` where the folder is not there or its plan cannot be read or is for another robot."""
         self.path = Path(path)
         self.model = model
-        if not self.path.is_dir():
-            raise InputError(
-                "E-EXP-005",
-                f"{self.path} is no folder; give the folder that holds {PLAN} and the measurements.",
-            )
-        refuse_mixture(self.path)
+        require_measurements(self.path)
         self.plan: Plan = read_plan(self.path / PLAN)
         joints = self.plan.joint_count
         if joints != model.n:
@@ -94,13 +89,27 @@ class FolderCell:
         return poses
 
     def _check_same(self, plan: Plan | None) -> None:
-        if plan is None:
-            return
-        mine, yours = to_plain(self.plan), to_plain(plan)
-        keys = [key for key in {**mine, **yours} if key != "name" and mine.get(key) != yours.get(key)]
-        if keys:
-            raise InputError(
-                "E-EXP-011",
-                f"{self.path / PLAN} is another plan than the one asked for ({', '.join(keys)} differ); "
-                "use the folder's own plan, or measure again.",
-            )
+        if plan is not None:
+            require_same_plan(self.path / PLAN, self.plan, plan)
+
+
+def require_measurements(folder: Path) -> None:
+    """Raise `InputError` where `folder` is none, or holds files of a run that was cut off."""
+    if not folder.is_dir():
+        raise InputError(
+            "E-EXP-005",
+            f"{folder} is no folder; give the folder that holds {PLAN} and the measurements.",
+        )
+    refuse_mixture(folder)
+
+
+def require_same_plan(path: Path, own: Plan, asked: Plan, free: tuple[str, ...] = ("name",)) -> None:
+    """Raise `InputError` where the plan of `path` differs from another one, but for the `free` keys."""
+    mine, yours = to_plain(own), to_plain(asked)
+    keys = [key for key in {**mine, **yours} if key not in free and mine.get(key) != yours.get(key)]
+    if keys:
+        raise InputError(
+            "E-EXP-011",
+            f"{path} is another plan than the one asked for ({', '.join(keys)} differ); "
+            "use the folder's own plan, or measure again.",
+        )

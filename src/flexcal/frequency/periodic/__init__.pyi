@@ -15,6 +15,8 @@ from .multisine import (
     samples_per_period,
     synthesise,
 )
+from .played_signal import PlayedSchedule, PlayedSignal, multisine_at, played_signals
+from .recognition import Recognition, SignalSearch, nearest_poses, on_plan
 from .response import FrequencyResponse, frequency_responses, pose_response
 from .symmetry import reciprocity
 
@@ -23,6 +25,10 @@ __all__ = [
     "Average",
     "FrequencyResponse",
     "LocalWindows",
+    "PlayedSchedule",
+    "PlayedSignal",
+    "Recognition",
+    "SignalSearch",
     "crest_factor",
     "excitation_torque",
     "frequency_responses",
@@ -31,10 +37,14 @@ __all__ = [
     "kronecker",
     "leave_out_detection_lines",
     "local_polynomial_responses",
+    "multisine_at",
     "multisine_spectra",
+    "nearest_poses",
     "noise_lines",
     "odd_lines",
+    "on_plan",
     "orthogonal_matrix",
+    "played_signals",
     "pool_noise",
     "pose_response",
     "projected",

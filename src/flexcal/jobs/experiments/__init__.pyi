@@ -1,4 +1,5 @@
 from .candidate_poses import PoseRequest, PoseRequestFiles, box_corners, working_file, working_volume
+from .excitation_export import export_excitation
 from .frequency_design import (
     DesignedFrequency,
     FrequencyRequest,
@@ -34,6 +35,7 @@ __all__ = [
     "design_poses",
     "design_trajectories",
     "exciting_plan",
+    "export_excitation",
     "frequency_plan",
     "measure",
     "optimise_excitation",

@@ -12,6 +12,7 @@ from flexcal.data.plans import MultisinePlan, PosePlan
 from flexcal.data.recordings import Recording
 from flexcal.errors import InputError, naming
 from flexcal.files.formats import read_yaml, yaml_text
+from flexcal.jobs.experiments.played_recordings import PlayedRecordings, plan_as_played
 from flexcal.jobs.experiments.poses import VERIFICATION
 from flexcal.jobs.inputs import read_plan_for_robot
 from flexcal.jobs.result_files import header, write_results
@@ -34,6 +35,7 @@ class Measurement:
     poses: int
     recordings: int
     loaded: bool
+    remarks: tuple[str, ...] = ()
 
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
@@ -44,6 +46,7 @@ class Measurement:
             "plan": self.plan,
             "poses": self.poses,
             "recordings": self.recordings,
+            "remarks": list(self.remarks),
         }
 
     @property
@@ -65,28 +68,33 @@ def measure(
 ) -> Measurement:
     """Carry out the plan in a file and leave the measurements, the plan and results.json in the folder `out`.
 
-    `cell` is "virtual", or a folder with measurements by this very plan, which are checked and copied in the standard form. The virtual
-    cell takes `config` (default: cell.yaml beside robot.yaml, where there is one); its hidden truth is drawn from `seed`, or taken from the
-    file `truth`, and left in `out`/truth.yaml. Raises `FlexcalError` where files do not fit, and where `out`
-    holds the measurements of another plan.
+    `cell` is "virtual", or a folder with measurements by this very plan, which are checked and copied in the standard form; recordings of
+    a frequency plan may have any names, beginnings and rates, see `PlayedRecordings`. The virtual cell takes `config` (default: cell.yaml
+    beside robot.yaml, where there is one); its hidden truth is drawn from `seed`, or taken from the file `truth`, and left in
+    `out`/truth.yaml. Raises `FlexcalError` where files do not fit, and where `out` holds the measurements of another plan.
     """
     model = RobotModel.from_yaml(robot_file, estimates=False)
     plan = read_plan_for_robot(plan_file, model)
     if cell != VIRTUAL and Path(cell).resolve() == out.resolve():
         raise InputError("E-RUN-039", f"{out} is the folder measured before; give another --out.")
+    if cell != VIRTUAL and isinstance(plan, MultisinePlan):
+        plan = plan_as_played(Path(cell), plan)
     before = out / PLAN
     if before.is_file() and yaml_text(read_plan_for_robot(before, model)) != yaml_text(plan):
         raise InputError("E-RUN-040", f"{out} holds what was measured by another plan; give another --out.")
     drawn: dict[str, float] = {}
-    source: Cell
+    source: Cell | PlayedRecordings
     if cell == VIRTUAL:
         beside = model.path.parent / "cell.yaml"
         file = beside if config is None and beside.is_file() else config
         settings = CellConfig() if file is None else read_yaml(file, CellConfig)
         source, drawn = VirtualCell.drawn(model, settings, seed, truth)
+    elif isinstance(plan, MultisinePlan):
+        source = PlayedRecordings(Path(cell), model)
     else:
         source = FolderCell(cell, model)
     if isinstance(plan, PosePlan):
+        assert isinstance(source, Cell)
         result = Measurement(out, plan.kind, plan.name, _measure_poses(source, plan, out, progress), 0, False)
     else:
         total = len(list(labels(plan)))
@@ -94,7 +102,8 @@ def measure(
             write_recordings(out, plan, _counted(source.record(plan), total, progress))
         poses = len(plan.poses) if isinstance(plan, MultisinePlan) else 0
         loaded = plan.payload != 0 and model.payload is not None
-        result = Measurement(out, plan.kind, plan.name, poses, total, loaded)
+        remarks = tuple(source.remarks) if isinstance(source, PlayedRecordings) else ()
+        result = Measurement(out, plan.kind, plan.name, poses, total, loaded, remarks)
     if drawn:
         write_truth(out / "truth.yaml", drawn)
     write_results(out, result.document())

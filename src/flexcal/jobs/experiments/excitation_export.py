@@ -1,0 +1,206 @@
+"""Signals of a frequency plan as files that a robot's controller plays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from math import ceil, log10
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from flexcal.data.experiments import PLAN
+from flexcal.data.plans import MultisinePlan, read_plan_of, write_plan
+from flexcal.data.recordings import RecordingLabel
+from flexcal.data.tables import UNITS, mapped_signals, standard_columns, write_table
+from flexcal.errors import InputError
+from flexcal.files.formats import sha256_of
+from flexcal.frequency.periodic import PlayedSchedule, PlayedSignal, multisine_spectra, played_signals
+from flexcal.jobs.inputs import robot_file
+from flexcal.model.robot import RobotModel
+from flexcal.progress import Progress, silent
+
+MANIFEST, MOVES, PHASES = "manifest.csv", "moves.csv", "phases.csv"
+Format = Literal["csv", "parquet"]
+_DIGITS = 9
+"""Significant digits of written values, of the largest of a column."""
+_MOVE_SHARE = 0.1
+"""Share of the velocity limits that a move between poses uses."""
+_MOVE_RATE = 0.5
+"""Largest velocity of a joint in a move whose limit is unknown, rad/s or m/s."""
+
+
+@dataclass(frozen=True, eq=False)
+class ExportedExcitation:
+    """Files in `folder` of the `plan` as it is played, with these `rows` of the manifest; `remarks` to print."""
+
+    folder: Path
+    plan: MultisinePlan
+    rows: tuple[dict[str, Any], ...]
+    moves: tuple[dict[str, Any], ...]
+    remarks: tuple[str, ...]
+
+    def document(self) -> dict[str, Any]:
+        """The JSON document."""
+        return {
+            "folder": self.folder,
+            "plan": self.folder / PLAN,
+            "rate_hz": self.plan.rate_hz,
+            "signals": list(self.rows),
+            "moves": list(self.moves),
+            "seconds_on_the_robot": sum(row["play_s"] for row in self.rows)
+            + sum(row["duration_s"] for row in self.moves),
+            "remarks": list(self.remarks),
+        }
+
+
+def export_excitation(
+    plan_file: Path,
+    out: Path,
+    *,
+    robot: Path | None = None,
+    rate_hz: float | None = None,
+    scale: float = 1.0,
+    whole: bool = False,
+    format: Format = "csv",
+    progress: Progress = silent,
+) -> ExportedExcitation:
+    """Write the signals of the frequency plan in a file to the folder `out`, one file a recording, with manifest.csv.
+
+    `rate_hz` is the controller's (default: the plan's), `scale` multiplies the amplitudes; both go into `out`/plan.yaml, the plan as it is
+    played. A file holds one period of excitation and reference motion, or with `whole` all of them. Raises `FlexcalError` where the plan
+    does not fit the robot of robot.yaml, or lines do not fit the rate.
+    """
+    model = RobotModel.from_yaml(robot_file(plan_file, robot))
+    plan = read_plan_of(plan_file, MultisinePlan)
+    if plan.joint_count != model.n:
+        raise InputError(
+            "E-EXP-012",
+            f"{plan_file}: the plan is for {plan.joint_count} joints, but {model.path} has {model.n}; give the plan of this robot.",
+        )
+    played = replace(
+        plan, rate_hz=plan.rate_hz if rate_hz is None else rate_hz, amplitude=scale * plan.amplitude
+    )
+    schedule = PlayedSchedule(played)
+    write_plan(out / PLAN, played)
+    write_table(out / PHASES, _phases(played))
+    total = len(played.poses) * played.recordings_per_pose
+    rows = []
+    for number, signal in enumerate(played_signals(played, whole=whole), start=1):
+        name = f"{_label(signal).name}.{format}"
+        write_table(out / name, _columns(model, signal))
+        rows.append(_row(schedule, signal, name, whole) | {"sha256": sha256_of(out / name)})
+        progress("signals", number / total)
+    write_table(out / MANIFEST, _as_columns(rows))
+    moves = []
+    for number, (time, q, dq) in enumerate(_moves(model, played), start=1):
+        name = f"move_{number}.{format}"
+        write_table(out / name, {"t": time} | _numbered("q", q) | _numbered("dq", dq))
+        move = {
+            "file": name,
+            "from_pose": number,
+            "to_pose": number + 1,
+            "rate_hz": played.rate_hz,
+            "duration_s": float(time[-1]),
+            "sha256": sha256_of(out / name),
+        }
+        moves.append(move)
+    if moves:
+        write_table(out / MOVES, _as_columns(moves))
+    return ExportedExcitation(out, played, tuple(rows), tuple(moves), _remarks(schedule, whole))
+
+
+def _label(signal: PlayedSignal) -> RecordingLabel:
+    return RecordingLabel(signal.pose, signal.realisation, signal.experiment, signal.sign)
+
+
+def _columns(model: RobotModel, signal: PlayedSignal) -> dict[str, np.ndarray]:
+    quantities = (("q", signal.position), ("dq", signal.velocity), ("tau", signal.torque))
+    columns = {"t": signal.time}
+    for quantity, values in quantities:
+        columns |= _numbered(quantity, values)
+    declared = model.config.signals.get("tau")
+    if declared is not None and declared.gain is not None and declared.unit in (None, "A", "mA"):
+        mapped = mapped_signals(model)["tau"]
+        unit = UNITS["tau"][declared.unit or "A"]
+        currents = mapped.columns_of(signal.torque + mapped.offset)
+        columns |= {f"i{k}": _rounded(unit * values) for k, values in enumerate(currents.values(), start=1)}
+    return columns
+
+
+def _numbered(quantity: str, values: np.ndarray) -> dict[str, np.ndarray]:
+    names = standard_columns(quantity, values.shape[1])
+    return {name: _rounded(values[:, j]) for j, name in enumerate(names)}
+
+
+def _rounded(values: np.ndarray) -> np.ndarray:
+    """Values with nine significant digits of the largest, as short texts; 0.0 for -0.0."""
+    largest = float(np.abs(values).max())
+    return np.round(values, _DIGITS - ceil(log10(largest))) + 0.0 if largest > 0 else np.zeros_like(values)
+
+
+def _row(schedule: PlayedSchedule, signal: PlayedSignal, name: str, whole: bool) -> dict[str, Any]:
+    plan = schedule.plan
+    loop = schedule.main if whole else schedule.loop
+    return {
+        "file": name,
+        "pose": signal.pose + 1,
+        "realisation": signal.realisation + 1,
+        "experiment": signal.experiment + 1,
+        "sign": signal.sign,
+        "rate_hz": plan.rate_hz,
+        "start_s": signal.start,
+        "period_s": 1 / plan.base_frequency_hz,
+        "periods": plan.periods - plan.settle_periods,
+        "loop_start_row": schedule.ramp,
+        "loop_rows": loop,
+        "play_rows": schedule.main,
+        "play_s": schedule.samples / plan.rate_hz,
+    }
+
+
+def _as_columns(rows: list[dict[str, Any]]) -> dict[str, np.ndarray]:
+    return {key: np.array([row[key] for row in rows]) for key in rows[0]}
+
+
+def _phases(plan: MultisinePlan) -> dict[str, np.ndarray]:
+    """Amplitude and phase of every line, of the experiments with sign +1."""
+    spectra = np.array([multisine_spectra(plan, realisation) for realisation in range(plan.realisations)])
+    realisation, line, axis, experiment = (index.ravel() for index in np.indices(spectra.shape))
+    phasors = spectra.ravel()
+    return {
+        "realisation": realisation + 1,
+        "experiment": experiment + 1,
+        "joint": np.array(plan.joints)[axis] + 1,
+        "line": plan.lines[line],
+        "frequency_hz": plan.frequencies_hz[line],
+        "amplitude": np.abs(phasors),
+        "phase_rad": np.angle(phasors),
+    }
+
+
+def _moves(model: RobotModel, plan: MultisinePlan) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Time (N,), position and velocity (N, n) from each pose to the next, straight in the joints, at a tenth of their velocity limits."""
+    limits = np.array([joint.velocity for joint in model.motor_joints])
+    fastest = np.where((limits > 0) & np.isfinite(limits), _MOVE_SHARE * limits, _MOVE_RATE)
+    for start, end in zip(plan.poses[:-1], plan.poses[1:], strict=True):
+        duration = 1.875 * float((np.abs(end - start) / fastest).max())  # peak of the polynomial's rate
+        samples = max(2, ceil(duration * plan.rate_hz) + 1)
+        time = np.arange(samples) / plan.rate_hz
+        u = (time / time[-1])[:, None]
+        share, rate = 10 * u**3 - 15 * u**4 + 6 * u**5, 30 * u**2 * (1 - u) ** 2 / time[-1]
+        yield time, start + share * (end - start), rate * (end - start)
+
+
+def _remarks(schedule: PlayedSchedule, whole: bool) -> tuple[str, ...]:
+    if schedule.period is not None or whole:
+        return ()
+    plan = schedule.plan
+    samples = plan.rate_hz / plan.base_frequency_hz
+    near = [plan.base_frequency_hz * count for count in (ceil(samples) - 1, ceil(samples))]
+    return (
+        f"a period of {1 / plan.base_frequency_hz:.6g} s is {samples:.6g} samples at {plan.rate_hz:g} Hz, no whole number: every sample is "
+        f"that of the plan's multisine, but the files hold all {plan.periods} periods in place of one, and a recording is resampled; at "
+        f"{near[0]:.9g} or {near[1]:.9g} Hz both would be spared",
+    )

@@ -1,0 +1,102 @@
+"""Recordings of played signals in a folder, as a cell: found by their torques, put on the plan's samples, and named."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from flexcal.data.experiments import PLAN, existing_file, labels, require_measurements, require_same_plan
+from flexcal.data.plans import MultisinePlan, TrajectoryPlan, read_plan_of
+from flexcal.data.recordings import Recording, RecordingLabel, read_recording
+from flexcal.errors import InputError
+from flexcal.frequency.periodic import SignalSearch, nearest_poses, on_plan
+from flexcal.jobs.experiments.excitation_export import MANIFEST, MOVES, PHASES
+from flexcal.model.robot import RobotModel
+
+_SHOWN = 5
+"""Recordings that a message lists."""
+
+
+class PlayedRecordings:
+    """Cell of the joint logs (CSV, Parquet) in a folder, recorded while the signals of a frequency plan were played.
+
+    Names do not matter: pose, realisation, experiment and sign are told from positions and torques; only where two poses are as near as
+    a soft controller sags does a standard name decide. `remarks` say, once all are read, what was exchanged or lags.
+    """
+
+    def __init__(self, folder: Path, model: RobotModel) -> None:
+        self.folder, self.model = folder, model
+        self.remarks: list[str] = []
+
+    def record(self, plan: MultisinePlan | TrajectoryPlan) -> Iterator[Recording]:
+        """The recordings one by one, in the order of the file names, labelled.
+
+        Raises `InputError` where a log is none of the plan, or two are the same; and, after the last, where one is missing.
+        """
+        assert isinstance(plan, MultisinePlan)
+        search = SignalSearch(plan)
+        expected = {label.name: label for label in labels(plan)}
+        found: dict[RecordingLabel, Path] = {}
+        renamed: list[str] = []
+        for file in self._files():
+            recording = read_recording(file, self.model)
+            poses = nearest_poses(plan, recording)
+            named = expected.get(file.stem)
+            if named is not None and named.pose in poses:
+                poses.insert(0, named.pose)
+            recognised = search.find(recording, poses)
+            label = recognised.label
+            if label in found:
+                raise InputError(
+                    "E-EXP-018",
+                    f"{file} and {found[label].name} are both recordings of {label.name}; remove one of them, or record again what the "
+                    "other should be.",
+                )
+            found[label] = file
+            if named is not None and named != label:
+                renamed.append(f"{file.name} is {label.name}")
+            yield on_plan(plan, recording, recognised)
+        missing = [name for name, label in expected.items() if label not in found]
+        if missing:
+            raise InputError(
+                "E-EXP-019",
+                f"{self.folder}: {len(missing)} of {len(expected)} recordings of the plan are missing: {_listed(missing)}; play and record "
+                f"{'it' if len(missing) == 1 else 'them'}.",
+            )
+        if renamed:
+            self.remarks.append(
+                f"{len(renamed)} recordings are not what their names say, and are taken as what their torques are: {_listed(renamed)}"
+            )
+
+    def _files(self) -> list[Path]:
+        """The logs, by name; raises `InputError` where there are none, or one is there in both formats."""
+        others = {MANIFEST, MOVES, PHASES}
+        files = [
+            path
+            for path in sorted(self.folder.iterdir())
+            if path.suffix in (".csv", ".parquet") and path.name not in others and path.is_file()
+        ]
+        if not files:
+            raise InputError(
+                "E-EXP-020",
+                f"{self.folder} holds no joint logs (.csv or .parquet); give the folder with the recordings, or 'virtual'.",
+            )
+        return [existing_file(self.folder, file.stem) for file in files]
+
+
+def _listed(names: list[str]) -> str:
+    more = len(names) - _SHOWN
+    return ", ".join(names[:_SHOWN]) + (f" and {more} more" if more > 0 else "")
+
+
+def plan_as_played(folder: Path, plan: MultisinePlan) -> MultisinePlan:
+    """The plan in `folder`, by which signals were exported, where there is one, else `plan`; rate and amplitudes may differ.
+
+    Raises `InputError` where `folder` is none, or its plan differs otherwise.
+    """
+    require_measurements(folder)
+    if not (folder / PLAN).is_file():
+        return plan
+    played = read_plan_of(folder / PLAN, MultisinePlan)
+    require_same_plan(folder / PLAN, played, plan, free=("name", "rate_hz", "amplitude"))
+    return played

@@ -1,0 +1,225 @@
+"""`export excitation`, and `measure` with recordings: of a robot in closed form that knows the written files alone."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import shutil
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+from played_robot import KD, KP, ROBOT, STEPS, URDF, Log, Robot
+from refusals import assert_refusal
+
+from flexcal import MultisinePlan, PlayedSignal, played_signals
+from flexcal.cli.main import main
+from flexcal.data.plans import read_plan_of, write_plan
+
+NAMES = [f"{kind}{j}" for kind in ("q", "dq", "tau") for j in (1, 2)]
+
+
+def plan_of(**changes: object) -> MultisinePlan:
+    lines = np.arange(3, 60, 2)
+    values: dict = {
+        "name": "fence",
+        "poses": np.array([[-0.3, 0.5], [-1.0, 1.6]]),
+        "joints": (0, 1),
+        "base_frequency_hz": 1.0,
+        "lines": lines,
+        "amplitude": np.repeat([[3.0], [1.5]], len(lines), axis=1),
+        "periods": 3,
+        "settle_periods": 1,
+        "realisations": 3,
+        "signs": True,
+        "reference_amplitude": 0.02,
+        "reference_frequency_hz": 1.5,
+        "kp": np.array(KP),
+        "kd": np.array(KD),
+        "rate_hz": 1000.0,
+        "torque": "held",
+        "seed": 3,
+    }
+    return MultisinePlan(**(values | changes))
+
+
+def project(folder: Path, **changes: object) -> Path:
+    """A folder with the robot and its plan."""
+    folder.mkdir(exist_ok=True)
+    (folder / "fence.urdf").write_text(URDF)
+    (folder / "robot.yaml").write_text(ROBOT)
+    write_plan(folder / "frequency.yaml", plan_of(**changes))
+    return folder
+
+
+def manifest(folder: Path, name: str = "manifest.csv") -> list[dict[str, str]]:
+    with (folder / name).open() as stream:
+        return list(csv.DictReader(stream))
+
+
+def multisine(folder: Path, row: dict[str, str], time: np.ndarray) -> np.ndarray:
+    """Torques (N, 2) of a row of the manifest by phases.csv alone, at times from the begin of the periods on."""
+    phases = pl.read_csv(folder / "phases.csv")
+    result = np.zeros((len(time), 2))
+    for joint in (1, 2):
+        mine = phases.filter(
+            (pl.col("realisation") == int(row["realisation"]))
+            & (pl.col("experiment") == int(row["experiment"]))
+            & (pl.col("joint") == joint)
+        )
+        angle = 2 * np.pi * time[:, None] * mine["frequency_hz"].to_numpy() + mine["phase_rad"].to_numpy()
+        result[:, joint - 1] = int(row["sign"]) * np.cos(angle) @ mine["amplitude"].to_numpy()
+    return result
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Log]:
+    folder = project(tmp_path_factory.mktemp("played") / "fence")
+    export = ["export", "excitation", folder / "frequency.yaml", "--out", folder / "excitation"]
+    assert main([str(word) for word in export]) == 0
+    return folder, Robot().play(folder / "excitation", before=0.5)
+
+
+def test_the_measured_part_is_the_plan_s_multisine(cell: tuple[Path, Log]) -> None:
+    folder = cell[0] / "excitation"
+    plan = read_plan_of(folder / "plan.yaml", MultisinePlan)
+    rows = manifest(folder)
+    assert len(rows) == 24 and len({row["file"] for row in rows}) == 24
+    first = list(rows[0])[:9]
+    assert first == ["file", "pose", "realisation", "experiment", "sign", "rate_hz", "start_s", "period_s", "periods"]  # fmt: skip
+    spectra = {}
+    for row in rows:
+        file = folder / row["file"]
+        assert row["sha256"] == hashlib.sha256(file.read_bytes()).hexdigest()
+        table = pl.read_csv(file)
+        assert table.columns == ["t", *NAMES]
+        assert float(row["start_s"]) == 2.0 and float(row["period_s"]) == 1.0 and row["periods"] == "2"
+        begin, length = int(row["loop_start_row"]), int(row["loop_rows"])
+        assert length == 2000  # the reference motion repeats itself after two periods
+        loop = table[begin : begin + length]
+        values = loop.select("tau1", "tau2").to_numpy()
+        exact = multisine(folder, row, loop["t"].to_numpy() - loop["t"][0])
+        assert np.abs(values - exact).max() < 1e-6 * np.abs(exact).max()
+        bins = np.fft.rfft(values, axis=0) / len(values) * 2
+        off = np.delete(bins, 2 * plan.lines, axis=0)
+        assert np.abs(off).max() < 1e-6 * np.abs(bins).max()
+        key = row["pose"], row["realisation"], row["sign"]
+        spectra.setdefault(key, []).append(bins[2 * plan.lines])
+    for (pose, realisation, sign), columns in spectra.items():
+        gamma = np.stack(columns, axis=2)  # (L, axes, experiments), eq. (25)
+        product = gamma @ gamma.conj().transpose(0, 2, 1)
+        assert np.allclose(product, np.diag([9.0, 2.25]), atol=1e-6)
+        assert np.allclose(
+            gamma, (1 if sign == "1" else -1) * np.stack(spectra["1", realisation, "1"], axis=2)
+        )
+        assert pose in "12"
+
+
+def test_from_rest_to_rest_and_on_to_the_next_pose(cell: tuple[Path, Log]) -> None:
+    folder = cell[0] / "excitation"
+    plan = read_plan_of(folder / "plan.yaml", MultisinePlan)
+    for signal in played_signals(plan):
+        assert isinstance(signal, PlayedSignal)
+        for end in (0, -1):
+            assert np.array_equal(signal.position[end], plan.poses[signal.pose])
+            assert not signal.velocity[end].any() and not signal.torque[end].any()
+        numeric = (signal.position[2:] - signal.position[:-2]) * 500
+        assert np.abs(signal.velocity[1:-1] - numeric).max() < 1e-4 * np.abs(numeric).max()
+        assert np.abs(signal.position - plan.poses[signal.pose]).max() == pytest.approx(0.02, rel=1e-3)
+    (row,) = manifest(folder, "moves.csv")
+    move = pl.read_csv(folder / row["file"])
+    q, dq = move.select("q1", "q2").to_numpy(), move.select("dq1", "dq2").to_numpy()
+    assert np.allclose(q[[0, -1]], plan.poses) and not dq[[0, -1]].any()
+    assert np.abs(dq).max() <= 0.9 * 1.001
+    assert np.allclose(np.diff(q, axis=0) * 1000, (dq[1:] + dq[:-1]) / 2, atol=1e-4)
+
+
+def test_whole_signals_are_those_of_the_loops(run, cell: tuple[Path, Log], tmp_path: Path) -> None:
+    folder = cell[0]
+    asked = ("--out", tmp_path / "whole", "--whole", "--format", "parquet")
+    assert run("export", "excitation", folder / "frequency.yaml", *asked).status == 0
+    for short, long in zip(manifest(folder / "excitation"), manifest(tmp_path / "whole"), strict=True):
+        table = pl.read_csv(folder / "excitation" / short["file"]).to_numpy()
+        begin, length, play = (int(short[key]) for key in ("loop_start_row", "loop_rows", "play_rows"))
+        order = [*range(begin), *(begin + np.arange(play) % length), *range(begin + length, len(table))]
+        every = pl.read_parquet(tmp_path / "whole" / long["file"]).to_numpy()
+        assert np.allclose(every[:, 1:], table[order, 1:], atol=1e-8)
+        assert np.allclose(every[:, 0], np.arange(len(order)) / 1000)
+        assert float(long["play_s"]) == pytest.approx(len(order) / 1000)
+
+
+def test_a_period_that_is_no_whole_number_of_samples(run, tmp_path: Path) -> None:
+    """Every sample is that of the multisine; what it costs is said."""
+    folder = project(tmp_path / "odd", base_frequency_hz=0.7, reference_frequency_hz=1.05)
+    outcome = run(
+        "export", "excitation", folder / "frequency.yaml", "--out", folder / "played", "--rate", 997
+    )
+    assert outcome.status == 0
+    assert "1424.29 samples at 997 Hz" in outcome.out and "996.8 or 997.5 Hz" in outcome.out
+    for row in manifest(folder / "played")[:4]:
+        table = pl.read_csv(folder / "played" / row["file"])
+        begin, length = int(row["loop_start_row"]), int(row["play_rows"])
+        time = np.arange(length) / 997
+        values = table[begin : begin + length].select("tau1", "tau2").to_numpy()
+        exact = multisine(folder / "played", row, time)
+        assert np.abs(values - exact).max() < 1e-6 * np.abs(exact).max()
+        assert len(table) == length + 2 * begin and float(row["start_s"]) == pytest.approx(
+            begin / 997 + 1 / 0.7
+        )
+
+
+STIFFNESS = {"j1": 9000.0, "j2": 4000.0}
+
+
+@pytest.mark.parametrize(
+    "log", [{"by_hand": 1}, {"every": 2, "late": 1, "by_hand": 2}, {"every": 5, "late": 3}]
+)
+def test_round_trip(run, cell: tuple[Path, Log], tmp_path: Path, log: dict[str, int]) -> None:
+    """Written files, a robot that reads them alone, its logs, responses, stiffnesses."""
+    folder = shutil.copytree(cell[0], tmp_path / "fence")
+    cell[1].write(folder / "logs", **log)
+    exchanged = sorted((folder / "logs").iterdir())[3], sorted((folder / "logs").iterdir())[16]
+    exchanged[0].rename(folder / "logs" / "aside")
+    exchanged[1].rename(exchanged[0])
+    (folder / "logs" / "aside").rename(exchanged[1])
+    robot = folder / "robot.yaml"
+    arguments = ("--robot", robot, "--cell", folder / "logs", "--out", folder / "frequency", "--json")
+    outcome = run("measure", folder / "excitation" / "plan.yaml", *arguments)
+    assert outcome.status == 0
+    (remark,) = outcome.document["remarks"]
+    assert remark.startswith("2 recordings are not what their names say")
+    assert exchanged[0].name in remark and exchanged[1].stem in remark
+    one = pl.read_parquet(folder / "frequency" / "pose_1_realisation_1_experiment_1_plus.parquet")
+    rate = STEPS * 1000 / log.get("every", STEPS)
+    assert len(one) == 3 * max(1000, rate)
+    assert run("identify", "response", robot, folder / "frequency", "--out", folder / "responses").status == 0
+    found = run("identify", "stiffness", robot, folder / "responses", "--json").document["stage1"][
+        "stiffness"
+    ]
+    for joint, true in STIFFNESS.items():
+        value = found[joint]["drive"]
+        assert value["estimate"] == pytest.approx(true, rel=0.01)
+        assert abs(value["estimate"] - true) < 3 * value["std"]
+
+
+def test_recordings_that_are_missing_or_there_twice(run, cell: tuple[Path, Log], tmp_path: Path) -> None:
+    folder = cell[0]
+    cell[1].write(tmp_path / "logs")
+    files = sorted((tmp_path / "logs").iterdir())
+    arguments = ("--robot", folder / "robot.yaml", "--cell", tmp_path / "logs", "--out", tmp_path / "out")
+    measure = ("measure", folder / "excitation" / "plan.yaml", *arguments)
+    files[5].rename(tmp_path / "aside")
+    assert_refusal(run(*measure).err, "E-EXP-019", "1 of 24", files[5].stem)
+    shutil.copy(files[7], files[5])
+    assert_refusal(run(*measure).err, "E-EXP-018", files[7].name, files[5].name)
+    table = pl.read_csv(tmp_path / "aside")
+    table[1900:].write_csv(files[5])
+    assert_refusal(run(*measure).err, "E-EXP-017", files[5].name, "begins")
+    table.with_columns(tau1=-pl.col("tau2"), tau2=pl.col("tau1")).write_csv(files[5])
+    assert_refusal(run(*measure).err, "E-EXP-014", files[5].name)
+    table.with_columns(q1=pl.col("q1") + 0.4).write_csv(files[5])
+    assert_refusal(run(*measure).err, "E-EXP-016", files[5].name, "joint 1")
+    table[: 500 + 2000].write_csv(files[5])
+    assert_refusal(run(*measure).err, "E-EXP-013", files[5].name)
+    assert not (tmp_path / "out").exists()
