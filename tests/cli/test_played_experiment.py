@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import csv
 import hashlib
+import re
 import shutil
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 import pytest
-from played_robot import KD, KP, ROBOT, STEPS, URDF, Log, Robot
+from played_robot import KD, KP, ROBOT, STEPS, URDF, Log, Robot, gravity
 from refusals import assert_refusal
 
-from flexcal import MultisinePlan, PlayedSignal, played_signals
+from flexcal import MultisinePlan, PlayedSignal, RobotModel, played_signals
 from flexcal.cli.main import main
 from flexcal.data.plans import read_plan_of, write_plan
+from flexcal.design.frequency import signal_uses
 
 NAMES = [f"{kind}{j}" for kind in ("q", "dq", "tau") for j in (1, 2)]
 
@@ -223,3 +225,73 @@ def test_recordings_that_are_missing_or_there_twice(run, cell: tuple[Path, Log],
     table[: 500 + 2000].write_csv(files[5])
     assert_refusal(run(*measure).err, "E-EXP-013", files[5].name)
     assert not (tmp_path / "out").exists()
+
+
+def test_limits_are_what_the_robot_does(cell: tuple[Path, Log], tmp_path: Path) -> None:
+    """Torque, position and load of a spring along the signals at their largest, against the robot that played them."""
+    folder = shutil.copytree(cell[0], tmp_path / "fence", ignore=shutil.ignore_patterns("excitation"))
+    true = ROBOT.replace("14000.0", "9000.0").replace("6000.0", "4000.0")
+    (folder / "robot.yaml").write_text(true + "geometry: {backlash: [j1, j2]}\n")
+    plan = read_plan_of(folder / "frequency.yaml", MultisinePlan)
+    uses = {
+        what: vars(use)
+        for what, use in signal_uses(RobotModel.from_yaml(folder / "robot.yaml"), plan).items()
+    }
+    log = cell[1]
+    signs = np.array(["plus" in name for name in log.names])
+    spring = np.array(STIFFNESS["j1"]), np.array(STIFFNESS["j2"])
+    load = np.stack(spring) * (log.q - log.arm)
+    of_excitation = (load[:, signs] - load[:, ~signs]) / 2
+    q = np.repeat([[[-0.3, 0.5]], [[-1.0, 1.6]]], 12, axis=0).reshape(24, 2)
+    preload = np.abs(gravity(q - gravity(q) / np.stack(spring)))
+    measured = {
+        "the torque": np.abs(log.tau) / [300.0, 150.0],
+        "the motor position": np.abs(log.q) / 3.0,
+        "the position of the deflected arm": np.abs(log.arm) / 3.0,
+        "the torque by the excitation in the preloaded drive": np.abs(of_excitation) / preload[signs],
+    }
+    for what, share in measured.items():
+        assert uses[what]["share"] == pytest.approx(share.max(), rel=0.03), what
+        joint = int(share.max(axis=(0, 1)).argmax())
+        assert uses[what]["joint"] == ("j1", "j2")[joint]
+    # a controller without feed-forward of the acceleration overshoots the reference motion: the excitation's part and the commanded one
+    rate = (log.q[6004:18004] - log.q[5996:17996]) * 500
+    swung = (rate[:, signs] - rate[:, ~signs]) / 2
+    commanded = 0.02 * 3 * np.pi * np.cos(3 * np.pi * np.arange(12000) / 4000)[:, None, None]
+    fastest = max(np.abs(commanded + swung).max(), np.abs(commanded - swung).max())
+    assert uses["the velocity"]["share"] == pytest.approx(fastest / 9, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("limit", "changed", "named"),
+    [
+        ('effort="300"', 'effort="55"', ["the torque of j1", "55", "--scale"]),
+        ('velocity="9"', 'velocity="0.25"', ["the velocity of", "0.25", "--scale"]),
+        ('upper="3" effort="150"', 'upper="1.63" effort="150"', ["of j2", "pose 2", "1.63", "--scale"]),
+        ('upper="3" effort="150"', 'upper="1.61" effort="150"', ["of j2", "pose 2", "1.61", "no --scale helps"]),
+        ("prior:", "limits: {speed: 0.3}\nprior:", ["the speed of the point 'tip'", "beyond 0.3;", "--scale"]),
+        ("prior:", "limits: {box: {lower: [-1, -1, 0.02], upper: [1, 1, 1]}}\nprior:", ["the reach of the point 'tip' along z", "0.02;"]),
+        ("prior:", "geometry: {backlash: [j2]}\nprior:", ["the torque by the excitation in the preloaded drive of j2", "--scale"]),
+    ],
+)  # fmt: skip
+def test_a_limit_that_would_be_passed(
+    run, tmp_path: Path, limit: str, changed: str, named: list[str]
+) -> None:
+    """It is named, nothing is written, and what is proposed is enough."""
+    folder = project(tmp_path / "fence", amplitude=np.repeat([[5.0], [2.5]], 29, axis=1))
+    for file in ("fence.urdf", "robot.yaml"):
+        text = (folder / file).read_text()
+        (folder / file).write_text(text.replace(limit, changed))
+    export = ("export", "excitation", folder / "frequency.yaml", "--out", folder / "played")
+    outcome = run(*export)
+    assert outcome.status == 2 and outcome.err.rstrip().endswith("[E-EXP-022]")
+    for words in named:
+        assert words in outcome.err
+    assert not (folder / "played").exists()
+    proposed = re.search(r"give --scale (\d+\.\d+)\.", outcome.err)
+    if proposed is not None:
+        again = run(*export, "--scale", proposed[1], "--json")
+        assert again.status == 0
+        assert 0.97 < max(use["share"] for use in again.document["limits"]) <= 1
+        amplitude = read_plan_of(folder / "played" / "plan.yaml", MultisinePlan).amplitude
+        assert np.allclose(amplitude[:, 0], float(proposed[1]) * np.array([5.0, 2.5]))

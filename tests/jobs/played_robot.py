@@ -59,12 +59,12 @@ class Robot:
 
     def run(
         self, q: np.ndarray, dq: np.ndarray, tau: np.ndarray, tick: float, rng: np.random.Generator
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Motor positions and motor torques (samples, recordings, 2) of all steps of the integration."""
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Positions and torques of the motors, and positions of the arm (samples, recordings, 2), of all steps of the integration."""
         step, (recordings, ticks, _) = tick / STEPS, q.shape
         arm = q[:, 0] - gravity(q[:, 0]) / self.stiffness
         state = np.concatenate([q[:, 0], arm, np.zeros((recordings, 4))], axis=1)
-        states, torques = np.empty((ticks * STEPS, recordings, 2)), np.empty((ticks * STEPS, recordings, 2))
+        states, torques, arms = (np.empty((ticks * STEPS, recordings, 2)) for _ in range(3))
         expected = gravity(q)
         for n in range(ticks):
             seen = state[:, :2] + self.noise[0] * rng.standard_normal((recordings, 2))
@@ -72,12 +72,13 @@ class Robot:
             measured = motor + self.noise[1] * rng.standard_normal(motor.shape)
             for part in range(STEPS):
                 states[n * STEPS + part], torques[n * STEPS + part] = state[:, :2], measured
+                arms[n * STEPS + part] = state[:, 2:4]
                 a = self.rate(state, motor)
                 b = self.rate(state + 0.5 * step * a, motor)
                 c = self.rate(state + 0.5 * step * b, motor)
                 d = self.rate(state + step * c, motor)
                 state = state + step / 6 * (a + 2 * b + 2 * c + d)
-        return states + self.noise[0] * rng.standard_normal(states.shape), torques
+        return states + self.noise[0] * rng.standard_normal(states.shape), torques, arms
 
     def rate(self, state: np.ndarray, motor: np.ndarray) -> np.ndarray:
         q, arm, dq, rate = state[:, :2], state[:, 2:4], state[:, 4:6], state[:, 6:]
@@ -124,13 +125,14 @@ def played(file: Path, row: dict[str, str]) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Log:
-    """Motor positions and torques (steps, recordings, 2) of the files with these names, after `idle` samples of `tick` s at rest."""
+    """Positions and torques of motors, and the arm's, (steps, recordings, 2) in files of these names; `idle` samples of `tick` s first."""
 
     names: list[str]
     tick: float
     idle: int
     q: np.ndarray
     tau: np.ndarray
+    arm: np.ndarray
 
     def write(self, out: Path, *, every: int = STEPS, late: int = 0, by_hand: int | None = None) -> None:
         """Write every `every`-th step of each from the `late`-th on; begun `by_hand` (a seed) at different times before the signal."""

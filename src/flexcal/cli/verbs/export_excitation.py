@@ -21,6 +21,9 @@ class ExportExcitation:
     Columns t, q1…, dq1… (reference of the motors) and tau1… (torque to add to the controller's), joint side, from rest to rest: soft start,
     all periods, soft stop. manifest.csv lists the files with the measured part of each, moves.csv the moves from pose to pose, phases.csv
     amplitude and phase of every line; plan.yaml is the plan as it is played.
+
+    Nothing is written where a signal would pass a limit of the robot: of positions, velocities and torques of the joints, of the tool in
+    robot.yaml, and, in drives with backlash, of the load by gravity that keeps the gap closed.
     """
 
     plan: Annotated[Positional[Path], arg(metavar="PLAN", help="the plan of 'design frequency' (YAML)")]
@@ -61,6 +64,10 @@ class ExportExcitation:
                 progress=progress,
             )
         document, plan = exported.document(), self.out / "plan.yaml"
+        console.say(
+            "largest use of limits: "
+            + ", ".join(f"{use.what} {100 * use.share:.0f} % ({use.joint})" for use in exported.uses)
+        )
         for remark in document["remarks"]:
             console.say(remark)
         console.say(

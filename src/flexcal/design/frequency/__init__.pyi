@@ -5,6 +5,7 @@ from .payload_placement import Placement, payload_placements
 from .pose_selection import FrequencyPoseSelection, choose_frequency_poses, stiffness_curve
 from .predicted_uncertainty import PlannedResponses
 from .response_noise import COMMON_SENSORS, ResponseSensors
+from .signal_limits import SignalUse, require_within_limits, signal_uses
 from .spring_precision import largest_stiffness_std
 
 __all__ = [
@@ -14,12 +15,15 @@ __all__ = [
     "PlannedResponses",
     "ResponseSensors",
     "Schedule",
+    "SignalUse",
     "choose_frequency_poses",
     "excitation_margin",
     "flat_multisine",
     "largest_stiffness_std",
     "optimal_amplitudes",
     "payload_placements",
+    "require_within_limits",
+    "signal_uses",
     "static_amplitude_share",
     "stiffness_curve",
     "within_preload",

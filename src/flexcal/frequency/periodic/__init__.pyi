@@ -15,7 +15,14 @@ from .multisine import (
     samples_per_period,
     synthesise,
 )
-from .played_signal import PlayedSchedule, PlayedSignal, multisine_at, played_signals
+from .played_signal import (
+    PlayedSchedule,
+    PlayedSignal,
+    envelope,
+    multisine_at,
+    played_signals,
+    reference_motion,
+)
 from .recognition import Recognition, SignalSearch, nearest_poses, on_plan
 from .response import FrequencyResponse, frequency_responses, pose_response
 from .symmetry import reciprocity
@@ -30,6 +37,7 @@ __all__ = [
     "Recognition",
     "SignalSearch",
     "crest_factor",
+    "envelope",
     "excitation_torque",
     "frequency_responses",
     "half_integer_frequency",
@@ -49,6 +57,7 @@ __all__ = [
     "pose_response",
     "projected",
     "reciprocity",
+    "reference_motion",
     "reference_trajectory",
     "samples_per_period",
     "spectrum",

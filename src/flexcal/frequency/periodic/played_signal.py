@@ -131,7 +131,7 @@ def played_signals(plan: MultisinePlan, *, whole: bool = True) -> Iterator[Playe
     schedule = PlayedSchedule(plan)
     rows = np.arange(schedule.samples) if whole else schedule.rows()
     time = rows / plan.rate_hz
-    offset, rate = _reference(plan, schedule, time)
+    offset, rate, _ = reference_motion(schedule, time)
     moved = np.isin(np.arange(plan.joint_count), plan.joints)
     for pose, q in enumerate(plan.poses):
         position, velocity = q + offset[:, None] * moved, rate[:, None] * moved
@@ -165,16 +165,20 @@ def multisine_at(phasors: np.ndarray, frequencies_hz: np.ndarray, time: np.ndarr
     return np.concatenate(parts).reshape(len(time), *phasors.shape[1:])
 
 
-def envelope(schedule: PlayedSchedule, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Share (N,) of the amplitude at times (N,), s, and its derivative."""
+def envelope(schedule: PlayedSchedule, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Share (N,) of the amplitude at times (N,), s, and its first and second derivative."""
     plan, ramp = schedule.plan, schedule.ramp / schedule.plan.rate_hz
     stop = (schedule.ramp + schedule.main) / plan.rate_hz
     length = (schedule.samples - 1) / plan.rate_hz
     fall = length - stop
     after = time > stop
     u = np.clip(np.where(after, (length - time) / fall, time / ramp), 0.0, 1.0)
-    slope = 30 * u**2 * (1 - u) ** 2
-    return soft(u), np.where(after, -slope / fall, slope / ramp)
+    by_time = np.where(after, -1 / fall, 1 / ramp)
+    return (
+        soft(u),
+        30 * u**2 * (1 - u) ** 2 * by_time,
+        60 * u * (1 - u) * (1 - 2 * u) * by_time**2,
+    )
 
 
 def soft(u: np.ndarray) -> np.ndarray:
@@ -183,13 +187,17 @@ def soft(u: np.ndarray) -> np.ndarray:
     return u**3 * (10 - 15 * u + 6 * u**2)
 
 
-def _reference(
-    plan: MultisinePlan, schedule: PlayedSchedule, time: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Reference motion (N,) of every excited axis from the pose on, rad, and its rate."""
-    share, change = envelope(schedule, time)
-    angle, rate, _ = reference_trajectory(plan, time - schedule.ramp / plan.rate_hz)
-    return share * angle, share * rate + change * angle
+def reference_motion(schedule: PlayedSchedule, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Reference motion (N,) of every excited axis from the pose on at times (N,), s: rad, rad/s, rad/s²."""
+    share, change, bend = envelope(schedule, time)
+    angle, rate, acceleration = reference_trajectory(
+        schedule.plan, time - schedule.ramp / schedule.plan.rate_hz
+    )
+    return (
+        share * angle,
+        share * rate + change * angle,
+        share * acceleration + 2 * change * rate + bend * angle,
+    )
 
 
 @lru_cache(maxsize=12)

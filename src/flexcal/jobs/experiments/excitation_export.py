@@ -14,6 +14,8 @@ from flexcal.data.experiments import PLAN
 from flexcal.data.plans import MultisinePlan, read_plan_of, write_plan
 from flexcal.data.recordings import RecordingLabel
 from flexcal.data.tables import UNITS, mapped_signals, standard_columns, write_table
+from flexcal.design.frequency import SignalUse, require_within_limits, signal_uses
+from flexcal.design.scene import CollisionChecker
 from flexcal.errors import InputError
 from flexcal.files.formats import sha256_of
 from flexcal.frequency.periodic import PlayedSchedule, PlayedSignal, multisine_spectra, played_signals
@@ -27,18 +29,22 @@ _DIGITS = 9
 """Significant digits of written values, of the largest of a column."""
 _MOVE_SHARE = 0.1
 """Share of the velocity limits that a move between poses uses."""
+_COUNTED = ("pose", "realisation", "experiment")
+_MOVE_INSTANTS = 100
+"""Instants of a move at which collisions are checked."""
 _MOVE_RATE = 0.5
 """Largest velocity of a joint in a move whose limit is unknown, rad/s or m/s."""
 
 
 @dataclass(frozen=True, eq=False)
 class ExportedExcitation:
-    """Files in `folder` of the `plan` as it is played, with these `rows` of the manifest; `remarks` to print."""
+    """Files in `folder` of the `plan` as it is played: `rows` of the manifest and of the `moves`, largest `uses` of limits, `remarks`."""
 
     folder: Path
     plan: MultisinePlan
     rows: tuple[dict[str, Any], ...]
     moves: tuple[dict[str, Any], ...]
+    uses: tuple[SignalUse, ...]
     remarks: tuple[str, ...]
 
     def document(self) -> dict[str, Any]:
@@ -49,6 +55,7 @@ class ExportedExcitation:
             "rate_hz": self.plan.rate_hz,
             "signals": list(self.rows),
             "moves": list(self.moves),
+            "limits": [vars(use) | {key: vars(use)[key] + 1 for key in _COUNTED} for use in self.uses],
             "seconds_on_the_robot": sum(row["play_s"] for row in self.rows)
             + sum(row["duration_s"] for row in self.moves),
             "remarks": list(self.remarks),
@@ -70,7 +77,7 @@ def export_excitation(
 
     `rate_hz` is the controller's (default: the plan's), `scale` multiplies the amplitudes; both go into `out`/plan.yaml, the plan as it is
     played. A file holds one period of excitation and reference motion, or with `whole` all of them. Raises `FlexcalError` where the plan
-    does not fit the robot of robot.yaml, or lines do not fit the rate.
+    does not fit the robot of robot.yaml, lines do not fit the rate, the robot touches something, or a limit is passed (`signal_uses`).
     """
     model = RobotModel.from_yaml(robot_file(plan_file, robot))
     plan = read_plan_of(plan_file, MultisinePlan)
@@ -82,6 +89,10 @@ def export_excitation(
     played = replace(
         plan, rate_hz=plan.rate_hz if rate_hz is None else rate_hz, amplitude=scale * plan.amplitude
     )
+    uses = signal_uses(model, played, progress)
+    require_within_limits(uses, scale)
+    checker = CollisionChecker(model)
+    _require_free(checker, played)
     schedule = PlayedSchedule(played)
     write_plan(out / PLAN, played)
     write_table(out / PHASES, _phases(played))
@@ -93,8 +104,11 @@ def export_excitation(
         rows.append(_row(schedule, signal, name, whole) | {"sha256": sha256_of(out / name)})
         progress("signals", number / total)
     write_table(out / MANIFEST, _as_columns(rows))
-    moves = []
+    moves, touching = [], []
     for number, (time, q, dq) in enumerate(_moves(model, played), start=1):
+        if checker.collides(q[np.linspace(0, len(q) - 1, _MOVE_INSTANTS).astype(int)]).any():
+            touching.append(f"{number} to {number + 1}")
+            continue
         name = f"move_{number}.{format}"
         write_table(out / name, {"t": time} | _numbered("q", q) | _numbered("dq", dq))
         move = {
@@ -108,7 +122,29 @@ def export_excitation(
         moves.append(move)
     if moves:
         write_table(out / MOVES, _as_columns(moves))
-    return ExportedExcitation(out, played, tuple(rows), tuple(moves), _remarks(schedule, whole))
+    remarks = _remarks(schedule, whole)
+    if touching:
+        remarks.append(
+            f"the straight move from pose {', '.join(touching)} would touch something and is not written: move there by a way of your own"
+        )
+    if not checker.pairs:
+        remarks.append(
+            "the URDF has no collision shapes, so collisions of poses and moves are not excluded: run them in a simulator, or slowly, first"
+        )
+    return ExportedExcitation(out, played, tuple(rows), tuple(moves), tuple(uses.values()), tuple(remarks))
+
+
+def _require_free(checker: CollisionChecker, plan: MultisinePlan) -> None:
+    """Raise `InputError` where the robot touches itself, the floor or an obstacle within the reference motion."""
+    moved = plan.reference_amplitude * np.isin(np.arange(plan.joint_count), plan.joints)
+    for pose, q in enumerate(plan.poses, start=1):
+        for place in q + np.array([[0.0], [1.0], [-1.0]]) * moved:
+            if pairs := checker.colliding(place):
+                raise InputError(
+                    "E-EXP-023",
+                    f"in pose {pose} of the plan, {pairs[0][0]} and {pairs[0][1]} touch or are nearer than {1e3 * checker.margin:g} mm, so "
+                    "nothing is written; give another pose, or correct the collision shapes.",
+                )
 
 
 def _label(signal: PlayedSignal) -> RecordingLabel:
@@ -193,14 +229,14 @@ def _moves(model: RobotModel, plan: MultisinePlan) -> Iterator[tuple[np.ndarray,
         yield time, start + share * (end - start), rate * (end - start)
 
 
-def _remarks(schedule: PlayedSchedule, whole: bool) -> tuple[str, ...]:
+def _remarks(schedule: PlayedSchedule, whole: bool) -> list[str]:
     if schedule.period is not None or whole:
-        return ()
+        return []
     plan = schedule.plan
     samples = plan.rate_hz / plan.base_frequency_hz
     near = [plan.base_frequency_hz * count for count in (ceil(samples) - 1, ceil(samples))]
-    return (
+    return [
         f"a period of {1 / plan.base_frequency_hz:.6g} s is {samples:.6g} samples at {plan.rate_hz:g} Hz, no whole number: every sample is "
         f"that of the plan's multisine, but the files hold all {plan.periods} periods in place of one, and a recording is resampled; at "
         f"{near[0]:.9g} or {near[1]:.9g} Hz both would be spared",
-    )
+    ]
