@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+import yaml
 from played_robot import KD, KP, ROBOT, STEPS, URDF, Log, Robot, gravity
 from refusals import assert_refusal
 
@@ -174,6 +175,19 @@ def test_a_period_that_is_no_whole_number_of_samples(run, tmp_path: Path) -> Non
 STIFFNESS = {"j1": 9000.0, "j2": 4000.0}
 
 
+def assert_stiffness(run, folder: Path) -> None:
+    """Responses and stiffnesses of the recordings in `frequency` are the robot's."""
+    robot = folder / "robot.yaml"
+    assert run("identify", "response", robot, folder / "frequency", "--out", folder / "responses").status == 0
+    found = run("identify", "stiffness", robot, folder / "responses", "--json").document["stage1"][
+        "stiffness"
+    ]
+    for joint, true in STIFFNESS.items():
+        value = found[joint]["drive"]
+        assert value["estimate"] == pytest.approx(true, rel=0.01)
+        assert abs(value["estimate"] - true) < 3 * value["std"]
+
+
 @pytest.mark.parametrize(
     "log", [{"by_hand": 1}, {"every": 2, "late": 1, "by_hand": 2}, {"every": 5, "late": 3}]
 )
@@ -195,14 +209,62 @@ def test_round_trip(run, cell: tuple[Path, Log], tmp_path: Path, log: dict[str, 
     one = pl.read_parquet(folder / "frequency" / "pose_1_realisation_1_experiment_1_plus.parquet")
     rate = STEPS * 1000 / log.get("every", STEPS)
     assert len(one) == 3 * max(1000, rate)
-    assert run("identify", "response", robot, folder / "frequency", "--out", folder / "responses").status == 0
-    found = run("identify", "stiffness", robot, folder / "responses", "--json").document["stage1"][
-        "stiffness"
-    ]
-    for joint, true in STIFFNESS.items():
-        value = found[joint]["drive"]
-        assert value["estimate"] == pytest.approx(true, rel=0.01)
-        assert abs(value["estimate"] - true) < 3 * value["std"]
+    assert_stiffness(run, folder)
+
+
+def test_round_trip_of_a_position_controlled_robot(run, tmp_path: Path) -> None:
+    """It takes no torques, and its controller is not the assumed one."""
+    folder = project(tmp_path / "fence")
+    asked = ("--bandwidth", 4, "--out", folder / "excitation", "--json")
+    outcome = run("export", "excitation", folder / "frequency.yaml", *asked)
+    assert {"the commanded position", "the commanded velocity"} <= {
+        use["what"] for use in outcome.document["limits"]
+    }
+    table = pl.read_csv(folder / "excitation" / "pose_1_realisation_1_experiment_1_plus.csv")
+    assert table.columns == ["t", "q1", "q2", "dq1", "dq2"]
+    q, dq = table["q1"].to_numpy()[:3000], table["dq1"].to_numpy()[:3000]
+    assert np.abs(np.diff(q) * 1000 - (dq[1:] + dq[:-1]) / 2).max() < 0.01 * np.abs(dq).max()
+    Robot(kp=(1700.0, 250.0), kd=(60.0, 22.0)).play(folder / "excitation", before=0.5).write(
+        folder / "logs", by_hand=4
+    )
+    shutil.copy(folder / "excitation" / "plan.yaml", folder / "logs")
+    arguments = ("--cell", folder / "logs", "--out", folder / "frequency")
+    assert run("measure", folder / "frequency.yaml", *arguments).status == 0
+    assert_stiffness(run, folder)
+
+
+def test_messages_of_ros(run, tmp_path: Path) -> None:
+    plan = {"periods": 2, "realisations": 1, "poses": np.array([[-0.3, 0.5], [-0.5, 0.6]])}
+    folder = project(tmp_path / "fence", **plan)
+    asked = ("--format", "ros", "--rate", 200, "--out", folder / "ros")
+    assert run("export", "excitation", folder / "frequency.yaml", *asked).status == 0
+    played = read_plan_of(folder / "ros" / "plan.yaml", MultisinePlan)
+    rows = manifest(folder / "ros")
+    for signal, row in zip(played_signals(played), rows, strict=True):
+        message = yaml.safe_load((folder / "ros" / row["file"]).read_text())
+        assert message["joint_names"] == ["j1", "j2"] and row["loop_rows"] == row["play_rows"]
+        quantities = (
+            ("positions", signal.position),
+            ("velocities", signal.velocity),
+            ("effort", signal.torque),
+        )
+        for key, values in quantities:
+            assert np.allclose([point[key] for point in message["points"]], values, atol=1e-9)
+        stamps = [point["time_from_start"] for point in message["points"]]
+        assert np.allclose([at["sec"] + 1e-9 * at["nanosec"] for at in stamps], signal.time, atol=1e-9)
+    (move,) = manifest(folder / "ros", "moves.csv")
+    assert "effort" not in yaml.safe_load((folder / "ros" / move["file"]).read_text())["points"][0]
+
+
+def test_currents_where_the_torque_constants_are_known(run, tmp_path: Path) -> None:
+    folder = project(tmp_path / "fence", periods=2, realisations=1)
+    with (folder / "robot.yaml").open("a") as file:
+        file.write("signals: {tau: {columns: [a, b], gain: [20.0, 8.0], unit: A}}\n")
+    out = folder / "played"
+    assert run("export", "excitation", folder / "frequency.yaml", "--out", out).status == 0
+    table = pl.read_csv(out / manifest(out)[0]["file"])
+    assert np.allclose(table["i1"] * 20, table["tau1"], atol=1e-7)
+    assert np.allclose(table["i2"] * 8, table["tau2"], atol=1e-7)
 
 
 def test_recordings_that_are_missing_or_there_twice(run, cell: tuple[Path, Log], tmp_path: Path) -> None:

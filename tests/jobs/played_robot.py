@@ -44,6 +44,8 @@ class Robot:
     stiffness: tuple[float, float] = (9000.0, 4000.0)
     coulomb: tuple[float, float] = (0.5, 0.25)
     noise: tuple[float, float] = (1e-6, 0.01)
+    kp: tuple[float, float] = KP
+    kd: tuple[float, float] = KD
 
     def play(self, folder: Path, before: float = 0.0, seed: int = 0) -> Log:
         """Play all signals of a folder, and stand still in each pose `before` s and after."""
@@ -68,7 +70,8 @@ class Robot:
         expected = gravity(q)
         for n in range(ticks):
             seen = state[:, :2] + self.noise[0] * rng.standard_normal((recordings, 2))
-            motor = expected[:, n] + KP * (q[:, n] - seen) + KD * (dq[:, n] - state[:, 4:6]) + tau[:, n]
+            motor = expected[:, n] + tau[:, n]
+            motor += self.kp * (q[:, n] - seen) + self.kd * (dq[:, n] - state[:, 4:6])
             measured = motor + self.noise[1] * rng.standard_normal(motor.shape)
             for part in range(STEPS):
                 states[n * STEPS + part], torques[n * STEPS + part] = state[:, :2], measured
@@ -112,11 +115,13 @@ def gravity(arm: np.ndarray) -> np.ndarray:
 
 
 def played(file: Path, row: dict[str, str]) -> np.ndarray:
-    """Reference, its rate and torque side by side (samples, 6), with the loop of the file repeated."""
+    """Reference, its rate and torque, if any, side by side (samples, 6), with the loop of the file repeated."""
     with file.open() as stream:
         header = next(csv.reader(stream))
         table = np.array(list(csv.reader(stream)), dtype=float)
-    assert header == ["t", *(f"{kind}{j}" for kind in ("q", "dq", "tau") for j in (1, 2))]
+    names = ["t", *(f"{kind}{j}" for kind in ("q", "dq", "tau") for j in (1, 2))]
+    assert header in (names, names[:5])
+    table = np.pad(table, ((0, 0), (0, 7 - len(header))))
     start, loop, play = (int(row[key]) for key in ("loop_start_row", "loop_rows", "play_rows"))
     middle = start + np.arange(play) % loop
     order = np.concatenate([np.arange(start), middle, np.arange(start + loop, len(table))])

@@ -34,10 +34,17 @@ class ExportExcitation:
     """Rate of the controller that plays the files."""
     scale: Annotated[float, arg(metavar="FACTOR"), Between(1e-3, 100)] = 1.0
     """Factor on all amplitudes of the excitation."""
+    bandwidth: Annotated[
+        MaybeNumber,
+        arg(metavar="HZ", help_behavior_hint="(default: the robot takes torques)"),
+        Between(0.01, 1000),
+    ] = None
+    """For a robot that takes positions alone: assumed bandwidth of its controller. The multisine is added to the reference, so that the
+    controller makes the plan's torques of it; files have no tau1…."""
     whole: bool = False
     """Write the whole signal, not one period of it to be repeated."""
-    format: Literal["csv", "parquet"] = "csv"
-    """Format of signals and moves."""
+    format: Literal["csv", "parquet", "ros"] = "csv"
+    """Format of signals and moves; ros: trajectory_msgs/JointTrajectory as YAML, whole, with effort."""
     robot: Annotated[
         MaybePath,
         arg(metavar="ROBOT", help_behavior_hint="(default: beside PLAN, else in the current folder)"),
@@ -59,6 +66,7 @@ class ExportExcitation:
                 robot=robot,
                 rate_hz=self.rate,
                 scale=self.scale,
+                bandwidth_hz=self.bandwidth,
                 whole=self.whole,
                 format=self.format,
                 progress=progress,

@@ -5,7 +5,7 @@ from .payload_placement import Placement, payload_placements
 from .pose_selection import FrequencyPoseSelection, choose_frequency_poses, stiffness_curve
 from .predicted_uncertainty import PlannedResponses
 from .response_noise import COMMON_SENSORS, ResponseSensors
-from .signal_limits import SignalUse, require_within_limits, signal_uses
+from .signal_limits import PositionLoop, SignalUse, require_within_limits, signal_uses
 from .spring_precision import largest_stiffness_std
 
 __all__ = [
@@ -13,6 +13,7 @@ __all__ = [
     "FrequencyPoseSelection",
     "Placement",
     "PlannedResponses",
+    "PositionLoop",
     "ResponseSensors",
     "Schedule",
     "SignalUse",

@@ -91,8 +91,10 @@ class _Quantity:
     high: np.ndarray
 
 
-def signal_uses(model: RobotModel, plan: MultisinePlan, progress: Progress = silent) -> dict[str, SignalUse]:
-    """Largest use of every kind of limit along all signals of a plan, from soft start to soft stop.
+def signal_uses(
+    model: RobotModel, plan: MultisinePlan, progress: Progress = silent, *, loop: PositionLoop | None = None
+) -> dict[str, SignalUse]:
+    """Largest use of every kind of limit along all signals of a plan, from soft start to soft stop; `loop` of a position-controlled robot.
 
     The controller is taken to follow the reference motion, along which the torques are those of the elastic robot in motion, with rotors
     and friction; the excitation adds the motion of the robot linearised in the pose, under the plan's gains. Positions are those of the
@@ -100,23 +102,59 @@ def signal_uses(model: RobotModel, plan: MultisinePlan, progress: Progress = sil
     backlash below what gravity loads it with. robot.yaml's limits of the first point count too. Raises `InputError` where the plan excites
     a joint that robot.yaml does not declare elastic, and as `linearise` does.
     """
-    excited = [model.joint_names[joint] for joint in plan.joints]
-    model = model.with_brakes(tuple(excited))
-    driven = [joint.index for joint in model.driven]
-    if sorted(plan.joints) != driven:
-        lacking = [name for name, joint in zip(excited, plan.joints, strict=True) if joint not in driven]
-        raise InputError(
-            "E-EXP-021",
-            f"{model.path} declares no drive spring of {lacking[0]}, which the plan excites; add it under `elastic:`.",
-        )
+    model = _excited(model, plan)
     worst: dict[str, SignalUse] = {}
     for pose in range(len(plan.poses)):
-        for use in _pose_uses(model, plan, pose):
+        for use in _pose_uses(model, plan, pose, loop):
             before = worst.get(use.what, use)
             largest = use if use.share > before.share else before
             worst[use.what] = replace(largest, factor=min(use.factor, before.factor))
         progress("limits", (pose + 1) / len(plan.poses))
     return worst
+
+
+_DAMPING = 0.7
+"""Damping ratio of an assumed position loop."""
+
+
+@dataclass(frozen=True, eq=False)
+class PositionLoop:
+    """Assumed position controller of a robot that takes no torques: gains `kp`, `kd` (n,), N m/rad and N m s/rad.
+
+    `motions` (P, L, n_u, n_u), rad/(N m): reference that makes the torque of an axis, (C⁻¹ + G) with the controller C and the robot's
+    receptance G in each pose.
+    """
+
+    kp: np.ndarray
+    kd: np.ndarray
+    motions: tuple[np.ndarray, ...]
+
+    @classmethod
+    def of(cls, model: RobotModel, plan: MultisinePlan, bandwidth_hz: float) -> PositionLoop:
+        """Loop of this bandwidth about the inertia of each excited axis, the mean over the poses; gains of other axes are the plan's.
+
+        Raises `InputError` as `signal_uses`.
+        """
+        model = _excited(model, plan)
+        axes = [joint.index for joint in model.driven]
+        order = np.argsort([plan.joints.index(axis) for axis in axes])
+        systems = [linearise(model, q, plan.payload) for q in plan.poses]
+        stretch = drive_stretch(model, systems[0])
+        twists = np.where(stretch.T > 0)[1]
+        rigid = np.eye(len(stretch), len(axes))
+        rigid[twists, range(len(axes))] = 1.0
+        inertia = np.mean([np.diag(rigid.T @ system.mass @ rigid) for system in systems], axis=0)
+        omega = 2 * np.pi * bandwidth_hz
+        kp, kd = plan.kp.copy(), plan.kd.copy()
+        kp[axes], kd[axes] = inertia * omega**2, 2 * _DAMPING * inertia * omega
+        none = np.zeros(len(axes))
+        rate = 2j * np.pi * plan.frequencies_hz[:, None]
+        by_loop = np.eye(len(axes)) / (kp[axes] + kd[axes] * rate)[:, :, None]
+        motions = []
+        for system in systems:
+            free = closed_loop_motion(system, plan.frequencies_hz, none, none)[:, : len(axes)]
+            motions.append((by_loop + free)[:, order][:, :, order])
+        return cls(kp, kd, tuple(motions))
 
 
 def require_within_limits(uses: dict[str, SignalUse], scale: float) -> None:
@@ -136,7 +174,23 @@ def require_within_limits(uses: dict[str, SignalUse], scale: float) -> None:
     )
 
 
-def _pose_uses(model: RobotModel, plan: MultisinePlan, pose: int) -> Iterator[SignalUse]:
+def _excited(model: RobotModel, plan: MultisinePlan) -> RobotModel:
+    """Robot whose other elastic joints are braked; raises `InputError` where an excited one is not elastic."""
+    excited = [model.joint_names[joint] for joint in plan.joints]
+    model = model.with_brakes(tuple(excited))
+    driven = [joint.index for joint in model.driven]
+    lacking = [name for name, joint in zip(excited, plan.joints, strict=True) if joint not in driven]
+    if lacking:
+        raise InputError(
+            "E-EXP-021",
+            f"{model.path} declares no drive spring of {lacking[0]}, which the plan excites; add it under `elastic:`.",
+        )
+    return model
+
+
+def _pose_uses(
+    model: RobotModel, plan: MultisinePlan, pose: int, loop: PositionLoop | None
+) -> Iterator[SignalUse]:
     schedule = PlayedSchedule(plan)
     instants = 2 * int(np.ceil(_FINE * plan.lines[-1] / 2))
     step = 1 / (plan.base_frequency_hz * instants)
@@ -145,10 +199,10 @@ def _pose_uses(model: RobotModel, plan: MultisinePlan, pose: int) -> Iterator[Si
     share = envelope(schedule, time)[0]
     turn = np.rint((time - start) / step).astype(int) % instants
     still = _along_reference(model, plan, schedule, pose, time)
-    swing = _by_excitation(model, plan, pose, instants)
+    swing = _by_excitation(model, plan, pose, instants, loop)
     for realisation, experiment in product(range(plan.realisations), range(plan.experiments)):
         added = swing(multisine_spectra(plan, realisation)[:, :, experiment])
-        for quantity in _quantities(model, plan, pose, still, added):
+        for quantity in _quantities(model, plan, pose, still, added, commanded=loop is not None):
             swung = share[:, None] * quantity.swung[turn]
             for sign in (1, -1) if plan.signs else (1,):
                 found = _use(quantity, sign * swung)
@@ -199,7 +253,7 @@ def _use(quantity: _Quantity, swung: np.ndarray) -> tuple[int, int, float, float
 class _Motion:
     """Position, velocity and torque (N, n) of the motors, and elastic coordinates (N, d): arm's position, or tilt of a bearing.
 
-    `spring` (N, E): torque in each driven spring.
+    `spring` (N, E): torque in each driven spring. `commanded` and its velocity (N, n): the reference.
     """
 
     position: np.ndarray
@@ -208,6 +262,8 @@ class _Motion:
     elastic: np.ndarray
     elastic_velocity: np.ndarray
     spring: np.ndarray
+    commanded: np.ndarray
+    commanded_velocity: np.ndarray
 
 
 def _along_reference(
@@ -238,7 +294,7 @@ def _along_reference(
     base = np.array([q[:, joint] if component == 2 else 0 * q[:, joint] for joint, component in axes]).T
     elastic = base + bent
     driven = [axes.index((joint.index, 2)) for joint in model.driven]
-    parts = (q, speed, torque, elastic, derivatives(elastic)[1], load[:, driven])
+    parts = (q, speed, torque, elastic, derivatives(elastic)[1], load[:, driven], q, speed)
     return _Motion(*(_interpolated(slow, part, time) for part in parts))
 
 
@@ -247,13 +303,16 @@ def _interpolated(at: np.ndarray, values: np.ndarray, time: np.ndarray) -> np.nd
 
 
 def _by_excitation(
-    model: RobotModel, plan: MultisinePlan, pose: int, instants: int
+    model: RobotModel, plan: MultisinePlan, pose: int, instants: int, loop: PositionLoop | None
 ) -> Callable[[np.ndarray], _Motion]:
     """What phasors of torque (L, n_u) add to the motion over a period, at so many instants."""
     axes = [joint.index for joint in model.driven]
     order = [plan.joints.index(axis) for axis in axes]
     system = linearise(model, plan.poses[pose], plan.payload)
-    moved = closed_loop_motion(system, plan.frequencies_hz, plan.kp[axes], plan.kd[axes])
+    # a reference that makes these very torques leaves the motion of the robot without a controller
+    kp, kd = (gains[axes] * (loop is None) for gains in (plan.kp, plan.kd))
+    moved = closed_loop_motion(system, plan.frequencies_hz, kp, kd)
+    asked = None if loop is None else loop.motions[pose][:, order][:, :, order]
     stiffness = np.array([joint.stiffness[2] for joint in model.driven])
     stretch = stiffness[:, None] * drive_stretch(model, system).T
     rate = 2j * np.pi * plan.frequencies_hz[:, None]
@@ -262,7 +321,8 @@ def _by_excitation(
         torque = phasors[:, order]
         motion = np.einsum("lij,lj->li", moved, torque)
         motors, elastic = motion[:, : len(axes)], motion[:, len(axes) :]
-        feedback = (plan.kp[axes] + plan.kd[axes] * rate) * motors
+        feedback = (kp + kd * rate) * motors
+        commanded = motors if asked is None else np.einsum("lij,lj->li", asked, torque)
         spring = motion @ stretch.T
 
         def over(values: np.ndarray) -> np.ndarray:
@@ -280,13 +340,15 @@ def _by_excitation(
             over(elastic),
             over(elastic * rate),
             over(spring),
+            of_all(commanded),
+            of_all(commanded * rate),
         )
 
     return added
 
 
 def _quantities(
-    model: RobotModel, plan: MultisinePlan, pose: int, still: _Motion, added: _Motion
+    model: RobotModel, plan: MultisinePlan, pose: int, still: _Motion, added: _Motion, *, commanded: bool
 ) -> Iterator[_Quantity]:
     limits, names = MotionLimits.of(model), model.joint_names
     lower, upper = (np.array([getattr(joint, side) for joint in model.joints]) for side in ("lower", "upper"))
@@ -306,6 +368,11 @@ def _quantities(
     yield _Quantity(
         "the velocity", "rad/s", names, still.velocity, added.velocity, -limits.velocity, limits.velocity
     )
+    if commanded:
+        reference = still.commanded, added.commanded
+        yield _Quantity("the commanded position", "rad", names, *reference, lower, upper)
+        rates = still.commanded_velocity, added.commanded_velocity
+        yield _Quantity("the commanded velocity", "rad/s", names, *rates, -limits.velocity, limits.velocity)
     yield _Quantity("the torque", "N m", names, still.torque, added.torque, -limits.torque, limits.torque)
     loose = [k for k, joint in enumerate(model.driven) if joint.index in model.backlash_joints]
     if loose:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -84,7 +84,7 @@ class PlayedSignal:
     position, velocity : ndarray
         Reference (N, n) of the motors, rad and rad/s.
     torque : ndarray
-        Torque (N, n), N m, to be added to the controller's.
+        Torque (N, n), N m, to be added to the controller's, or that its position controller makes of the reference.
     start : float
         Time at which the measured periods begin, s.
     """
@@ -100,7 +100,9 @@ class PlayedSignal:
     start: float
 
 
-def played_signals(plan: MultisinePlan, *, whole: bool = True) -> Iterator[PlayedSignal]:
+def played_signals(
+    plan: MultisinePlan, *, whole: bool = True, motions: Sequence[np.ndarray] | None = None
+) -> Iterator[PlayedSignal]:
     """Signals that a robot's controller plays for a plan of frequency experiments, at the plan's rate.
 
     From rest in the pose, reference motion and excitation grow within a second as a polynomial of degree 5, run for all periods of the
@@ -112,6 +114,9 @@ def played_signals(plan: MultisinePlan, *, whole: bool = True) -> Iterator[Playe
         The plan; `dataclasses.replace(plan, rate_hz=…)` plays it at another rate.
     whole : bool
         Whether the whole signal is returned, or as files hold it: soft start, one period of excitation and reference, soft stop.
+    motions : sequence of ndarray, optional
+        For a position-controlled robot: of every pose the reference motion (L, n_u, n_u), rad/(N m), that makes a unit of each torque. It
+        is added to `position` and `velocity`.
 
     Yields
     ------
@@ -139,6 +144,11 @@ def played_signals(plan: MultisinePlan, *, whole: bool = True) -> Iterator[Playe
             for experiment in range(plan.experiments):
                 torque = np.zeros((len(rows), plan.joint_count))
                 torque[:, list(plan.joints)] = _excitation(schedule, realisation, experiment)[rows]
+                added = np.zeros((2, len(rows), plan.joint_count))
+                if motions is not None:
+                    phasors = multisine_spectra(plan, realisation)[:, :, experiment]
+                    moving = np.einsum("lij,lj->li", motions[pose], phasors)
+                    added[:, :, list(plan.joints)] = _swung(schedule, moving)[:, rows]
                 for sign in (1, -1) if plan.signs else (1,):
                     yield PlayedSignal(
                         pose,
@@ -146,8 +156,8 @@ def played_signals(plan: MultisinePlan, *, whole: bool = True) -> Iterator[Playe
                         experiment,
                         sign,
                         time,
-                        position,
-                        velocity,
+                        position + sign * added[0],
+                        velocity + sign * added[1],
                         sign * torque,
                         schedule.start,
                     )
@@ -203,12 +213,17 @@ def reference_motion(schedule: PlayedSchedule, time: np.ndarray) -> tuple[np.nda
 @lru_cache(maxsize=12)
 def _excitation(schedule: PlayedSchedule, realisation: int, experiment: int) -> np.ndarray:
     """Torque (samples, n_u) of an experiment of one realisation, the same in all poses."""
-    plan = schedule.plan
-    phasors = multisine_spectra(plan, realisation)[:, :, experiment]
-    time = np.arange(schedule.samples) / plan.rate_hz
+    return _swung(schedule, multisine_spectra(schedule.plan, realisation)[:, :, experiment])[0]
+
+
+def _swung(schedule: PlayedSchedule, phasors: np.ndarray) -> np.ndarray:
+    """Signal of phasors (L, n_u) under the envelope, and its derivative (2, samples, n_u)."""
+    plan, samples = schedule.plan, np.arange(schedule.samples)
+    share, change, _ = (part[:, None] for part in envelope(schedule, samples / plan.rate_hz))
+    both = np.stack([phasors, 2j * np.pi * plan.frequencies_hz[:, None] * phasors], axis=1)
     if schedule.period is None:
-        values = multisine_at(phasors, plan.frequencies_hz, time - schedule.ramp / plan.rate_hz)
+        values = multisine_at(both, plan.frequencies_hz, (samples - schedule.ramp) / plan.rate_hz)
     else:
-        period = synthesise(phasors, plan.lines, schedule.period)
-        values = period[(np.arange(schedule.samples) - schedule.ramp) % schedule.period]
-    return envelope(schedule, time)[0][:, None] * values
+        values = synthesise(both, plan.lines, schedule.period)[(samples - schedule.ramp) % schedule.period]
+    value, slope = values[:, 0], values[:, 1]
+    return np.stack([share * value, share * slope + change * value])

@@ -11,10 +11,10 @@ from typing import Any, Literal
 import numpy as np
 
 from flexcal.data.experiments import PLAN
-from flexcal.data.plans import MultisinePlan, read_plan_of, write_plan
+from flexcal.data.plans import MultisinePlan, TimedPositions, read_plan_of, write_plan
 from flexcal.data.recordings import RecordingLabel
 from flexcal.data.tables import UNITS, mapped_signals, standard_columns, write_table
-from flexcal.design.frequency import SignalUse, require_within_limits, signal_uses
+from flexcal.design.frequency import PositionLoop, SignalUse, require_within_limits, signal_uses
 from flexcal.design.scene import CollisionChecker
 from flexcal.errors import InputError
 from flexcal.files.formats import sha256_of
@@ -24,7 +24,8 @@ from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 
 MANIFEST, MOVES, PHASES = "manifest.csv", "moves.csv", "phases.csv"
-Format = Literal["csv", "parquet"]
+Format = Literal["csv", "parquet", "ros"]
+_ENDINGS = {"csv": ".csv", "parquet": ".parquet", "ros": ".yaml"}
 _DIGITS = 9
 """Significant digits of written values, of the largest of a column."""
 _MOVE_SHARE = 0.1
@@ -69,6 +70,7 @@ def export_excitation(
     robot: Path | None = None,
     rate_hz: float | None = None,
     scale: float = 1.0,
+    bandwidth_hz: float | None = None,
     whole: bool = False,
     format: Format = "csv",
     progress: Progress = silent,
@@ -76,8 +78,10 @@ def export_excitation(
     """Write the signals of the frequency plan in a file to the folder `out`, one file a recording, with manifest.csv.
 
     `rate_hz` is the controller's (default: the plan's), `scale` multiplies the amplitudes; both go into `out`/plan.yaml, the plan as it is
-    played. A file holds one period of excitation and reference motion, or with `whole` all of them. Raises `FlexcalError` where the plan
-    does not fit the robot of robot.yaml, lines do not fit the rate, the robot touches something, or a limit is passed (`signal_uses`).
+    played. With `bandwidth_hz` the robot takes positions alone, through a controller of about this bandwidth: the reference makes the
+    plan's torques (`PositionLoop`). A file holds one period of excitation and reference motion, or with `whole`, and in `format` ros, all
+    of them. Raises `FlexcalError` where the plan does not fit the robot of robot.yaml, lines do not fit the rate, the robot touches
+    something, or a limit is passed (`signal_uses`).
     """
     model = RobotModel.from_yaml(robot_file(plan_file, robot))
     plan = read_plan_of(plan_file, MultisinePlan)
@@ -89,7 +93,10 @@ def export_excitation(
     played = replace(
         plan, rate_hz=plan.rate_hz if rate_hz is None else rate_hz, amplitude=scale * plan.amplitude
     )
-    uses = signal_uses(model, played, progress)
+    loop = None if bandwidth_hz is None else PositionLoop.of(model, played, bandwidth_hz)
+    if loop is not None:
+        played = replace(played, kp=loop.kp, kd=loop.kd)
+    uses = signal_uses(model, played, progress, loop=loop)
     require_within_limits(uses, scale)
     checker = CollisionChecker(model)
     _require_free(checker, played)
@@ -97,10 +104,19 @@ def export_excitation(
     write_plan(out / PLAN, played)
     write_table(out / PHASES, _phases(played))
     total = len(played.poses) * played.recordings_per_pose
-    rows = []
-    for number, signal in enumerate(played_signals(played, whole=whole), start=1):
-        name = f"{_label(signal).name}.{format}"
-        write_table(out / name, _columns(model, signal))
+    rows, whole = [], whole or format == "ros"
+    ending = _ENDINGS[format]
+    motions = None if loop is None else loop.motions
+    for number, signal in enumerate(played_signals(played, whole=whole, motions=motions), start=1):
+        name = _label(signal).name + ending
+        if format == "ros":
+            effort = None if loop is not None else signal.torque
+            timed = TimedPositions(
+                model.joint_names, signal.time, signal.position, signal.velocity, effort=effort
+            )
+            timed.rounded().write_ros(out / name)
+        else:
+            write_table(out / name, _columns(model, signal, torques=loop is None))
         rows.append(_row(schedule, signal, name, whole) | {"sha256": sha256_of(out / name)})
         progress("signals", number / total)
     write_table(out / MANIFEST, _as_columns(rows))
@@ -109,8 +125,11 @@ def export_excitation(
         if checker.collides(q[np.linspace(0, len(q) - 1, _MOVE_INSTANTS).astype(int)]).any():
             touching.append(f"{number} to {number + 1}")
             continue
-        name = f"move_{number}.{format}"
-        write_table(out / name, {"t": time} | _numbered("q", q) | _numbered("dq", dq))
+        name = f"move_{number}{ending}"
+        if format == "ros":
+            TimedPositions(model.joint_names, time, q, dq).rounded().write_ros(out / name)
+        else:
+            write_table(out / name, {"t": time} | _numbered("q", q) | _numbered("dq", dq))
         move = {
             "file": name,
             "from_pose": number,
@@ -151,11 +170,11 @@ def _label(signal: PlayedSignal) -> RecordingLabel:
     return RecordingLabel(signal.pose, signal.realisation, signal.experiment, signal.sign)
 
 
-def _columns(model: RobotModel, signal: PlayedSignal) -> dict[str, np.ndarray]:
-    quantities = (("q", signal.position), ("dq", signal.velocity), ("tau", signal.torque))
-    columns = {"t": signal.time}
-    for quantity, values in quantities:
-        columns |= _numbered(quantity, values)
+def _columns(model: RobotModel, signal: PlayedSignal, *, torques: bool) -> dict[str, np.ndarray]:
+    columns = {"t": signal.time} | _numbered("q", signal.position) | _numbered("dq", signal.velocity)
+    if not torques:
+        return columns
+    columns |= _numbered("tau", signal.torque)
     declared = model.config.signals.get("tau")
     if declared is not None and declared.gain is not None and declared.unit in (None, "A", "mA"):
         mapped = mapped_signals(model)["tau"]

@@ -90,7 +90,7 @@ def _listed(names: list[str]) -> str:
 
 
 def plan_as_played(folder: Path, plan: MultisinePlan) -> MultisinePlan:
-    """The plan in `folder`, by which signals were exported, where there is one, else `plan`; rate and amplitudes may differ.
+    """The plan in `folder`, by which signals were exported, where there is one, else `plan`; rate, amplitudes and gains may differ.
 
     Raises `InputError` where `folder` is none, or its plan differs otherwise.
     """
@@ -98,5 +98,5 @@ def plan_as_played(folder: Path, plan: MultisinePlan) -> MultisinePlan:
     if not (folder / PLAN).is_file():
         return plan
     played = read_plan_of(folder / PLAN, MultisinePlan)
-    require_same_plan(folder / PLAN, played, plan, free=("name", "rate_hz", "amplitude"))
+    require_same_plan(folder / PLAN, played, plan, free=("name", "rate_hz", "amplitude", "kp", "kd"))
     return played
