@@ -45,3 +45,21 @@ def test_poses_that_repeat_are_one() -> None:
     q = np.array([[0.0, 1.0], [0.001, 0.999], [0.5, 1.0], [0.0, 1.0]])
     number = repeated_pose_numbers(q)
     assert number[0] == number[1] == number[3] != number[2]
+
+
+def test_expected_errors_are_the_mean_of_many_draws(rng: np.random.Generator) -> None:
+    """Points of 0.1 mm beside lengths of 0.5 mm, which have one coordinate, and columns with a prior; 800 draws tell each to 3 %."""
+    free, held = rng.standard_normal((60, 3, 9)), 1e-4 * rng.standard_normal((60, 3, 3))
+    std = np.full((60, 3), 1e-4)
+    std[20:] = (5e-4, 0.0, 0.0)
+    free[20:, 1:] = held[20:, 1:] = 0.0
+    folds, penalty = [order_folds(60, 60), order_folds(60, 8)], 2e-8
+    left, fitted = [], []
+    for _ in range(800):
+        errors = std * rng.standard_normal((60, 3)) + held @ rng.standard_normal(3)
+        found = leave_out_fit([free, held], [0.0, penalty], errors, folds, variances=std**2)
+        left.append(found.distances)
+        fitted.append(found.fitted)
+    assert np.mean(left, axis=0) / found.expected == pytest.approx(np.ones((2, 60)), abs=0.12)
+    assert (np.mean(left, axis=0) / found.expected).mean() == pytest.approx(1, abs=0.01)
+    assert (np.mean(fitted, axis=0) / found.expected_fitted).mean() == pytest.approx(1, abs=0.01)

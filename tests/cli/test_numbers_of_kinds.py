@@ -206,6 +206,32 @@ def test_a_wire_whose_drum_is_larger_than_declared_does_no_harm(tmp_path: Path) 
     assert len(said) == len(scales) > 1
 
 
+def left_out_check(seed: int, folder: Path, asked: Sequence[Asked]) -> tuple[str, float]:
+    """Judgement of poses left out of a calibration with terms chosen, and their mean error over the expected one."""
+    model, poses = readings(folder / str(seed), ReadArm.drawn(seed), asked, seed)
+    result = calibrate(model, poses, terms=["auto"])
+    validated = result.document()["cross_validation"]
+    status = next(check.status for check in result.trust.checks if check.code == "left_out")
+    return status, validated["mean_mm"] / validated["expected_mm"]
+
+
+def test_poses_left_out_of_a_mixture_are_judged_by_the_readings_they_have(tmp_path: Path) -> None:
+    """A wire or a face gives one coordinate, not three, so the parameters weigh more: 15 of 20 of these were called worse than expected."""
+    status, ratio = left_out_check(4004, tmp_path, KINDS["points, wires and plane"])
+    assert status == "good"
+    assert ratio == pytest.approx(1, abs=0.25)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "kind", ["wires", "points and sockets", "wires and plane", "points, wires and plane"]
+)
+def test_poses_left_out_are_seldom_worse_than_expected(tmp_path: Path, kind: str) -> None:
+    found = over_seeds(left_out_check, range(7100, 7120), tmp_path, KINDS[kind])
+    assert sum(status != "good" for status, _ in found) <= 2
+    assert np.mean([ratio for _, ratio in found]) == pytest.approx(1, abs=0.1)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("case", list(MIXTURES))
 def test_more_instruments_do_no_harm_on_twenty_arms(tmp_path: Path, case: str) -> None:

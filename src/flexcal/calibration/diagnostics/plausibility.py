@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.fit import TOLERANCE, GeometricFit, manufacturing_tolerances
+from flexcal.calibration.fit import TOLERANCE, GeometricFit, base_errors, manufacturing_tolerances
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.model.parts import vector_rotation
 from flexcal.model.robot import RobotModel
@@ -74,10 +74,12 @@ def _in_base(calibration: GeometricFit) -> np.ndarray:
 def implausible_shifts(calibration: GeometricFit) -> tuple[ImplausibleShift, ...]:
     """Parameters with an implausibly large change from their start values, the largest first.
 
-    Where the residuals are plausible, beyond what the noise of the estimate (2σ) explains.
+    Where the residuals are plausible, beyond what the noise of the estimate (2σ) explains. Beside a fixture, whose place starts from the
+    nominal robot at a few poses, errors of the first joint that another place of the robot looks like say where the instruments stand.
     """
     estimate, prior = calibration.estimate.parameters, calibration.prior
-    kept = [name for name in calibration.identifiability.kept_names if _has_size(name)]
+    placed = base_errors(calibration.model) if calibration.poses.in_socket.any() else ()
+    kept = [name for name in calibration.identifiability.kept_names if _has_size(name) and name not in placed]
     named = [*kept, *prior.parameters.names]
     end, start = estimate.subset(named).coordinates(), estimate.subset(named).prior_mean()
     size = np.concatenate(

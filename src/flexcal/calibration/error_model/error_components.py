@@ -109,11 +109,11 @@ class ErrorComponents:
     def whitening(self, readings: Readings, turns: np.ndarray) -> Whitening:
         """Whitening by the total variance of single readings, and what is stated of a point with its orientation."""
         whole = self.independent(readings, turns)
-        whole = whole + self._systematic(readings)[:, :, None] * np.eye(3)
+        whole = whole + self.systematic(readings)[:, :, None] * np.eye(3)
         across = None if readings.across is None else self.share**2 * readings.across
         return Whitening.of(whole, across, readings.beside)
 
-    def _systematic(self, readings: Readings) -> np.ndarray:
+    def systematic(self, readings: Readings) -> np.ndarray:
         """Variances (R, 3) of the model error, of which sockets, lengths and contacts beside points have none of the workspace."""
         lengths = readings.unit == METRES
         placed = readings.of_scatter(ROBOT) | readings.of_scatter("views")

@@ -58,12 +58,14 @@ class TermSelection:
 class CrossValidation:
     """Cross-validated `mean` error (m): `by` "poses", left out one by one, "folds", the larger of both kinds, or "places" of a fixture.
 
-    `freedom` is the number of parameters of the fit, the trace of its hat matrix.
+    `freedom` is the number of parameters of the fit, the trace of its hat matrix. `expected` (m) is the mean error to expect from what the
+    fit leaves at its own poses: that times the ratio of both for independent errors with the scatter of every reading.
     """
 
     by: str
     mean: float
     freedom: float
+    expected: float
 
 
 def cross_validated(fit: GeometricFit) -> CrossValidation | None:
@@ -77,9 +79,11 @@ def cross_validated(fit: GeometricFit) -> CrossValidation | None:
         return None
     by = left_out_by(inside.poses, distinct)
     trials = TermTrials(inside, fit.model, fit.terms, folds, by=by)
-    left = trials.fit(fit.terms)
-    mean = max(float(left.distances[kind].mean()) for kind in trials.deciding)
-    return CrossValidation(by, mean, left.freedom)
+    left = trials.with_expected(fit.terms)
+    worst = max(trials.deciding, key=lambda kind: left.distances[kind].mean())
+    growth = left.expected[worst].mean() / left.expected_fitted.mean()
+    mean = float(left.distances[worst].mean())
+    return CrossValidation(by, mean, left.freedom, float(growth * left.fitted.mean()))
 
 
 def folds_of(poses: PoseSet) -> tuple[tuple[np.ndarray, ...], int]:

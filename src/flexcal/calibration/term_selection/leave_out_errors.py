@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+
+from flexcal.estimation import mean_distance, principal_variances
 
 _REACH = 1e-2
 """Bound, m, on the root mean square displacement of the points by one column; it affects only directions seen by no other pose."""
@@ -16,12 +18,27 @@ class LeaveOutErrors:
     """Leave-out errors of a linear fit of p columns to the residuals of N points.
 
     `distances` has, for each kind of fold, the distance (N,) m between points and their prediction from the other folds; `squares` (m²) is
-    what the fit to all points leaves, a prior's penalty included; `freedom` the trace of the hat matrix, its number of parameters.
+    what the fit to all points leaves, a prior's penalty included; `freedom` the trace of the hat matrix, its number of parameters;
+    `fitted` (N,) m the distances that it leaves. Where the variances of the readings were given, `expected` has for each kind of fold the
+    mean distances (N,) m of independent errors with these variances, and `expected_fitted` (N,) those that the fit leaves of them.
     """
 
     distances: tuple[np.ndarray, ...]
     squares: float
     freedom: float
+    fitted: np.ndarray
+    expected: tuple[np.ndarray, ...] = ()
+    expected_fitted: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    def of_points(self, count: int) -> LeaveOutErrors:
+        """The errors of the first `count` readings."""
+        return replace(
+            self,
+            distances=tuple(d[:count] for d in self.distances),
+            fitted=self.fitted[:count],
+            expected=tuple(d[:count] for d in self.expected),
+            expected_fitted=self.expected_fitted[:count],
+        )
 
     def mean(self, kinds: Sequence[int]) -> float:
         """Mean distance at left-out poses over some kinds of folds, m."""
@@ -38,6 +55,7 @@ def leave_out_fit(
     residuals: np.ndarray,
     folds: Sequence[np.ndarray],
     places: Sequence[tuple[np.ndarray, np.ndarray]] = (),
+    variances: np.ndarray | None = None,
 ) -> LeaveOutErrors:
     """Fit blocks of `columns` (N, 3, k) to `residuals` (N, 3) m, and predict every fold of each kind (N,) from the others.
 
@@ -45,6 +63,7 @@ def leave_out_fit(
     (Allen 1974). `penalty` is the factor on the sum of squared coefficients of each block, m²: of a prior, with the columns in its
     standard deviations; 0 for none. H_gg = Q_g Q_gᵀ is inverted in the space of its points or of its columns, whichever is smaller.
     `places`: rows (m,) and columns (m, 3, k) by the place of each fixture; one that is left out whole is placed by its own points.
+    `variances` (N, 3), m², are those of the residuals' errors, zero where nothing was measured.
     """
     scaled = [
         block * _scale(block) if free == 0 else block for block, free in zip(columns, penalty, strict=True)
@@ -60,7 +79,15 @@ def leave_out_fit(
     left = residuals.ravel() - seen @ (seen.T @ residuals.ravel())
     q, r = seen.reshape(len(residuals), 3, -1), left.reshape(-1, 3)
     distances = tuple(_distances(q, r, fold, places) for fold in folds)
-    return LeaveOutErrors(distances, float(left @ residuals.ravel()), float((seen**2).sum()))
+    found = LeaveOutErrors(
+        distances, float(left @ residuals.ravel()), float((seen**2).sum()), np.linalg.norm(r, axis=1)
+    )
+    if variances is None:
+        return found
+    of_prior = [np.full(block.shape[2], factor) for block, factor in zip(columns, penalty, strict=True)]
+    spread = basis.T @ (np.concatenate([variances.ravel(), *of_prior])[:, None] * basis)
+    expected = tuple(_expected_distances(q, variances, spread, fold, places) for fold in folds)
+    return replace(found, expected=expected, expected_fitted=_expected_residuals(q, variances, spread))
 
 
 def _scale(block: np.ndarray) -> np.ndarray:
@@ -94,3 +121,42 @@ def _distances(
             shift = flat @ np.linalg.lstsq(flat, errors[rows].ravel(), rcond=1e-9)[0]
             errors[rows] -= shift.reshape(-1, 3)
     return np.linalg.norm(errors, axis=1)
+
+
+def _expected_residuals(basis: np.ndarray, variances: np.ndarray, spread: np.ndarray) -> np.ndarray:
+    """Mean distances (N,) that the fit leaves of errors n of diagonal covariance V, `variances` (N, 3): of (1 - H) V (1 - H).
+
+    H = Q Qᵀ with the `basis` Q (N, 3, p), `spread` = Qᵀ V Q (p, p) with the rows of the prior, whose variance is its penalty.
+    """
+    own = basis @ np.swapaxes(basis, 1, 2) * variances[:, None, :]
+    covariance = basis @ spread @ np.swapaxes(basis, 1, 2) - own - np.swapaxes(own, 1, 2)
+    return mean_distance(principal_variances(covariance + variances[:, :, None] * np.eye(3)))
+
+
+def _expected_distances(
+    basis: np.ndarray,
+    variances: np.ndarray,
+    spread: np.ndarray,
+    fold: np.ndarray,
+    places: Sequence[tuple[np.ndarray, np.ndarray]],
+) -> np.ndarray:
+    """Mean distances (N,) of points from their prediction without their fold, of errors as in `_expected_residuals`.
+
+    The error of fold g is n_g - Q_g (1 - Q_gᵀ Q_g)⁻¹ Q₋ᵀ n₋, with the others' errors n₋, which are independent of n_g.
+    """
+    seen, own = basis.copy(), variances[:, :, None] * np.eye(3)
+    for rows, columns in places:
+        if (fold[rows] == fold[rows[0]]).all():
+            flat = columns.reshape(3 * len(rows), -1)
+            kept = np.eye(len(flat)) - flat @ np.linalg.pinv(flat, rcond=1e-9)
+            seen[rows] = (kept @ seen[rows].reshape(len(flat), -1)).reshape(seen[rows].shape)
+            whole = ((kept * variances[rows].ravel()) @ kept).reshape(len(rows), 3, len(rows), 3)
+            own[rows] = whole[np.arange(len(rows)), :, np.arange(len(rows))]
+    covariance = np.empty_like(own)
+    for group in np.unique(fold):
+        rows = np.flatnonzero(fold == group)
+        q = basis[rows].reshape(3 * len(rows), -1)
+        others = spread - q.T @ (variances[rows].reshape(-1, 1) * q)
+        inverse = np.linalg.inv(np.eye(q.shape[1]) - q.T @ q)
+        covariance[rows] = seen[rows] @ (inverse @ others @ inverse) @ np.swapaxes(seen[rows], 1, 2)
+    return mean_distance(principal_variances(covariance + own))

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from flexcal.calibration.error_model import joint_rotation_jacobian
 from flexcal.calibration.fit import LEVELS, GeometricFit, geometric_parameters, with_reference_temperature
 from flexcal.calibration.measurement import (
     METRES,
@@ -140,20 +141,31 @@ class TermTrials:
     def fit(self, terms: tuple[str, ...]) -> LeaveOutErrors:
         """Fit of some terms, with springs and inertia as in the base fit."""
         if terms not in self._fits:
-            blocks = [self._block(term) for term in terms] + [self._held]
-            penalty = [0.0] * len(terms) + [self._noise]
-            self._fits[terms] = self._left_out(blocks, penalty)
+            self._fits[terms] = self._left_out(*self._blocks(terms))
         return self._fits[terms]
 
-    def _left_out(self, blocks: list[np.ndarray], penalty: list[float]) -> LeaveOutErrors:
+    def with_expected(self, terms: tuple[str, ...]) -> LeaveOutErrors:
+        """Fit of some terms, with the errors to expect from the scatter of the base fit."""
+        return self._left_out(*self._blocks(terms), self._variances)
+
+    def _blocks(self, terms: tuple[str, ...]) -> tuple[list[np.ndarray], list[float]]:
+        """Columns of some terms and of what has a prior, and the penalty of each."""
+        return [*map(self._block, terms), self._held], [*[0.0] * len(terms), self._noise]
+
+    def _left_out(
+        self, blocks: list[np.ndarray], penalty: list[float], variances: np.ndarray | None = None
+    ) -> LeaveOutErrors:
         order, workspace, alone = self._row_folds
         # folds in measuring order are those in the workspace where both are places of a fixture
         folds = (order, alone) if (order == workspace).all() else (order, workspace, alone)
-        fit = leave_out_fit(blocks, penalty, self._residual, folds, self._places)
+        fit = leave_out_fit(blocks, penalty, self._residual, folds, self._places, variances)
         if len(folds) < len(self._row_folds):
-            fit = replace(fit, distances=(fit.distances[0], *fit.distances))
-        points = len(self.rigid.poses)
-        return replace(fit, distances=tuple(d[:points] for d in fit.distances))
+            fit = replace(
+                fit,
+                distances=(fit.distances[0], *fit.distances),
+                expected=(*fit.expected[:1], *fit.expected),
+            )
+        return fit.of_points(len(self.rigid.poses))
 
     def determined(self) -> LeaveOutErrors:
         """Fit of those parameters of the base fit that its points determine."""
@@ -218,6 +230,14 @@ class TermTrials:
     def _residual(self) -> np.ndarray:
         """Residuals (R, 3) of the base fit, as lengths, m."""
         return self.rigid.readings * self._lever
+
+    @property
+    def _variances(self) -> np.ndarray:
+        """Variances (R, 3), m², of the readings by the scatter of the base fit; zero where nothing was measured."""
+        at, scatter = self._prediction, self.rigid.scatter
+        own = scatter.independent(at.readings, joint_rotation_jacobian(at))
+        whole = np.einsum("rii->ri", own) + scatter.systematic(at.readings)
+        return np.where(at.readings.present, whole, 0.0) * self._lever**2
 
     @cached_property
     def _coordinates(self) -> int:

@@ -313,6 +313,7 @@ class Calibration(Identification):
                 "by": self.validated.by,
                 "mean_mm": self.validated.mean / MILLIMETRE,
                 "parameters": self.validated.freedom,
+                "expected_mm": self.validated.expected / MILLIMETRE,
             },
             "orientation": orientation_document(
                 self.orientation_before,
@@ -332,6 +333,7 @@ class Calibration(Identification):
                 "status": selected.estimate.status,
                 "reduced_chi2": noise[0].chi2 if noise else None,
                 "stated_noise": [item.document() for item in noise],
+                "coordinates": int(selected.linear.readings.present.sum()),
                 "sigma_given": selected.poses.sigma_given,
                 "sigma_mm": float(np.sqrt(np.mean(selected.poses.sigma**2))) / MILLIMETRE,
                 "ambiguous_poses": int(selected.ambiguous.sum()),

@@ -129,7 +129,7 @@ points:
 
 gravity: [0, 0, -9.81]         # in the robot's base frame; turn it for a robot on a wall or a ceiling
 
-# What the robot holds while it is measured: kg, and its centre of mass in the frame, m.
+# What the robot holds while it is measured: kg, its centre of mass in the frame, m, and 1σ of the mass, kg.
 # payload: {{frame: {_text(arm.frame)}, mass: 5.0, com: [0.0, 0.0, 0.1], mass_std: 0.02}}
 
 # Where the instrument stands, m in the base frame, to plan poses that it sees.

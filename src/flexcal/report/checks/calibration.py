@@ -39,7 +39,9 @@ def calibration_checks(
     )
     validated = results["cross_validation"]
     left_out = None if validated is None else validated["mean_mm"] * MILLIMETRE
-    share = (identifiable.rank if validated is None else validated["parameters"]) / max(3 * errors.poses, 1)
+    expected = None if validated is None else validated["expected_mm"] * MILLIMETRE
+    parameters = identifiable.rank if validated is None else validated["parameters"]
+    share = parameters / max(results["fit"]["coordinates"], 1)
     groups, held = results["held_out"], in_sockets(points)
     remedy = "Run it with --hold-out COLUMN" + (
         "." if held else ", or measure fresh poses and run flexcal verify, before relying on it."
@@ -48,7 +50,7 @@ def calibration_checks(
     good = ErrorStatistics.of(points.calibrated[inside]).mean if len(inside) else errors.mean
     return (
         *(
-            [check_left_out(good, left_out, share, remedy).named("left_out", independent=True)]
+            [check_left_out(good, left_out, expected, remedy).named("left_out", independent=True)]
             if groups is None or left_out is not None
             else []
         ),

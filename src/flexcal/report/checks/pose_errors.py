@@ -238,22 +238,26 @@ def check_truth(covered: int, total: int) -> Check:
 _FRESH = "Measure fresh poses and run flexcal verify before relying on it."
 
 
-def check_left_out(mean: float, left_out: float | None, share: float, remedy: str = _FRESH) -> Check:
+def check_left_out(
+    mean: float, left_out: float | None, expected: float | None, remedy: str = _FRESH
+) -> Check:
     """Whether the cross-validation error is as small as expected from that of the fit.
 
-    `mean` is the mean error (m) of the fit without its outliers, `left_out` that of poses left out, `share` the number of parameters over
-    that of measured coordinates. A fit of p parameters to n values of variance σ² has residuals of variance σ² (1 − p/n) and prediction
-    errors of variance σ² (1 + p/n), to first order. `remedy` is what to do where no pose was left out.
+    `mean` is the mean error (m) of the fit without its outliers, `left_out` that of poses left out, `expected` what that is on average
+    where the scatter is all that there is (`CrossValidation.expected`). `remedy` is what to do where no pose was left out.
     """
     question = "Are poses left out of the fit predicted?"
-    if left_out is None or share >= 1:
+    if left_out is None or expected is None:
         return Check(question, f"Cannot be judged: no pose was left out. {remedy}", "unknown")
-    return _compared_with_fit(question, "In cross-validation the mean error is", left_out, mean, share)
+    return _compared(question, "In cross-validation the mean error is", left_out, mean, expected)
 
 
 def check_held_out(held_out: Mapping[str, Any], mean: float, share: float) -> Check:
-    """Whether groups that were left out are predicted as well as expected; `held_out` is the block of results.json, the rest as in
-    `check_left_out`.
+    """Whether groups that were left out are predicted as well as expected.
+
+    `held_out` is the block of results.json, `mean` the mean error (m) of the fit, `share` the number of parameters over that of measured
+    coordinates. A fit of p parameters to n values of variance σ² has residuals of variance σ² (1 − p/n) and prediction errors of variance
+    σ² (1 + p/n), to first order.
     """
     groups = held_out["groups"]
     worst = max(groups, key=lambda name: groups[name]["mean_mm"])
@@ -261,17 +265,12 @@ def check_held_out(held_out: Mapping[str, Any], mean: float, share: float) -> Ch
         f"With each of the {len(groups)} groups of equal '{held_out['by']}' left out in turn, the largest mean error at one is "
         f"{document_millimetres(groups[worst]['mean_mm'])} mm ({worst}), and the mean of all"
     )
-    return _compared_with_fit(
-        "Are whole groups left out of the fit predicted?",
-        found,
-        held_out["mean_mm"] * MILLIMETRE,
-        mean,
-        share,
-    )
-
-
-def _compared_with_fit(question: str, found: str, left_out: float, mean: float, share: float) -> Check:
     expected = float(np.sqrt((1 + share) / (1 - share))) * mean if share < 1 else mean
+    question = "Are whole groups left out of the fit predicted?"
+    return _compared(question, found, held_out["mean_mm"] * MILLIMETRE, mean, expected)
+
+
+def _compared(question: str, found: str, left_out: float, mean: float, expected: float) -> Check:
     answer = f"{found} {millimetres(left_out)} mm; expected from {millimetres(mean)} mm in the fit are {millimetres(expected)} mm."
     if left_out > CHANCE * expected:
         return Check(
