@@ -196,7 +196,14 @@ def virtual_robot(folder: Path, examples: Path) -> list[str]:
     run("flexcal identify payload robot.yaml loaded --out payload")
     assert sha256_of("loaded/plan.yaml") in Path("payload/report.html").read_text("utf-8")
     run(example("identify payload"))
-    for name in ("design frequency", "measure", "identify response", "identify stiffness", "design poses"):
+    for name in (
+        "design frequency",
+        "export excitation",
+        "measure",
+        "identify response",
+        "identify stiffness",
+        "design poses",
+    ):
         run(example(name))
     run("flexcal identify stiffness robot.yaml responses --out stiffness")
     run("flexcal measure poses.yaml --cell virtual --out measured")
@@ -209,8 +216,17 @@ def virtual_robot(folder: Path, examples: Path) -> list[str]:
     return []
 
 
-EXPORTS = tuple(verb.name for verb in VERBS if verb.words[0] == "export" and verb.words[1] != "isaac")
-PROCEDURE = ("design trajectory", "identify inertials", "identify payload", "design frequency", "measure")
+EXPORTS = tuple(
+    verb.name for verb in VERBS if verb.words[0] == "export" and verb.words[1] not in ("isaac", "excitation")
+)
+PROCEDURE = (
+    "design trajectory",
+    "identify inertials",
+    "identify payload",
+    "design frequency",
+    "export excitation",
+    "measure",
+)
 PROCEDURE += ("identify response", "identify stiffness", "design poses", "calibrate", "verify")
 PLACES = {
     own_robot: {"init"},

@@ -6,13 +6,17 @@ import csv
 import hashlib
 import re
 import shutil
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
 
 import numpy as np
 import polars as pl
 import pytest
 import yaml
-from played_robot import KD, KP, ROBOT, STEPS, URDF, Log, Robot, gravity
+from played_robot import KD, KP, ROBOT, STEPS, URDF, Log, Robot, Stepped, gravity
 from refusals import assert_refusal
 
 from flexcal import MultisinePlan, PlayedSignal, RobotModel, played_signals
@@ -231,6 +235,105 @@ def test_round_trip_of_a_position_controlled_robot(run, tmp_path: Path) -> None:
     arguments = ("--cell", folder / "logs", "--out", folder / "frequency")
     assert run("measure", folder / "frequency.yaml", *arguments).status == 0
     assert_stiffness(run, folder)
+
+
+@pytest.fixture(scope="module")
+def player(root: Path) -> Any:
+    """The example of a program that plays the files."""
+    spec = spec_from_file_location("play", root / "examples" / "excitation_player" / "play.py")
+    assert spec is not None and spec.loader is not None
+    module = module_from_spec(spec)
+    sys.modules["play"] = module  # dataclasses look there
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Four signals of 3 s, and a move."""
+    lines = np.arange(3, 30, 2)
+    few = {"lines": lines, "amplitude": np.repeat([[4.0], [2.0]], len(lines), axis=1)}
+    poses = np.array([[-0.3, 0.5], [-0.5, 0.7]])
+    schedule = {
+        "base_frequency_hz": 2.0,
+        "reference_frequency_hz": 3.0,
+        "periods": 2,
+        "realisations": 1,
+        "signs": False,
+    }
+    folder = project(tmp_path_factory.mktemp("short") / "fence", poses=poses, **few, **schedule)
+    export = ["export", "excitation", folder / "frequency.yaml", "--out", folder / "excitation"]
+    assert main([str(word) for word in export]) == 0
+    return folder
+
+
+def test_the_example_plays_all_files_and_logs_them(run, player: Any, short: Path, tmp_path: Path) -> None:
+    robot = Robot(noise=(0.0, 0.0))
+    hold = player.Hold(gravity, np.array(KP), np.array(KD))
+    player.play_all(short / "excitation", tmp_path / "logs", Stepped(robot, np.array([-0.3, 0.5])), hold)
+    first = robot.play(short / "excitation")
+    log = pl.read_csv(tmp_path / "logs" / first.names[0]).to_numpy()
+    expected = np.column_stack([first.q[::STEPS, 0], first.tau[::STEPS, 0]])
+    assert np.abs(log[:, 1:] - expected).max() < 1e-6
+    cell = ("--cell", tmp_path / "logs", "--out", tmp_path / "frequency", "--json")
+    outcome = run("measure", short / "excitation" / "plan.yaml", "--robot", short / "robot.yaml", *cell)
+    assert outcome.document["recordings"] == 4 and outcome.document["remarks"] == []
+
+
+def test_the_example_under_ros2_control(player: Any, short: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By topics whose names and messages are ROS's, of a robot of which every message is a cycle."""
+    for name, message in (("sensor_msgs", "JointState"), ("std_msgs", "Float64MultiArray")):
+        module = ModuleType(f"{name}.msg")
+        setattr(module, message, SimpleNamespace)
+        monkeypatch.setitem(sys.modules, name, ModuleType(name))
+        monkeypatch.setitem(sys.modules, f"{name}.msg", module)
+    received: list = []
+
+    def node(robot: Stepped) -> SimpleNamespace:
+        def publisher(_: type, topic: str, __: int) -> SimpleNamespace:
+            assert topic == "/effort_controller/commands"
+            return SimpleNamespace(publish=lambda message: robot.write(np.array(message.data)[::-1]))
+
+        return SimpleNamespace(
+            create_publisher=publisher, create_subscription=lambda *x: received.append(x[2])
+        )
+
+    def spin() -> None:
+        position, velocity, effort = (values[::-1].tolist() for values in robot.read())
+        state = SimpleNamespace(
+            name=["j1", "j2"], position=position[::-1], velocity=velocity[::-1], effort=effort[::-1]
+        )
+        received[0](state)
+
+    row = manifest(short / "excitation")[0]
+    file = short / "excitation" / row["file"]
+    hold = player.Hold(lambda q: gravity(q[::-1])[::-1], np.array(KP)[::-1], np.array(KD)[::-1])
+    robot = Stepped(Robot(), np.array([-0.3, 0.5]))
+    ros = player.RosEffort(node(robot), spin, ["j2", "j1"], "/effort_controller/commands")
+    for number, (q, dq, added) in enumerate(player.signal(file, row)):
+        at, speed, _ = ros.read()
+        ros.write(hold.torque(q[::-1], dq[::-1], at, speed) + added[::-1])
+        if number == 1500:
+            break
+    other = Stepped(Robot(), np.array([-0.3, 0.5]))
+    usual = player.Hold(gravity, np.array(KP), np.array(KD))
+    for _, (q, dq, added) in zip(range(1501), player.signal(file, row), strict=False):
+        at, speed, _ = other.read()
+        other.write(usual.torque(q, dq, at, speed) + added)
+    assert np.abs(robot.state - other.state).max() < 1e-9 and np.abs(robot.state[0, 4:6]).max() > 0.01
+
+
+def test_the_example_with_a_robot_of_positions(player: Any, short: Path, tmp_path: Path, run) -> None:
+    asked = ("--bandwidth", 4, "--out", tmp_path / "positions", "--robot", short / "robot.yaml")
+    assert run("export", "excitation", short / "frequency.yaml", *asked).status == 0
+    row = manifest(tmp_path / "positions")[0]
+    robot = Stepped(Robot(kp=(1500.0, 350.0), kd=(80.0, 20.0)), np.array([-0.3, 0.5]), positions=True)
+    log = player.play(tmp_path / "positions" / row["file"], row, robot, None)
+    q, tau = log[1000:2000, 1:3], log[1000:2000, 3:]
+    assert 0.9 < np.abs(q - [-0.3, 0.5]).max() / 0.02 < 1.6
+    bins = np.fft.rfft(tau, axis=0)[2 * np.arange(3, 30, 2)] / 500
+    asked_for = np.array([4.0, 2.0]) / np.sqrt(2)
+    assert np.all(np.abs(np.abs(bins) / asked_for - 1).mean(axis=0) < 0.35)
 
 
 def test_messages_of_ros(run, tmp_path: Path) -> None:

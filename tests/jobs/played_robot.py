@@ -148,3 +148,30 @@ class Log:
             kept = np.arange(skip + late, len(self.q), every)
             log = np.column_stack([kept * self.tick / STEPS, self.q[kept, number], self.tau[kept, number]])
             np.savetxt(out / name, log, delimiter=",", header="t,q1,q2,tau1,tau2", comments="", fmt="%.10g")
+
+
+class Stepped:
+    """The robot for a program that reads and writes in every cycle of 1 ms; of torques, or of positions with a controller of its own."""
+
+    def __init__(self, robot: Robot, at: np.ndarray, *, positions: bool = False) -> None:
+        self.robot, self.positions = robot, positions
+        arm = at - gravity(at) / robot.stiffness
+        self.state = np.concatenate([at, arm, np.zeros(4)])[None]
+        self.applied = gravity(at)
+        self.before = at
+
+    def read(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self.state[0, :2], self.state[0, 4:6], self.applied
+
+    def write(self, command: np.ndarray) -> None:
+        if self.positions:
+            speed, self.before = (command - self.before) / 1e-3, command
+            error, rate = command - self.state[0, :2], speed - self.state[0, 4:6]
+            command = gravity(command) + np.multiply(self.robot.kp, error) + np.multiply(self.robot.kd, rate)
+        self.applied, step = command, 1e-3 / STEPS
+        for _ in range(STEPS):
+            a = self.robot.rate(self.state, command[None])
+            b = self.robot.rate(self.state + 0.5 * step * a, command[None])
+            c = self.robot.rate(self.state + 0.5 * step * b, command[None])
+            d = self.robot.rate(self.state + step * c, command[None])
+            self.state = self.state + step / 6 * (a + 2 * b + 2 * c + d)

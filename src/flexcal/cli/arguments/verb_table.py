@@ -191,7 +191,7 @@ STEPS = (
                 "export_excitation",
                 "ExportExcitation",
                 "the signals of that plan as files that a robot's controller plays",
-                "flexcal export excitation frequency.yaml --out excitation --rate 4000",
+                "flexcal export excitation frequency.yaml --out excitation --rate 4000 --scale 0.8",
                 ("plan.yaml", "manifest.csv", "moves.csv", "phases.csv", "move_*", "pose_*_realisation_*"),
             ),
             Verb(
