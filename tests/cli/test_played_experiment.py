@@ -195,7 +195,7 @@ def assert_stiffness(run, folder: Path) -> None:
 @pytest.mark.parametrize(
     "log", [{"by_hand": 1}, {"every": 2, "late": 1, "by_hand": 2}, {"every": 5, "late": 3}]
 )
-def test_round_trip(run, cell: tuple[Path, Log], tmp_path: Path, log: dict[str, int]) -> None:
+def test_round_trip(run, cell: tuple[Path, Log], tmp_path: Path, log: dict[str, Any]) -> None:
     """Written files, a robot that reads them alone, its logs, responses, stiffnesses."""
     folder = shutil.copytree(cell[0], tmp_path / "fence")
     cell[1].write(folder / "logs", **log)
@@ -207,7 +207,12 @@ def test_round_trip(run, cell: tuple[Path, Log], tmp_path: Path, log: dict[str, 
     arguments = ("--robot", robot, "--cell", folder / "logs", "--out", folder / "frequency", "--json")
     outcome = run("measure", folder / "excitation" / "plan.yaml", *arguments)
     assert outcome.status == 0
-    (remark,) = outcome.document["remarks"]
+    remark, *clock = outcome.document["remarks"]
+    assert len(clock) == ("clock" in log) and all("by up to 100 in a million" in text for text in clock)
+    for entry in outcome.document["found"]:
+        assert entry["correlation"] > 0.7 and entry["clock_ppm"] == pytest.approx(
+            1e6 * (log.get("clock", 1) - 1), abs=1
+        )
     assert remark.startswith("2 recordings are not what their names say")
     assert exchanged[0].name in remark and exchanged[1].stem in remark
     one = pl.read_parquet(folder / "frequency" / "pose_1_realisation_1_experiment_1_plus.parquet")

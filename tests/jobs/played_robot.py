@@ -139,14 +139,18 @@ class Log:
     tau: np.ndarray
     arm: np.ndarray
 
-    def write(self, out: Path, *, every: int = STEPS, late: int = 0, by_hand: int | None = None) -> None:
-        """Write every `every`-th step of each from the `late`-th on; begun `by_hand` (a seed) at different times before the signal."""
+    def write(
+        self, out: Path, *, every: int = STEPS, late: int = 0, by_hand: int | None = None, clock: float = 1.0
+    ) -> None:
+        """Write every `every`-th step of each from the `late`-th on; begun `by_hand` (a seed) at times of their own, by a `clock`."""
         out.mkdir()
         rng = np.random.default_rng(by_hand)
         for number, name in enumerate(self.names):
             skip = 0 if by_hand is None else int(0.9 * self.idle * rng.random()) * STEPS
             kept = np.arange(skip + late, len(self.q), every)
-            log = np.column_stack([kept * self.tick / STEPS, self.q[kept, number], self.tau[kept, number]])
+            log = np.column_stack(
+                [kept * self.tick / STEPS * clock, self.q[kept, number], self.tau[kept, number]]
+            )
             np.savetxt(out / name, log, delimiter=",", header="t,q1,q2,tau1,tau2", comments="", fmt="%.10g")
 
 

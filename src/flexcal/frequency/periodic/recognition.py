@@ -36,17 +36,21 @@ _WINDOW = 9.0
 _SAME_SAMPLES = 0.1
 """Samples by which a log's time may depart from the plan's over all periods without being interpolated."""
 _REFINEMENTS = 2
+_CERTAIN, _LEAST_DRIFT = 5.0, 0.1
+"""Standard deviations, and samples, beyond which the drift of a log's clock over the settling periods is corrected."""
 
 
 @dataclass(frozen=True, eq=False)
 class Recognition:
     """A recording of the signal `label` of a plan, whose excitation begins at `start`, s, on the clock of the log.
 
-    `correlation` of its torque with that signal, between 0 and 1, and `second`, the largest with another one.
+    That clock counts `clock` s in one of the controller. `correlation` of its torque with that signal is between 0 and 1, and `second` the
+    largest with another one.
     """
 
     label: RecordingLabel
     start: float
+    clock: float
     correlation: float
     second: float
 
@@ -104,9 +108,21 @@ class SignalSearch:
         realisation, experiment = self._members[best]
         label = RecordingLabel(poses[0], realisation, experiment, sign)
         start = recording.start + lags[best] * self._step
+        phasors, last = sign * self._phasors[best], plan.settle_periods
+        phasors, last = sign * self._phasors[best], plan.settle_periods
         for _ in range(_REFINEMENTS):
-            start += self._delay(recording, start, sign * self._phasors[best])
-        return Recognition(label, start, correlation, second)
+            measured = self._lines(recording, start, phasors, last)
+            start += self._delay(np.angle(measured), np.sqrt(np.abs(measured)), controlled=True)[0]
+        clock = 1.0
+        if last:
+            early, late = (self._lines(recording, start, phasors, skipped) for skipped in (0, last))
+            change = late * early.conj()
+            drift, std = self._delay(np.angle(change), np.sqrt(np.abs(change)), controlled=False)
+            if abs(drift) > max(_CERTAIN * std, _LEAST_DRIFT * recording.time_step):
+                clock = 1 + drift * plan.base_frequency_hz / last
+                # the phases were those in the middle of the measured periods
+                start -= (clock - 1) * (last + plan.periods) / 2 / plan.base_frequency_hz
+        return Recognition(label, start, clock, correlation, second)
 
     def _correlations(self, recording: Recording) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Of every signal, where it fits best: projection of the torque on it, with its sign, the search's samples before its first
@@ -142,29 +158,33 @@ class SignalSearch:
         total = power[best + end[best]] - power[best + begin[best]]
         return signed, lags[best], np.abs(signed) / np.sqrt(np.maximum(total, np.finfo(float).tiny))
 
-    def _delay(self, recording: Recording, start: float, phasors: np.ndarray) -> float:
-        """Time, s, by which the excitation with `phasors` (L, n_u) lies after `start` in a recording.
+    def _lines(self, recording: Recording, start: float, phasors: np.ndarray, skipped: int) -> np.ndarray:
+        """Torque at the lines (L,) with the excitation's `phasors` (L, n_u), which begins at `start`, as phase reference, over all axes.
 
-        The phases of the torque at the lines are fitted by -ω δ + b/ω: the second term is that of a controller, which takes up a part of
-        the excitation by friction and damping.
+        Of as many periods as are measured, after those `skipped`.
         """
         plan = self.plan
         kept = plan.periods - plan.settle_periods
         samples = kept * ceil(2 * _COARSE * plan.lines[-1])
         step = kept / plan.base_frequency_hz / samples
-        first = start + plan.settle_periods / plan.base_frequency_hz
+        first = start + skipped / plan.base_frequency_hz
         at = (first - recording.start + step * np.arange(samples)) / recording.time_step
         torque = sampled(recording.torque[:, self._axes], np.clip(at, 0, len(recording) - 1))
-        measured = spectrum(torque, kept, plan.lines) * self._weight**2
-        turned = np.sum(measured * phasors.conj(), axis=1)
-        omega = 2 * np.pi * plan.frequencies_hz
-        columns = np.stack([-omega, 1 / omega], axis=1)
-        weight = np.sqrt(np.abs(turned))[:, None]
-        if len(omega) == 1:
-            columns = columns[:, :1]
-        return float(
-            np.linalg.lstsq(columns * weight, np.angle(turned)[:, None] * weight, rcond=None)[0][0, 0]
-        )
+        return np.sum(spectrum(torque, kept, plan.lines) * self._weight**2 * phasors.conj(), axis=1)
+
+    def _delay(self, angle: np.ndarray, weight: np.ndarray, *, controlled: bool) -> tuple[float, float]:
+        """Delay, s, of which `angle` (L,) is the phase at the lines, and its standard deviation.
+
+        The phases are fitted by -ω δ, or if `controlled` by -ω δ + b/ω: the second term is that of a controller, which takes up a part of
+        the excitation by friction and damping.
+        """
+        omega = 2 * np.pi * self.plan.frequencies_hz
+        columns = np.stack([-omega, 1 / omega], axis=1)[:, : 2 if controlled and len(omega) > 2 else 1]
+        columns, angle = columns * weight[:, None], angle * weight
+        solution = np.linalg.lstsq(columns, angle, rcond=None)[0]
+        freedom = max(1, len(omega) - columns.shape[1])
+        variance = np.sum((angle - columns @ solution) ** 2) / freedom
+        return float(solution[0]), float(np.sqrt(variance * np.linalg.pinv(columns.T @ columns)[0, 0]))
 
 
 def _cumulative(values: np.ndarray) -> np.ndarray:
@@ -199,7 +219,7 @@ def on_plan(plan: MultisinePlan, recording: Recording, found: Recognition) -> Re
     """
     several = max(1, round(1 / (recording.time_step * plan.rate_hz)))
     period = several * ceil(plan.rate_hz / plan.base_frequency_hz * (1 - 1e-9))
-    step = 1 / (plan.base_frequency_hz * period)
+    step = found.clock / (plan.base_frequency_hz * period)
     count = plan.periods * period
     first = (found.start - recording.start) / recording.time_step
     same = abs(step / recording.time_step - 1) * count < _SAME_SAMPLES
@@ -228,7 +248,7 @@ def on_plan(plan: MultisinePlan, recording: Recording, found: Recognition) -> Re
         for field in fields(recording)
         if isinstance(values := getattr(recording, field.name), np.ndarray)
     }
-    return replace(recording, time_step=step, start=0.0, label=found.label, **whole)
+    return replace(recording, time_step=step / found.clock, start=0.0, label=found.label, **whole)
 
 
 def sampled(values: np.ndarray, at: np.ndarray) -> np.ndarray:

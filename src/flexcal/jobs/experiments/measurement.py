@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +36,7 @@ class Measurement:
     recordings: int
     loaded: bool
     remarks: tuple[str, ...] = ()
+    found: tuple[dict[str, Any], ...] = ()
 
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
@@ -47,6 +48,7 @@ class Measurement:
             "poses": self.poses,
             "recordings": self.recordings,
             "remarks": list(self.remarks),
+            "found": list(self.found),
         }
 
     @property
@@ -102,8 +104,9 @@ def measure(
             write_recordings(out, plan, _counted(source.record(plan), total, progress))
         poses = len(plan.poses) if isinstance(plan, MultisinePlan) else 0
         loaded = plan.payload != 0 and model.payload is not None
-        remarks = tuple(source.remarks) if isinstance(source, PlayedRecordings) else ()
-        result = Measurement(out, plan.kind, plan.name, poses, total, loaded, remarks)
+        result = Measurement(out, plan.kind, plan.name, poses, total, loaded)
+        if isinstance(source, PlayedRecordings):
+            result = replace(result, remarks=tuple(source.remarks), found=tuple(source.found))
     if drawn:
         write_truth(out / "truth.yaml", drawn)
     write_results(out, result.document())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from flexcal.data.experiments import PLAN, existing_file, labels, require_measurements, require_same_plan
 from flexcal.data.plans import MultisinePlan, TrajectoryPlan, read_plan_of
@@ -21,12 +22,14 @@ class PlayedRecordings:
     """Cell of the joint logs (CSV, Parquet) in a folder, recorded while the signals of a frequency plan were played.
 
     Names do not matter: pose, realisation, experiment and sign are told from positions and torques; only where two poses are as near as
-    a soft controller sags does a standard name decide. `remarks` say, once all are read, what was exchanged or lags.
+    a soft controller sags does a standard name decide. Once all are read, `remarks` say what was exchanged or drifts, and `found` has an
+    entry a log.
     """
 
     def __init__(self, folder: Path, model: RobotModel) -> None:
         self.folder, self.model = folder, model
         self.remarks: list[str] = []
+        self.found: list[dict[str, Any]] = []
 
     def record(self, plan: MultisinePlan | TrajectoryPlan) -> Iterator[Recording]:
         """The recordings one by one, in the order of the file names, labelled.
@@ -55,6 +58,16 @@ class PlayedRecordings:
             found[label] = file
             if named is not None and named != label:
                 renamed.append(f"{file.name} is {label.name}")
+            self.found.append(
+                {
+                    "file": file,
+                    "recording": label.name,
+                    "start_s": recognised.start - recording.start,
+                    "rate_hz": 1 / recording.time_step,
+                    "clock_ppm": 1e6 * (recognised.clock - 1),
+                    "correlation": recognised.correlation,
+                }
+            )
             yield on_plan(plan, recording, recognised)
         missing = [name for name, label in expected.items() if label not in found]
         if missing:
@@ -66,6 +79,12 @@ class PlayedRecordings:
         if renamed:
             self.remarks.append(
                 f"{len(renamed)} recordings are not what their names say, and are taken as what their torques are: {_listed(renamed)}"
+            )
+
+        drifts = [abs(entry["clock_ppm"]) for entry in self.found if entry["clock_ppm"]]
+        if drifts:
+            self.remarks.append(
+                f"the clock of {len(drifts)} logs differs from the controller's, by up to {max(drifts):.3g} in a million, which is corrected"
             )
 
     def _files(self) -> list[Path]:
