@@ -10,14 +10,15 @@ the robot; n goes through all of them.
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import shutil
 import signal
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from flexcal.cli.main import main as flexcal
@@ -44,7 +45,7 @@ _USERS = "notes.txt"
 @dataclass(frozen=True)
 class Case:
     """A verb, in a copy of a robot's folder: command lines that lead to the state before, the one that is killed, the folder that it writes
-    to, and the files in it that hold no duration or time, and so are the same whenever it runs."""
+    to, and the files in it that hold no duration or time, and so are the same whenever it runs; and files that the folder does not have."""
 
     name: str
     robot: str
@@ -52,6 +53,36 @@ class Case:
     killed: str
     out: str
     steady: tuple[str, ...]
+    files: Mapping[str, str] = field(default_factory=dict)
+
+
+_TOUCHES = """q1,q2,q3,q4,q5,q6
+0.28957550,-1.38726369,2.26466142,-4.01831095,-1.86754466,-3.13321799
+0.45485406,-1.29200939,1.55331120,-0.28554692,-2.68525066,-1.59585455
+0.45456218,-1.29116907,1.55330275,-0.28639264,-2.68552609,1.54572614
+0.17245181,-1.18379188,1.40623812,-0.22222255,-1.39736204,-0.01142470
+-0.06296244,-1.48553449,1.79076719,-0.13432700,-0.06214422,-1.74378110
+"""
+"""Joint positions of the UR5 that bring one point to one place."""
+_MOTORS = json.dumps({
+    f"{joint}_joint": {"id": k, "drive_mode": 0, "homing_offset": 0, "range_min": 700, "range_max": 3300}
+    for k, joint in enumerate(("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"))
+})  # fmt: skip
+_STUDY = """kind: virtual_calibration
+robot: robot.yaml
+seeds: {count: 3}
+options: {terms: [kinematic]}
+grid: {poses: [20]}
+"""
+_TRAJECTORY = "design trajectory robot.yaml --count 1 --steps 2"
+_EXCITING = (f"{_TRAJECTORY} --out trajectory.yaml", "measure trajectory.yaml --cell virtual --out exciting")
+_LOADED = (
+    f"{_TRAJECTORY} --loaded --seed 3 --out loaded.yaml",
+    "measure loaded.yaml --cell virtual --out loaded",
+)
+_FREQUENCY = ("design frequency robot.yaml --plan quick --out frequency.yaml",
+              "measure frequency.yaml --cell virtual --out frequency",
+              "identify response robot.yaml frequency --out responses")  # fmt: skip
 
 
 _CALIBRATE = "calibrate robot.yaml random.csv --terms kinematic --loss"
@@ -79,6 +110,52 @@ CASES = (
          "map robot.yaml --count 400 --out map.html", ".", ()),
     Case("init", "ur5_tracker", (), "init ur5.urdf --out out", "out", ("robot.yaml",)),
     Case("report", "ur5_tracker", (f"{_CALIBRATE} squares --out out",), "report out", "out", ("points.csv",)),
+    Case("export json", "ur5_tracker", (f"{_CALIBRATE} squares", "export json robot.yaml --out all.json", f"{_CALIBRATE} cauchy"),
+         "export json robot.yaml --out all.json", ".", ("all.json",)),
+    Case("export runtime", "ur5_tracker", (f"{_CALIBRATE} squares", "export runtime robot.yaml --out runtime.json", f"{_CALIBRATE} cauchy"),
+         "export runtime robot.yaml --out runtime.json", ".", ("runtime.json",)),
+    Case("export sdf", "ur5_tracker", (f"{_CALIBRATE} squares", "export sdf robot.yaml --out arm.sdf", f"{_CALIBRATE} cauchy"),
+         "export sdf robot.yaml --out arm.sdf", ".", ("arm.sdf",)),
+    Case("export mjcf", "tx90l", (), "export mjcf robot.yaml --out arm.xml", ".", ("arm.xml",)),
+    Case("export dh", "ur5_tracker", (f"{_CALIBRATE} squares", "export dh robot.yaml --out dh.csv", f"{_CALIBRATE} cauchy"),
+         "export dh robot.yaml --out dh.csv", ".", ("dh.csv",)),
+    Case("export mdh", "ur5_tracker", (f"{_CALIBRATE} squares",), "export mdh robot.yaml --out mdh.csv", ".", ("mdh.csv",)),
+    Case("export offsets", "ur5_tracker", (f"{_CALIBRATE} squares",), "export offsets robot.yaml --out offsets.csv", ".", ("offsets.csv",)),
+    Case("export kinematics", "ur5_tracker", (f"{_CALIBRATE} squares",), "export kinematics robot.yaml --out ur.yaml", ".", ("ur.yaml",)),
+    Case("export xacro", "ur5_tracker", (f"{_CALIBRATE} squares", "export xacro robot.yaml --out description", f"{_CALIBRATE} cauchy"),
+         "export xacro robot.yaml --out description", "description", ()),
+    Case("export lerobot", "ur5_tracker", (f"{_CALIBRATE} squares",),
+         "export lerobot robot.yaml --calibration motors.json --out corrected.json", ".", ("corrected.json",), {"motors.json": _MOTORS}),
+    Case("export isaac", "servo_arm", ("identify actuators robot.yaml moves.csv",), "export isaac robot.yaml --out groups.json", ".",
+         ("groups.json",)),
+    Case("identify actuators", "servo_arm", (), "identify actuators robot.yaml moves.csv", ".", ("estimates.yaml",)),
+    Case("compensate", "ur5_tracker", (f"{_CALIBRATE} squares", "compensate robot.yaml grid.csv --out out.csv", f"{_CALIBRATE} cauchy"),
+         "compensate robot.yaml grid.csv --out out.csv", ".", ("out.csv",)),
+    Case("predict", "ur5_tracker", (f"{_CALIBRATE} squares",), "predict robot.yaml touches.csv --out tool.csv", ".", ("tool.csv",),
+         {"touches.csv": _TOUCHES.replace("q1,", "pose,q1,", 1).replace("\n0", "\n1,0").replace("\n-", "\n2,-")}),
+    Case("filter", "irb120_program", ("calibrate robot.yaml points.csv", "filter robot.yaml pick.mod --out there.mod",
+                                      "calibrate robot.yaml points.csv --loss cauchy"),
+         "filter robot.yaml pick.mod --out there.mod", ".", ("there.mod",)),
+    Case("certificate", "ur5_tracker", (f"{_CALIBRATE} squares",),
+         "certificate robot.yaml --targets grid.csv --before grid.csv --after grid.csv", ".", ()),
+    Case("identify tool", "ur5_tracker", (f"{_CALIBRATE} squares",), "identify tool robot.yaml touches.csv --out tool", "tool", (),
+         {"touches.csv": _TOUCHES}),
+    Case("identify frame", "ur5_tracker", (f"{_CALIBRATE} squares",), "identify frame robot.yaml fixture.csv --out place", "place", (),
+         {"fixture.csv": (EXAMPLES / "ur5_tracker" / "random.csv").read_text().replace(",x,y,z", ",wx,wy,wz", 1)}),
+    Case("study", "ur5_tracker", (), "study study.yaml --jobs 1 --out study", "study", (), {"study.yaml": _STUDY}),
+    Case("fleet", "ur5_tracker", (f"{_CALIBRATE} squares --out 2026-01-01", f"{_CALIBRATE} cauchy --out 2026-02-01",
+                                  "fleet . --out fleet.csv", "verify robot.yaml grid.csv --estimates 2026-02-01 --out 2026-03-01"),
+         "fleet . --out fleet.csv", ".", ("fleet.csv",)),
+    Case("design trajectory", "tx90l", (_EXCITING[0],), f"{_TRAJECTORY} --seed 7 --out trajectory.yaml", ".", ("trajectory.yaml",)),
+    Case("identify inertials", "tx90l", _EXCITING, "identify inertials robot.yaml exciting", ".", ("estimates.yaml",)),
+    Case("identify dynamics", "tx40", ("identify dynamics robot.yaml exciting.parquet",),
+         "identify dynamics robot.yaml exciting.parquet --estimator irls", ".", ("estimates.yaml",)),
+    Case("identify payload", "tx90l", (*_EXCITING, *_LOADED), "identify payload robot.yaml loaded --free exciting --out load", "load",
+         ("estimates.yaml",)),
+    Case("identify response", "tx90l", _FREQUENCY, "identify response robot.yaml frequency --out responses", "responses", ()),
+    Case("identify stiffness", "tx90l", _FREQUENCY, "identify stiffness robot.yaml responses", ".", ("estimates.yaml",)),
+    Case("design frequency", "tx90l", _FREQUENCY[:1], "design frequency robot.yaml --plan quick --seed 2 --out frequency.yaml", ".",
+         ("frequency.yaml",)),
 )  # fmt: skip
 
 
@@ -88,7 +165,8 @@ def killed_runs(case: Case, every: int) -> Counter[str]:
     with tempfile.TemporaryDirectory(prefix="kill_") as place:
         start, folder = Path(place, "start"), Path(place, "robot")
         shutil.copytree(EXAMPLES / case.robot, start)
-        (start / _USERS).write_text("mine")
+        for name, text in {_USERS: "mine", **case.files}.items():
+            (start / name).write_text(text)
         for command in case.before:
             _complete(command, start)
         shutil.copytree(start, folder)
