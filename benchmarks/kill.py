@@ -64,6 +64,9 @@ _TOUCHES = """q1,q2,q3,q4,q5,q6
 -0.06296244,-1.48553449,1.79076719,-0.13432700,-0.06214422,-1.74378110
 """
 """Joint positions of the UR5 that bring one point to one place."""
+_GRID = (EXAMPLES / "ur5_tracker" / "grid.csv").read_text()
+_NOMINAL = "".join(f"{row.rsplit(',', 3)[0]}\n" for row in _GRID.splitlines())
+"""Joint positions alone."""
 _MOTORS = json.dumps({
     f"{joint}_joint": {"id": k, "drive_mode": 0, "homing_offset": 0, "range_min": 700, "range_max": 3300}
     for k, joint in enumerate(("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"))
@@ -129,19 +132,20 @@ CASES = (
     Case("export isaac", "servo_arm", ("identify actuators robot.yaml moves.csv",), "export isaac robot.yaml --out groups.json", ".",
          ("groups.json",)),
     Case("identify actuators", "servo_arm", (), "identify actuators robot.yaml moves.csv", ".", ("estimates.yaml",)),
-    Case("compensate", "ur5_tracker", (f"{_CALIBRATE} squares", "compensate robot.yaml grid.csv --out out.csv", f"{_CALIBRATE} cauchy"),
-         "compensate robot.yaml grid.csv --out out.csv", ".", ("out.csv",)),
-    Case("predict", "ur5_tracker", (f"{_CALIBRATE} squares",), "predict robot.yaml touches.csv --out tool.csv", ".", ("tool.csv",),
-         {"touches.csv": _TOUCHES.replace("q1,", "pose,q1,", 1).replace("\n0", "\n1,0").replace("\n-", "\n2,-")}),
+    Case("compensate", "ur5_tracker", (f"{_CALIBRATE} squares", "compensate robot.yaml nominal.csv --out out.csv", f"{_CALIBRATE} cauchy"),
+         "compensate robot.yaml nominal.csv --out out.csv", ".", ("out.csv",), {"nominal.csv": _NOMINAL}),
+    Case("predict", "ur5_tracker", (f"{_CALIBRATE} squares",), "predict robot.yaml nominal.csv --out tool.csv", ".", ("tool.csv",),
+         {"nominal.csv": _NOMINAL}),
     Case("filter", "irb120_program", ("calibrate robot.yaml points.csv", "filter robot.yaml pick.mod --out there.mod",
                                       "calibrate robot.yaml points.csv --loss cauchy"),
          "filter robot.yaml pick.mod --out there.mod", ".", ("there.mod",)),
     Case("certificate", "ur5_tracker", (f"{_CALIBRATE} squares",),
-         "certificate robot.yaml --targets grid.csv --before grid.csv --after grid.csv", ".", ()),
+         "certificate robot.yaml --targets nominal.csv --before grid.csv --after after.csv", ".", (),
+         {"nominal.csv": _NOMINAL, "after.csv": _GRID}),
     Case("identify tool", "ur5_tracker", (f"{_CALIBRATE} squares",), "identify tool robot.yaml touches.csv --out tool", "tool", (),
          {"touches.csv": _TOUCHES}),
     Case("identify frame", "ur5_tracker", (f"{_CALIBRATE} squares",), "identify frame robot.yaml fixture.csv --out place", "place", (),
-         {"fixture.csv": (EXAMPLES / "ur5_tracker" / "random.csv").read_text().replace(",x,y,z", ",wx,wy,wz", 1)}),
+         {"fixture.csv": _GRID.replace(",x,y,z", ",wx,wy,wz", 1)}),
     Case("study", "ur5_tracker", (), "study study.yaml --jobs 1 --out study", "study", (), {"study.yaml": _STUDY}),
     Case("fleet", "ur5_tracker", (f"{_CALIBRATE} squares --out 2026-01-01", f"{_CALIBRATE} cauchy --out 2026-02-01",
                                   "fleet . --out fleet.csv", "verify robot.yaml grid.csv --estimates 2026-02-01 --out 2026-03-01"),

@@ -7,6 +7,8 @@ MILLIMETRE = 1e-3
 INCH = 25.4e-3
 LARGEST = 1e50
 """No quantity in SI units is as large: beyond, products of a few overflow."""
+SMALLEST = 1e-50
+"""Numbers nearer to zero are zero: beyond, quotients overflow."""
 LEAST_STD = 1e-12
 """No instrument's standard deviation is as small, m or rad."""
 

@@ -27,6 +27,8 @@ CANARY = "canary-7f3a"
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 _OF_THE_ROBOT = ("[E-MODEL-007]",)
 """Sentences that name the robot instead of a file: what is wrong follows from several files together."""
+_AFTER_A_LOOK = "[E-CLI-035]\n"
+"""Refusal after the sentences on how a file was read."""
 _REMARK = re.compile(" …$|^(Pinocchio|OpenCV): |^note: .* left by a run that was cut off")
 """Of progress, what a native library says, on one line, and left-overs, which are named and stay."""
 Tree = dict[str, tuple[object, ...]]
@@ -75,6 +77,7 @@ def fault_of(
     if ending.status != 2:
         return None
     lines = [line for line in err.splitlines() if not _REMARK.search(line)]
+    partly = partly or err.endswith(_AFTER_A_LOOK)
     if len(lines[-1:] if partly else lines) != 1 or not lines[-1].startswith("flexcal: "):
         return f"not one sentence\n{err[-3000:]}"
     if len(lines[-1]) > 1200:

@@ -11,6 +11,7 @@ from flexcal.dynamics.inverse_model import CLASSIC
 from flexcal.dynamics.signals import Motion, PeriodicMotion, real_rows
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters
+from flexcal.model.parts import LINK_PARAMETERS
 from flexcal.model.robot import (
     GEOMETRY,
     PARALLEL,
@@ -19,6 +20,7 @@ from flexcal.model.robot import (
     declared_parameter,
     uncertain_inertials,
 )
+from flexcal.model.torques import torque_regressor
 from flexcal.model.vibration import ElasticArm, periodic_torque
 
 SAMPLES_PER_LINE = 4
@@ -34,7 +36,8 @@ def unknowns(model: RobotModel) -> tuple[Parameters, tuple[str, ...]]:
     """All unknowns of the torques with their prior, and the names of those that belong to the robot's dynamics.
 
     These are mass and centre of mass of every link, and the classic terms of the drives; the others are spring stiffnesses, geometric
-    errors and what friction does at a reversal. Raises `FlexcalError` where a rotor inertia is missing.
+    errors, what friction does at a reversal, and the inertia tensors about the centres of mass, in units of their prior. Raises
+    `FlexcalError` where a rotor inertia is missing.
     """
     lacking = [
         name
@@ -51,7 +54,10 @@ def unknowns(model: RobotModel) -> tuple[Parameters, tuple[str, ...]]:
     beside += [f"{joint}.{key}" for joint in model.joint_names for key in GEOMETRY]
     start = model.with_values({name: 0.0 for name in own if np.isnan(model.value(name))})
     items = [declared_parameter(start, name) for name in (*own, *beside)]
-    items += [Parameter(_reversal(joint), "1", 0.0, prior_std=1.0) for joint in model.joint_names]
+    shapes = [_tensor(model, i, entry) for i, entry, _ in _tensor_entries(model)]
+    items += [
+        Parameter(name, "1", 0.0, prior_std=1.0) for name in (*map(_reversal, model.joint_names), *shapes)
+    ]
     return Parameters(items), tuple(own)
 
 
@@ -85,6 +91,10 @@ class LinearisedEquations:
                 number = parameters.index(name)
                 torque[:, joint] += rows * parameters[number].value
                 jacobian[:, joint, number] += rows * parameters.natural_slope(x)[number]
+            for name, rows in _tensors(model, motion):
+                number = parameters.index(name)
+                torque += rows * parameters[number].value
+                jacobian[:, :, number] += rows
             predicted.append(torque)
             jacobians.append(jacobian)
         seen = np.array(measured)
@@ -145,6 +155,26 @@ def _reversals(model: RobotModel, motion: PeriodicMotion) -> Iterator[tuple[str,
         yield _reversal(name), joint, motion.rows(rounded[:, joint])
 
 
+def _tensor_entries(model: RobotModel) -> Iterator[tuple[int, str, float]]:
+    """Link, entry and 1σ (kg m²) of the uncertain inertia tensors about centres of mass: moments and products to the prior's share of
+    the moments."""
+    share = model.prior.inertia
+    for i, tensor in enumerate(model.links.inertia):
+        moments = np.diag(tensor)
+        if share > 0 and model.links.mass[i] > 0 and np.all(moments > 0):
+            for entry in LINK_PARAMETERS[4:]:
+                a, b = ("xyz".index(axis) for axis in entry[1:])
+                yield i, entry, share * float(np.sqrt(moments[a] * moments[b]))
+
+
+def _tensors(model: RobotModel, motion: PeriodicMotion) -> Iterator[tuple[str, np.ndarray]]:
+    """Parameter and rows (2 K + 1, n) of every uncertain entry of a tensor."""
+    regressor = motion.rows(torque_regressor(model, *motion.states(SAMPLES_PER_LINE * motion.lines)))
+    for i, entry, std in _tensor_entries(model):
+        column = len(LINK_PARAMETERS) * i + LINK_PARAMETERS.index(entry)
+        yield _tensor(model, i, entry), std * regressor[:, :, column]
+
+
 def _drive_names(model: RobotModel) -> tuple[str, ...]:
     still = np.zeros((1, model.n))
     motion = Motion(np.zeros(1), still, still, still, still)
@@ -158,3 +188,7 @@ def _of_drive(name: str) -> bool:
 
 def _reversal(joint: str) -> str:
     return f"{joint}.reversal"
+
+
+def _tensor(model: RobotModel, i: int, entry: str) -> str:
+    return f"{model.joints[i].link}.{entry}.about_com"  # not the parameter at the joint frame

@@ -7,11 +7,11 @@ from typing import Any, get_args
 
 from flexcal.files.structuring.faults import Fault
 from flexcal.files.structuring.wording import describe, suggestion
-from flexcal.units import LARGEST
+from flexcal.units import LARGEST, SMALLEST
 
 
 def number(value: Any) -> float:
-    """A finite number below `units.LARGEST`; raises `Fault`, as all below."""
+    """A finite number below `units.LARGEST`, zero below `units.SMALLEST`; raises `Fault`, as all below."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise Fault("E-YAML-025", f"a number is expected, not {describe(value)}")
     try:
@@ -22,7 +22,7 @@ def number(value: Any) -> float:
         raise Fault("E-YAML-026", f"a finite number is expected, not {describe(value)}")
     if abs(number) > LARGEST:
         raise Fault("E-YAML-027", f"a number below {LARGEST:.0e} is expected, not {number:g}")
-    return number
+    return 0.0 if abs(number) < SMALLEST else number
 
 
 def integer(value: Any) -> int:

@@ -14,6 +14,7 @@ from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation,
 from flexcal.dynamics.regression import RegressionData
 from flexcal.errors import InputError
 from flexcal.jobs import fleet_prior  # loaded where a prior is given
+from flexcal.jobs.dynamics.encoder_bias import without_encoder_bias
 from flexcal.jobs.dynamics.flexible_model import require_flexible_bearings, require_flexible_drives
 from flexcal.jobs.dynamics.result import DynamicsIdentification
 from flexcal.jobs.inputs import require_distinct_files
@@ -30,10 +31,14 @@ from flexcal.jobs.logs import (
     worker_robot,
 )
 from flexcal.model.robot import DynamicsConfig, RobotModel
-from flexcal.parallel import open_workers
+from flexcal.parallel import ThisProcess, open_workers
 from flexcal.progress import Progress, silent
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from flexcal.estimation import Estimate
     from flexcal.jobs.fleet_prior import ModelPrior
 
 _DEFAULT = WLS()
@@ -152,6 +157,25 @@ def identify_dynamics(
             held_out = RegressionData.of(observation, base, divided.unseen_equations(observation))
         rows = divided.rows(observation, base)
         estimate = with_nominal_uncertainty(train, estimator.fit(train, rows))
+        encoders = None
+        if springs:
+
+            def refit(robot: RobotModel, copies: Sequence[Path], filtered: Path) -> Estimate:
+                again = HoldOutLogs.read(
+                    copies,
+                    (),
+                    hold_out,
+                    robot,
+                    preprocessing,
+                    filtered,
+                    accept_weight=True,
+                    workers=ThisProcess(),
+                    progress=silent,
+                )
+                data = RegressionData.of(observation, base, again.equations(observation))
+                return estimator.fit(data, again.rows(observation, base))
+
+            estimate, encoders = without_encoder_bias(model, files, estimate, refit)
         essential = essential_parameters(train, estimate)
         if selection.uncertainty is not None:
             estimate = selection.uncertainty.widened(estimate)
@@ -186,6 +210,7 @@ def identify_dynamics(
             weight_faults=tuple(weight_faults(divided.logs, model)),
             weight_shares={} if accept_weight else weight_shares(train, estimate),
             external=external,
+            encoders=encoders,
             learned=learned,
             pooled=use,
             predictions=tuple(divided.predictions(observation, estimate)),

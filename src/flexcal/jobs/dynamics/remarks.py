@@ -12,6 +12,7 @@ from flexcal.dynamics.estimators import EstimatorName
 from flexcal.dynamics.friction import FrictionSelection
 from flexcal.dynamics.regression import RegressionData
 from flexcal.estimation import Estimate
+from flexcal.jobs.dynamics.encoder_bias import EncoderBias
 from flexcal.model.parts import LINK_PARAMETERS
 
 _CLEAR = 5.0
@@ -101,14 +102,22 @@ def unlike_log_notes(predictions: Sequence[TorquePrediction]) -> Iterator[str]:
         )
 
 
-def dynamics_notes(data: RegressionData, estimate: Estimate, estimator: EstimatorName) -> tuple[str, ...]:
-    """Notes: an assumed controller, springs that robot.yaml does not declare, a stiffness that noise may have reduced."""
+def dynamics_notes(
+    data: RegressionData, estimate: Estimate, estimator: EstimatorName, encoders: EncoderBias | None
+) -> tuple[str, ...]:
+    """Notes: an assumed controller, masses that torques do not determine, springs that robot.yaml does not declare, noise of encoders."""
     notes = []
     if estimator in ("iv", "didim") and data.observation.model.controller is None:
         notes.append(
             f"robot.yaml declares no controller: {estimator} simulated one that tracks the recorded path, gains proportional to inertia"
         )
-    return (*notes, *undeclared_spring_remarks(data, estimate), *_attenuated(data, estimate))
+    if estimator == "sdp":
+        notes.append(
+            "torques determine base parameters alone: single masses, centres of mass and inertias are the physically consistent ones "
+            "nearest to the URDF's, and no better known than these"
+        )
+    noise = _attenuated(data, estimate) if encoders is None else encoders.remarks()
+    return (*notes, *undeclared_spring_remarks(data, estimate), *noise)
 
 
 def selection_remark(friction: FrictionSelection, estimate: Estimate) -> str | None:

@@ -41,6 +41,7 @@ from flexcal.model.torques import motion_batch
 from flexcal.report.checks import Trust, dynamics_checks
 
 if TYPE_CHECKING:
+    from flexcal.jobs.dynamics.encoder_bias import EncoderBias
     from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
     from flexcal.jobs.fleet_prior import PooledUse
 
@@ -85,6 +86,8 @@ class DynamicsIdentification(TorqueIdentification):
         Identified weight of the links over that of the URDF; empty where it was accepted.
     external : ExternalShare or None
         How much of the measured external torques appears in the motors' torques; None without a force sensor.
+    encoders : EncoderBias or None
+        What rounded positions did to flexible drives; None where they are not rounded, or the drives are rigid.
     learned : LearnedDynamics or None
         Learned residual torques, where they were asked for.
     pooled : PooledUse or None
@@ -112,6 +115,7 @@ class DynamicsIdentification(TorqueIdentification):
     weight_faults: tuple[str, ...]
     weight_shares: Mapping[str, GravityRatio]
     external: ExternalShare | None
+    encoders: EncoderBias | None
     learned: LearnedDynamics | None
     pooled: PooledUse | None
     seconds: float
@@ -234,7 +238,7 @@ class DynamicsIdentification(TorqueIdentification):
             "pooled": None if self.pooled is None else self.pooled.document(),
             "notes": [
                 *([] if self.pooled is None else self.pooled.remarks),
-                *dynamics_notes(self.train, self.estimate, self.estimator),
+                *dynamics_notes(self.train, self.estimate, self.estimator, self.encoders),
                 *unlike_log_notes(self.predictions),
             ],
             "weight_shares": {

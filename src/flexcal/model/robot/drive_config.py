@@ -33,8 +33,9 @@ class PayloadConfig:
 
 @dataclass(frozen=True)
 class PriorConfig:
-    """Prior standard deviations (1σ) of nominal values: mass (relative), centre of mass (m), rotor inertia (relative), stiffness
-    (relative), and the torque constants behind the motor torques that a controller gives (relative; 0 for measured torques).
+    """Prior standard deviations (1σ) of nominal values: mass (relative), centre of mass (m), inertia tensor about it (relative, beside
+    its change with the mass), rotor inertia (relative), stiffness (relative), and the torque constants behind the motor torques that a
+    controller gives (relative; 0 for measured torques).
 
     `length` (m) and `angle` (rad) are those of the joints' geometric errors, and `parameters` those of single ones by name, relative for a
     stiffness; a geometric parameter without is estimated from the measurements alone.
@@ -42,6 +43,7 @@ class PriorConfig:
 
     mass: float = 0.07
     com: float = 0.010
+    inertia: float = 0.15
     rotor_inertia: float = 0.05
     stiffness: float = 0.3
     torque_constant: float = 0.02
@@ -50,11 +52,11 @@ class PriorConfig:
     parameters: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name in ("mass", "com", "torque_constant"):
+        for name in ("mass", "com", "inertia", "torque_constant"):
             if getattr(self, name) < 0 or 0 < getattr(self, name) < _LEAST_PRIOR:
                 raise FlexcalError(
                     "E-ROBOT-009",
-                    "the prior's mass, com and torque_constant must not be negative (0: known exactly), and no less than "
+                    "the prior's mass, com, inertia and torque_constant must not be negative (0: known exactly), and no less than "
                     f"{_LEAST_PRIOR:g} otherwise; {name} is {getattr(self, name):g}.",
                 )
         single = {"rotor_inertia": self.rotor_inertia, "stiffness": self.stiffness}

@@ -13,7 +13,7 @@ import numpy as np
 from flexcal.errors import InputError, unreadable
 from flexcal.files.transaction import MEGABYTE, open_regular
 from flexcal.printable import excerpt, name_fault, quoted
-from flexcal.units import LARGEST
+from flexcal.units import LARGEST, SMALLEST
 
 LARGEST_URDF = 16 * MEGABYTE
 MOST_PARTS = 1000
@@ -66,7 +66,7 @@ class Element:
         return InputError(code, f"{self.path} line {self.line}: {sentence}")
 
     def numbers(self, attribute: str, count: int, owner: str) -> np.ndarray:
-        """The `count` finite numbers of an attribute; raises `InputError` naming its `owner` if it is missing or malformed."""
+        """The `count` finite numbers of an attribute, zero below `units.SMALLEST`; raises `InputError` naming its `owner` without them."""
         text = self.attributes.get(attribute)
         if text is None:
             raise self.error(
@@ -85,7 +85,7 @@ class Element:
                 "E-URDF-028",
                 f'{attribute}="{excerpt(text)}" in <{self.tag}> of {owner} is not {what}; write {what} with decimal points.',
             )
-        return values
+        return np.where(np.abs(values) < SMALLEST, 0.0, values)
 
 
 def xacro_error(path: Path, what: str = ": this") -> InputError:
