@@ -1,5 +1,5 @@
 """Verbs that are killed at every operation on files: each file is of the run before or of the new one, readers say where these are mixed,
-and the next run leaves what one that was not killed leaves.
+and the next run leaves what one that was not killed leaves. A study, whose rows are kept and gone on with, has tests of its own.
 
 `python -m benchmarks.kill [--cases calibrate verify …] [--every 1]`
 
@@ -71,12 +71,6 @@ _MOTORS = json.dumps({
     f"{joint}_joint": {"id": k, "drive_mode": 0, "homing_offset": 0, "range_min": 700, "range_max": 3300}
     for k, joint in enumerate(("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"))
 })  # fmt: skip
-_STUDY = """kind: virtual_calibration
-robot: robot.yaml
-seeds: {count: 3}
-options: {terms: [kinematic]}
-grid: {poses: [20]}
-"""
 _TRAJECTORY = "design trajectory robot.yaml --count 1 --steps 2"
 _EXCITING = (f"{_TRAJECTORY} --out trajectory.yaml", "measure trajectory.yaml --cell virtual --out exciting")
 _LOADED = (
@@ -145,8 +139,7 @@ CASES = (
     Case("identify tool", "ur5_tracker", (f"{_CALIBRATE} squares",), "identify tool robot.yaml touches.csv --out tool", "tool", (),
          {"touches.csv": _TOUCHES}),
     Case("identify frame", "ur5_tracker", (f"{_CALIBRATE} squares",), "identify frame robot.yaml fixture.csv --out place", "place", (),
-         {"fixture.csv": _GRID.replace(",x,y,z", ",wx,wy,wz", 1)}),
-    Case("study", "ur5_tracker", (), "study study.yaml --jobs 1 --out study", "study", (), {"study.yaml": _STUDY}),
+         {"fixture.csv": "\n".join(_GRID.splitlines()[:30]).replace(",x,y,z", ",wx,wy,wz", 1)}),
     Case("fleet", "ur5_tracker", (f"{_CALIBRATE} squares --out 2026-01-01", f"{_CALIBRATE} cauchy --out 2026-02-01",
                                   "fleet . --out fleet.csv", "verify robot.yaml grid.csv --estimates 2026-02-01 --out 2026-03-01"),
          "fleet . --out fleet.csv", ".", ("fleet.csv",)),

@@ -103,6 +103,11 @@ def test_currents_of_any_scale(arm: Path, capsys: pytest.CaptureFixture[str]) ->
     assert found["gains"] == pytest.approx(list(DECLARED * GAINS), rel=0.01)
 
 
+def test_a_link_to_itself_is_no_log(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (arm / "loop.csv").symlink_to("loop.csv")
+    assert_refusal(refused_verb("gains", arguments(arm, "free", "loop"), capsys), "E-FILE-001", "loop.csv")
+
+
 def test_the_robots_own_dynamics_take_the_free_logs(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["identify", "dynamics", *arguments(arm, "free"), "--out", str(arm / "out")]) == 0
     message = refused_verb("dynamics", arguments(arm, "free", "loaded"), capsys)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 from datetime import datetime
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -52,6 +54,19 @@ def test_table_has_every_value_with_its_source(tmp_path: Path, capsys: pytest.Ca
     p90 = table.row(by_predicate=pl.col("name") == "error.p90", named=True)
     assert p90["value"] == pytest.approx(1e-4) and p90["unit"] == "m" and p90["independent"]
     assert str(p90["date"]) == "2026-03-01 00:00:00"
+
+
+def test_a_file_of_no_reasonable_size_is_not_hashed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fleet = tmp_path / "fleet"
+    for name in "ab":
+        write_robot(fleet / name)
+        write_calibration(fleet / name / "2026-03-01", {"j1.offset": (1e-3, 1e-4)}, data=name)
+    os.truncate(fleet / "a" / "2026-03-01" / "estimates.yaml", 10**10)
+    start = process_time()
+    main(["fleet", str(fleet), "--out", str(tmp_path / "fleet.csv")])
+    assert "has 10 GB" in capsys.readouterr().out and process_time() - start < 3
 
 
 def test_the_table_is_of_the_kind_that_its_name_says(

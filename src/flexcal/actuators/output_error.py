@@ -70,7 +70,7 @@ class OutputError:
         )
 
     def _jacobian(self, x: np.ndarray, parameters: Parameters) -> np.ndarray:
-        """Derivatives (W S n, p) by differences, with time steps twice as long: they need less accuracy."""
+        """Derivatives (W S n, p) by differences, with longer time steps: they need less accuracy."""
         at, columns = self._difference(x, coarse=True), []
         for k, step in enumerate(self._steps(parameters)):
             moved = x.copy()

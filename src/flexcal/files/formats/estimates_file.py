@@ -204,16 +204,18 @@ def provenance(
     return origin
 
 
-def sha256_of(path: str | Path) -> str:
-    """SHA-256 of a file; of a folder: of the names and SHA-256 of all files in it, in the order of their names."""
+def sha256_of(path: str | Path, *, limit: int | None = None) -> str:
+    """SHA-256 of a file of at most `limit` bytes; of a folder: of the names and SHA-256 of all files in it, in the order of their names."""
     path = Path(path)
     digest = hashlib.sha256()
     try:
         if path.is_dir():
             for file in sorted(file for file in path.rglob("*") if file.is_file()):
-                digest.update(f"{file.relative_to(path).as_posix()}\0{sha256_of(file)}\n".encode())
+                digest.update(
+                    f"{file.relative_to(path).as_posix()}\0{sha256_of(file, limit=limit)}\n".encode()
+                )
         else:
-            with open_regular(path, limit=None) as stream:
+            with open_regular(path, limit=limit) as stream:
                 while content := stream.read(2**20):
                     digest.update(content)
     except OSError as problem:

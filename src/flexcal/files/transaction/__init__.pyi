@@ -4,9 +4,20 @@ from .file_transaction import FileTransaction, Record, current_path, files_on_di
 from .growing_file import append_lines, whole_lines
 from .ledger import LEDGER, Ledger, digest_on_disk, refuse_mixture
 from .locks import locked, sole_holder
-from .reading import MEGABYTE, open_regular, read_bytes, read_text, regular_path, size_text, unpacked_limit
+from .reading import (
+    LARGEST,
+    MEGABYTE,
+    open_regular,
+    read_bytes,
+    read_text,
+    real_path,
+    regular_path,
+    size_text,
+    unpacked_limit,
+)
 
 __all__ = [
+    "LARGEST",
     "LEDGER",
     "MEGABYTE",
     "FileTransaction",
@@ -23,6 +34,7 @@ __all__ = [
     "open_regular",
     "read_bytes",
     "read_text",
+    "real_path",
     "refuse_irregular",
     "refuse_linked_folder",
     "refuse_mixture",

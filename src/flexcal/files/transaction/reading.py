@@ -36,6 +36,11 @@ def open_regular(path: str | Path, *, limit: int | None) -> BufferedReader:
         raise
 
 
+def real_path(path: str | Path) -> Path:
+    """Absolute path without links; where these form a loop, `Path.resolve` raises, and here the path stays as it is."""
+    return Path(os.path.realpath(path))
+
+
 def regular_path(path: str | Path, *, limit: int | None) -> Path:
     """Path of a regular file, for a library that opens it by its name; checked, and raises, as `open_regular` does."""
     place = current_path(path)

@@ -31,6 +31,7 @@ from flexcal.compensation import desired_pose
 from flexcal.data.poses import PoseSet, ToolTargets, read_targets
 from flexcal.errors import InputError
 from flexcal.files.formats import sha256_of
+from flexcal.files.transaction import real_path
 from flexcal.jobs.accuracy.verification import require_stations, verification_poses
 from flexcal.jobs.calibration import fitted_files, fitted_points
 from flexcal.jobs.inputs import CalibratedRobot, outdated_remarks, unmeasured_targets_remark, with_temperature
@@ -335,7 +336,7 @@ def certify_robot(
     """
     if out.suffix != ".html":
         raise InputError("E-RUN-001", f"{out} must end in .html; give another --out.")
-    if before.resolve() == after.resolve():
+    if real_path(before) == real_path(after):
         raise InputError(
             "E-RUN-002",
             f"{before} is given as --before and as --after; measure the compensated commands too.",

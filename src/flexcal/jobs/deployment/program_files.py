@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from flexcal.errors import InputError, naming
-from flexcal.files.transaction import MEGABYTE, atomic_paths, read_bytes
+from flexcal.files.transaction import MEGABYTE, atomic_paths, read_bytes, real_path
 from flexcal.programs import Program, ProgramFile, dialect_of
 
 _LARGEST = 16 * MEGABYTE
@@ -73,8 +73,8 @@ def with_companions(files: Sequence[Path]) -> list[Path]:
             and other.suffix.lower() in beside
             and other != file
         ]
-        known = {each.resolve() for each in every}
-        every += [each for each in (file, *others) if each.resolve() not in known]
+        known = {real_path(each) for each in every}
+        every += [each for each in (file, *others) if real_path(each) not in known]
     return every
 
 

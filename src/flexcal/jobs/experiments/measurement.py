@@ -12,6 +12,7 @@ from flexcal.data.plans import MultisinePlan, PosePlan
 from flexcal.data.recordings import Recording
 from flexcal.errors import InputError, naming
 from flexcal.files.formats import read_yaml, yaml_text
+from flexcal.files.transaction import real_path
 from flexcal.jobs.experiments.played_recordings import PlayedRecordings, plan_as_played
 from flexcal.jobs.experiments.poses import VERIFICATION
 from flexcal.jobs.inputs import read_plan_for_robot
@@ -77,7 +78,7 @@ def measure(
     """
     model = RobotModel.from_yaml(robot_file, estimates=False)
     plan = read_plan_for_robot(plan_file, model)
-    if cell != VIRTUAL and Path(cell).resolve() == out.resolve():
+    if cell != VIRTUAL and real_path(cell) == real_path(out):
         raise InputError("E-RUN-039", f"{out} is the folder measured before; give another --out.")
     if cell != VIRTUAL and isinstance(plan, MultisinePlan):
         plan = plan_as_played(Path(cell), plan)

@@ -16,6 +16,7 @@ from flexcal.calibration.comparison import temperature_of
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, read_estimates, sha256_of
+from flexcal.files.transaction import LARGEST
 from flexcal.jobs.fleet.batches import Batches, batches_of
 from flexcal.jobs.fleet.geometry_drifts import GeometryCourse, geometry_courses
 from flexcal.jobs.fleet.members import Twin, latest_members, twins_of
@@ -180,7 +181,7 @@ def _row(root: Path, folder: ResultFolder, path: Path) -> Row:
         independent=None,
         temperature=None,
         file=path.relative_to(root).as_posix(),
-        sha256=sha256_of(path),
+        sha256=sha256_of(path, limit=LARGEST),
     )
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from flexcal.errors import FlexcalError
 from flexcal.files.formats import read_yaml, sha256_of
+from flexcal.files.transaction import real_path
 from flexcal.jobs.fleet.places import ROBOT
 from flexcal.jobs.recheck import VISITS
 from flexcal.jobs.result_files import ESTIMATES, RESULTS, read_results
@@ -168,7 +169,7 @@ def _project(root: Path, folder: Path) -> Project:
     description = read_elements(urdf)
     model = description.attributes.get("name") or urdf.stem
     names = [part for part in _parts(root, folder) if date_of((part,)) is None]
-    place = "/".join(names) or root.resolve().name
+    place = "/".join(names) or real_path(root).name
     return Project(
         folder,
         place,

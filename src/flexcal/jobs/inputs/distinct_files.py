@@ -7,6 +7,7 @@ from filecmp import cmp
 from pathlib import Path
 
 from flexcal.errors import InputError
+from flexcal.files.transaction import real_path
 
 
 def require_distinct_files(files: Sequence[Path], unseen: Sequence[Path] = ()) -> None:
@@ -31,7 +32,7 @@ def _twin(file: Path, others: Sequence[Path]) -> Path | None:
 
 
 def _same_place(file: Path, other: Path) -> bool:
-    return file.resolve() == other.resolve()
+    return real_path(file) == real_path(other)
 
 
 def _same_content(file: Path, other: Path) -> bool:

@@ -13,7 +13,7 @@ from flexcal.calibration.comparison import GeometryChange, compare_geometry
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 from flexcal.files.formats import block_sha256, sha256_of
-from flexcal.files.transaction import current_path
+from flexcal.files.transaction import current_path, real_path
 from flexcal.jobs.result_files import read_results
 from flexcal.model.robot import RobotModel
 from flexcal.report.results import Run
@@ -65,7 +65,7 @@ def _robot_file(folders: tuple[Path, Path], estimates: tuple[Estimate, Estimate]
     """The robot.yaml of either calibration, unchanged if possible, in or above the folders or in the working folder."""
     there: list[Path] = []
     for folder in folders:
-        above = folder.resolve()
+        above = real_path(folder)
         there += [above, *list(above.parents)[:_ABOVE]]
     names = [
         name.rpartition("/")[2]

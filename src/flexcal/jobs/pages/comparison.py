@@ -9,6 +9,7 @@ from typing import Any
 from flexcal.data.poses import DEFAULT_SIGMA
 from flexcal.errors import InputError
 from flexcal.files.formats import read_estimates
+from flexcal.files.transaction import real_path
 from flexcal.jobs.pages.changed_robot import geometry_change
 from flexcal.jobs.pages.report import missing_key_error
 from flexcal.jobs.result_files import (
@@ -42,7 +43,7 @@ def folder_comparison(first: Path, second: Path, robot: Path | None = None) -> C
 
     Raises `InputError` where one holds no calibration, verification or demo, they are of different kinds or robots, or both are the same.
     """
-    if first.resolve() == second.resolve():
+    if real_path(first) == real_path(second):
         raise InputError("E-REPORT-001", f"{first} and {second} are the same folder; give two.")
     names = _names(first, second)
     one, two = _run(first, names[0]), _run(second, names[1])
@@ -61,7 +62,7 @@ def folder_comparison(first: Path, second: Path, robot: Path | None = None) -> C
 
 def _names(first: Path, second: Path) -> tuple[str, str]:
     """Names of the folders, with as much of the path as distinguishes them."""
-    parts = [path.resolve().parts for path in (first, second)]
+    parts = [real_path(path).parts for path in (first, second)]
     for depth in range(1, max(len(p) for p in parts) + 1):
         one, two = ("/".join(p[-depth:]) for p in parts)
         if one != two:

@@ -14,6 +14,7 @@ from flexcal.calibration.recheck import ShiftAtVisit, drift_sums
 from flexcal.data.poses import DEFAULT_SIGMA, read_poses, tables_of
 from flexcal.errors import InputError
 from flexcal.files.formats import block_sha256, provenance, sha256_of
+from flexcal.files.transaction import real_path
 from flexcal.jobs.inputs import CalibratedRobot, image_provenance, outdated_remarks, require_distinct_files
 from flexcal.jobs.recheck.one_visit import recheck, without_implausible_temperatures
 from flexcal.jobs.recheck.result import Recheck
@@ -194,7 +195,7 @@ def _order(when: str, stored: Path, later: Sequence[Visit], becomes: bool) -> tu
 def _date_of_folder(stored: Path) -> str | None:
     """Date of a calibration, from the name of its folder; None where that is none."""
     try:
-        return date.fromisoformat(stored.resolve().parent.name[:10]).isoformat()
+        return date.fromisoformat(real_path(stored).parent.name[:10]).isoformat()
     except ValueError:
         return None
 

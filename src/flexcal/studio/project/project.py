@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from flexcal.errors import InputError
+from flexcal.files.transaction import real_path
 
 ROBOT = "robot.yaml"
 PLAN = "poses.yaml"
@@ -61,7 +62,7 @@ class Project:
             raise InputError(
                 "E-STUDIO-040", f"{folder} is no folder; make it, or give that of the robot's files."
             )
-        return cls(folder.resolve())
+        return cls(real_path(folder))
 
     @property
     def name(self) -> str:
@@ -91,7 +92,7 @@ class Project:
         if not name.strip() or "\0" in name or Path(name).is_absolute():
             raise outside
         try:
-            place = (self.folder / name).resolve()
+            place = real_path(self.folder / name)
         except (OSError, RuntimeError) as problem:
             raise outside from problem
         if not place.is_relative_to(self.folder) or place == self.folder:

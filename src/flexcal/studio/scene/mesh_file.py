@@ -10,7 +10,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from flexcal.errors import InputError
-from flexcal.files.transaction import read_bytes
+from flexcal.files.transaction import read_bytes, real_path
 
 FORMATS = ("stl", "obj", "dae")
 """Endings of the files that are read."""
@@ -38,10 +38,10 @@ class MeshFolder:
         outside = False
         for candidate in self._candidates(name):
             try:
-                real = candidate.resolve()
+                real = real_path(candidate)
                 if not real.is_file():
                     continue
-                if real.is_relative_to(self.project.resolve()):
+                if real.is_relative_to(real_path(self.project)):
                     return real
                 outside = True
             except (OSError, ValueError, RuntimeError):  # too long, a NUL, a circle of links

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from flexcal.errors import InputError
-from flexcal.files.transaction import open_regular
+from flexcal.files.transaction import open_regular, real_path
 from flexcal.studio.server.answer import PLAIN, Answer, said
 
 _KINDS = {
@@ -40,7 +40,7 @@ class ProjectFiles:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder.resolve()
+        self._folder = real_path(folder)
 
     def __call__(self, path: str) -> Answer | None:
         """As `Route`."""
