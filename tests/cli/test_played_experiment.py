@@ -213,7 +213,7 @@ def test_round_trip(run, cell: tuple[Path, Log], tmp_path: Path, log: dict[str, 
         assert entry["correlation"] > 0.7 and entry["clock_ppm"] == pytest.approx(
             1e6 * (log.get("clock", 1) - 1), abs=1
         )
-    assert remark.startswith("2 recordings are not what their names say")
+    assert remark.startswith("logs are taken as what they hold, not by their names: ")
     assert exchanged[0].name in remark and exchanged[1].stem in remark
     one = pl.read_parquet(folder / "frequency" / "pose_1_realisation_1_experiment_1_plus.parquet")
     rate = STEPS * 1000 / log.get("every", STEPS)

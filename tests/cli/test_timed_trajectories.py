@@ -102,6 +102,42 @@ def test_a_log_of_the_written_motion_identifies_the_robot(run, gantry: Path) -> 
         assert found[name]["estimate"] == pytest.approx(true, rel=0.05)
 
 
+def test_logs_of_any_name_rate_and_beginning(run, gantry: Path, tmp_path: Path) -> None:
+    """Two trajectories, with names exchanged, recorded by hand at another rate than planned, with the robot at rest before and after."""
+    folder = gantry.parent
+    asked = ("--rate", 1000, "--out", folder / "plan.yaml")
+    assert run("design", "trajectory", gantry, "--count", 2, "--searches", 1, *asked).status == 0
+    logs = tmp_path / "logs"
+    logs.mkdir()
+    rng = np.random.default_rng(8)
+    for number, name, before in ((1, "second", 3.217), (2, "pose_1_realisation_1_experiment_1_plus", 0.6)):
+        _, rows = motion(folder / f"plan_{number}.csv")
+        time = np.arange(0, rows[-1, 0] + before + 2, 1 / 640.0)
+        at = np.clip(time - before, 0, rows[-1, 0])
+        q, dq, ddq = (
+            np.stack([np.interp(at, rows[:, 0], column) for column in part.T], axis=1)
+            for part in np.split(rows[:, 1:], 3, axis=1)
+        )
+        tau = torques(folder, q, dq, ddq) + 0.05 * rng.standard_normal(q.shape)
+        lines = ["t,q1,q2,q3,tau1,tau2,tau3"]
+        lines += [",".join(f"{v:.9g}" for v in row) for row in np.column_stack([time + 7.0, q, tau])]
+        (logs / f"{name}.csv").write_text("\n".join(lines) + "\n")
+    measure = ("measure", folder / "plan.yaml", "--cell", logs, "--out", tmp_path / "exciting", "--json")
+    document = run(*measure).document
+    found = {Path(entry["file"]).stem: entry for entry in document["found"]}
+    assert found["second"]["recording"] == "pose_1_realisation_1_experiment_1_plus"
+    assert found["second"]["start_s"] == pytest.approx(3.217, abs=0.01)
+    assert document["remarks"] == [
+        "logs are taken as what they hold, not by their names: "
+        "pose_1_realisation_1_experiment_1_plus.csv is pose_1_realisation_2_experiment_1_plus"
+    ]
+    parameters = run("identify", "inertials", gantry, tmp_path / "exciting", "--json").document["parameters"]
+    for name, true in (("rail.viscous", 60.0), ("elbow.coulomb", 2.0), ("shoulder.viscous", 8.0)):
+        assert parameters[name]["estimate"] == pytest.approx(true, rel=0.05)
+    (logs / "second.csv").unlink()
+    assert_refusal(run(*measure[:-1]).err, "E-EXP-019", "1 of 2", "pose_1_realisation_1_experiment_1_plus")
+
+
 @pytest.mark.parametrize("seeds", [range(40, 42), pytest.param(range(40, 46), marks=pytest.mark.slow)])
 def test_seeds_end_at_like_conditions(gantry: Path, seeds: range) -> None:
     from flexcal.design.optimality import condition_number

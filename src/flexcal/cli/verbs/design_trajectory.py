@@ -29,7 +29,7 @@ class DesignTrajectory:
     """Plan exciting trajectories: periodic motions within all limits and without collision that best determine the robot's dynamics.
 
     Beside the plan, every trajectory is written as timed joint positions from rest to rest, as CSV and as a ROS JointTrajectory: move the
-    robot slowly to the first position, then start the log with the motion.
+    robot slowly to the first position, and log it at a fixed rate from before the motion until after it.
     """
 
     robot: Robot
@@ -136,6 +136,6 @@ class DesignTrajectory:
             console.say(remark)
         console.say(f"wrote {document['page']}, with figures")
         folder = "loaded" if self.loaded else "exciting"
-        console.finish(
-            document, f"{measure_command(self.out, self.robot, folder)}, or record it on the robot"
-        )
+        virtual = measure_command(self.out, self.robot, folder)
+        real = virtual.replace("--cell virtual", "--cell FOLDER")
+        console.finish(document, f"{virtual}; or record it on the robot, and {real}")

@@ -23,7 +23,7 @@ from .played_signal import (
     played_signals,
     reference_motion,
 )
-from .recognition import Recognition, SignalSearch, nearest_poses, on_plan
+from .recognition import MotionSearch, Recognition, SignalSearch, nearest_poses, on_plan
 from .response import FrequencyResponse, frequency_responses, pose_response
 from .symmetry import reciprocity
 
@@ -32,6 +32,7 @@ __all__ = [
     "Average",
     "FrequencyResponse",
     "LocalWindows",
+    "MotionSearch",
     "PlayedSchedule",
     "PlayedSignal",
     "Recognition",

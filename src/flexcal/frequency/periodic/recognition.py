@@ -8,7 +8,7 @@ from math import ceil
 
 import numpy as np
 
-from flexcal.data.plans import MultisinePlan
+from flexcal.data.plans import MultisinePlan, TrajectoryPlan
 from flexcal.data.recordings import Recording, RecordingLabel
 from flexcal.errors import FlexcalError
 from flexcal.frequency.periodic.line_spectra import spectrum
@@ -35,6 +35,10 @@ _WINDOW = 9.0
 """Shape parameter of the Kaiser window of the interpolation: stop band 90 dB down."""
 _SAME_SAMPLES = 0.1
 """Samples by which a log's time may depart from the plan's over all periods without being interpolated."""
+_MOTION_INSTANTS = 400
+"""Instants of a period of a trajectory in the search."""
+_MOTION_DIFFERS, _MOTION_CLEAR, _MOTION_ALIKE = 0.05, 4.0, 1e-3
+"""Largest mean squared distance from a trajectory, relative to its variance; least ratio of the second to it; difference that is none."""
 _REFINEMENTS = 2
 _CERTAIN, _LEAST_DRIFT = 5.0, 0.1
 """Standard deviations, and samples, beyond which the drift of a log's clock over the settling periods is corrected."""
@@ -187,6 +191,73 @@ class SignalSearch:
         return float(solution[0]), float(np.sqrt(variance * np.linalg.pinv(columns.T @ columns)[0, 0]))
 
 
+class MotionSearch:
+    """Search for the trajectories of a plan in recorded positions."""
+
+    def __init__(self, plan: TrajectoryPlan) -> None:
+        self.plan = plan
+        self._step = 1 / (_MOTION_INSTANTS * plan.base_frequency_hz)
+        periods = plan.periods - plan.settle_periods
+        time = self._step * np.arange(_MOTION_INSTANTS * periods)
+        self._paths = np.array([plan.motion(number, time)[0] for number in range(len(plan))])
+        self._mean = self._paths.mean(axis=1, keepdims=True)
+        self._size = np.sqrt(np.mean((self._paths - self._mean) ** 2, axis=(0, 1)))
+        self._size = np.where(self._size > 0, self._size, 1.0)
+
+    def find(self, recording: Recording) -> Recognition:
+        """The trajectory of a recording, by the least squared distance of its positions from the measured periods.
+
+        Raises `FlexcalError` where it is shorter than the plan's periods, or none of the trajectories is in it, or more than one.
+        """
+        plan = self.plan
+        if (len(recording) + 0.5) * recording.time_step < plan.duration:
+            raise FlexcalError(
+                "E-EXP-024",
+                f"{recording.name}: the log lasts {len(recording) * recording.time_step:.4g} s, less than the {plan.duration:g} s of the "
+                f"plan's {plan.periods} periods; record the whole motion.",
+            )
+        settling = plan.settle_periods / plan.base_frequency_hz
+        ratio = self._step / recording.time_step
+        first = np.arange(int((len(recording) - 1) / ratio) + 1)
+        q = sampled(recording.q, ratio * first) / self._size
+        lags = np.arange(len(q) - self._paths.shape[1] + 1)
+        lags = lags[lags * self._step > settling - self._step]
+        shares, places = zip(*(self._distances(q, number, lags) for number in range(len(plan))), strict=True)
+        order = np.argsort(shares)
+        best, share = int(order[0]), float(shares[order[0]])
+        second = float(shares[order[1]]) if len(order) > 1 else np.inf
+        if share > _MOTION_DIFFERS or second < _MOTION_CLEAR * share:
+            raise FlexcalError(
+                "E-EXP-025",
+                f"{recording.name}: none of the plan's trajectories, or more than one, fits its positions (the nearest departs by "
+                f"{100 * np.sqrt(share):.0f} % of its range); check that it is a recording of this plan, and the columns of q.",
+            )
+        spare = len(recording) * recording.time_step - plan.duration
+        after = float(np.clip(places[best] * self._step - settling, 0.0, max(spare, 0.0)))
+        label = RecordingLabel(0, best, 0, 1)
+        return Recognition(label, recording.start + after, 1.0, 1 - share, 1 - min(second, 1.0))
+
+    def _distances(self, q: np.ndarray, number: int, lags: np.ndarray) -> tuple[float, float]:
+        """Least mean squared distance from a trajectory, relative to its variance, and where: the last place that is about as good."""
+        path = self._paths[number] / self._size
+        size = 1 << int(np.ceil(np.log2(len(q) + len(path))))
+        product = np.fft.rfft(q, size, axis=0) * np.fft.rfft(path, size, axis=0).conj()
+        inner = np.fft.irfft(product.sum(axis=1), size)[lags]
+        power = _cumulative(np.sum(q**2, axis=1))
+        distance = power[lags + len(path)] - power[lags] - 2 * inner + np.sum(path**2)
+        distance /= np.sum((path - self._mean[number] / self._size) ** 2)
+        least = float(distance.min())
+        at = int(np.flatnonzero(distance <= least + _MOTION_ALIKE)[-1])
+        while at > 0 and distance[at - 1] < distance[at]:
+            at -= 1
+        place = float(lags[at])
+        if 0 < at < len(lags) - 1:
+            before, here, after = distance[at - 1 : at + 2]
+            bend = before - 2 * here + after
+            place += 0.5 * (before - after) / bend if bend > 0 else 0.0
+        return max(least, 0.0), place
+
+
 def _cumulative(values: np.ndarray) -> np.ndarray:
     """Sums (N + 1, …) of the first 0 … N of values (N, …)."""
     return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
@@ -209,15 +280,16 @@ def nearest_poses(plan: MultisinePlan, recording: Recording) -> list[int]:
     return [int(pose) for pose in order if apart[pose] <= apart[order[0]] + _NEARLY]
 
 
-def on_plan(plan: MultisinePlan, recording: Recording, found: Recognition) -> Recording:
+def on_plan(plan: MultisinePlan | TrajectoryPlan, recording: Recording, found: Recognition) -> Recording:
     """The periods of the plan in a recording, from the beginning of the excitation on, in whole samples a period.
 
-    At the plan's rate, or the multiple of it that is nearest to the log's, so that a torque held over a sample of the plan stays so. Where
-    the log has these samples it is cut to whole ones; else all quantities are interpolated as band-limited signals.
+    At the plan's rate, of multisines also at the multiple of it that is nearest to the log's, so that a torque held over a sample of the
+    plan stays so. Where the log has these samples it is cut to whole ones; else all quantities are interpolated as band-limited signals.
 
     Raises `FlexcalError` where a part of the periods is not in the log.
     """
-    several = max(1, round(1 / (recording.time_step * plan.rate_hz)))
+    faster = isinstance(plan, MultisinePlan)
+    several = max(1, round(1 / (recording.time_step * plan.rate_hz))) if faster else 1
     period = several * ceil(plan.rate_hz / plan.base_frequency_hz * (1 - 1e-9))
     step = found.clock / (plan.base_frequency_hz * period)
     count = plan.periods * period

@@ -72,15 +72,15 @@ def measure(
     """Carry out the plan in a file and leave the measurements, the plan and results.json in the folder `out`.
 
     `cell` is "virtual", or a folder with measurements by this very plan, which are checked and copied in the standard form; recordings of
-    a frequency plan may have any names, beginnings and rates, see `PlayedRecordings`. The virtual cell takes `config` (default: cell.yaml
-    beside robot.yaml, where there is one); its hidden truth is drawn from `seed`, or taken from the file `truth`, and left in
+    signals and trajectories may have any names, beginnings and rates (`PlayedRecordings`). The virtual cell takes `config` (default:
+    cell.yaml beside robot.yaml, where there is one); its hidden truth is drawn from `seed`, or taken from the file `truth`, and left in
     `out`/truth.yaml. Raises `FlexcalError` where files do not fit, and where `out` holds the measurements of another plan.
     """
     model = RobotModel.from_yaml(robot_file, estimates=False)
     plan = read_plan_for_robot(plan_file, model)
     if cell != VIRTUAL and real_path(cell) == real_path(out):
         raise InputError("E-RUN-039", f"{out} is the folder measured before; give another --out.")
-    if cell != VIRTUAL and isinstance(plan, MultisinePlan):
+    if cell != VIRTUAL and not isinstance(plan, PosePlan):
         plan = plan_as_played(Path(cell), plan)
     before = out / PLAN
     if before.is_file() and yaml_text(read_plan_for_robot(before, model)) != yaml_text(plan):
@@ -92,7 +92,7 @@ def measure(
         file = beside if config is None and beside.is_file() else config
         settings = CellConfig() if file is None else read_yaml(file, CellConfig)
         source, drawn = VirtualCell.drawn(model, settings, seed, truth)
-    elif isinstance(plan, MultisinePlan):
+    elif not isinstance(plan, PosePlan):
         source = PlayedRecordings(Path(cell), model)
     else:
         source = FolderCell(cell, model)

@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from flexcal.data.experiments import PLAN, existing_file, labels, require_measurements, require_same_plan
 from flexcal.data.plans import MultisinePlan, TrajectoryPlan, read_plan_of
-from flexcal.data.recordings import Recording, RecordingLabel, read_recording
+from flexcal.data.recordings import FILL, Recording, RecordingLabel, read_recording
 from flexcal.errors import InputError
-from flexcal.frequency.periodic import SignalSearch, nearest_poses, on_plan
+from flexcal.frequency.periodic import MotionSearch, Recognition, SignalSearch, nearest_poses, on_plan
 from flexcal.jobs.experiments.excitation_export import MANIFEST, MOVES, PHASES
 from flexcal.model.robot import RobotModel
 
+_Find = Callable[[Recording, Path], Recognition]
 _SHOWN = 5
 """Recordings that a message lists."""
 
 
 class PlayedRecordings:
-    """Cell of the joint logs (CSV, Parquet) in a folder, recorded while the signals of a frequency plan were played.
+    """Cell of the joint logs (CSV, Parquet) in a folder, recorded while the signals of a frequency plan, or trajectories, were played.
 
-    Names do not matter: pose, realisation, experiment and sign are told from positions and torques; only where two poses are as near as
-    a soft controller sags does a standard name decide. Once all are read, `remarks` say what was exchanged or drifts, and `found` has an
-    entry a log.
+    Names do not matter: a trajectory is told from positions; pose, realisation, experiment and sign of a signal from positions and torques,
+    and only where two poses are as near as a soft controller sags does a standard name decide. Once all are read, `remarks` say what was
+    exchanged or drifts, and `found` has an entry a log.
     """
 
     def __init__(self, folder: Path, model: RobotModel) -> None:
@@ -36,18 +37,14 @@ class PlayedRecordings:
 
         Raises `InputError` where a log is none of the plan, or two are the same; and, after the last, where one is missing.
         """
-        assert isinstance(plan, MultisinePlan)
-        search = SignalSearch(plan)
         expected = {label.name: label for label in labels(plan)}
+        find = self._motions(plan) if isinstance(plan, TrajectoryPlan) else self._signals(plan, expected)
+        fill = FILL if isinstance(plan, TrajectoryPlan) else 0.0
         found: dict[RecordingLabel, Path] = {}
         renamed: list[str] = []
         for file in self._files():
-            recording = read_recording(file, self.model)
-            poses = nearest_poses(plan, recording)
-            named = expected.get(file.stem)
-            if named is not None and named.pose in poses:
-                poses.insert(0, named.pose)
-            recognised = search.find(recording, poses)
+            recording = read_recording(file, self.model, fill=fill)
+            recognised, named = find(recording, file), expected.get(file.stem)
             label = recognised.label
             if label in found:
                 raise InputError(
@@ -77,15 +74,27 @@ class PlayedRecordings:
                 f"{'it' if len(missing) == 1 else 'them'}.",
             )
         if renamed:
-            self.remarks.append(
-                f"{len(renamed)} recordings are not what their names say, and are taken as what their torques are: {_listed(renamed)}"
-            )
-
+            self.remarks.append(f"logs are taken as what they hold, not by their names: {_listed(renamed)}")
         drifts = [abs(entry["clock_ppm"]) for entry in self.found if entry["clock_ppm"]]
         if drifts:
             self.remarks.append(
-                f"the clock of {len(drifts)} logs differs from the controller's, by up to {max(drifts):.3g} in a million, which is corrected"
+                f"the clock of {len(drifts)} logs differs from the controller's, by up to {max(drifts):.3g} in a million: corrected"
             )
+
+    def _signals(self, plan: MultisinePlan, expected: dict[str, RecordingLabel]) -> _Find:
+        search = SignalSearch(plan)
+
+        def find(recording: Recording, file: Path) -> Recognition:
+            poses, named = nearest_poses(plan, recording), expected.get(file.stem)
+            if named is not None and named.pose in poses:
+                poses.insert(0, named.pose)
+            return search.find(recording, poses)
+
+        return find
+
+    def _motions(self, plan: TrajectoryPlan) -> _Find:
+        search = MotionSearch(plan)
+        return lambda recording, file: search.find(recording)
 
     def _files(self) -> list[Path]:
         """The logs, by name; raises `InputError` where there are none, or one is there in both formats."""
@@ -108,7 +117,7 @@ def _listed(names: list[str]) -> str:
     return ", ".join(names[:_SHOWN]) + (f" and {more} more" if more > 0 else "")
 
 
-def plan_as_played(folder: Path, plan: MultisinePlan) -> MultisinePlan:
+def plan_as_played(folder: Path, plan: MultisinePlan | TrajectoryPlan) -> MultisinePlan | TrajectoryPlan:
     """The plan in `folder`, by which signals were exported, where there is one, else `plan`; rate, amplitudes and gains may differ.
 
     Raises `InputError` where `folder` is none, or its plan differs otherwise.
@@ -116,6 +125,10 @@ def plan_as_played(folder: Path, plan: MultisinePlan) -> MultisinePlan:
     require_measurements(folder)
     if not (folder / PLAN).is_file():
         return plan
-    played = read_plan_of(folder / PLAN, MultisinePlan)
-    require_same_plan(folder / PLAN, played, plan, free=("name", "rate_hz", "amplitude", "kp", "kd"))
+    played: MultisinePlan | TrajectoryPlan
+    if isinstance(plan, TrajectoryPlan):
+        played, free = read_plan_of(folder / PLAN, TrajectoryPlan), ()
+    else:
+        played, free = read_plan_of(folder / PLAN, MultisinePlan), ("rate_hz", "amplitude", "kp", "kd")
+    require_same_plan(folder / PLAN, played, plan, free=("name", *free))
     return played
