@@ -82,7 +82,7 @@ def test_results_have_the_fixed_names(demo: Path) -> None:
         for joint in ("joint_1", "joint_2", "joint_3"):
             for spring in ("drive", "bearing_x", "bearing_y"):
                 quantity = document["stage1"][kind][joint][spring]
-                assert list(quantity) == ["estimate", "std", "low", "high", "truth", "identifiable"]
+                assert list(quantity) == ["estimate", "std", "low", "high", "truth", "identifiable", "bound"]
                 assert (quantity["std"] is None) == (not quantity["identifiable"])
     assert (document["identifiability"]["rank"], document["identifiability"]["parameters"]) == (29, 47)
     assert len(document["identifiability"]["dropped"]) == 18

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
@@ -158,7 +159,48 @@ class Estimate:
         low, high = item.natural(centre - half), item.natural(centre + half)
         return max(low, item.lower), min(high, item.upper)
 
-    def quantity(self, name: str, truth: float | None = None) -> dict[str, float | bool | None]:
+    def bound(self, name: str) -> Literal["lower", "upper"] | None:
+        """Which bound the 95 % interval of a parameter ends at: it is one-sided, and ± a standard deviation would leave the bounds.
+
+        Parameters
+        ----------
+        name : str
+            Name of the parameter.
+
+        Returns
+        -------
+        {"lower", "upper"} or None
+            None within the bounds, and when not identifiable.
+        """
+        interval, item = self.interval(name), self.parameters[name]
+        if interval is None:
+            return None
+        return "lower" if interval[0] == item.lower else "upper" if interval[1] == item.upper else None
+
+    def spread(self, name: str, factor: float = 1.0) -> str:
+        """Uncertainty of a parameter in words, after its value: ± the standard deviation, or the limit of a one-sided 95 % interval.
+
+        Parameters
+        ----------
+        name : str
+            Name of the parameter.
+        factor : float
+            Printed unit, as 1000 for m in mm.
+
+        Returns
+        -------
+        str
+            "" when not identifiable.
+        """
+        interval, std = self.interval(name), self.std(name)
+        if interval is None or std is None:
+            return ""
+        low, high = (f"{factor * limit:.2g}" for limit in interval)
+        return {"lower": f"at most {high}", "upper": f"at least {low}"}.get(
+            self.bound(name) or "", f"± {factor * std:.2g}"
+        )
+
+    def quantity(self, name: str, truth: float | None = None) -> dict[str, float | bool | str | None]:
         """Value, standard deviation and interval of a parameter as in every results file.
 
         Parameters
@@ -171,7 +213,7 @@ class Estimate:
         Returns
         -------
         dict
-            `std`, `low` and `high` are None when not identifiable.
+            `std`, `low` and `high` are None when not identifiable; `bound` is that of `bound`.
         """
         interval = self.interval(name)
         return {
@@ -181,6 +223,7 @@ class Estimate:
             "high": interval[1] if interval else None,
             "truth": None if truth is None else float(truth),
             "identifiable": self.identifiable[self.parameters.index(name)],
+            "bound": self.bound(name),
         }
 
     def marginal(self, names: Iterable[str]) -> tuple[np.ndarray, np.ndarray]:

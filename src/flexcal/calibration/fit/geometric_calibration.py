@@ -71,9 +71,9 @@ class GeometricFit:
     def summary(self) -> str:
         """Errors at the poses of the fit and every identified parameter with its standard deviation, as text."""
         rows = [
-            f"{item.name:<40} {self.estimate.values[item.name]:>12.5g} ± {std:<10.2g} {item.unit}"
+            f"{item.name:<40} {self.estimate.values[item.name]:>12.5g} {spread:<12} {item.unit}"
             for item in self.estimate.parameters
-            if (std := self.estimate.std(item.name)) is not None
+            if (spread := self.estimate.spread(item.name))
         ]
         return "\n".join(
             [

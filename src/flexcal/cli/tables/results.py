@@ -172,6 +172,7 @@ def quantity_table(
         numbers = ["not", "identifiable", ""]
         if values["identifiable"]:
             numbers = [f"{values[key]:.5g}" for key in ("std", "low", "high")]
+            numbers[0] = numbers[0] if values["bound"] is None else "at a bound"
         table.add_row(name, f"{values['estimate']:.5g}", *numbers, units.get(name, ""))
     return table
 

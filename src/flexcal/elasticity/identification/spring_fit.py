@@ -87,7 +87,7 @@ class SpringFit:
             model = model.with_bearings(self.bearings.taken)
         return model.with_estimate(self.estimate)
 
-    def quantity(self, name: str, truth: float | None = None) -> dict[str, float | bool | None]:
+    def quantity(self, name: str, truth: float | None = None) -> dict[str, float | bool | str | None]:
         """Estimated quantity as in results files."""
         return self.estimate.quantity(name, truth)
 

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from flexcal.actuators import ActuatorFit, Servo
 from flexcal.export import Actuators, actuator_name
 from flexcal.files.formats import Block
-from flexcal.jobs.pages import Identification, summary_row
+from flexcal.jobs.pages import Identification, estimate_row
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, header
 from flexcal.report.checks import Trust, actuator_checks
 
@@ -60,10 +60,7 @@ class ActuatorIdentification(Identification):
 
     def summary(self) -> str:
         """Every parameter with its standard deviation, remarks, and the verdict."""
-        rows = [
-            summary_row(item.name, item.value, self.estimate.std(item.name), item.unit)
-            for item in self.estimate.parameters
-        ]
+        rows = [estimate_row(self.estimate, item.name) for item in self.estimate.parameters]
         return "\n".join([self.headline, *rows, *self.remarks, self.trust.sentence])
 
     @cached_property

@@ -24,11 +24,12 @@ from flexcal.calibration.diagnostics import (
     stated_noise,
 )
 from flexcal.calibration.fit import GeometricFit
+from flexcal.estimation import Estimate
 from flexcal.jobs.calibration.few_readings import few_readings_remarks
 from flexcal.jobs.calibration.ignored_columns import ignored_columns_remarks
 from flexcal.jobs.calibration.inclinations import inclination_remarks
 from flexcal.jobs.calibration.thermal import thermal_remarks
-from flexcal.model.robot import BOARD_SCALE, socket_scale
+from flexcal.model.robot import BOARD_SCALE, LATERAL, socket_scale
 from flexcal.report.layout import counted, listed
 from flexcal.report.results import chance_in_words
 from flexcal.units import MILLIMETRE, decimals
@@ -42,6 +43,8 @@ _LOOK = (
 _OVERSTATED, _UNDERSTATED = 0.5, 2.0
 """Ratio of estimated noise to the stated sigma, below and above which a remark is made."""
 
+_CERTAINLY = 3.0
+"""Standard deviations below zero from which a compliance is negative."""
 _FLOOR = 2.0
 """Scatter from pose to pose, relative to all other errors together, from which it is what limits the accuracy."""
 _GAIN = 1 / 3
@@ -169,6 +172,7 @@ def calibration_remarks(
         *_noise(fit, prior_misfits=prior_misfits),
         *few_readings_remarks(fit),
         *_jumps(fit),
+        *negative_compliances(fit.estimate),
     ]
     remarks += inclination_remarks(fit)
     drift = Drift.of(fit) if fit.poses.located.any() else None
@@ -194,6 +198,26 @@ def calibration_remarks(
             "import' and the nominal geometry in the URDF, take fewer terms under `geometry:`, or measure more poses, farther apart"
         )
     return tuple(remarks)
+
+
+def negative_compliances(estimate: Estimate) -> Sequence[str]:
+    """Remark on compliances that are negative beyond three standard deviations."""
+    told = []
+    for item in estimate.parameters:
+        owner, _, key = item.name.rpartition(".")
+        std = estimate.std(item.name) if key in ("gravity_compliance", *LATERAL) else None
+        if std is not None and item.value < -_CERTAINLY * std:
+            across = "" if key not in LATERAL else ", across its axis"
+            size = (
+                f"{1e6 * item.value:.3g} {estimate.spread(item.name, 1e6)} {item.unit.replace('rad', 'µrad')}"
+            )
+            told.append(f"{owner} ({size}{across})".replace("-", "−"))
+    if not told:
+        return ()
+    return (
+        f"negative compliance under gravity: {listed(told, _LISTED)}; no joint yields against its load, so another error that changes with "
+        "it is in this term: a wrong mass of a link or the payload, a balancer, or an error of transmission",
+    )
 
 
 def _zeros(fit: GeometricFit) -> Sequence[str]:

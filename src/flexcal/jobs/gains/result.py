@@ -11,7 +11,7 @@ import numpy as np
 
 from flexcal.estimation import Estimate
 from flexcal.jobs.gains.split_halves import SplitHalfGains
-from flexcal.jobs.pages import ReportedResult, summary_row
+from flexcal.jobs.pages import ReportedResult, estimate_row
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, header, quantities
 from flexcal.report.checks import Trust, gain_checks
 
@@ -61,10 +61,7 @@ class GainsIdentification(ReportedResult):
 
     def summary(self) -> str:
         """Every factor with its standard deviation, and the verdict."""
-        rows = [
-            summary_row(item.name, item.value, self.estimate.std(item.name), item.unit)
-            for item in self.estimate.parameters
-        ]
+        rows = [estimate_row(self.estimate, item.name) for item in self.estimate.parameters]
         return "\n".join([self.headline, *rows, self.trust.sentence])
 
     @property

@@ -11,7 +11,7 @@ import numpy as np
 
 from flexcal.dynamics.inertials import TrajectoryTorques, relative_torque_error
 from flexcal.files.formats import Block
-from flexcal.jobs.pages import Identification, summary_row
+from flexcal.jobs.pages import Identification, estimate_row
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, header, quantities
 from flexcal.model.robot import RobotModel
 from flexcal.report.checks import Trust
@@ -71,10 +71,7 @@ class InertialsIdentification(Identification):
 
     def summary(self) -> str:
         """Every parameter with its standard deviation, and the verdict."""
-        rows = [
-            summary_row(item.name, item.value, self.estimate.std(item.name), item.unit)
-            for item in self.estimate.parameters
-        ]
+        rows = [estimate_row(self.estimate, item.name) for item in self.estimate.parameters]
         return "\n".join([self.headline, *rows, self.trust.sentence])
 
     @cached_property

@@ -11,6 +11,7 @@ from .result import (
     SummarisedResult,
     TorqueIdentification,
     WrittenResult,
+    estimate_row,
     summary_row,
 )
 
@@ -26,6 +27,7 @@ __all__ = [
     "WrittenResult",
     "compare_folders",
     "customer_report",
+    "estimate_row",
     "folder_comparison",
     "folder_page",
     "model_before",

@@ -197,6 +197,15 @@ class TorqueIdentification(Identification):
         write_predictions(folder, self.predictions)
 
 
+def estimate_row(estimate: Estimate, name: str) -> str:
+    """Summary line of a parameter of an estimate."""
+    return _row(name, estimate.values[name], estimate.spread(name), estimate.parameters[name].unit)
+
+
 def summary_row(name: str, value: float, std: float | None, unit: str) -> str:
     """Summary line of a parameter; without a standard deviation if it is not identifiable."""
-    return f"{name:<60.60} {value:>12.5g} {'' if std is None else f'± {std:.2g}':<12} {unit}"
+    return _row(name, value, "" if std is None else f"± {std:.2g}", unit)
+
+
+def _row(name: str, value: float, spread: str, unit: str) -> str:
+    return f"{name:<60.60} {value:>12.5g} {spread:<12} {unit}"

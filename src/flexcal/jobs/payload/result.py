@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 from flexcal.dynamics.payload import PayloadFit
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block
-from flexcal.jobs.pages import TorqueIdentification, summary_row
+from flexcal.jobs.pages import TorqueIdentification, estimate_row
 from flexcal.jobs.payload.remarks import declared_payload, other_payloads, payload_remarks
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, header, quantities
 from flexcal.model.robot import RobotModel, torque_units
@@ -73,10 +73,7 @@ class PayloadIdentification(TorqueIdentification):
 
     def summary(self) -> str:
         """Mass, centre of mass and inertia with their standard deviations, remarks, verdict, and the line of robot.yaml."""
-        rows = [
-            summary_row(item.name, item.value, self.estimate.std(item.name), item.unit)
-            for item in self.estimate.parameters
-        ]
+        rows = [estimate_row(self.estimate, item.name) for item in self.estimate.parameters]
         return "\n".join(
             [self.headline, *rows, *self._numbers["remarks"], self.trust.sentence, self.declaration]
         )

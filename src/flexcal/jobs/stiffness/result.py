@@ -12,7 +12,7 @@ import numpy as np
 from flexcal.elasticity.identification import SpringFit
 from flexcal.files.formats import Block
 from flexcal.jobs.fleet_prior import PooledUse
-from flexcal.jobs.pages import Identification, summary_row
+from flexcal.jobs.pages import Identification, estimate_row
 from flexcal.jobs.result_files import (
     NOT_RECORDED,
     RunRecord,
@@ -93,15 +93,7 @@ class StiffnessIdentification(Identification):
 
     def summary(self) -> str:
         """Stiffness and damping with their standard deviations, remarks and verdict."""
-        rows = [
-            summary_row(
-                name,
-                self.estimate.values[name],
-                self.estimate.std(name),
-                self.estimate.parameters[name].unit,
-            )
-            for name in self.springs
-        ]
+        rows = [estimate_row(self.estimate, name) for name in self.springs]
         return "\n".join([self.headline, *rows, *self.remarks, self.trust.sentence])
 
     @cached_property

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from flexcal.calibration.error_model import ErrorStatistics
+from flexcal.estimation import Estimate
 from flexcal.units import MILLIMETRE
 
 NOTHING = "–"
@@ -69,6 +70,17 @@ def significant(value: float | None, digits: int = 4) -> str:
     if not -4 < magnitude < 5:
         return f"{value:.{digits - 1}e}".replace("-", "−")
     return f"{value:.{max(0, digits - 1 - magnitude)}f}".replace("-", "−")
+
+
+def interval_words(estimate: Estimate, name: str, written: Callable[[float], str]) -> str:
+    """95 % interval of a parameter, its limits as `written`: one limit where the other is a bound, a dash where there is none."""
+    interval = estimate.interval(name)
+    if interval is None:
+        return NOTHING
+    low, high = map(written, interval)
+    return {"lower": f"at most {high}", "upper": f"at least {low}"}.get(
+        estimate.bound(name) or "", f"{low} to {high}"
+    )
 
 
 def to_half_width(value: float, half_width: float, digits: int = 2) -> str:

@@ -17,6 +17,7 @@ from flexcal.report.layout import (
     Status,
     Table,
     Verdict,
+    interval_words,
     scaled,
     significant,
 )
@@ -112,8 +113,10 @@ def _table(study: InertialsStudy) -> Table:
     rows = []
     for item in study.estimate.parameters:
         factor, unit = scaled(item.unit)
-        interval, std = study.estimate.interval(item.name), study.estimate.std(item.name)
-        bounds = NOTHING if interval is None else " to ".join(significant(factor * v, 3) for v in interval)
+        std = study.estimate.std(item.name)
+        bounds = interval_words(
+            study.estimate, item.name, lambda v, factor=factor: significant(factor * v, 3)
+        )
         wide = item.value * item.prior_std if item.scale == "log" else item.prior_std
         narrower = NOTHING if std is None or not 0 < wide < float("inf") else f"{wide / std:.1f} times"
         rows.append((item.name, unit, significant(factor * item.value, 4), bounds, narrower))

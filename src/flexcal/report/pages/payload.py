@@ -18,6 +18,7 @@ from flexcal.report.layout import (
     Table,
     Text,
     Verdict,
+    interval_words,
     scaled,
     to_half_width,
 )
@@ -152,5 +153,5 @@ def _value(estimate: Estimate, name: str) -> tuple[str, str]:
     if interval is None or half is None:
         return NOTHING, NOTHING
     factor = scaled(estimate.parameters[name].unit)[0]
-    low, high = (to_half_width(factor * bound, half) for bound in interval)
-    return to_half_width(factor * estimate.values[name], half), f"{low} to {high}"
+    words = interval_words(estimate, name, lambda v: to_half_width(factor * v, half))
+    return to_half_width(factor * estimate.values[name], half), words

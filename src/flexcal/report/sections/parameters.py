@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from flexcal.estimation import Estimate
 from flexcal.report.figures import parameter_bars, shown_parameters
-from flexcal.report.layout import FigureBlock, Table, scaled, significant
+from flexcal.report.layout import FigureBlock, Table, interval_words, scaled, significant
 
 
 def parameter_figures(estimate: Estimate, names: tuple[str, ...]) -> tuple[FigureBlock, ...]:
@@ -71,8 +71,8 @@ def parameter_table(
         if interval is None:
             cells = ["not determined by these data", None]
         else:
-            bounds = [significant(factor * v, 3) for v in interval]
-            cells = [significant(factor * value, 3), f"{bounds[0]} to {bounds[1]}"]
+            words = interval_words(estimate, name, lambda v, factor=factor: significant(factor * v, 3))
+            cells = [significant(factor * value, 3), words]
         if should is not None:
             inside = interval is not None and interval[0] <= should[name] <= interval[1]
             cells += [significant(factor * should[name], 3), "yes" if inside else "no"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from flexcal.estimation import Estimate
-from flexcal.report.layout import NOTHING, Table, percent, scaled, significant, spring_label
+from flexcal.report.layout import NOTHING, Table, interval_words, percent, scaled, significant, spring_label
 
 
 def spring_table(
@@ -52,12 +52,13 @@ def hardening_sentence(estimate: Estimate) -> str:
     if not names:
         return ""
     shares = (
-        f"{name.split('.')[0]} {percent(estimate.values[name])} ± {percent(estimate.std(name) or 0.0)}"
+        f"{name.split('.')[0]} {percent(estimate.values[name])} ({estimate.spread(name, 100.0)} %)"
         for name in names
     )
     return (
         "The drives harden under load: at a twist of 1 mrad the torque exceeds what the stiffness gives by "
-        f"{', '.join(shares)} (1σ). The stiffness is that at no load; rest positions and responses are computed with both."
+        f"{', '.join(shares)}; ± is 1σ, a limit that of 95 %. The stiffness is that at no load; rest positions and responses are computed "
+        "with both."
     )
 
 
@@ -76,7 +77,7 @@ def _row(
         std = estimate.std(name) or 0.0
         cells = [
             significant(factor * value),
-            f"{significant(factor * interval[0])} to {significant(factor * interval[1])}",
+            interval_words(estimate, name, lambda v: significant(factor * v)),
             percent(std / value),
         ]
     if truth is not None:
