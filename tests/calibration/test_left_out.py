@@ -63,3 +63,20 @@ def test_expected_errors_are_the_mean_of_many_draws(rng: np.random.Generator) ->
     assert np.mean(left, axis=0) / found.expected == pytest.approx(np.ones((2, 60)), abs=0.12)
     assert (np.mean(left, axis=0) / found.expected).mean() == pytest.approx(1, abs=0.01)
     assert (np.mean(fitted, axis=0) / found.expected_fitted).mean() == pytest.approx(1, abs=0.01)
+
+
+@pytest.mark.parametrize("lacking", [False, True])
+def test_a_model_error_shows_in_folds_beyond_what_scatter_explains(
+    rng: np.random.Generator, lacking: bool
+) -> None:
+    """Polynomials of degree 5 fitted to noise alone, and to a wave of three periods of the same size."""
+    t = np.linspace(-1, 1, 80)
+    powers = np.polynomial.legendre.legvander(t, 5)
+    columns = (powers[:, None, :, None] * np.eye(3)[:, None, :]).reshape(80, 3, 18)
+    size = np.full((80, 3), 1e-4)
+    wave = 1.41 * size * np.sin(3 * np.pi * t)[:, None]
+    errors = wave if lacking else size * rng.standard_normal((80, 3))
+    found = leave_out_fit([columns], [0.0], errors, [order_folds(80, 8)], variances=size**2)
+    growth = found.expected[0].mean() / found.expected_fitted.mean()
+    ratio = found.distances[0].mean() / (growth * found.fitted.mean())
+    assert (ratio > 1.35) == lacking

@@ -168,6 +168,7 @@ def test_what_is_exactly_tied_is_dropped_named_and_mapped():
         "high": None,
         "truth": 0.7,
         "identifiable": False,
+        "bound": None,
     }
     kept = design[:, [0, 1, 3, 4]]
     np.testing.assert_allclose(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flexcal.calibration.verification import ErrorScale
-from flexcal.report.checks import Trust, check_left_out, prediction_checks
+from flexcal.report.checks import Trust, check_held_out, check_left_out, prediction_checks
 from flexcal.report.checks.verdict import NO_INDEPENDENT_CHECK, PHRASES
 from flexcal.report.layout import Check, Status
 from flexcal.report.pages import two_stage_checks
@@ -81,10 +81,12 @@ def test_expected_cross_validation_error_is_that_of_linear_regression(rng: np.ra
     expected = np.sqrt(1.1 / 0.9)
     assert np.mean(ratios) == pytest.approx(expected, rel=0.02)
     observed = 1e-4 * float(np.mean(ratios))
-    assert check_left_out(1e-4, observed, 0.1).status == "good"
-    assert check_left_out(1e-4, 1.4 * observed, 0.1).status == "care"
-    assert check_left_out(1e-4, None, 0.1).status == "unknown"
-    assert check_left_out(1e-4, 1e-4, 1.0).status == "unknown"
+    for factor, status in ((1.0, "good"), (1.4, "care")):
+        mean = factor * observed / 1e-3
+        groups = {"by": "day", "groups": {"monday": {"mean_mm": mean}}, "mean_mm": mean}
+        assert check_held_out(groups, 1e-4, 0.1).status == status
+        assert check_left_out(1e-4, factor * observed, 1e-4 * expected).status == status
+    assert check_left_out(1e-4, None, None).status == "unknown"
 
 
 def test_bad_checks_are_named(study: TwoStageStudy) -> None:
