@@ -394,7 +394,27 @@ def test_recordings_that_are_missing_or_there_twice(run, cell: tuple[Path, Log],
     assert_refusal(run(*measure).err, "E-EXP-016", files[5].name, "joint 1")
     table[: 500 + 2000].write_csv(files[5])
     assert_refusal(run(*measure).err, "E-EXP-013", files[5].name)
+    table[::8].write_csv(files[5])
+    assert_refusal(run(*measure).err, "E-EXP-027", files[5].name, "125", "59", "147.5")
     assert not (tmp_path / "out").exists()
+
+
+def test_a_torque_of_the_wrong_sign_is_no_exchange_of_names(
+    run, cell: tuple[Path, Log], tmp_path: Path
+) -> None:
+    """With two axes it makes one orthogonal experiment of the other."""
+    cell[1].write(tmp_path / "logs")
+    for file in (tmp_path / "logs").iterdir():
+        pl.read_csv(file).with_columns(tau2=-pl.col("tau2")).write_csv(file)
+    cells = ("--cell", tmp_path / "logs", "--out", tmp_path / "out", "--robot", cell[0] / "robot.yaml")
+    outcome = run("measure", cell[0] / "excitation" / "plan.yaml", *cells)
+    assert_refusal(outcome.err, "E-EXP-028", "24 of 24", "tau")
+
+
+def test_plans_that_are_too_long(run, tmp_path: Path) -> None:
+    folder = project(tmp_path / "fence", periods=50_000)
+    outcome = run("export", "excitation", folder / "frequency.yaml", "--out", folder / "played")
+    assert_refusal(outcome.err, "E-EXP-026", "fence", "59")
 
 
 def test_limits_are_what_the_robot_does(cell: tuple[Path, Log], tmp_path: Path) -> None:

@@ -155,6 +155,8 @@ identify payload robot.yaml loaded.csv --free log.csv --out new
   @used log.csv loaded.csv
 design frequency robot.yaml --poses frequency_poses.csv --out new.yaml
   @used frequency_poses.csv
+export excitation plan.yaml --robot robot.yaml --out new
+  plan.yaml robot.yaml @arm
 measure plan.yaml --cell virtual --robot robot.yaml --config cell.yaml --out new
   plan.yaml cell.yaml @arm
 measure plan.yaml --cell virtual --robot robot.yaml --config cell.yaml --out new --truth frequency/truth.yaml

@@ -9,10 +9,13 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from flexcal.data.plans import MultisinePlan
+from flexcal.errors import FlexcalError
 from flexcal.frequency.periodic.multisine import multisine_spectra, reference_trajectory, synthesise
 
 RAMP_S = 1.0
 """Duration of soft start and soft stop, s."""
+MOST_VALUES, MOST_INSTANTS = 1e7, 5e5
+"""Largest number of values, over all joints, and of instants of a signal that is checked."""
 _ROUNDING = 1e-9
 """Samples by which a whole number of them may be missed."""
 _CHUNK = 4096
@@ -27,6 +30,20 @@ class PlayedSchedule:
     """
 
     plan: MultisinePlan
+
+    def __post_init__(self) -> None:
+        plan = self.plan
+        values = self.samples * plan.joint_count
+        # instants of the highest line, and of the reference motion, at which limits are checked and signals are searched
+        instants = (plan.duration + 2 * RAMP_S) * max(
+            plan.frequencies_hz[-1] * 16, plan.reference_frequency_hz * 80, 50.0
+        )
+        if values > MOST_VALUES or instants > MOST_INSTANTS:
+            raise FlexcalError(
+                "E-EXP-026",
+                f"a signal of the plan '{plan.name}' lasts {plan.duration:.4g} s, with lines up to {plan.frequencies_hz[-1]:.4g} Hz, at "
+                f"{plan.rate_hz:.6g} Hz, which is too long to play: give fewer periods, a lower band or a lower rate.",
+            )
 
     @cached_property
     def ramp(self) -> int:

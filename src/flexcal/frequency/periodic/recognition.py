@@ -13,12 +13,14 @@ from flexcal.data.recordings import Recording, RecordingLabel
 from flexcal.errors import FlexcalError
 from flexcal.frequency.periodic.line_spectra import spectrum
 from flexcal.frequency.periodic.multisine import multisine_spectra
-from flexcal.frequency.periodic.played_signal import RAMP_S, multisine_at, soft
+from flexcal.frequency.periodic.played_signal import RAMP_S, PlayedSchedule, multisine_at, soft
 
 LEAST = 0.3
 """Least correlation of a recorded torque with its signal; that with any other signal of the plan is about 0.1."""
 CLEAR = 1.25
 """Least ratio of the best correlation to the second."""
+HIGHEST = 0.4
+"""Highest line relative to the rate of a log: the interpolation passes what is below."""
 SAME_POSE = 0.1
 """Largest distance of a recording from a pose of the plan, rad or m."""
 _NEARLY = 0.02
@@ -64,6 +66,7 @@ class SignalSearch:
 
     def __init__(self, plan: MultisinePlan) -> None:
         self.plan = plan
+        PlayedSchedule(plan)  # raises where it is too long
         self._axes = list(plan.joints)
         self._members = [(r, e) for r in range(plan.realisations) for e in range(plan.experiments)]
         spectra = [multisine_spectra(plan, realisation) for realisation in range(plan.realisations)]
@@ -91,6 +94,12 @@ class SignalSearch:
                 "E-EXP-013",
                 f"{recording.name}: the log lasts {len(recording) * recording.time_step:.4g} s, less than the {plan.duration:g} s of the "
                 f"plan's {plan.periods} periods; record the whole signal.",
+            )
+        if plan.frequencies_hz[-1] * recording.time_step > HIGHEST:
+            raise FlexcalError(
+                "E-EXP-027",
+                f"{recording.name}: the log has {1 / recording.time_step:.6g} samples a second, too few for the plan's lines up to "
+                f"{plan.frequencies_hz[-1]:.4g} Hz; log at {plan.frequencies_hz[-1] / HIGHEST:.4g} Hz or more.",
             )
         signed, lags, shares = self._correlations(recording)
         order = np.argsort(-np.abs(signed))

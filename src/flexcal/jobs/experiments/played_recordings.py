@@ -15,6 +15,8 @@ from flexcal.jobs.experiments.excitation_export import MANIFEST, MOVES, PHASES
 from flexcal.model.robot import RobotModel
 
 _Find = Callable[[Recording, Path], Recognition]
+_SEVERAL, _MOSTLY = 2, 0.3
+"""Number and share of logs with another's name up to which they were exchanged by mistake."""
 _SHOWN = 5
 """Recordings that a message lists."""
 
@@ -35,7 +37,8 @@ class PlayedRecordings:
     def record(self, plan: MultisinePlan | TrajectoryPlan) -> Iterator[Recording]:
         """The recordings one by one, in the order of the file names, labelled.
 
-        Raises `InputError` where a log is none of the plan, or two are the same; and, after the last, where one is missing.
+        Raises `InputError` where a log is none of the plan, or two are the same; and, after the last, where one is missing, or many hold
+        another signal than their names say.
         """
         expected = {label.name: label for label in labels(plan)}
         find = self._motions(plan) if isinstance(plan, TrajectoryPlan) else self._signals(plan, expected)
@@ -72,6 +75,13 @@ class PlayedRecordings:
                 "E-EXP-019",
                 f"{self.folder}: {len(missing)} of {len(expected)} recordings of the plan are missing: {_listed(missing)}; play and record "
                 f"{'it' if len(missing) == 1 else 'them'}.",
+            )
+        known = sum(Path(entry["file"]).stem in expected for entry in self.found)
+        if len(renamed) > max(_SEVERAL, _MOSTLY * known):
+            raise InputError(
+                "E-EXP-028",
+                f"{self.folder}: {len(renamed)} of {known} logs hold another signal than their names say ({_listed(renamed)}), as where a "
+                "column of tau has the wrong sign or is another joint's; correct it under `signals:`, or give names that say nothing.",
             )
         if renamed:
             self.remarks.append(f"logs are taken as what they hold, not by their names: {_listed(renamed)}")
