@@ -12,7 +12,15 @@ from flexcal.programs.krl_data import KrlData, components, numbers_of, variable_
 from flexcal.programs.notation import Notation
 from flexcal.programs.orientation import RollPitchYaw
 from flexcal.programs.pose import Pose
-from flexcal.programs.syntax import Node, Statement, between_commas, is_tree, name_of, written_number
+from flexcal.programs.syntax import (
+    Node,
+    Statement,
+    between_commas,
+    is_tree,
+    name_of,
+    whole_number,
+    written_number,
+)
 from flexcal.units import DEGREE, MILLIMETRE
 
 KRL_NOTATION = Notation(MILLIMETRE, DEGREE, RollPitchYaw((2, 1, 0)), 6)
@@ -138,7 +146,7 @@ class KrlFrames:
         if name in _NULL:
             return Setting(Pose.identity())
         if name.startswith(f"{kind}_data["):
-            return self._numbered(kind, int(name.split("[")[1][:-1]), file)
+            return self._numbered(kind, whole_number(name.split("[")[1][:-1]), file)
         found = self.data.value(list(value), file)
         known = None if found is None else _pose(found)
         return Setting(

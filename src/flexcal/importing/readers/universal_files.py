@@ -75,7 +75,7 @@ def _require_whole(path: Path) -> None:
         content = read_bytes(path, limit=_LARGEST)
     except OSError as problem:
         raise unreadable(path, problem) from problem
-    if any(int(count) > len(content) for count in _ANNOUNCED.findall(content)):
+    if any(float(count) > len(content) for count in _ANNOUNCED.findall(content)):
         raise InputError(
             "E-IMPORT-070",
             f"{path}: a data set announces more values than the file can hold; export it again.",

@@ -73,6 +73,7 @@ _OF_TEMPERATURE = {"c", "f", "k"}
 _LAST_WORD = {"m", "s", "a", "n"}
 """Units recognised only after other words, and no number."""
 _BRACKETS = re.compile(r"[\[({<]\s*([^\])}>]*?)\s*[\])}>]\s*$")
+_MOST_DIGITS = 18
 _WORDS = re.compile(r"\d+|[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[θφτσω]|[^\W\d_a-zA-Z]+")
 
 
@@ -123,7 +124,7 @@ def parse_name(column: str, unit: str | None = None) -> ColumnName:
         warm = last in _OF_TEMPERATURE and set(parts[:-1]) & SINGLE["temperature"]
         if warm or last in _AS_WORD or (last in _LAST_WORD and after_words and not _is_short(parts[:-1])):
             given_unit, parts = _SPELLINGS[last], parts[:-1]
-    numbers = [int(part) for part in parts if part.isdigit()]
+    numbers = [int(part) for part in parts if part.isdecimal() and len(part) <= _MOST_DIGITS]
     words = tuple(part for part in parts if not part.isdigit())
     return ColumnName(column, text, words, numbers[-1] if numbers else None, given_unit)
 

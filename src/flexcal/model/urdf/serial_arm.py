@@ -105,7 +105,8 @@ def _with_mimicked(chain: Sequence[str], joints: Mapping[str, Element]) -> set[s
 
 def _natural(name: str) -> list[tuple[bool, int, str]]:
     """Sort key of names in which numbers count as numbers."""
-    return [(part.isdigit(), int(part) if part.isdigit() else 0, part) for part in re.split(r"(\d+)", name)]
+    parts = re.split(r"([0-9]{1,18})", name)
+    return [(k % 2 == 1, int(part) if k % 2 else 0, part) for k, part in enumerate(parts)]
 
 
 def _way(link: str, above: dict[str, str], joints: dict[str, Element]) -> tuple[str, ...]:
