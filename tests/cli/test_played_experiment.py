@@ -193,7 +193,7 @@ def assert_stiffness(run, folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "log", [{"by_hand": 1}, {"every": 2, "late": 1, "by_hand": 2}, {"every": 5, "late": 3}]
+    "log", [{"by_hand": 1}, {"every": 2, "late": 1, "by_hand": 2}, {"every": 5, "late": 3, "clock": 1.0001}]
 )
 def test_round_trip(run, cell: tuple[Path, Log], tmp_path: Path, log: dict[str, Any]) -> None:
     """Written files, a robot that reads them alone, its logs, responses, stiffnesses."""
@@ -207,11 +207,14 @@ def test_round_trip(run, cell: tuple[Path, Log], tmp_path: Path, log: dict[str, 
     arguments = ("--robot", robot, "--cell", folder / "logs", "--out", folder / "frequency", "--json")
     outcome = run("measure", folder / "excitation" / "plan.yaml", *arguments)
     assert outcome.status == 0
-    remark, *clock = outcome.document["remarks"]
-    assert len(clock) == ("clock" in log) and all("by up to 100 in a million" in text for text in clock)
+    remark, *more = outcome.document["remarks"]
+    slow, drift = (
+        any(words in text for text in more) for words in ("held for 1/1000 s", "in a million: corrected")
+    )
+    assert (slow, drift) == ("clock" in log, "clock" in log) and len(more) == slow + drift
     for entry in outcome.document["found"]:
         assert entry["correlation"] > 0.7 and entry["clock_ppm"] == pytest.approx(
-            1e6 * (log.get("clock", 1) - 1), abs=1
+            1e6 * (log.get("clock", 1) - 1), abs=2
         )
     assert remark.startswith("logs are taken as what they hold, not by their names: ")
     assert exchanged[0].name in remark and exchanged[1].stem in remark
@@ -409,6 +412,33 @@ def test_a_torque_of_the_wrong_sign_is_no_exchange_of_names(
     cells = ("--cell", tmp_path / "logs", "--out", tmp_path / "out", "--robot", cell[0] / "robot.yaml")
     outcome = run("measure", cell[0] / "excitation" / "plan.yaml", *cells)
     assert_refusal(outcome.err, "E-EXP-028", "24 of 24", "tau")
+
+
+def test_the_manifest_says_how_long_a_torque_is_held(run, short: Path, tmp_path: Path) -> None:
+    """The plan was for 1 kHz, and is played at 500 Hz."""
+    asked = ("--rate", 500, "--robot", short / "robot.yaml", "--out", tmp_path / "slow", "--whole")
+    assert run("export", "excitation", short / "frequency.yaml", *asked).status == 0
+    shutil.copytree(
+        tmp_path / "slow", tmp_path / "logs", ignore=shutil.ignore_patterns("plan.yaml", ".flexcal", "move*")
+    )
+    for row in manifest(tmp_path / "slow"):
+        table = pl.read_csv(tmp_path / "slow" / row["file"]).select("t", "q1", "q2", "tau1", "tau2")
+        table.write_csv(tmp_path / "logs" / row["file"])
+    cells = ("--cell", tmp_path / "logs", "--robot", short / "robot.yaml")
+    assert (
+        run("measure", short / "frequency.yaml", *cells, "--out", tmp_path / "a", "--json").document[
+            "remarks"
+        ]
+        == []
+    )
+    assert read_plan_of(tmp_path / "a" / "plan.yaml", MultisinePlan).rate_hz == 500
+    (tmp_path / "logs" / "manifest.csv").unlink()
+    outcome = run("measure", short / "frequency.yaml", *cells, "--out", tmp_path / "b", "--json")
+    assert "held for 1/1000 s" in outcome.document["remarks"][0]
+    (tmp_path / "logs" / "manifest.csv").write_text("file,pose\na.csv,1\n")
+    assert_refusal(
+        run("measure", short / "frequency.yaml", *cells, "--out", tmp_path / "c").err, "E-EXP-029", "rate_hz"
+    )
 
 
 def test_plans_that_are_too_long(run, tmp_path: Path) -> None:

@@ -42,8 +42,8 @@ _MOTION_INSTANTS = 400
 _MOTION_DIFFERS, _MOTION_CLEAR, _MOTION_ALIKE = 0.05, 4.0, 1e-3
 """Largest mean squared distance from a trajectory, relative to its variance; least ratio of the second to it; difference that is none."""
 _REFINEMENTS = 2
-_CERTAIN, _LEAST_DRIFT = 5.0, 0.1
-"""Standard deviations, and samples, beyond which the drift of a log's clock over the settling periods is corrected."""
+_CERTAIN, _LEAST_DRIFT = 5.0, 0.01
+"""Standard deviations, and phase of the highest line, rad, beyond which the drift of a log's clock while settling is corrected."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +131,7 @@ class SignalSearch:
             early, late = (self._lines(recording, start, phasors, skipped) for skipped in (0, last))
             change = late * early.conj()
             drift, std = self._delay(np.angle(change), np.sqrt(np.abs(change)), controlled=False)
-            if abs(drift) > max(_CERTAIN * std, _LEAST_DRIFT * recording.time_step):
+            if abs(drift) > max(_CERTAIN * std, _LEAST_DRIFT / (2 * np.pi * plan.frequencies_hz[-1])):
                 clock = 1 + drift * plan.base_frequency_hz / last
                 # the phases were those in the middle of the measured periods
                 start -= (clock - 1) * (last + plan.periods) / 2 / plan.base_frequency_hz

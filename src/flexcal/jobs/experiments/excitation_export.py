@@ -16,11 +16,13 @@ from flexcal.data.recordings import RecordingLabel
 from flexcal.data.tables import UNITS, mapped_signals, standard_columns, write_table
 from flexcal.design.frequency import PositionLoop, SignalUse, require_within_limits, signal_uses
 from flexcal.design.scene import CollisionChecker
+from flexcal.design.trajectories import MotionLimits
 from flexcal.errors import InputError
 from flexcal.files.formats import sha256_of
 from flexcal.frequency.periodic import PlayedSchedule, PlayedSignal, multisine_spectra, played_signals
 from flexcal.jobs.inputs import robot_file
 from flexcal.model.robot import RobotModel
+from flexcal.model.statics import tool_at_rest
 from flexcal.progress import Progress, silent
 
 MANIFEST, MOVES, PHASES = "manifest.csv", "moves.csv", "phases.csv"
@@ -122,7 +124,8 @@ def export_excitation(
     write_table(out / MANIFEST, _as_columns(rows))
     moves, touching = [], []
     for number, (time, q, dq) in enumerate(_moves(model, played), start=1):
-        if checker.collides(q[np.linspace(0, len(q) - 1, _MOVE_INSTANTS).astype(int)]).any():
+        instants = q[np.linspace(0, len(q) - 1, _MOVE_INSTANTS).astype(int)]
+        if checker.collides(instants).any() or _leaves_box(model, instants):
             touching.append(f"{number} to {number + 1}")
             continue
         name = f"move_{number}{ending}"
@@ -144,7 +147,8 @@ def export_excitation(
     remarks = _remarks(schedule, whole)
     if touching:
         remarks.append(
-            f"the straight move from pose {', '.join(touching)} would touch something and is not written: move there by a way of your own"
+            f"the straight move from pose {', '.join(touching)} would touch something or leave the limits of the tool, and is not written: "
+            "move there by a way of your own"
         )
     if not checker.pairs:
         remarks.append(
@@ -164,6 +168,15 @@ def _require_free(checker: CollisionChecker, plan: MultisinePlan) -> None:
                     f"in pose {pose} of the plan, {pairs[0][0]} and {pairs[0][1]} touch or are nearer than {1e3 * checker.margin:g} mm, so "
                     "nothing is written; give another pose, or correct the collision shapes.",
                 )
+
+
+def _leaves_box(model: RobotModel, q: np.ndarray) -> bool:
+    """Whether the first point of the resting arm is outside of the box of robot.yaml at one of the positions (N, n)."""
+    limits = MotionLimits.of(model)
+    if not limits.cartesian:
+        return False
+    place = tool_at_rest(model, q, None, np.repeat(next(iter(model.points)), len(q))).kinematics.position
+    return bool(((place < limits.box[0]) | (place > limits.box[1])).any())
 
 
 def _label(signal: PlayedSignal) -> RecordingLabel:

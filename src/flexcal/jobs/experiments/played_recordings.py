@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from flexcal.data.experiments import PLAN, existing_file, labels, require_measurements, require_same_plan
 from flexcal.data.plans import MultisinePlan, TrajectoryPlan, read_plan_of
 from flexcal.data.recordings import FILL, Recording, RecordingLabel, read_recording
+from flexcal.data.tables import open_table
 from flexcal.errors import InputError
 from flexcal.frequency.periodic import MotionSearch, Recognition, SignalSearch, nearest_poses, on_plan
 from flexcal.jobs.experiments.excitation_export import MANIFEST, MOVES, PHASES
 from flexcal.model.robot import RobotModel
 
 _Find = Callable[[Recording, Path], Recognition]
+_SLOWER = 0.9
+"""Rate of a log relative to the plan's below which it may be that of the controller."""
 _SEVERAL, _MOSTLY = 2, 0.3
 """Number and share of logs with another's name up to which they were exchanged by mistake."""
+_TEXTS = ("file", "sha256")
+"""Columns of the manifest that are no numbers."""
 _SHOWN = 5
 """Recordings that a message lists."""
 
@@ -85,6 +91,12 @@ class PlayedRecordings:
             )
         if renamed:
             self.remarks.append(f"logs are taken as what they hold, not by their names: {_listed(renamed)}")
+        slowest = min(entry["rate_hz"] for entry in self.found)
+        if isinstance(plan, MultisinePlan) and plan.torque == "held" and slowest < _SLOWER * plan.rate_hz:
+            self.remarks.append(
+                f"logs have {slowest:.6g} samples a second, and torques are taken as held for 1/{plan.rate_hz:.6g} s, as the plan has it; "
+                "if the signals were played at another rate, give the plan.yaml beside them"
+            )
         drifts = [abs(entry["clock_ppm"]) for entry in self.found if entry["clock_ppm"]]
         if drifts:
             self.remarks.append(
@@ -130,11 +142,21 @@ def _listed(names: list[str]) -> str:
 def plan_as_played(folder: Path, plan: MultisinePlan | TrajectoryPlan) -> MultisinePlan | TrajectoryPlan:
     """The plan in `folder`, by which signals were exported, where there is one, else `plan`; rate, amplitudes and gains may differ.
 
+    Of a manifest.csv there, the rate is taken.
+
     Raises `InputError` where `folder` is none, or its plan differs otherwise.
     """
     require_measurements(folder)
     if not (folder / PLAN).is_file():
-        return plan
+        if isinstance(plan, TrajectoryPlan) or not (folder / MANIFEST).is_file():
+            return plan
+        table = open_table(folder / MANIFEST)
+        if "rate_hz" not in table.columns:
+            raise table.error(
+                "E-EXP-029",
+                "the column 'rate_hz' is missing; copy the file that 'flexcal export excitation' wrote.",
+            )
+        return replace(plan, rate_hz=float(table.read(_TEXTS).columns["rate_hz"][0]))
     played: MultisinePlan | TrajectoryPlan
     if isinstance(plan, TrajectoryPlan):
         played, free = read_plan_of(folder / PLAN, TrajectoryPlan), ()
