@@ -86,6 +86,7 @@ def test_calibration_report_is_complete(study: CalibrationStudy, fit: Calibratio
         "taken: it gains",
         "left: it does not gain",
         "left: one flank only",
+        "Intervals take the terms that cross-validation chose for known",
     ):
         assert words in outline.words
     assert fit.estimate.provenance["input.some.csv"] in outline.words and COMMAND in outline.words

@@ -1,9 +1,10 @@
-from .cross_validation import CrossValidation, TermSelection, cross_validated, select_terms
+from .cross_validation import CONDITIONAL, CrossValidation, TermSelection, cross_validated, select_terms
 from .geometry_levels import ZerosOrGeometry, asks_for_levels, zeros_or_geometry
 from .stored_trials import considered_document, considered_terms
 from .trials import TermComparison
 
 __all__ = [
+    "CONDITIONAL",
     "CrossValidation",
     "TermComparison",
     "TermSelection",

@@ -32,6 +32,7 @@ from flexcal.calibration.fit import (
     probable_robot,
 )
 from flexcal.calibration.term_selection import (
+    CONDITIONAL,
     CrossValidation,
     TermSelection,
     ZerosOrGeometry,
@@ -191,7 +192,10 @@ class Calibration(Identification):
 
     def summary(self) -> str:
         """Errors, terms, remarks and verdict."""
-        return "\n".join([self.selected.summary(), *self._numbers["remarks"], self.trust.sentence])
+        conditional = () if self.selection is None else (CONDITIONAL,)
+        return "\n".join(
+            [self.selected.summary(), *conditional, *self._numbers["remarks"], self.trust.sentence]
+        )
 
     def write_arrays(self, folder: Path) -> None:
         """Leave points.csv, arm.npz and gravity_loads.npz in a folder, tilts.csv where there are readings of inclinometers."""

@@ -8,7 +8,7 @@ from typing import Any
 
 from flexcal.calibration.diagnostics import GravityLoads
 from flexcal.calibration.error_model import ErrorStatistics
-from flexcal.calibration.term_selection import considered_terms
+from flexcal.calibration.term_selection import CONDITIONAL, considered_terms
 from flexcal.calibration.verification import CALIBRATED, RIGID, ArmPoses, MeasuredPoints, MeasuredTilts
 from flexcal.estimation import Estimate
 from flexcal.report.checks import Trust, calibration_checks, in_sockets
@@ -110,7 +110,9 @@ def calibration_page(study: CalibrationStudy) -> Page:
                     IdentifiableParameters.stored(results["identifiability"]["selected"]), None
                 ),
                 *parameter_figures(study.estimate, kept),
-                parameter_table(study.estimate, kept, None),
+                parameter_table(
+                    study.estimate, kept, None, remark=CONDITIONAL if results["term_selection"] else ""
+                ),
             ),
         ),
         provenance_section(results["command"], None, {}, study.estimate.provenance),

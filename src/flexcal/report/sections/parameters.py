@@ -59,9 +59,14 @@ def parameter_figures(estimate: Estimate, names: tuple[str, ...]) -> tuple[Figur
 
 
 def parameter_table(
-    estimate: Estimate, names: tuple[str, ...], truth: Mapping[str, float] | None, *, folded: bool = True
+    estimate: Estimate,
+    names: tuple[str, ...],
+    truth: Mapping[str, float] | None,
+    *,
+    folded: bool = True,
+    remark: str = "",
 ) -> Table:
-    """Estimate, 95 % interval and, where known, the regrouped truth of the named parameters."""
+    """Estimate, 95 % interval and, where known, the regrouped truth of the named parameters; `remark` ends the note below."""
     should = estimate.regrouped(truth) if truth is not None else None
     rows = []
     for name in names:
@@ -90,7 +95,7 @@ def parameter_table(
         f"All {len(rows)} estimated geometric parameters",
         columns,
         tuple(rows),
-        note,
+        f"{note} {remark}".rstrip(),
         text_columns=(1,),
         folded=folded,
     )
