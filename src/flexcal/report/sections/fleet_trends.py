@@ -35,9 +35,8 @@ def trends_section(document: Mapping[str, Any]) -> Section:
         "calibrations; and the geometry as a whole, by the movement of the tool at common poses that all parameters together make, of "
         f"{counted(counts['geometry_trends_tested'], 'robot')}. "
         f"P-values are corrected for the number of tests (Holm): if nothing drifts, any robot is named for its errors in "
-        f"{100 * level:.0f} % of fleets at most, and in as many for its single parameters. For the geometry as a whole it was 0 to 4 % of "
-        "simulated fleets, but 10 % of those of 20 robots with three visits each whose values scatter three times as much as their "
-        "covariances tell: after three visits, measure again what is named. "
+        f"{100 * level:.0f} % of fleets at most, and in as many for its single parameters. For the geometry as a whole it may be more "
+        "often after three visits, where values scatter more than their covariances tell: measure again what is named. "
         "The geometry is tested for a jump between any two calibrations that follow each other too, from three on; what explains a robot "
         "better, trend or jump, is named. flexcal report --compare compares two calibrations."
     )
