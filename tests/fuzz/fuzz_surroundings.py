@@ -103,7 +103,8 @@ def _runs_that_name_each_other(folder: Path) -> None:
 def _hostile_names(folder: Path) -> None:
     for name in HOSTILE_NAMES:
         for ending in ("", ".csv", ".yaml"):
-            (folder / f"{name}{ending}").write_text("1,2\n")
+            if not (folder / f"{name}{ending}").is_dir():  # as what was read before may be
+                (folder / f"{name}{ending}").write_text("1,2\n")
 
 
 def _links(folder: Path) -> None:

@@ -52,6 +52,7 @@ MISTAKES = [
     (PRIOR, "prior: {mass: -0.07}", ["E-ROBOT-009"]),
     (PRIOR, "prior: {rotor_inertia: 0}", ["E-ROBOT-010", "rotor_inertia"]),
     (PAYLOAD, PAYLOAD.replace("6.0", "-6"), ["E-ROBOT-007"]),
+    (POINT, "smr: {frame: flange, xyz: [100, 0, 150]}", ["E-ROBOT-083", "150 m", "millimetres"]),
     # lengths
     (INERTIA, "rotor_inertia: [6.4, 9.8]", ["E-ROBOT-036", "rotor_inertia", "2", "6"]),
     (RATIO, "ratio: [45, 45, 60, 60, 60, 45, 45]", ["E-ROBOT-036", "ratio", "7", "6"]),

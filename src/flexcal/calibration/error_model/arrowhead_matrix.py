@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from flexcal.calibration.error_model.whitening import cholesky_inverses
+from flexcal.errors import FlexcalError
 from flexcal.kernels import triangular_inverse
 
 
@@ -43,10 +44,17 @@ class Arrowhead:
         return np.concatenate([upper, self.border.T @ first + self.corner @ last])
 
     def factored(self) -> ArrowheadFactor:
-        """Cholesky factor, with B eliminated first; raises `LinAlgError` if M is not positive definite."""
+        """Cholesky factor, with B eliminated first; raises `FlexcalError` if M is not positive definite."""
         inverses = tuple(cholesky_inverses(values) for values in self.blocks)
         border = _by_blocks(inverses, self.border)
-        factor = np.linalg.cholesky(self.corner - border.T @ border)
+        try:
+            factor = np.linalg.cholesky(self.corner - border.T @ border)
+        except np.linalg.LinAlgError:
+            raise FlexcalError(
+                "E-CAL-037",
+                "the sizes of the errors cannot be computed: measurements and robot are too far apart for the accuracy of the numbers; "
+                "check the units of both.",
+            ) from None
         corner = np.empty_like(factor)
         triangular_inverse(factor, corner)
         return ArrowheadFactor(inverses, border, corner)

@@ -11,6 +11,9 @@ from flexcal.units import LEAST_STD
 
 Triple = tuple[float, float, float]
 
+_FARTHEST = 10.0
+"""Largest coordinate of a point on a tool, m."""
+
 
 @dataclass(frozen=True)
 class AcceptanceConfig:
@@ -39,6 +42,13 @@ class PointConfig:
     xyz: Triple
     acceptance: AcceptanceConfig | None = None
     std: Triple | None = None
+
+    def __post_init__(self) -> None:
+        if (far := max(map(abs, self.xyz))) > _FARTHEST:
+            raise FlexcalError(
+                "E-ROBOT-083",
+                f"a point {far:g} m from its frame is on no tool; give its xyz in metres, not millimetres.",
+            )
 
 
 @dataclass(frozen=True)
