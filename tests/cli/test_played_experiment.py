@@ -193,7 +193,12 @@ def assert_stiffness(run, folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "log", [{"by_hand": 1}, {"every": 2, "late": 1, "by_hand": 2}, {"every": 5, "late": 3, "clock": 1.0001}]
+    "log",
+    [
+        {"by_hand": 1},
+        pytest.param({"every": 2, "late": 1, "by_hand": 2}, marks=pytest.mark.slow),
+        {"every": 5, "late": 3, "clock": 1.0001},
+    ],
 )
 def test_round_trip(run, cell: tuple[Path, Log], tmp_path: Path, log: dict[str, Any]) -> None:
     """Written files, a robot that reads them alone, its logs, responses, stiffnesses."""

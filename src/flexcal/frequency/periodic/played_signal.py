@@ -135,17 +135,21 @@ def played_signals(
         For a position-controlled robot: of every pose the reference motion (L, n_u, n_u), rad/(N m), that makes a unit of each torque. It
         is added to `position` and `velocity`.
 
-    Yields
-    ------
-    PlayedSignal
+    Returns
+    -------
+    iterator of PlayedSignal
         By pose, realisation, experiment and sign (+1, then −1), as recordings are.
+
+    Raises
+    ------
+    FlexcalError
+        Where a signal has more than 1e7 values or lasts too long for its highest line, and where a line needs a higher rate.
 
     Examples
     --------
-    >>> import numpy as np
     >>> from flexcal import RobotModel, frequency_plan, played_signals
     >>> model = RobotModel.from_yaml("examples/tx90l/robot.yaml", estimates=False)
-    >>> plan = frequency_plan(model, np.array([[0.0, -0.5, -1.6, 0.65, -1.7, 0.0]]))
+    >>> plan = frequency_plan(model, "examples/tx90l/frequency_poses.csv", "default", seed=0)
     >>> signal = next(played_signals(plan))
     >>> signal.torque.shape, signal.start
     ((72000, 6), 9.0)
