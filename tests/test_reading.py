@@ -252,6 +252,7 @@ REFUSALS = [
     ("a.txt", wide, lambda p: read_foreign(p, []), "E-IMPORT-075"),
     ("a.xlsx", sparse, lambda p: read_foreign(p, []), "E-FILE-020"),
     ("a.xlsx", two_corners, lambda p: read_foreign(p, []), "E-IMPORT-073"),
+    ("a.bag", sparse, lambda p: read_foreign(p, []), "E-IMPORT-036"),
     ("a.mat", sparse, lambda p: read_foreign(p, []), "E-FILE-020"),
     ("a.uff", sparse, lambda p: read_foreign(p, []), "E-FILE-020"),
 ]  # fmt: skip

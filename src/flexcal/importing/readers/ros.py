@@ -13,7 +13,7 @@ import numpy as np
 from flexcal.data.tables import Table, TableFile
 from flexcal.errors import InputError
 from flexcal.files.formats import read_yaml_file
-from flexcal.files.transaction import regular_path
+from flexcal.files.transaction import open_regular, regular_path
 from flexcal.importing.readers.standstill import points_at_rest
 from flexcal.importing.tables import ForeignTable
 
@@ -21,6 +21,8 @@ _JOINTS = "sensor_msgs/msg/JointState"
 _POINTS = ("geometry_msgs/msg/PointStamped", "geometry_msgs/msg/PoseStamped")
 _METADATA = "metadata.yaml"
 _FIELDS = {"position": "rad", "velocity": "rad/s", "effort": "N m"}
+_LONGEST = 64
+"""Bytes of the first line of a recording of ROS 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +56,10 @@ def read_ros(path: Path, joints: Sequence[str], topic: str | None) -> ForeignTab
             regular_path(file, limit=None)
     notes: list[str] = []
     try:
+        if path.suffix.lower() == ".bag":  # whose first line rosbags reads, however long
+            with open_regular(path, limit=None) as stream:
+                if not stream.readline(_LONGEST).endswith(b"\n"):
+                    raise ValueError
         with AnyReader(
             [regular_path(path, limit=None)], default_typestore=get_typestore(Stores.ROS2_HUMBLE)
         ) as reader:
