@@ -45,7 +45,7 @@ class IdentifyStiffness:
     inertias_known: bool = False
     """Take link inertias as exact."""
     weighting: Literal["covariance", "paper", "uniform"] = "covariance"
-    """covariance: that of the measured responses, with correct intervals; paper: emphasis near poles and zeros; uniform: equal weights."""
+    """covariance: that of the measured responses, the narrowest intervals; paper: emphasis near poles and zeros; uniform: equal weights."""
     search: Literal["multi-start", "population"] = "multi-start"
     """Search for a start: multi-start with gradients, or differential evolution in place of the paper's genetic algorithm."""
     seed: Seed = 0

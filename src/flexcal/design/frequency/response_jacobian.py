@@ -16,6 +16,7 @@ from flexcal.design.frequency.response_noise import (
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters, Sensitivity
 from flexcal.model.robot import (
+    DRIVE_GAIN,
     FRICTION_LOG_STD,
     FRICTION_TOLERANCE,
     GEOMETRY,
@@ -27,6 +28,7 @@ from flexcal.model.robot import (
     sensor_delay_name,
     sensor_parameters,
     springs_and_rotors,
+    uncertain_drive_gains,
 )
 from flexcal.model.vibration import (
     KNOT_OCTAVES,
@@ -98,8 +100,8 @@ class PoseResponse:
 
 
 def response_parameters(model: RobotModel, plan: MultisinePlan) -> Parameters:
-    """Parameters common to the responses of all poses: springs, rotors, inertials of links and payload, a delay per axis, geometric
-    errors, and of every sensor on the arm its sensitivity, delay and mounting errors.
+    """Parameters common to the responses of all poses: springs, rotors, inertials of links and payload, a delay and gain per axis,
+    geometric errors, and of every sensor on the arm its sensitivity, delay and mounting errors.
 
     Priors are those that robot.yaml declares; `prior_of_parameters` takes what was estimated before instead.
     """
@@ -111,7 +113,8 @@ def response_parameters(model: RobotModel, plan: MultisinePlan) -> Parameters:
     sensors = (
         item for sensor in model.sensors.values() for item in sensor_parameters(sensor, 1 / plan.rate_hz)
     )
-    return Parameters((*springs_and_rotors(model), *inertials, *delays, *errors, *sensors))
+    gains = uncertain_drive_gains(model, [joint.index for joint in model.driven])
+    return Parameters((*springs_and_rotors(model), *inertials, *delays, *gains, *errors, *sensors))
 
 
 def response_sensitivity(
@@ -188,6 +191,9 @@ def pose_response(
         elif item.name.endswith(".delay"):
             axis = [joint.name for joint in model.driven].index(item.name.removesuffix(".delay"))
             columns.append(_late(response, frequencies, axis))
+        elif item.name.endswith(f".{DRIVE_GAIN}"):
+            axis = [joint.name for joint in model.driven].index(item.name.removesuffix(f".{DRIVE_GAIN}"))
+            columns.append(response * (np.arange(response.shape[2]) == axis))
         else:
             columns.append(by[item.name] * (item.value if item.scale == "log" else 1.0))
     loss = [by[name] * value * FRICTION_LOG_STD for name, value in zip(rubbing, viscous, strict=True)]
@@ -223,7 +229,7 @@ def thinned(plan: MultisinePlan, step: int) -> MultisinePlan:
 def _in_linearisation(name: str) -> bool:
     return (
         not name.startswith("sensor.")
-        and not name.endswith(".delay")
+        and not name.endswith((".delay", f".{DRIVE_GAIN}"))
         and name.rpartition(".")[2] not in GEOMETRY
     )
 

@@ -13,11 +13,13 @@ from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters
 from flexcal.model.parts import LINK_PARAMETERS
 from flexcal.model.robot import (
+    DRIVE_GAIN,
     GEOMETRY,
     PARALLEL,
     SPRINGS,
     RobotModel,
     declared_parameter,
+    uncertain_drive_gains,
     uncertain_inertials,
 )
 from flexcal.model.torques import torque_regressor
@@ -35,9 +37,9 @@ _FIRST_SIGMA = 0.01
 def unknowns(model: RobotModel) -> tuple[Parameters, tuple[str, ...]]:
     """All unknowns of the torques with their prior, and the names of those that belong to the robot's dynamics.
 
-    These are mass and centre of mass of every link, and the classic terms of the drives; the others are spring stiffnesses, geometric
-    errors, what friction does at a reversal, and the inertia tensors about the centres of mass, in units of their prior. Raises
-    `FlexcalError` where a rotor inertia is missing.
+    These are mass and centre of mass of every link, the classic terms of the drives, and the drive gains; the others are spring
+    stiffnesses, geometric errors, what friction does at a reversal, and the inertia tensors about the centres of mass, in units of their
+    prior. Raises `FlexcalError` where a rotor inertia is missing.
     """
     lacking = [
         name
@@ -53,7 +55,9 @@ def unknowns(model: RobotModel) -> tuple[Parameters, tuple[str, ...]]:
     beside = [f"{e.name}.{SPRINGS[c]}.stiffness" for e in model.elastic for c in sorted(e.components)]
     beside += [f"{joint}.{key}" for joint in model.joint_names for key in GEOMETRY]
     start = model.with_values({name: 0.0 for name in own if np.isnan(model.value(name))})
-    items = [declared_parameter(start, name) for name in (*own, *beside)]
+    gains = uncertain_drive_gains(model, range(model.n))
+    items = [*(declared_parameter(start, name) for name in (*own, *beside)), *gains]
+    own += [item.name for item in gains]
     shapes = [_tensor(model, i, entry) for i, entry, _ in _tensor_entries(model)]
     items += [
         Parameter(name, "1", 0.0, prior_std=1.0) for name in (*map(_reversal, model.joint_names), *shapes)
@@ -95,6 +99,7 @@ class LinearisedEquations:
                 number = parameters.index(name)
                 torque += rows * parameters[number].value
                 jacobian[:, :, number] += rows
+            _as_logged(model, parameters, torque, jacobian)
             predicted.append(torque)
             jacobians.append(jacobian)
         seen = np.array(measured)
@@ -136,6 +141,15 @@ def _links(
     for k in moved:
         jacobian[:, :, k] = (beside(k, _STEP) - beside(k, -_STEP)) / (2 * _STEP)
     return torque, jacobian
+
+
+def _as_logged(model: RobotModel, parameters: Parameters, torque: np.ndarray, jacobian: np.ndarray) -> None:
+    """Change true torques (2 K + 1, n) and their derivatives (2 K + 1, n, p) to those of the log, by the drive gains."""
+    for joint, name in enumerate(model.joint_names):
+        if (gain := f"{name}.{DRIVE_GAIN}") in parameters:
+            torque[:, joint] /= parameters[gain].value
+            jacobian[:, joint] /= parameters[gain].value
+            jacobian[:, joint, parameters.index(gain)] = -torque[:, joint]
 
 
 def drive_rows(model: RobotModel, motion: PeriodicMotion) -> Iterator[tuple[str, int, np.ndarray]]:
@@ -183,7 +197,7 @@ def _drive_names(model: RobotModel) -> tuple[str, ...]:
 
 def _of_drive(name: str) -> bool:
     key = name.rpartition(".")[2].partition("_at_")[0]
-    return key in ("rotor_inertia", "viscous", "coulomb", "torque_offset", *PARALLEL)
+    return key in ("rotor_inertia", "viscous", "coulomb", "torque_offset", DRIVE_GAIN, *PARALLEL)
 
 
 def _reversal(joint: str) -> str:

@@ -53,9 +53,9 @@ def relative_torque_error(torques: Iterable[TrajectoryTorques]) -> float:
 
 
 def _torque(model: RobotModel, motion: PeriodicMotion, payload: float | None) -> np.ndarray:
-    """Rows (2 K + 1, n) of the motor torques of a motion."""
+    """Rows (2 K + 1, n) of the motor torques of a motion, as logged."""
     states = motion.states(SAMPLES_PER_LINE * motion.lines)
     torque = motion.rows(periodic_torque(model, *states, 1 / motion.base_frequency_hz, payload))
     for name, joint, rows in drive_rows(model, motion):
         torque[:, joint] += rows * np.nan_to_num(model.value(name))
-    return torque
+    return torque / model.drives.drive_gain

@@ -153,6 +153,8 @@ class Observation:
     def reduced(self, motion: Motion, memory: Memory | None = None) -> np.ndarray:
         """Reduced columns and, last, torque of each equation, below each other (Σ widths, N), at every sample of the motion.
 
+        The torque is the logged one times the drive gains of the model, 1 where none was estimated.
+
         The motion continues what `memory` is of, which is brought up to its end; it begins an experiment without. Raises `FlexcalError`
         where there are springs and the motion has no arm side.
         """
@@ -163,7 +165,8 @@ class Observation:
         else:
             self._tilted.write(self._link_states(motion), motion, links, rows)
         undriven = np.zeros((len(motion), len(self.bearings)))
-        right = [motion.net, motion.torque[:, self._torques[self.model.n :]], undriven]
+        torque = motion.torque * self.model.drives.drive_gain
+        right = [motion.net - motion.torque + torque, torque[:, self._torques[self.model.n :]], undriven]
         rows[np.cumsum(self.widths) - 1] = np.hstack(right).T
         columns = self._drive_columns(motion, {} if memory is None else memory)
         for place, column in zip(drives, columns, strict=True):

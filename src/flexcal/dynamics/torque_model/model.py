@@ -26,7 +26,8 @@ class TorqueModel:
     """Torques of the motors for a motion: links, payload, rotors, friction, couplings, springs and cables (Eq. 2.20).
 
     The robot is warm, and rigid unless asked for: friction that fades as it warms up is left out, and friction that builds up over a
-    presliding travel is at its full value. At rest Coulomb friction is zero.
+    presliding travel is at its full value. At rest Coulomb friction is zero. Torques are the true ones: a log or a controller whose
+    torque constants are off has them divided by `<joint>.drive_gain`, where that was estimated.
 
     Attributes
     ----------

@@ -89,6 +89,17 @@ class ResponseFit:
         """Rows (m,) or (m, c), whitened by the measurement's covariance, after whitening by the model error as well."""
         return rows if self.error is None else self.error.whiten(rows)
 
+    def score_covariance(self) -> np.ndarray:
+        """Covariance (p, p) of Jᵀ r by that of responses and model error: Jᵀ J where the weights are their inverse.
+
+        With S the whitening (1 + B Bᵀ)^(-1/2) by the model error B and N Nᵀ the covariance of the weighted errors, that of r is
+        S (N Nᵀ + B Bᵀ) Sᵀ = 1 - S Sᵀ + S N Nᵀ Sᵀ.
+        """
+        jacobian = self.problem.linearise(self.x)[1]
+        through = jacobian if self.error is None else self.error.transposed(jacobian)
+        scatter = self.residual.by_noise(through)
+        return jacobian.T @ jacobian - through.T @ through + scatter.T @ scatter
+
     def predicted(self) -> tuple[np.ndarray, ...]:
         """Responses (L, E + S, E) of every pose at the optimum, effects of the experiment included."""
         responses = self.residual.model.responses(self.x)
@@ -113,6 +124,11 @@ def first_fit(model: RobotModel, data: ResponseData, x: np.ndarray) -> ResponseF
 def final_fit(model: RobotModel, data: ResponseData, first: ResponseFit) -> ResponseFit:
     """Fit from the optimum of `first`, at which model error and experiment effects are evaluated, if there are any."""
     return _fit(model, data, first.x, FINE) if data.effects else first
+
+
+def reweighted_fit(model: RobotModel, data: ResponseData, first: ResponseFit) -> ResponseFit:
+    """Fit by the weights of `data` from the optimum of `first`, which has others, and with its model error and experiment effects."""
+    return _fit(model, data, first.x, FINE)
 
 
 def _fit(model: RobotModel, data: ResponseData, x: np.ndarray, tolerance: float) -> ResponseFit:

@@ -10,11 +10,11 @@ WELL_KNOWN = 0.1
 """Posterior standard deviation of a log stiffness below which its double lies five standard deviations of the compliance away."""
 
 
-def profile_std_ratio(problem: Problem, fitted: Estimate) -> np.ndarray:
-    """Ratio (p,) of the width of the profile likelihood to the posterior's curvature, at least 1; `fitted` is the optimum of `problem`.
+def profile_std_ratio(problem: Problem, fitted: Estimate, known: np.ndarray) -> np.ndarray:
+    """Ratio (p,) of the width of the profile of the cost to its curvature, at least 1; `fitted` is the optimum of `problem`.
 
-    A stiffness that counts as identifiable is held at twice its value and all others are fitted again. The response is
-    nearly linear in the compliance, which is half there: where the cost rises by d, its relative standard deviation is 0.5/√(2 d).
+    A stiffness that counts as identifiable by its standard deviation `known` (p,) is held at twice its value and all others are fitted
+    again. The response is nearly linear in the compliance, which is half there: where the cost rises by d, its relative standard deviation is 0.5/√(2 d).
     A soft and damped mode that follows the noise is found out so: giving it up costs little.
     """
     stretch = np.ones(len(fitted.parameters))
@@ -23,7 +23,7 @@ def profile_std_ratio(problem: Problem, fitted: Estimate) -> np.ndarray:
         zip(fitted.parameters, np.diag(fitted.covariance), strict=True)
     ):
         std = float(np.sqrt(variance))
-        if not item.name.endswith(".stiffness") or not WELL_KNOWN < std <= LOG_STD_LIMIT:
+        if not item.name.endswith(".stiffness") or not WELL_KNOWN < known[number] <= LOG_STD_LIMIT:
             continue
         shifted = x.copy()
         shifted[number] += np.log(2.0)

@@ -16,6 +16,7 @@ from flexcal.elasticity.identification.fit import (
     final_fit,
     first_fit,
     fit_responses,
+    reweighted_fit,
 )
 from flexcal.elasticity.identification.hardening_drives import with_hardening
 from flexcal.elasticity.identification.held_joints import CompliantHeldJoints
@@ -116,24 +117,24 @@ def fit_springs(
     """Fit the linearised elastic robot to the measured responses of all poses, with the uncertainty of each spring.
 
     The cost is Eq. (26) on the log of the ratio Ĝ/G (linear where Ĝ is poorly known), by default weighed with the covariance of the
-    measurement. A `search` (default: `MultiStart`) finds the basin; Levenberg-Marquardt with exact derivatives follows. With the
+    measurement. A `search` (default: `MultiStart`) finds the basin; Levenberg-Marquardt with exact derivatives follows. With another
+    `weighting` the same fit comes first: it chooses the model and tells the misfit, and its optimum is the start. With the
     `plan`, what the reference motion does is part of the model: the arm's inertia changes along it, friction acts in pulses at its
     reversals, gaps stand open while the torque of their drive passes zero, and drives harden under it where the responses ask for that.
     `tolerances` are what the model leaves out, all of it in the covariance; `Tolerances.none()` for an exact linear plant.
     `inertias_known` fixes link and payload inertias at the model's.
 
-    The covariance of the estimate is the larger, parameter by parameter, of the posterior and the sandwich over clusters of
-    neighbouring lines, the first inflated by the reduced χ² where it exceeds 1; a badly known stiffness has the width of its profile
-    likelihood. The damping of a spring whose stiffness is not identifiable is not either. Bearing axes that robot.yaml does not declare
-    are those that the responses prefer. Raises `FlexcalError` where responses do
-    not fit the robot.
+    The covariance of the estimate is the larger, parameter by parameter, of that which follows from the covariance of the measurement (for
+    the default weights the posterior) and the sandwich over clusters of neighbouring lines, the first inflated by the reduced χ² where it
+    exceeds 1; a badly known stiffness has the width of its profile likelihood. The damping of a spring whose stiffness is not identifiable
+    is not either. Bearing axes that robot.yaml does not declare are those that the responses prefer. Raises `FlexcalError` where responses
+    do not fit the robot.
     """
     data = ResponseData(
         tuple(responses),
         plan,
-        CovarianceWeighting() if weighting is None else weighting,
-        Tolerances() if tolerances is None else tolerances,
-        inertias_known,
+        tolerances=Tolerances() if tolerances is None else tolerances,
+        inertias_known=inertias_known,
     )
     check_responses(model, responses)
     check_sensors(model, responses)
@@ -160,8 +161,10 @@ def fit_springs(
 
     model, fit, bearings = with_fitting_bearings(model, data, first, completed)
     progress("fitting", 0.8)
-    scale = TorqueScale.of(fit)
-    estimate = _widened(fit, data, scale)
+    scale, likelihood = TorqueScale.of(fit), fit
+    if not isinstance(weighting, CovarianceWeighting | None):
+        fit = reweighted_fit(model, replace(data, weighting=weighting), likelihood)
+    estimate = _widened(fit, likelihood, data, scale)
     progress("fitting", 1.0)
     stacked, axes = fit.predicted(), len(responses[0].joints)
     pairs = zip(fit.residual.poses, stacked, strict=True)
@@ -238,35 +241,28 @@ def _searched_fit(
     return final_fit(model, data, first)
 
 
-def _by_torque_constants(fit: ResponseFit, scale: TorqueScale | None) -> np.ndarray:
-    """Covariance (p, p) of the logarithms of stiffness and damping due to the torque constants: one error for all springs of a joint, and
-    one for all where the torques may have another `scale`.
-    """
-    names = fit.estimate.parameters.names
-    joints = [name.split(".")[0] if name.endswith((".stiffness", ".damping")) else "" for name in names]
-    same = np.array([[own == other != "" for other in joints] for own in joints], dtype=float)
-    springs = np.array([joint != "" for joint in joints], dtype=float)
-    common = 0.0 if scale is None else scale.log_std**2
-    return fit.residual.model.robot.prior.torque_constant**2 * same + common * np.outer(springs, springs)
-
-
-def _widened(fit: ResponseFit, data: ResponseData, scale: TorqueScale | None) -> Estimate:
+def _widened(
+    fit: ResponseFit, likelihood: ResponseFit, data: ResponseData, scale: TorqueScale | None
+) -> Estimate:
     """Estimate with the covariance for measurements whose variance is `Tolerances.inflation` times the assumed one.
 
-    That is H + (f - 1) (H - H P H), with H the posterior and P = LᵀL the prior's information by its rows L, times the reduced χ² where it
-    exceeds 1. What springs are known worse by after the sandwich, a misfit where there is one, and the profile likelihood is error of the
+    That is H (f V + P) H, with H the inverse Hessian of the cost, P the prior's information and V the covariance of the scores of the data
+    (J' J for the default weights, for which H is the posterior), times the reduced χ² of the `likelihood` fit, the one by the covariance
+    of the measurement, where it exceeds 1. What springs are known worse by after the sandwich, a misfit where there is one, and the
+    profile likelihood is error of the
     springs alone, independent of each other: masses and centres of mass, whose moments are known far better than each of them, stay as
-    they are correlated. Where these took up a part of the misfit they count as not identifiable. No spring is known better than the
-    torque constant of its joint: the responses are accelerations by the torques that a controller believes in.
+    they are correlated. Where these took up a part of the misfit they count as not identifiable. Where the torques may have another
+    `scale`, all springs may.
     """
     problem, fitted = fit.problem, fit.estimate
-    posterior = fitted.covariance
-    from_prior = problem.prior_rows() @ posterior
-    from_data = posterior - from_prior.T @ from_prior
-    covariance = posterior + (data.tolerances.inflation(data.responses) - 1.0) * from_data
-    std = np.sqrt(np.diag(posterior))
-    excess = max(1.0, fitted.reduced_chi2 if fitted.degrees_of_freedom > 0 else 1.0)
-    misfit = find_misfit(fit, data.responses)
+    hessian, known = fitted.covariance, problem.prior_rows()
+    scores, information = fit.score_covariance(), known.T @ known
+    std = np.sqrt(np.diag(hessian @ (scores + information) @ hessian))
+    inflated = data.tolerances.inflation(data.responses) * scores + information
+    covariance = hessian @ inflated @ hessian
+    judged = likelihood.estimate
+    excess = max(1.0, judged.reduced_chi2 if judged.degrees_of_freedom > 0 else 1.0)
+    misfit = find_misfit(likelihood, data.responses)
     wider = std
     if problem.groups is not None and len(np.unique(problem.groups)) > len(fitted.parameters) + 1:
         robust = solve(problem, starts=fit.x[None], covariance="sandwich", tolerance=FINE)
@@ -274,20 +270,30 @@ def _widened(fit: ResponseFit, data: ResponseData, scale: TorqueScale | None) ->
     if misfit is not None:
         wider = np.maximum(wider, misfit_std(fit, misfit))
     factor = np.divide(wider, std, out=np.ones_like(std), where=std > 0)
-    factor = np.maximum(factor, np.sqrt(excess)) * profile_std_ratio(problem, fitted)
+    factor = np.maximum(factor, np.sqrt(excess)) * profile_std_ratio(problem, fitted, std)
     springs = np.array([name.endswith(SPRING_VALUES) for name in fitted.parameters.names])
     alone = np.where(springs, (factor**2 - excess) * np.diag(covariance), 0.0)
-    covariance = excess * covariance + np.diag(alone) + _by_torque_constants(fit, scale)
+    covariance = excess * covariance + np.diag(alone)
+    if scale is not None:
+        sized = np.array([name.endswith(SPRING_VALUES[:2]) for name in fitted.parameters.names])
+        covariance += scale.log_std**2 * np.outer(sized, sized)
     sized = is_log_identified(fitted.parameters, covariance)
+    dropped = {entry.name for entry in fitted.dropped}
     small = {
-        name: flag and size
-        for name, flag, size in zip(fitted.parameters.names, fitted.identifiable, sized, strict=True)
+        name: name not in dropped and size for name, size in zip(fitted.parameters.names, sized, strict=True)
     }
     absorbing = misfit is not None and misfit.inertials > 0
-    known = tuple(
+    identifiable = tuple(
         flag
         and small.get(name.replace(".damping", ".stiffness"), True)
         and not (absorbing and name.rpartition(".")[2] in MASS_AND_COM)
         for name, flag in small.items()
     )
-    return replace(fitted, covariance=covariance, identifiable=known, misfit=misfit)
+    return replace(
+        fitted,
+        covariance=covariance,
+        identifiable=identifiable,
+        chi2=judged.chi2,
+        degrees_of_freedom=judged.degrees_of_freedom,
+        misfit=misfit,
+    )

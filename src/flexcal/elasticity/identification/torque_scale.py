@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from flexcal.elasticity.identification.fit import ResponseFit
-from flexcal.model.robot import MASS_AND_COM
+from flexcal.model.robot import DRIVE_GAIN, MASS_AND_COM
 
 CERTAIN = 1e-3
 """Significance level of the conflict between what was known of the inertia and what the responses say."""
@@ -39,27 +39,29 @@ class TorqueScale:
 
     @classmethod
     def of(cls, fit: ResponseFit) -> TorqueScale | None:
-        """Test of the prior of the inertia (Evans and Moshonov 2006), the torque constants' share included; None where there is no
-        conflict, or one factor is not what makes it.
+        """Test of the prior of the inertia (Evans and Moshonov 2006) and of the torque constants, which share a common factor of the
+        torques between them; None where there is no conflict, or one factor is not what makes it.
         """
         from scipy.special import chdtrc
 
         parameters, prior = fit.estimate.parameters, fit.problem.prior_covariance
-        own = [
-            k for k, name in enumerate(parameters.names) if name.rpartition(".")[2] in (*MASS_AND_COM, _ROTOR)
-        ]
+        names = parameters.names
+        own = [k for k, name in enumerate(names) if name.rpartition(".")[2] in (*MASS_AND_COM, _ROTOR)]
         if not own or prior is None:
             return None
         scaled = np.array([parameters[k].scale == "log" for k in own], dtype=float)
-        rotors = np.array([parameters.names[k].endswith(_ROTOR) for k in own], dtype=float)
+        rotors = np.array([names[k].endswith(_ROTOR) for k in own])
         if scaled.sum() < 2 or not rotors.any():
             return None
-        # the torque constants may be off too: of each motor, and so for the links
-        of_torques = fit.residual.model.robot.prior.torque_constant**2
-        known = prior[np.ix_(own, own)] + of_torques * (
-            np.diag(rotors) + np.outer(scaled, scaled) / rotors.sum()
-        )
-        off = (parameters.coordinates() - parameters.prior_mean())[own]
+        # with the torques of the log: a rotor differs by its own drive gain, links by the mean of all
+        gains = {name: k for k, name in enumerate(names) if name.endswith(f".{DRIVE_GAIN}")}
+        by_log = np.eye(len(names))[own]
+        for row, (k, rotor) in enumerate(zip(own, rotors, strict=True)):
+            motor = f"{names[k].rpartition('.')[0]}.{DRIVE_GAIN}"
+            of = [gains[motor]] if rotor and motor in gains else list(gains.values())
+            by_log[row, of] = -scaled[row] / max(len(of), 1)
+        known = by_log @ prior @ by_log.T
+        off = by_log @ (parameters.coordinates() - parameters.prior_mean())
         std = np.sqrt(np.diag(known))
         weight = np.linalg.pinv(known / np.outer(std, std), hermitian=True) / np.outer(std, std)
         square = float(off @ weight @ off)

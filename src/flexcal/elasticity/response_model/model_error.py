@@ -151,12 +151,17 @@ class ModelError:
 
     def whiten(self, rows: np.ndarray) -> np.ndarray:
         """Rows (m,) or (m, c), whitened by the measurement alone, after whitening by both."""
-        parts, start = [], 0
-        for block in self.poses:
-            count = len(block.basis)
-            parts.append(block.whiten(rows[start : start + count]))
-            start += count
-        return self.common.whiten(np.concatenate(parts))
+        return self.common.whiten(self._by_pose(rows))
+
+    def transposed(self, rows: np.ndarray) -> np.ndarray:
+        """Sᵀ `rows` (m, c) of S, by which `whiten` multiplies."""
+        return self._by_pose(self.common.whiten(rows))
+
+    def _by_pose(self, rows: np.ndarray) -> np.ndarray:
+        ends = np.cumsum([len(block.basis) for block in self.poses])
+        return np.concatenate(
+            [block.whiten(part) for block, part in zip(self.poses, np.split(rows, ends[:-1]), strict=True)]
+        )
 
 
 def geometric_shifts(model: ResponseModel, x: np.ndarray, tolerances: Tolerances) -> list[np.ndarray]:

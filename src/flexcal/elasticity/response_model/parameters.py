@@ -22,6 +22,7 @@ from flexcal.model.robot import (
     elastic_inertials,
     sensor_parameters,
     springs_and_rotors,
+    uncertain_drive_gains,
     unit_of,
 )
 from flexcal.model.vibration import linearise, transfer_matrix
@@ -46,10 +47,10 @@ def stiffness_parameters(
 ) -> Parameters:
     """All parameters of stage 1 with their priors.
 
-    Springs, rotor inertias, viscous coefficients and masses are estimated as logarithms. The motor's viscous coefficient is free
-    in every pose: friction under the reference motion acts like one that differs from pose to pose. One delay an axis has the
-    prior 0 ± the sample time; a sensor on the arm has its sensitivity, delay and errors of mounting. Rotor inertias have the prior
-    of robot.yaml; so have mass and centre of mass of every link that an elastic joint moves, and the payload's mass, unless
+    Springs, rotor inertias, viscous coefficients and masses are estimated as logarithms. The motor's viscous coefficient is free in every
+    pose: friction under the reference motion acts like one that differs from pose to pose. One delay an axis has the prior 0 ± the sample
+    time, one drive gain that of the torque constants; a sensor on the arm has its sensitivity, delay and errors of mounting. Rotor inertias
+    have the prior of robot.yaml; so have mass and centre of mass of every link that an elastic joint moves, and the payload's mass, unless
     `inertias_known`. With `backlash`, a drive with backlash has its half gap: while it stands open, the drive appears softer. With
     `hardening`, every drive may be stiffer where it carries more torque. Raises `FlexcalError` where responses do not fit the robot.
     """
@@ -63,6 +64,7 @@ def stiffness_parameters(
     for joint in model.driven:
         name = f"{joint.name}.delay"
         items.append(Parameter(name, "s", 0.0, prior_std=late))
+    items += uncertain_drive_gains(model, [joint.index for joint in model.driven])
     for name in dict.fromkeys(name for response in responses for name in response.sensors):
         items += sensor_parameters(model.sensors[name], late)
     for response, label in zip(responses, pose_labels(responses), strict=True):

@@ -18,7 +18,14 @@ from flexcal.elasticity.response_model.parameter_names import (
 from flexcal.elasticity.time_periodic import DriveTorque, HardenedStiffness
 from flexcal.estimation import Parameters
 from flexcal.frequency.periodic import FrequencyResponse
-from flexcal.model.robot import ArmSensor, RobotModel, mounting_names, sensitivity_name, sensor_delay_name
+from flexcal.model.robot import (
+    DRIVE_GAIN,
+    ArmSensor,
+    RobotModel,
+    mounting_names,
+    sensitivity_name,
+    sensor_delay_name,
+)
 from flexcal.model.vibration import ElasticArm, linearise, transfer_matrix
 
 _MOUNTING_STEP = 1e-6
@@ -42,10 +49,10 @@ class PoseModel:
 
     `robot_names` maps names of the robot's own values to parameter numbers. `backlash` maps the axes with backlash to the numbers of their
     half gaps; `backlash_compliance` (phases, E) is the relative compliance that each adds along the reference motion, per rad. `hardening`
-    maps the axes whose drives harden under their `torque` to the numbers of hardening and stiffness. `delays` (E,) are the numbers of the
-    axes' delays, -1 where there is none; `payload` is the nominal payload mass in kg, None for the declared. `sensors` (S) on the arm have
-    their sensitivities and delays at `sensitivities` and `late` (S,), and their errors of mounting at `mounting` (S, 5), -1 where there is
-    none.
+    maps the axes whose drives harden under their `torque` to the numbers of hardening and stiffness. `delays` and `gains` (E,) are the
+    numbers of the axes' delays and drive gains, -1 where there is none; `payload` is the nominal payload mass in kg, None for the declared.
+    `sensors` (S) on the arm have their sensitivities and delays at `sensitivities` and `late` (S,), and their errors of mounting at
+    `mounting` (S, 5), -1 where there is none.
     """
 
     frequencies_hz: np.ndarray
@@ -57,6 +64,7 @@ class PoseModel:
     hardening: dict[int, tuple[int, int]]
     torque: DriveTorque | None
     delays: np.ndarray
+    gains: np.ndarray
     sensors: tuple[ArmSensor, ...]
     sensitivities: np.ndarray
     late: np.ndarray
@@ -72,12 +80,13 @@ class PoseModel:
         return np.where(self.mounting >= 0, natural[self.mounting], 0.0)
 
     def measured(self, natural: np.ndarray) -> np.ndarray:
-        """Measurement factor (L, E + S, E) of G: delays of torques and readings, sensitivities of sensors."""
+        """Measurement factor (L, E + S, E) of G: gains and delays of torques, delays and sensitivities of readings."""
         s = 2j * np.pi * self.frequencies_hz[:, None]
+        gain = np.array([natural[number] if number >= 0 else 1.0 for number in self.gains])
         torque = np.array([natural[number] if number >= 0 else 0.0 for number in self.delays])
         ones = np.ones((len(s), len(torque)))
         rows = np.concatenate([ones, natural[self.sensitivities] * np.exp(-s * natural[self.late])], axis=1)
-        return rows[:, :, None] * np.exp(-s * torque)[:, None, :]
+        return rows[:, :, None] * (gain * np.exp(-s * torque))[:, None, :]
 
     def values(self, robot: RobotModel, natural: np.ndarray) -> tuple[dict[str, float], float | None]:
         """Values of the robot and payload (kg) in this pose for natural parameter values (p,)."""
@@ -135,8 +144,8 @@ class PoseModel:
 class ResponseModel:
     """Predictor of every pose at estimation coordinates x (p,); values that are not `parameters` are those of `robot`.
 
-    The linearisation point is the measured mean motor position; the rest position of the arm follows the parameters. The delay of
-    an axis acts on its torque: column j of G is multiplied by exp(-jω τ_j). Gaps count as closed and drives as linear until
+    The linearisation point is the measured mean motor position; the rest position of the arm follows the parameters. The delay of an axis
+    acts on its torque: column j of G is multiplied by exp(-jω τ_j), and by its drive gain. Gaps count as closed and drives as linear until
     `with_loaded_drives`.
     """
 
@@ -178,12 +187,17 @@ class ResponseModel:
             names: dict[str, int] = {}
             for k, name in enumerate(parameters.names):
                 target, only = own.get(name, (name, label))
-                if only == label and target in robot.values and not name.endswith((".delay", ".hardening")):
+                if (
+                    only == label
+                    and target in robot.values
+                    and not name.endswith((".delay", ".hardening", f".{DRIVE_GAIN}"))
+                ):
                     names[target] = k
             if response.payload == 0:
                 names.pop("payload.mass", None)
             delays = [f"{joint.name}.delay" for joint in robot.driven]
             at = np.array([number(name) for name in delays])
+            gains = np.array([number(f"{joint.name}.{DRIVE_GAIN}") for joint in robot.driven])
             sensors = tuple(robot.sensors[name] for name in response.sensors)
             poses.append(
                 PoseModel(
@@ -196,6 +210,7 @@ class ResponseModel:
                     hardening,
                     None,
                     at,
+                    gains,
                     sensors,
                     np.array([parameters.index(sensitivity_name(s.name)) for s in sensors], dtype=int),
                     np.array([parameters.index(sensor_delay_name(s.name)) for s in sensors], dtype=int),
@@ -266,6 +281,10 @@ class ResponseModel:
             number = int(pose.delays[axis])
             blocks[number] = np.zeros_like(response)
             blocks[number][:, :, axis] = -s[:, None] * response[:, :, axis] * slopes[number]
+        for axis in np.flatnonzero(pose.gains >= 0):
+            number = int(pose.gains[axis])
+            blocks[number] = np.zeros_like(response)
+            blocks[number][:, :, axis] = response[:, :, axis] * slopes[number] / values[number]
         for row, (sensitivity, late) in enumerate(
             zip(pose.sensitivities, pose.late, strict=True), response.shape[2]
         ):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.elasticity.response_model.prediction import PredictedMeasurements, ResponseModel
-from flexcal.elasticity.response_model.weighting import Weighting
+from flexcal.elasticity.response_model.weighting import CovarianceWeighting, Weighting
 from flexcal.frequency.periodic import FrequencyResponse, vec
 
 LOGARITHM_LIMIT = 0.1
@@ -29,27 +29,30 @@ class PoseResidual:
 
     `logarithmic` (L, m, n) tells the elements whose error is log(Ĝ/G); the error of the others is (Ĝ - G)/`scale`, with scale
     √|Ĝ_ii Ĝ_jj| so that a coupling near zero counts as what it is beside its axes, and for a sensor the size of its row. `factor`
-    (L, m n, m n) whitens vec of the errors. `shift` (L, m, n) is added to every prediction.
+    (L, m n, m n) weights vec of the errors, of `covariance` (L, m n, m n). `shift` (L, m, n) is added to every prediction.
     """
 
     measured: np.ndarray
     logarithmic: np.ndarray
     scale: np.ndarray
     factor: np.ndarray
+    covariance: np.ndarray
     shift: np.ndarray | float = 0.0
 
     @classmethod
     def of(cls, response: FrequencyResponse, weighting: Weighting) -> PoseResidual:
-        """Residual with logarithmic or linear errors chosen by their standard deviation, and weighted."""
+        """Residual with logarithmic or linear errors chosen by their standard deviation, whatever their weights."""
         measured = response.stacked
         scale = element_scale(measured)
         relative = response.stacked_std / np.maximum(np.abs(measured), np.finfo(float).tiny)
         small = relative < LOGARITHM_LIMIT
-        apart = 1.0 / np.linalg.norm(_factor(response, weighting, measured, scale, small), axis=1)
+        assumed = _covariance(response, measured, scale, small)
+        apart = 1.0 / np.linalg.norm(CovarianceWeighting().factor(response, assumed), axis=1)
         logarithmic = small & (vec(relative) ** 2 / 2 < LOGARITHM_CURVATURE * apart).reshape(
             len(measured), measured.shape[2], -1
         ).swapaxes(1, 2)
-        return cls(measured, logarithmic, scale, _factor(response, weighting, measured, scale, logarithmic))
+        covariance = _covariance(response, measured, scale, logarithmic)
+        return cls(measured, logarithmic, scale, weighting.factor(response, covariance), covariance)
 
     def errors(self, predicted: np.ndarray) -> np.ndarray:
         """Complex errors Δ (L, m, n); the phase of a logarithm is in (-π, π] as it is that of the ratio."""
@@ -68,6 +71,13 @@ class PoseResidual:
         change = prediction.derivatives / -unit[..., None]
         lines, m, n, columns = change.shape
         return _real(self.factor @ np.swapaxes(change, 1, 2).reshape(lines, m * n, columns))
+
+    def by_noise(self, rows: np.ndarray) -> np.ndarray:
+        """Nᵀ `rows` (2 L m n, c) of the weighted residual with the covariance N Nᵀ, 1 where the weights are its inverse."""
+        root = self.factor @ np.linalg.cholesky(self.covariance)
+        real, imaginary = np.split(rows.reshape(len(root), -1, rows.shape[-1]), 2, axis=1)
+        spread = np.swapaxes(root.conj(), 1, 2) @ (real + 1j * imaginary)
+        return _real(spread) / np.sqrt(2.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +116,13 @@ class ResponseResidual:
             start += count
         return np.concatenate(residuals), jacobian
 
+    def by_noise(self, rows: np.ndarray) -> np.ndarray:
+        """Nᵀ `rows` (m, c), with N Nᵀ (m, m) the covariance of the weighted residual by that of the responses."""
+        ends = np.cumsum([2 * pose.measured.size for pose in self.poses])
+        return np.concatenate(
+            [pose.by_noise(part) for pose, part in zip(self.poses, np.split(rows, ends[:-1]), strict=True)]
+        )
+
     def clusters(self, lines: int = CLUSTER_LINES) -> np.ndarray:
         """Cluster number (m,) of every row: `lines` neighbouring lines of one pose."""
         labels, first = [], 0
@@ -125,18 +142,12 @@ def element_scale(stacked: np.ndarray) -> np.ndarray:
     return np.concatenate([scale, np.repeat(rows, axes, axis=2)], axis=1)
 
 
-def _factor(
-    response: FrequencyResponse,
-    weighting: Weighting,
-    measured: np.ndarray,
-    scale: np.ndarray,
-    logarithmic: np.ndarray,
+def _covariance(
+    response: FrequencyResponse, measured: np.ndarray, scale: np.ndarray, logarithmic: np.ndarray
 ) -> np.ndarray:
-    """Factor (L, m n, m n) of the weight of the errors, of which some are logarithms."""
+    """Covariance (L, m n, m n) of the errors, of which some are logarithms."""
     unit = vec(np.where(logarithmic, measured, scale))
-    return weighting.factor(
-        response, response.stacked_covariance / (unit[:, :, None] * unit[:, None, :].conj())
-    )
+    return response.stacked_covariance / (unit[:, :, None] * unit[:, None, :].conj())
 
 
 def _real(white: np.ndarray) -> np.ndarray:

@@ -32,13 +32,10 @@ class CovarianceWeighting:
 
 @dataclass(frozen=True)
 class UniformWeighting:
-    """Equal weights of all elements and lines; the common variance is the median of those of the diagonal elements."""
+    """Equal weights of all elements and lines, of a size that the expected cost of a pose is that of its number of errors."""
 
     def factor(self, response: FrequencyResponse, covariance: np.ndarray) -> np.ndarray:
-        n, m = response.response.shape[-1], len(response.outputs)
-        variance = np.real(np.diagonal(covariance, axis1=1, axis2=2))
-        size = np.sqrt(np.median(variance[:, :: m + 1]))
-        return np.broadcast_to(np.eye(m * n) / size, covariance.shape)
+        return _normalised(np.ones(covariance.shape[:2]), covariance)
 
 
 @dataclass(frozen=True)
@@ -46,7 +43,8 @@ class ResonanceWeighting:
     """The paper's weights: uniform, amplified near poles and zeros of the diagonal elements, reduced for the others.
 
     The paper says no more than that. Here the error of G_ii is multiplied by up to `emphasis` within about `width` (relative
-    frequency) of an extremum of |Ĝ_ii| that stands out by `prominence` (a factor), that of an off-diagonal by `coupling`.
+    frequency) of an extremum of |Ĝ_ii| that stands out by `prominence` (a factor), that of an off-diagonal by `coupling`. The size is
+    as of `UniformWeighting`.
     """
 
     emphasis: float = 3.0
@@ -63,8 +61,14 @@ class ResonanceWeighting:
             for at in extrema(np.log(np.abs(response.response[:, i, i])), np.log(self.prominence)):
                 near = np.exp(-0.5 * ((logarithm - logarithm[at]) / self.width) ** 2)
                 weight[:, i, i] = np.maximum(weight[:, i, i], 1 + (self.emphasis - 1) * near)
-        vector = vec(weight)
-        return UniformWeighting().factor(response, covariance) * vector[:, :, None]
+        return _normalised(vec(weight), covariance)
+
+
+def _normalised(weight: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """Factor (L, k, k) of weights (L, k) for errors of `covariance` (L, k, k), with 1 the mean expected square."""
+    variance = np.real(np.diagonal(covariance, axis1=1, axis2=2))
+    weight = weight / np.sqrt(np.mean(weight**2 * variance))
+    return weight[:, :, None] * np.eye(weight.shape[1])
 
 
 def extrema(curve: np.ndarray, prominence: float) -> list[int]:

@@ -13,7 +13,7 @@ from flexcal.files.formats import block_sha256
 from flexcal.jobs.fleet_prior.geometry_information import independent_combinations
 from flexcal.jobs.fleet_prior.member import FEWEST, Member
 from flexcal.jobs.fleet_prior.pooled_values import CLEAR, PooledValues, Scale
-from flexcal.model.robot import FRICTION_PARAMETERS, MASS_AND_COM, SPRING_LOG_STD
+from flexcal.model.robot import DRIVE_GAIN, FRICTION_PARAMETERS, MASS_AND_COM, SPRING_LOG_STD
 
 _USEFUL = 0.7
 """Standard deviation of the logarithm of a quantity of the next robot from which the others tell too little of it: a factor of two."""
@@ -28,8 +28,7 @@ def pool_springs(members: Sequence[Member]) -> PooledValues:
     of one type differ by per cent.
 
     Frequency responses tell a stiffness over the inertia that it carries, and that is from the same CAD for all robots: masses, centres of
-    mass and rotor inertias are pooled with them, so that their common error does not average out over robots. The torque constants are
-    of one controller, too.
+    mass, rotor inertias and drive gains are pooled with them, so that their common error does not average out over robots.
 
     Raises `FlexcalError` for fewer than three robots, and for robots that are no one population.
     """
@@ -47,9 +46,8 @@ def pool_springs(members: Sequence[Member]) -> PooledValues:
     scales: list[Scale] = ["log"] * len(names)
     quantities = _Quantities(names, scales, np.array(reference), np.array(sizes))
     measured = [_spring_information(member.estimate, quantities) for member in members]
-    common = float(members[0].model.prior.torque_constant)
     springs = [name for name in names if name.endswith(SPRING)]
-    return quantities.pooled(members, measured, common, "bearings").among(springs)
+    return quantities.pooled(members, measured, "bearings").among(springs)
 
 
 def pool_friction(members: Sequence[Member]) -> PooledValues:
@@ -73,7 +71,7 @@ def pool_friction(members: Sequence[Member]) -> PooledValues:
     )
     quantities = _Quantities(names, scales, reference, sizes)
     measured = [_friction_information(member.estimate, quantities) for member in members]
-    return quantities.pooled(members, measured, 0.0, "friction")
+    return quantities.pooled(members, measured, "friction")
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,16 +83,12 @@ class _Quantities:
     reference: np.ndarray
     sizes: np.ndarray
 
-    def pooled(
-        self, members: Sequence[Member], measured: Sequence[Measured], common: float, option: str
-    ) -> PooledValues:
-        """Those that are useful over the `members`, of which these deviations were `measured` with an error of the standard deviation
-        `common` to all; the members have the `option` in common.
-        """
+    def pooled(self, members: Sequence[Member], measured: Sequence[Measured], option: str) -> PooledValues:
+        """Those that are useful over the `members`, of which these deviations were `measured`; the members have the `option` in common."""
         names, scales, sizes = self.names, self.scales, self.sizes
         kinds = [f"{scale}, {name.partition('.')[2]}" for name, scale in zip(names, scales, strict=True)]
         found = population(measured, sizes, kinds)
-        known = np.sqrt(np.diag(found.uncertainty) + common**2)
+        known = np.sqrt(np.diag(found.uncertainty))
         log = np.array(scales) == "log"
         unit = np.where(log, sizes, 1.0)
         kept = np.flatnonzero(np.hypot(known, found.spread) < _USEFUL * sizes / unit).tolist()
@@ -123,7 +117,7 @@ def _names(members: Sequence[Member], wanted: Callable[[str], bool]) -> list[str
 def _is_of_springs(name: str) -> bool:
     key = name.rpartition(".")[2]
     return name.endswith(SPRING) or (
-        key in ("rotor_inertia", *MASS_AND_COM) and not name.startswith("payload.")
+        key in ("rotor_inertia", DRIVE_GAIN, *MASS_AND_COM) and not name.startswith("payload.")
     )
 
 

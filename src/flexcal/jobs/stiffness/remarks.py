@@ -10,7 +10,7 @@ from flexcal.elasticity.identification import SpringFit
 from flexcal.estimation import Estimate
 from flexcal.jobs.stiffness.bearing_axes import response_bearings_remarks
 from flexcal.model.robot import RobotModel, mounting_names, sensitivity_name
-from flexcal.report.checks import misfit_sentences, torque_scale_sentence
+from flexcal.report.checks import drive_gain_sentence, misfit_sentences, torque_scale_sentence
 from flexcal.report.sections import hardening_sentence
 
 _ONE_SIDED = 1.645
@@ -51,6 +51,8 @@ def stiffness_remarks(result: SpringFit, model: RobotModel) -> tuple[str, ...]:
     remarks += sensor_remarks(result, model)
     if hardening := hardening_sentence(estimate):
         remarks.append(hardening[0].lower() + hardening.rstrip(".")[1:])
+    if gains := drive_gain_sentence(estimate):
+        remarks.append(gains)
     if estimate.misfit is not None:
         remarks.append(f"unexplained responses: {misfit_sentences(estimate.misfit).rstrip('.')}")
     if result.scale is not None:

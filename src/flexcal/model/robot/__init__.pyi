@@ -16,6 +16,7 @@ from .measuring_config import (
 from .parameter_groups import Links, Stations, Thermal
 from .parameter_names import (
     BOARD_SCALE,
+    DRIVE_GAIN,
     EXPANSION,
     FRICTION_PARAMETERS,
     GEOMETRY,
@@ -57,6 +58,7 @@ from .prior_parameters import (
     elastic_inertials,
     sensor_parameters,
     springs_and_rotors,
+    uncertain_drive_gains,
     uncertain_inertials,
     uncertain_payload,
 )
@@ -67,6 +69,7 @@ __all__ = [
     "ANGLE_TOLERANCE",
     "BOARD_SCALE",
     "DECLARED",
+    "DRIVE_GAIN",
     "EXPANSION",
     "FACES",
     "FRICTION_LOG_STD",
@@ -129,6 +132,7 @@ __all__ = [
     "spring_names",
     "springs_and_rotors",
     "torque_units",
+    "uncertain_drive_gains",
     "uncertain_inertials",
     "uncertain_payload",
     "unit_in",

@@ -46,7 +46,7 @@ class PriorConfig:
     inertia: float = 0.15
     rotor_inertia: float = 0.05
     stiffness: float = 0.3
-    torque_constant: float = 0.02
+    torque_constant: float = 0.05
     length: float | None = None
     angle: float | None = None
     parameters: dict[str, float] = field(default_factory=dict)

@@ -164,6 +164,7 @@ def _drives(file: YamlFile, config: RobotConfig, n: int, motors: Sequence[int]) 
         parallel=np.zeros((n, len(PARALLEL))),
         coupling=np.zeros((len(config.drives.coupling), len(COUPLED))),
         delay=np.zeros(n),
+        drive_gain=np.ones(n),
         ratio=declared("ratio"),
         backlash=np.zeros(n),
         transmission=np.zeros((n, len(HARMONICS), 2)),

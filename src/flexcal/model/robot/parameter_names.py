@@ -41,6 +41,8 @@ FRICTION_PARAMETERS = tuple(_FRICTION_UNITS)
 """Parameters of the friction terms beyond viscous and Coulomb friction, `<joint>.<key>`."""
 PARALLEL = ("spring_stiffness", "spring_torque", "cable_torque")
 COUPLED = ("rotor_inertia", "viscous", "coulomb")
+DRIVE_GAIN = "drive_gain"
+"""Key of the factor of a joint's true torque to that of the log: the torque constant over the one that the controller has."""
 MASS_AND_COM = ("mass", "com_x", "com_y", "com_z")
 MOMENTS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 STATION = ("x", "y", "z", "rx", "ry", "rz")
@@ -215,7 +217,7 @@ def parameter_locations(model: RobotModel) -> dict[str, Location]:
             table[f"{joint.name}.{RATIO}{model.joints[k].name}"] = Location("drives", "ratio_error", (i, k))
         table[f"{joint.name}.{ZERO_DRIFT}"] = Location("thermal", "zero_drift", (i,))
         table[f"{joint.link}.{LINK_EXPANSION}"] = Location("thermal", "link_expansion", (i,))
-        for key in ("rotor_inertia", "viscous", "coulomb", "torque_offset", "delay"):
+        for key in ("rotor_inertia", "viscous", "coulomb", "torque_offset", "delay", DRIVE_GAIN):
             table[f"{joint.name}.{key}"] = Location("drives", key, (i,))
         for key in unknown_parallel(model, joint.name):
             table[f"{joint.name}.{key}"] = Location("drives", "parallel", (i, PARALLEL.index(key)))

@@ -9,7 +9,7 @@ import numpy as np
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter
 from flexcal.model.robot.arm_sensor import ArmSensor, mounting_names, sensitivity_name, sensor_delay_name
-from flexcal.model.robot.parameter_names import GEOMETRY, spring_names, unit_in, unit_of
+from flexcal.model.robot.parameter_names import DRIVE_GAIN, GEOMETRY, spring_names, unit_in, unit_of
 from flexcal.model.robot.robot_model import RobotModel
 
 LENGTH_TOLERANCE = 3e-4
@@ -38,7 +38,7 @@ SHARED_DISTORTION = 0.2
 are the same in all; averaging over realisations does not lower it.
 """
 
-_POSITIVE = ("mass", "rotor_inertia", "stiffness")
+_POSITIVE = ("mass", "rotor_inertia", "stiffness", DRIVE_GAIN)
 
 
 def uncertain_inertials(model: RobotModel, links: Collection[int]) -> list[str]:
@@ -94,6 +94,13 @@ def springs_and_rotors(model: RobotModel) -> tuple[Parameter, ...]:
     return (*map(spring, names), *(declared_parameter(model, name) for name in rotors))
 
 
+def uncertain_drive_gains(model: RobotModel, joints: Collection[int]) -> list[Parameter]:
+    """True over logged torques of `joints`, by robot.yaml's prior of the torque constants; none where these are known."""
+    if model.prior.torque_constant == 0:
+        return []
+    return [declared_parameter(model, f"{model.joints[i].name}.{DRIVE_GAIN}") for i in joints]
+
+
 def elastic_inertials(model: RobotModel, *, loaded: bool) -> list[Parameter]:
     """Uncertain inertials, by robot.yaml's prior, of the links moved by an elastic joint and, if `loaded`, the payload's mass."""
     elastic = {joint.index for joint in model.elastic}
@@ -108,8 +115,8 @@ def elastic_inertials(model: RobotModel, *, loaded: bool) -> list[Parameter]:
 def declared_parameter(model: RobotModel, name: str) -> Parameter:
     """Parameter at the model's value, with its prior from robot.yaml and workshop tolerances.
 
-    Mass, rotor inertia and stiffness are estimated as logarithms. A link's inertia about its centre of mass goes with its mass and has no
-    prior of its own; friction and torque offset have none at all.
+    Mass, rotor inertia, stiffness and drive gain are estimated as logarithms. A link's inertia about its centre of mass goes with its mass
+    and has no prior of its own; friction and torque offset have none at all.
     """
     value, key = model.value(name), name.rpartition(".")[2]
     std = _std(model, name, key)
@@ -135,4 +142,5 @@ def _std(model: RobotModel, name: str, key: str) -> float:
         "rotor_inertia": model.prior.rotor_inertia,
         "stiffness": model.prior.stiffness,
         "backlash": GAP_TOLERANCE,
+        DRIVE_GAIN: model.prior.torque_constant,
     }.get(key, float("inf"))

@@ -16,7 +16,7 @@ from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, read_estimates
 from flexcal.model.parts import Bearings, is_physically_consistent
 from flexcal.model.robot.attached_payload import with_payload
-from flexcal.model.robot.parameter_names import unit_in, unit_of
+from flexcal.model.robot.parameter_names import DRIVE_GAIN, unit_in, unit_of
 
 if TYPE_CHECKING:
     from flexcal.model.robot.robot_model import RobotModel
@@ -49,7 +49,7 @@ def declared_sha256(nominal: RobotModel) -> str:
         for array in (point.rotation, point.translation, point.xyz):
             digest.update(_rounded(array))
     for name, value in sorted(nominal.values.items()):
-        if not name.startswith("station."):
+        if not name.startswith("station.") and not name.endswith(f".{DRIVE_GAIN}"):  # none is declared
             digest.update(name.encode() + _rounded(np.array(value)))
     digest.update(_rounded(np.array(nominal.config.gravity, dtype=float)))
     return digest.hexdigest()

@@ -18,9 +18,11 @@ from .dynamics import (
     held_out_recordings,
 )
 from .elastic_model import (
+    check_drive_gains,
     check_misfit,
     check_responses,
     check_torque_scale,
+    drive_gain_sentence,
     misfit_document,
     misfit_sentences,
     read_misfit,
@@ -70,6 +72,7 @@ __all__ = [
     "check_bodies",
     "check_claimed_uncertainty",
     "check_drift",
+    "check_drive_gains",
     "check_enough",
     "check_error_budget",
     "check_external",
@@ -99,6 +102,7 @@ __all__ = [
     "check_unseen_torques",
     "check_weight",
     "check_weight_shares",
+    "drive_gain_sentence",
     "dynamics_checks",
     "excitation_checks",
     "fleet_checks",

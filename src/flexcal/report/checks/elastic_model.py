@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from flexcal.estimation import Estimate, Misfit
+import numpy as np
+
+from flexcal.estimation import Estimate, Misfit, Parameter
+from flexcal.model.robot import DRIVE_GAIN
 from flexcal.report.checks.pose_errors import check_residual
-from flexcal.report.layout import Check, spring_label
+from flexcal.report.layout import Check, listed, spring_label
 from flexcal.report.results import chance_in_words
 
 CODE = "residual_stiffness"
@@ -49,6 +52,42 @@ def torque_scale_sentence(scale: Mapping[str, Any]) -> str:
         "or another torque constant; stiffness and damping are then wrong by the same factor, and their intervals allow for it. Check the "
         "unit of the torques (flexcal identify gains finds it from a payload), or correct the masses"
     )
+
+
+_OFF = 3.0
+"""Deviation of a drive gain from one, in standard deviations, from which torque constants are named as a cause."""
+
+
+def drive_gain_sentence(estimate: Estimate) -> str:
+    """What is known of the torque constants where they are not those of the log, beyond chance; empty where they may be."""
+    parts = [
+        f"{item.name.removesuffix(f'.{DRIVE_GAIN}')} {item.value:.3g} ± {item.value * std:.2g}"
+        for item, std in _drive_gains(estimate)
+        if abs(np.log(item.value)) > _OFF * std
+    ]
+    if not parts:
+        return ""
+    return (
+        f"the torques of the log are off, as by torque constants: the true ones are greater by the factors {listed(parts, len(parts))} "
+        "(1σ), by the reciprocity of the responses and by what is known of masses and payload; springs are those of the true torques"
+    )
+
+
+def check_drive_gains(estimate: Estimate) -> tuple[Check, ...]:
+    """Where a torque constant is farther from that of the log than what `prior: torque_constant` allows."""
+    if all(
+        abs(np.log(item.value)) < _OFF * np.hypot(item.prior_std, std) for item, std in _drive_gains(estimate)
+    ):
+        return ()
+    question = "Are the torque constants as well known as declared?"
+    return (Check(question, f"No: {drive_gain_sentence(estimate)}.", "care", "torque_constants"),)
+
+
+def _drive_gains(estimate: Estimate) -> list[tuple[Parameter, float]]:
+    """Drive gains with the standard deviation of their logarithms."""
+    stds = np.sqrt(np.diag(estimate.covariance))
+    pairs = zip(estimate.parameters, stds, strict=True)
+    return [(item, float(std)) for item, std in pairs if item.name.endswith(f".{DRIVE_GAIN}")]
 
 
 def misfit_sentences(misfit: Misfit) -> str:

@@ -23,6 +23,10 @@ _FEW_LINES = 20
 """Lines of all poses below which the difference of two elements says little."""
 _ASYMMETRY = 0.1
 """Difference of G_ij and G_ji beyond noise, relative to their size, from which the responses are not those of one mechanical system."""
+_CLEAR, _SMALL_GAIN = 4.0, 0.02
+"""Difference of two torque constants in standard deviations from which it is told, and the largest that does not matter, relative."""
+_PLAUSIBLE_GAIN = 0.25
+"""Logarithm of the ratio of two torque constants, known to 5 % each by default (3.5 σ), from which a gain or unit is wrong."""
 _SHOWN = 3
 _CURES: dict[Limit, str] = {
     "noise": "Noise dominates: record more periods, or increase the torques.",
@@ -67,6 +71,16 @@ def _check_reciprocity(pairs: Sequence[Mapping[str, Any]]) -> Check:
         f"{significant(worst['ratio'], 3)} times its standard deviation (rms over all lines), the largest of all pairs."
     )
     cause = "Check torque gain and sign of these axes, and the order of the columns."
+    unlike = max(pairs, key=_gain_difference)
+    if (worst["ratio"] > CHANCE or _gain_difference(unlike) > _CLEAR) and all(map(_by_gains, pairs)):
+        first, second = unlike["joints"]
+        return Check(
+            question,
+            f"They are with other torque constants. {answer} The true torque of {second} over that of "
+            f"the log is {significant(unlike['gain_ratio'], 4)} ± {significant(unlike['gain_ratio_std'], 2)} (1σ) times that of {first}; "
+            "'identify stiffness' estimates these factors (prior: torque_constant).",
+            "care",
+        )
     if worst["ratio"] > MISSING and worst["difference"] > _ASYMMETRY:
         return Check(
             question,
@@ -76,6 +90,20 @@ def _check_reciprocity(pairs: Sequence[Mapping[str, Any]]) -> Check:
     if worst["ratio"] > CHANCE:
         return Check(question, f"Not within their uncertainty. {answer} {cause}", "care")
     return Check(question, f"Yes. {answer}", "good")
+
+
+def _gain_difference(pair: Mapping[str, Any]) -> float:
+    """Difference of the drive gains of a pair of axes in standard deviations; 0 where it is too small to matter."""
+    gain = pair.get("gain_ratio")
+    if gain is None or abs(np.log(gain)) < _SMALL_GAIN:
+        return 0.0
+    return abs(float(np.log(gain))) * gain / pair["gain_ratio_std"]
+
+
+def _by_gains(pair: Mapping[str, Any]) -> bool:
+    """Whether the responses of a pair are reciprocal with torque constants that may be."""
+    gain = pair.get("gain_ratio")  # none in results of earlier versions
+    return gain is not None and pair["corrected_ratio"] <= CHANCE and abs(np.log(gain)) < _PLAUSIBLE_GAIN
 
 
 def _check_known(entries: Sequence[Mapping[str, Any]]) -> Check:

@@ -163,6 +163,7 @@ PHRASES: dict[str, dict[str, str]] = {
         "else": "it is not clear which parameters the poses determine",
     },
     "drift": {"good": "no drift was detected", "else": "residuals drift with time"},
+    "torque_constants": {"else": "torque constants are farther off than declared"},
     "torque_scale": {
         "else": "all masses come out at another size than declared, or the torques are in another unit"
     },

@@ -9,6 +9,7 @@ from typing import Any
 from flexcal.estimation import Estimate
 from flexcal.report.checks import (
     Trust,
+    check_drive_gains,
     check_response_bearings,
     check_responses,
     check_springs,
@@ -68,6 +69,7 @@ def stiffness_checks(
             "springs"
         ),
         *check_response_bearings(bearings),
+        *check_drive_gains(estimate),
         *check_torque_scale(torque_scale),
     )
 
