@@ -40,6 +40,13 @@ def about(axis: np.ndarray, angle: float) -> np.ndarray:
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
+def part(element: ET.Element, name: str) -> ET.Element:
+    """A child that every URDF has."""
+    found = element.find(name)
+    assert found is not None
+    return found
+
+
 @dataclass(frozen=True)
 class Arm:
     """Numbers of an arm; n joints, of which the first e have rotor, drive and two bearings: `springs`, `dampers` (e, 3) about x, y, z.
@@ -76,40 +83,43 @@ class Arm:
         config = yaml.safe_load(robot_file.read_text())
         tree = ET.parse(robot_file.parent / config["robot"]).getroot()
         joints = [j for j in tree.findall("joint") if j.get("type") == "revolute"]
-        fixed = {j.find("child").get("link"): j for j in tree.findall("joint") if j.get("type") == "fixed"}
-        bodies = {link.get("name"): link.find("inertial") for link in tree.findall("link")}
-        names = [j.find("child").get("link") for j in joints]
+        fixed = {
+            part(j, "child").attrib["link"]: j for j in tree.findall("joint") if j.get("type") == "fixed"
+        }
+        names = [part(j, "child").attrib["link"] for j in joints]
+        every = {link.attrib["name"]: link for link in tree.findall("link")}
+        bodies = {name: part(every[name], "inertial") for name in names}
 
         def numbers(element, key, default="0 0 0"):
             return np.array(element.get(key, default).split(), dtype=float)
 
-        place = [numbers(j.find("origin"), "xyz") for j in joints]
-        turn = [roll_pitch_yaw(numbers(j.find("origin"), "rpy")) for j in joints]
+        place = [numbers(part(j, "origin"), "xyz") for j in joints]
+        turn = [roll_pitch_yaw(numbers(part(j, "origin"), "rpy")) for j in joints]
         tensors = []
         for name in names:
-            t = {k: float(v) for k, v in bodies[name].find("inertia").items()}
+            t = {k: float(v) for k, v in part(bodies[name], "inertia").items()}
             tensor = [
                 [t["ixx"], t["ixy"], t["ixz"]],
                 [t["ixy"], t["iyy"], t["iyz"]],
                 [t["ixz"], t["iyz"], t["izz"]],
             ]
-            own = roll_pitch_yaw(numbers(bodies[name].find("origin"), "rpy"))
+            own = roll_pitch_yaw(numbers(part(bodies[name], "origin"), "rpy"))
             tensors.append(own @ np.array(tensor) @ own.T)
         payload = config["payload"]
-        origin = fixed[payload["frame"]].find("origin")
+        origin = part(fixed[payload["frame"]], "origin")
         springs = [
             [[float(e[k][what]) for k in ("bearing_x", "bearing_y", "drive")] for e in config["elastic"]]
             for what in ("stiffness", "damping")
         ]
         count = len(config["elastic"])
         return cls(
-            joints=tuple(j.get("name") for j in joints),
+            joints=tuple(j.attrib["name"] for j in joints),
             links=tuple(names),
             places=tuple(place),
             turns=tuple(turn),
-            axes=np.array([numbers(j.find("axis"), "xyz") for j in joints]),
-            mass=np.array([float(bodies[n].find("mass").get("value")) for n in names]),
-            com=np.array([numbers(bodies[n].find("origin"), "xyz") for n in names]),
+            axes=np.array([numbers(part(j, "axis"), "xyz") for j in joints]),
+            mass=np.array([float(part(bodies[n], "mass").attrib["value"]) for n in names]),
+            com=np.array([numbers(part(bodies[n], "origin"), "xyz") for n in names]),
             inertia=np.array(tensors),
             rotor=np.array(config["drives"]["rotor_inertia"][:count], dtype=float),
             viscous=np.array(config["drives"]["viscous"][:count], dtype=float),
