@@ -37,7 +37,7 @@ def single(plan: TrajectoryPlan) -> TrajectoryPlan:
 
 
 def drawn(model: RobotModel, rng: np.random.Generator) -> RobotModel:
-    """A true robot as far from CAD, nominal springs and nominal geometry as declared; friction changes by a tenth."""
+    """A true robot as far from CAD, nominal springs, nominal geometry and torque constants as declared; friction changes by a tenth."""
     values = draw_truth(model, CellConfig().spread, rng)
     values = {n: v for n, v in values.items() if not n.endswith((".backlash", ".damping"))}
     robot = model.with_values(values)
@@ -47,6 +47,7 @@ def drawn(model: RobotModel, rng: np.random.Generator) -> RobotModel:
             robot.drives,
             viscous=model.drives.viscous * rng.uniform(0.9, 1.1, model.n),
             coulomb=model.drives.coulomb * 1.1,
+            drive_gain=np.exp(model.prior.torque_constant * rng.standard_normal(model.n)),
         ),
     )
 
@@ -59,6 +60,12 @@ def reshaped(robot: RobotModel, rng: np.random.Generator) -> RobotModel:
         moments = np.maximum(moments, 1e-3 * moments.max()) * np.exp(0.15 * rng.standard_normal(3))
         tensors.append(np.sum(moments) * np.eye(3) - axes @ np.diag(moments) @ axes.T)
     return replace(robot, links=replace(robot.links, inertia=np.array(tensors)))
+
+
+def with_known_constants(model: RobotModel) -> RobotModel:
+    """The robot with torques that are those measured."""
+    prior = replace(model.config.prior, torque_constant=0.0)
+    return replace(model, config=replace(model.config, prior=prior))
 
 
 STILL = repeat(np.zeros((1, 6)))
@@ -77,7 +84,7 @@ def synthetic(truth: RobotModel, plan: TrajectoryPlan, noises: Iterable[np.ndarr
         yield Recording(
             time_step=1 / plan.rate_hz,
             q=np.tile(q, (plan.periods, 1)),
-            torque=np.tile(torque, (plan.periods, 1)) + noise,
+            torque=np.tile(torque / truth.drives.drive_gain, (plan.periods, 1)) + noise,
         )
 
 
@@ -102,7 +109,7 @@ def errors(estimate: Estimate, truth: RobotModel) -> tuple[np.ndarray, float]:
 
 def test_without_noise_the_torques_of_the_robot_come_back(tx90l: RobotModel, single: TrajectoryPlan) -> None:
     """Single masses stay as uncertain as CAD; what turns the motors, on motions never recorded, does not."""
-    rng = np.random.default_rng(5)
+    rng, tx90l = np.random.default_rng(5), with_known_constants(tx90l)
     truth = drawn(tx90l, rng)
     truth = replace(
         truth,
@@ -137,7 +144,8 @@ def test_what_torques_miss(tx90l: RobotModel, single: TrajectoryPlan) -> None:
     acceleration = single.motion(0, np.arange(size) / single.rate_hz)[2]
     spectrum = np.fft.rfft(recordings[0].torque[:size], axis=0)[:26] / size
     spectrum[1:] *= np.sqrt(2.0)
-    missed = np.linalg.norm(0.1 * truth.drives.rotor_inertia * acceleration) / np.sqrt(size)
+    missed = 0.1 * truth.drives.rotor_inertia * acceleration / truth.drives.drive_gain
+    missed = np.linalg.norm(missed) / np.sqrt(size)
     expected = missed / np.linalg.norm(spectrum)
     assert relative_torque_error(trajectory_torques(heavier, single, recordings)) == pytest.approx(
         expected, rel=1e-6
@@ -197,7 +205,7 @@ def test_the_virtual_cell_is_understood(tx90l: RobotModel) -> None:
     Its links have CAD's shapes, without which a rotor is not told from the link about the same axis.
     """
     known = replace(tx90l.config.prior, inertia=0.0)
-    tx90l = replace(tx90l, config=replace(tx90l.config, prior=known))
+    tx90l = with_known_constants(replace(tx90l, config=replace(tx90l.config, prior=known)))
     plan = exciting_plan(tx90l, count=1, seed=4)
     values = draw_truth(tx90l, CellConfig().spread, np.random.default_rng(4))
     truth = tx90l.with_values(values)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -73,7 +74,8 @@ def _minimum(cost: Callable[[float], float]) -> float:
     """Logarithm of a gain within a factor of two that minimises a cost."""
     from scipy.optimize import minimize_scalar
 
-    return float(minimize_scalar(cost, bounds=(-np.log(2.0), np.log(2.0)), method="bounded").x)
+    found: Any = minimize_scalar(cost, bounds=(-np.log(2.0), np.log(2.0)), method="bounded")
+    return float(found.x)
 
 
 def _curvature(cost: Callable[[float], float], at: float) -> float:
