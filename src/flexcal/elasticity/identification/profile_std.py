@@ -14,8 +14,8 @@ def profile_std_ratio(problem: Problem, fitted: Estimate, known: np.ndarray) -> 
     """Ratio (p,) of the width of the profile of the cost to its curvature, at least 1; `fitted` is the optimum of `problem`.
 
     A stiffness that counts as identifiable by its standard deviation `known` (p,) is held at twice its value and all others are fitted
-    again. The response is nearly linear in the compliance, which is half there: where the cost rises by d, its relative standard deviation is 0.5/√(2 d).
-    A soft and damped mode that follows the noise is found out so: giving it up costs little.
+    again. The response is nearly linear in the compliance, which is half there: where the cost rises by d, its relative standard deviation
+    is 0.5/√(2 d). A soft and damped mode that follows the noise is found out so: giving it up costs little.
     """
     stretch = np.ones(len(fitted.parameters))
     x = fitted.parameters.coordinates()
