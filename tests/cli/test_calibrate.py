@@ -37,7 +37,7 @@ def test_whole_example_reaches_its_numbers(run, ur5_folder: Path) -> None:
     assert document["calibration"]["rigid"]["poses"] == 1000
     assert document["calibration"]["selected"]["mean_mm"] < document["calibration"]["rigid"]["mean_mm"] < 0.11
     quantity = document["parameters"]["shoulder_lift_joint.offset"]
-    assert set(quantity) == {"estimate", "std", "low", "high", "truth", "identifiable"}
+    assert set(quantity) == {"estimate", "std", "low", "high", "truth", "identifiable", "bound"}
     assert quantity["identifiable"] and quantity["low"] < quantity["estimate"] < quantity["high"]
     lost = document["parameters"]["tool.offset"]
     assert not lost["identifiable"] and lost["std"] is lost["low"] is lost["high"] is None
