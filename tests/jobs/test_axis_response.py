@@ -55,3 +55,9 @@ def test_it_is_that_of_the_command_line(records: list[dict[str, np.ndarray]], tm
 def test_columns_of_one_length(records: list[dict[str, np.ndarray]]) -> None:
     with refused("E-IMPORT-056", "record 1"):
         frequency_response([{**records[0], "t": records[0]["t"][1:]}])
+
+
+def test_a_signal_that_stands_still(records: list[dict[str, np.ndarray]]) -> None:
+    for name in ("torque[Nm]", "velocity[rad/s]"):
+        with refused("E-IMPORT-077", "record 1", name.partition("[")[0]):
+            frequency_response([{**record, name: np.full(N, 3.0)} for record in records])

@@ -55,7 +55,7 @@ def read_response_records(
     """Records of one experiment from files, or from columns in memory; the columns are those of the first.
 
     `rate_hz` is the sampling rate of files without a column of time. Raises `InputError` where a file lacks a column, holds a cell that is
-    no number, or a time that does not grow.
+    no number, a constant input or output, or a time that does not grow.
     """
     files = record_paths(sources)
     tables = [
@@ -71,6 +71,15 @@ def read_response_records(
         of_file, notes = _records(file, table, columns, rate_hz)
         records += of_file
         remarks += notes
+    for side, chosen in (("inputs", columns.inputs), ("outputs", columns.outputs)):
+        signals = np.concatenate([getattr(record, side) for record in records])
+        for column, varies in zip(chosen, np.ptp(signals, axis=0) > 0, strict=True):
+            if not varies:
+                raise InputError(
+                    "E-IMPORT-077",
+                    f"{files[0]}: the column '{column.channel.name}' is constant, so it tells no response; name another (--input, "
+                    "--output), or record it.",
+                )
     step = float(np.median([record.time_step for record in records]))
     near = [abs(record.time_step / step - 1) < 1e-3 for record in records]
     if all(near):
