@@ -336,8 +336,8 @@ def case_of(number: int, seeds: Path) -> Case:
     if numbers and chance.random() < 0.25:
         odd = chance.choice([*NUMBERS.values(), *ODD_TEXTS.values(), ""])
         at = chance.choice(numbers)
-        if (arguments[at - 1], odd) == ("--candidates", NUMBERS["million"]):
-            odd = "10000"  # a million are chosen from, in half a minute
+        if arguments[at - 1] in ("--candidates", "--count") and odd == NUMBERS["million"]:
+            odd = "10000"  # a million are computed, in half a minute
         case = replace(case, arguments=(*arguments[:at], odd, *arguments[at + 1 :]))
     if chance.random() < 0.1:
         case = replace(case, arguments=(*case.arguments, "--json"))

@@ -60,4 +60,8 @@ def test_columns_of_one_length(records: list[dict[str, np.ndarray]]) -> None:
 def test_a_signal_that_stands_still(records: list[dict[str, np.ndarray]]) -> None:
     for name in ("torque[Nm]", "velocity[rad/s]"):
         with refused("E-IMPORT-077", "record 1", name.partition("[")[0]):
-            frequency_response([{**record, name: np.full(N, 3.0)} for record in records])
+            frequency_response(
+                [{**record, name: np.full(N, 3.0)} for record in records],
+                inputs=["torque[Nm]"],
+                outputs=["velocity[rad/s]"],
+            )
