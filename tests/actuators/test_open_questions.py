@@ -107,6 +107,8 @@ def test_logs_of_the_same_numbers_twice_or_of_exchanged_columns_are_refused(tmp_
     log = moves()
     with refused("E-DYN-048", "turn"):
         identify_actuators(robot(tmp_path), [replace(log, q=log.command)])
+    with refused("E-DYN-052", "turn"):
+        identify_actuators(robot(tmp_path), [replace(log, command=np.full_like(log.command, 0.5))])
     with refused("E-DYN-050", "turn"):
         identify_actuators(robot(tmp_path), [replace(log, q=-log.q)])
     commands = command(20.0, 100.0, np.random.default_rng(5))

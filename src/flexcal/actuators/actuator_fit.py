@@ -168,6 +168,12 @@ def _require_motion(model: RobotModel, logs: Sequence[CommandLog], motions: Sequ
             "E-DYN-048",
             f"the measured positions of {joint} in {logs[0].name} are the commanded ones; log what its encoder reads.",
         )
+    if (constant := np.ptp(command, axis=0) == 0).any():
+        raise FlexcalError(
+            "E-DYN-052",
+            f"the commanded positions of {model.joint_names[int(np.argmax(constant))]} in {logs[0].name} stand still while it moves; log "
+            "what its controller is asked for.",
+        )
     likeness = np.corrcoef(q.T, command.T)[: model.n, model.n :]
     for i in range(model.n):
         j = int(np.argmax(np.abs(likeness[i])))
