@@ -59,7 +59,7 @@ def test_it_comes_with_the_robot_from_then_on(arm: Path, run: Run) -> None:
     assert mass["estimate"] == pytest.approx(HELD[0], rel=0.01)
     assert mass["low"] < mass["estimate"] < mass["high"] and mass["identifiable"]
     assert document["parameters"]["payload.Iyy"] == {
-        "estimate": 0.0, "std": None, "low": None, "high": None, "truth": None, "identifiable": False,
+        "estimate": 0.0, "std": None, "low": None, "high": None, "bound": None, "truth": None, "identifiable": False,
     }  # fmt: skip
     assert any("do not determine payload.com_y" in remark for remark in document["remarks"])
     model = RobotModel.from_yaml(robot)

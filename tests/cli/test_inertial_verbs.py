@@ -74,7 +74,7 @@ def test_what_is_said_leads_on(
     quick = ("--count", "1", "--searches", "1")
     assert main(["design", "trajectory", str(robot), *quick, "--out", str(plan)]) == 0
     following = capsys.readouterr().out.splitlines()[-1]
-    words = following.partition("next: flexcal ")[2].partition(", or ")[0].split()
+    words = following.partition("next: flexcal ")[2].partition("; or ")[0].split()
     words[words.index("exciting")] = str(tmp_path / "exciting")
     assert main(words) == 0
     out = tmp_path / "inertials"
