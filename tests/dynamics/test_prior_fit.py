@@ -63,8 +63,8 @@ def reshaped(robot: RobotModel, rng: np.random.Generator) -> RobotModel:
 
 
 def with_known_constants(model: RobotModel) -> RobotModel:
-    """The robot with torques that are those measured."""
-    prior = replace(model.config.prior, torque_constant=0.0)
+    """The robot with torques that are those measured, and links of CAD's shapes."""
+    prior = replace(model.config.prior, torque_constant=0.0, inertia=0.0)
     return replace(model, config=replace(model.config, prior=prior))
 
 

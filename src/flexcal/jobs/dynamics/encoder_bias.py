@@ -12,6 +12,7 @@ import numpy as np
 
 from flexcal.data.recordings import Recording, read_recording_blocks
 from flexcal.estimation import Estimate
+from flexcal.files.transaction import FileTransaction
 from flexcal.jobs.logs import log_files, scratch_folder
 from flexcal.model.robot import RobotModel
 
@@ -66,7 +67,8 @@ def without_encoder_bias(
     moved = []
     for _ in range(_DRAWS):
         with scratch_folder() as folder:
-            copies = log_files(list(map(partial(_noisy, rng), whole, steps)), folder, "noisy")
+            with FileTransaction():  # they take their places now, not with the results
+                copies = log_files(list(map(partial(_noisy, rng), whole, steps)), folder, "noisy")
             again = refit(plain, copies, folder)
         if again.identifiable != estimate.identifiable:
             return estimate, None
