@@ -249,9 +249,9 @@ def _widened(
     That is H (f V + P) H, with H the inverse Hessian of the cost, P the prior's information and V the covariance of the scores of the data
     (J' J for the default weights, for which H is the posterior), times the reduced χ² of the `likelihood` fit, the one by the covariance
     of the measurement, where it exceeds 1. What springs are known worse by after the sandwich, a misfit where there is one, and the
-    profile likelihood is error of the
-    springs alone, independent of each other: masses and centres of mass, whose moments are known far better than each of them, stay as
-    they are correlated. Where these took up a part of the misfit they count as not identifiable. Where the torques may have another
+    profile likelihood is error of the springs alone, independent of each other: masses and centres of mass, whose moments are known far
+    better than each of them, stay as they are correlated.
+    Where these took up a part of the misfit they count as not identifiable. Where the torques may have another
     `scale`, all springs may.
     """
     problem, fitted = fit.problem, fit.estimate

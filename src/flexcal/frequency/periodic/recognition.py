@@ -122,7 +122,6 @@ class SignalSearch:
         label = RecordingLabel(poses[0], realisation, experiment, sign)
         start = recording.start + lags[best] * self._step
         phasors, last = sign * self._phasors[best], plan.settle_periods
-        phasors, last = sign * self._phasors[best], plan.settle_periods
         for _ in range(_REFINEMENTS):
             measured = self._lines(recording, start, phasors, last)
             start += self._delay(np.angle(measured), np.sqrt(np.abs(measured)), controlled=True)[0]
@@ -306,9 +305,8 @@ def on_plan(plan: MultisinePlan | TrajectoryPlan, recording: Recording, found: R
     same = abs(step / recording.time_step - 1) * count < _SAME_SAMPLES
     if same:
         first = round(first)
-        if (
-            -2 <= first < 0 and len(recording) >= count
-        ):  # the first sample is the beginning, as far as phases tell
+        # the first sample is the beginning, as far as phases tell
+        if -2 <= first < 0 and len(recording) >= count:
             first = 0
     last = first + (count - 1) * step / recording.time_step
     if first < -0.5 or last > len(recording) - 0.5:
