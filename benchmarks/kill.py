@@ -21,6 +21,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+import pinocchio
+
 from flexcal.cli.main import main as flexcal
 from flexcal.errors import InputError
 from flexcal.files.formats import read_estimates
@@ -71,6 +74,37 @@ _MOTORS = json.dumps({
     f"{joint}_joint": {"id": k, "drive_mode": 0, "homing_offset": 0, "range_min": 700, "range_max": 3300}
     for k, joint in enumerate(("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"))
 })  # fmt: skip
+_MOTORS_OF_ARM = """robot: arm.urdf
+gravity: [0, 0, -9.81]
+dynamics: {cutoff_hz: 20, decimation: 1, friction: classic}
+signals: {tau: {columns: [i1, i2], unit: A, gain: [50, 20]}}
+payload: {frame: lower, mass: 4.0, com: [0.3, 0, 0]}
+"""
+
+
+def _arm_log(payload: float) -> str:
+    """Forty seconds of the arm with two links, which holds a mass (kg) or nothing."""
+    model = pinocchio.buildModelFromUrdf(str(EXAMPLES / "servo_arm" / "arm.urdf"))
+    held = pinocchio.Inertia(payload, np.array([0.3, 0, 0.05]), 0.02 * payload * np.eye(3))
+    model.inertias[2] = model.inertias[2] + held
+    data, rng = model.createData(), np.random.default_rng(7)
+    rates, sizes, phases = (
+        2 * np.pi * 0.1 * np.array([1, 2, 3, 5, 7]),
+        rng.normal(size=(2, 5)),
+        rng.uniform(0, 6, (2, 5)),
+    )
+    rows = ["t,q1,q2,i1,i2,payload"]
+    for k in range(2000):
+        angle = rates * k / 50.0 + phases
+        q, dq, ddq = np.sum(
+            sizes * np.array([np.sin(angle), rates * np.cos(angle), -(rates**2) * np.sin(angle)]), axis=2
+        )
+        friction = [3, 1] * dq + [0.4, 0.15] * np.sign(dq)
+        currents = (pinocchio.rnea(model, data, q, dq, ddq) + friction) / [50, 20]
+        rows.append(",".join(f"{value:.9f}" for value in (k / 50.0, *q, *currents, payload)))
+    return "\n".join(rows) + "\n"
+
+
 _TRAJECTORY = "design trajectory robot.yaml --count 1 --steps 2"
 _EXCITING = (f"{_TRAJECTORY} --out trajectory.yaml", "measure trajectory.yaml --cell virtual --out exciting")
 _LOADED = (
@@ -80,8 +114,7 @@ _LOADED = (
 _FREQUENCY = ("design frequency robot.yaml --plan quick --out frequency.yaml",
               "measure frequency.yaml --cell virtual --out frequency",
               "identify response robot.yaml frequency --out responses")  # fmt: skip
-
-
+_EXCITATION = "export excitation frequency.yaml --out excitation --rate 250 --scale"
 _CALIBRATE = "calibrate robot.yaml random.csv --terms kinematic --loss"
 CASES = (
     Case("calibrate", "ur5_tracker", (f"{_CALIBRATE} squares --out out",), f"{_CALIBRATE} cauchy --out out", "out",
@@ -151,6 +184,12 @@ CASES = (
          ("estimates.yaml",)),
     Case("identify response", "tx90l", _FREQUENCY, "identify response robot.yaml frequency --out responses", "responses", ()),
     Case("identify stiffness", "tx90l", _FREQUENCY, "identify stiffness robot.yaml responses", ".", ("estimates.yaml",)),
+    Case("identify gains", "servo_arm", (), "identify gains motors.yaml free.csv loaded.csv --out gains", "gains", (),
+         {"motors.yaml": _MOTORS_OF_ARM, "free.csv": _arm_log(0), "loaded.csv": _arm_log(4)}),
+    Case("repeatability", "ur5_tracker", (f"{_CALIBRATE} squares",), "repeatability robot.yaml visits.csv --out visits", "visits", (),
+         {"visits.csv": _GRID + _GRID.split("\n", 1)[1]}),
+    Case("export excitation", "tx90l", (f"{_FREQUENCY[0]} --seed 3", f"{_EXCITATION} 0.5"), f"{_EXCITATION} 0.4", "excitation",
+         ("manifest.csv", "phases.csv", "moves.csv")),
     Case("design frequency", "tx90l", _FREQUENCY[:1], "design frequency robot.yaml --plan quick --seed 2 --out frequency.yaml", ".",
          ("frequency.yaml",)),
 )  # fmt: skip
