@@ -1,7 +1,9 @@
-"""Probability of a placement of the instrument where it was not moved."""
+"""Placement of the instrument: the probability of one that was not moved, and points on a line."""
 
 import numpy as np
+from refusals import refused
 
+from flexcal import rigid_motion
 from flexcal.calibration.verification import ErrorCovariance
 from flexcal.calibration.verification.refitted_placement import _unmoved
 
@@ -18,3 +20,12 @@ def test_the_probability_is_uniform_where_nothing_was_moved_and_small_where_some
     for share in (0.01, 0.1, 0.5):
         assert abs(np.mean(found < share) - share) < 4 * np.sqrt(share * (1 - share) / 2000)
     assert max(_unmoved(basis, own + 0.05 * basis[:, 0], covariance, 0.0) for own in errors) < 1e-3
+
+
+def test_points_on_a_line_are_said_to_be_measured_or_of_the_model() -> None:
+    rng = np.random.default_rng(5)
+    spread, line = rng.normal(size=(8, 3)), rng.normal(size=(8, 1)) * [1.0, 2.0, 0.5]
+    with refused("E-CAL-016", "line as measured"):
+        rigid_motion(spread, line, "tracker")
+    with refused("E-CAL-016", "line by the robot's model alone"):
+        rigid_motion(line, spread, "tracker")

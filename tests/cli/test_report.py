@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -65,6 +66,14 @@ def test_folders_without_anything_to_report(run, ur5_folder: Path, tmp_path: Pat
     assert_refusal(refused_run(run, tmp_path, "report", tmp_path / "measured"), "E-REPORT-009")
     (tmp_path / "measured" / "results.json").write_text("{")
     assert_refusal(refused_run(run, tmp_path, "report", tmp_path / "measured"), "E-FILE-023")
+
+
+def test_results_that_someone_changed_are_named(run, calibrated: Path) -> None:
+    results = calibrated / "results.json"
+    document = json.loads(results.read_text())
+    document["identifiability"]["selected"]["kept"][0] = "no.parameter"
+    results.write_text(json.dumps(document))
+    assert_refusal(refused_run(run, calibrated.parent, "report", calibrated), "E-CLI-009", str(results))
 
 
 def test_two_calibrations_are_compared(run, calibrated: Path, tmp_path: Path) -> None:

@@ -85,8 +85,11 @@ def rigid_motion(source: np.ndarray, target: np.ndarray, name: str = "") -> tupl
     """
     left, sizes, right = _correlation(source, target, name)
     if sizes[1] < 1e-9 * max(sizes[0], 1e-12):
+        spread = np.linalg.svd(target - np.mean(target, axis=0), compute_uv=False)
+        where = "as measured" if spread[1] < 1e-4 * max(spread[0], 1e-12) else "by the robot's model alone"
         raise FlexcalError(
-            "E-CAL-016", f"the points of station '{name}' lie on a line; measure poses distributed in space."
+            "E-CAL-016",
+            f"the points of station '{name}' lie on a line {where}; measure poses distributed in space, or correct the robot's URDF.",
         )
     return _motion(source, target, left, right)
 

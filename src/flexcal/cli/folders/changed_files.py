@@ -21,9 +21,9 @@ def stored_files(*folders: Path) -> Iterator[None]:
 
     try:
         yield
-    except FlexcalError:
+    except InputError:
         raise
-    except (*_OF_OTHER_CONTENT, UndefinedError) as problem:
+    except (FlexcalError, *_OF_OTHER_CONTENT, UndefinedError) as problem:
         changed = next((path for folder in folders for path in _changed(folder)), None)
         if changed is None:
             raise
