@@ -89,12 +89,7 @@ class SignalSearch:
         Raises `FlexcalError` where it is shorter than the plan's periods, or no signal of the plan is in its torques, or more than one.
         """
         plan = self.plan
-        if (len(recording) + 0.5) * recording.time_step < plan.duration:
-            raise FlexcalError(
-                "E-EXP-013",
-                f"{recording.name}: the log lasts {len(recording) * recording.time_step:.4g} s, less than the {plan.duration:g} s of the "
-                f"plan's {plan.periods} periods; record the whole signal.",
-            )
+        _require_whole(recording, plan)
         if plan.frequencies_hz[-1] * recording.time_step > HIGHEST:
             raise FlexcalError(
                 "E-EXP-027",
@@ -199,6 +194,16 @@ class SignalSearch:
         return float(solution[0]), float(np.sqrt(variance * np.linalg.pinv(columns.T @ columns)[0, 0]))
 
 
+def _require_whole(recording: Recording, plan: MultisinePlan | TrajectoryPlan) -> None:
+    """Raise `FlexcalError` for a recording that is shorter than the plan's periods."""
+    if (len(recording) + 0.5) * recording.time_step < plan.duration:
+        raise FlexcalError(
+            "E-EXP-013",
+            f"{recording.name}: the log lasts {len(recording) * recording.time_step:.4g} s, less than the {plan.duration:g} s of the "
+            f"plan's {plan.periods} periods; record all of them.",
+        )
+
+
 class MotionSearch:
     """Search for the trajectories of a plan in recorded positions."""
 
@@ -218,12 +223,7 @@ class MotionSearch:
         Raises `FlexcalError` where it is shorter than the plan's periods, or none of the trajectories is in it, or more than one.
         """
         plan = self.plan
-        if (len(recording) + 0.5) * recording.time_step < plan.duration:
-            raise FlexcalError(
-                "E-EXP-024",
-                f"{recording.name}: the log lasts {len(recording) * recording.time_step:.4g} s, less than the {plan.duration:g} s of the "
-                f"plan's {plan.periods} periods; record the whole motion.",
-            )
+        _require_whole(recording, plan)
         settling = plan.settle_periods / plan.base_frequency_hz
         ratio = self._step / recording.time_step
         first = np.arange(int((len(recording) - 1) / ratio) + 1)

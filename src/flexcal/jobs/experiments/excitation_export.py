@@ -111,39 +111,12 @@ def export_excitation(
     motions = None if loop is None else loop.motions
     for number, signal in enumerate(played_signals(played, whole=whole, motions=motions), start=1):
         name = _label(signal).name + ending
-        if format == "ros":
-            effort = None if loop is not None else signal.torque
-            timed = TimedPositions(
-                model.joint_names, signal.time, signal.position, signal.velocity, effort=effort
-            )
-            timed.rounded().write_ros(out / name)
-        else:
-            write_table(out / name, _columns(model, signal, torques=loop is None))
+        torque = None if loop is not None else signal.torque
+        _write(out / name, model, signal.time, signal.position, signal.velocity, torque)
         rows.append(_row(schedule, signal, name, whole) | {"sha256": sha256_of(out / name)})
         progress("signals", number / total)
     write_table(out / MANIFEST, _as_columns(rows))
-    moves, touching = [], []
-    for number, (time, q, dq) in enumerate(_moves(model, played), start=1):
-        instants = q[np.linspace(0, len(q) - 1, _MOVE_INSTANTS).astype(int)]
-        if checker.collides(instants).any() or _leaves_box(model, instants):
-            touching.append(f"{number} to {number + 1}")
-            continue
-        name = f"move_{number}{ending}"
-        if format == "ros":
-            TimedPositions(model.joint_names, time, q, dq).rounded().write_ros(out / name)
-        else:
-            write_table(out / name, {"t": time} | _numbered("q", q) | _numbered("dq", dq))
-        move = {
-            "file": name,
-            "from_pose": number,
-            "to_pose": number + 1,
-            "rate_hz": played.rate_hz,
-            "duration_s": float(time[-1]),
-            "sha256": sha256_of(out / name),
-        }
-        moves.append(move)
-    if moves:
-        write_table(out / MOVES, _as_columns(moves))
+    moves, touching = _write_moves(out, ending, model, played, checker)
     remarks = _remarks(schedule, whole)
     if touching:
         remarks.append(
@@ -155,6 +128,49 @@ def export_excitation(
             "the URDF has no collision shapes, so collisions of poses and moves are not excluded: run them in a simulator, or slowly, first"
         )
     return ExportedExcitation(out, played, tuple(rows), tuple(moves), tuple(uses.values()), tuple(remarks))
+
+
+def _write_moves(
+    out: Path, ending: str, model: RobotModel, plan: MultisinePlan, checker: CollisionChecker
+) -> tuple[list[dict[str, Any]], list[str]]:
+    """Rows of the moves that are written, with moves.csv, and which are not because something would be touched."""
+    moves, touching = [], []
+    for number, (time, q, dq) in enumerate(_moves(model, plan), start=1):
+        instants = q[np.linspace(0, len(q) - 1, _MOVE_INSTANTS).astype(int)]
+        if checker.collides(instants).any() or _leaves_box(model, instants):
+            touching.append(f"{number} to {number + 1}")
+            continue
+        name = f"move_{number}{ending}"
+        _write(out / name, model, time, q, dq)
+        move = {
+            "file": name,
+            "from_pose": number,
+            "to_pose": number + 1,
+            "rate_hz": plan.rate_hz,
+            "duration_s": float(time[-1]),
+            "sha256": sha256_of(out / name),
+        }
+        moves.append(move)
+    if moves:
+        write_table(out / MOVES, _as_columns(moves))
+    return moves, touching
+
+
+def _write(
+    file: Path,
+    model: RobotModel,
+    time: np.ndarray,
+    q: np.ndarray,
+    dq: np.ndarray,
+    torque: np.ndarray | None = None,
+) -> None:
+    """Write a motion as a trajectory of ROS, or as a table, by the name's ending."""
+    if file.suffix == _ENDINGS["ros"]:
+        TimedPositions(model.joint_names, time, q, dq, effort=torque).rounded().write_ros(file)
+    else:
+        write_table(
+            file, {"t": time} | _numbered("q", q) | _numbered("dq", dq) | _torque_columns(model, torque)
+        )
 
 
 def _require_free(checker: CollisionChecker, plan: MultisinePlan) -> None:
@@ -183,16 +199,16 @@ def _label(signal: PlayedSignal) -> RecordingLabel:
     return RecordingLabel(signal.pose, signal.realisation, signal.experiment, signal.sign)
 
 
-def _columns(model: RobotModel, signal: PlayedSignal, *, torques: bool) -> dict[str, np.ndarray]:
-    columns = {"t": signal.time} | _numbered("q", signal.position) | _numbered("dq", signal.velocity)
-    if not torques:
-        return columns
-    columns |= _numbered("tau", signal.torque)
+def _torque_columns(model: RobotModel, torque: np.ndarray | None) -> dict[str, np.ndarray]:
+    """Torques (N, n), and currents where robot.yaml has the gains; nothing without torques."""
+    if torque is None:
+        return {}
+    columns = _numbered("tau", torque)
     declared = model.config.signals.get("tau")
     if declared is not None and declared.gain is not None and declared.unit in (None, "A", "mA"):
         mapped = mapped_signals(model)["tau"]
         unit = UNITS["tau"][declared.unit or "A"]
-        currents = mapped.columns_of(signal.torque + mapped.offset)
+        currents = mapped.columns_of(torque + mapped.offset)
         columns |= {f"i{k}": _rounded(unit * values) for k, values in enumerate(currents.values(), start=1)}
     return columns
 
