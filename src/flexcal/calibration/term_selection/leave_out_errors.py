@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -104,11 +104,8 @@ def _distances(
 ) -> np.ndarray:
     """Distances (N,) of the points, of which the fit to all leaves `left` (N, 3), from their prediction without their fold (N,)."""
     errors = np.empty_like(left)
-    number, sizes = np.unique(fold, return_inverse=True, return_counts=True)[1:]
-    by_fold, first = np.argsort(number, kind="stable"), np.cumsum(sizes) - sizes
-    for size in np.unique(sizes):
-        rows = by_fold[first[sizes == size, None] + np.arange(size)]  # of all folds of this size
-        q, r = basis[rows].reshape(len(rows), 3 * size, -1), left[rows].reshape(len(rows), 3 * size, 1)
+    for rows in _folds_by_size(fold):
+        q, r = basis[rows].reshape(len(rows), 3 * rows.shape[1], -1), left[rows].reshape(len(rows), -1, 1)
         turned = q.swapaxes(1, 2)
         if q.shape[1] <= q.shape[2]:
             error = np.linalg.solve(np.eye(q.shape[1]) - q @ turned, r)
@@ -121,6 +118,14 @@ def _distances(
             shift = flat @ np.linalg.lstsq(flat, errors[rows].ravel(), rcond=1e-9)[0]
             errors[rows] -= shift.reshape(-1, 3)
     return np.linalg.norm(errors, axis=1)
+
+
+def _folds_by_size(fold: np.ndarray) -> Iterator[np.ndarray]:
+    """Rows (F, s) of all F folds that have s of them, for every s."""
+    number, sizes = np.unique(fold, return_inverse=True, return_counts=True)[1:]
+    by_fold, first = np.argsort(number, kind="stable"), np.cumsum(sizes) - sizes
+    for size in np.unique(sizes):
+        yield by_fold[first[sizes == size, None] + np.arange(size)]
 
 
 def _expected_residuals(basis: np.ndarray, variances: np.ndarray, spread: np.ndarray) -> np.ndarray:
@@ -153,10 +158,19 @@ def _expected_distances(
             whole = ((kept * variances[rows].ravel()) @ kept).reshape(len(rows), 3, len(rows), 3)
             own[rows] = whole[np.arange(len(rows)), :, np.arange(len(rows))]
     covariance = np.empty_like(own)
-    for group in np.unique(fold):
-        rows = np.flatnonzero(fold == group)
-        q = basis[rows].reshape(3 * len(rows), -1)
-        others = spread - q.T @ (variances[rows].reshape(-1, 1) * q)
-        inverse = np.linalg.inv(np.eye(q.shape[1]) - q.T @ q)
-        covariance[rows] = seen[rows] @ (inverse @ others @ inverse) @ np.swapaxes(seen[rows], 1, 2)
+    for rows in _folds_by_size(fold):
+        folds, size = rows.shape
+        q, left = (columns[rows].reshape(folds, 3 * size, -1) for columns in (basis, seen))
+        turned, known = q.swapaxes(1, 2), variances[rows].reshape(folds, 3 * size)
+        if q.shape[1] <= q.shape[2]:  # (1 - Qᵀ Q)⁻¹ = 1 + Qᵀ (1 - Q Qᵀ)⁻¹ Q
+            left = left + left @ turned @ np.linalg.solve(np.eye(q.shape[1]) - q @ turned, q)
+            itself = left @ turned
+            whole = left @ spread @ left.swapaxes(1, 2) - (itself * known[:, None]) @ itself.swapaxes(1, 2)
+            each = np.arange(size)
+            covariance[rows.T] = whole.reshape(folds, size, 3, size, 3)[:, each, :, each]
+        else:
+            others = (spread - turned @ (known[..., None] * q))[:, None]
+            left = left @ np.linalg.inv(np.eye(q.shape[2]) - turned @ q)
+            left = left.reshape(folds, size, 3, -1)
+            covariance[rows] = left @ others @ left.swapaxes(2, 3)
     return mean_distance(principal_variances(covariance + own))
