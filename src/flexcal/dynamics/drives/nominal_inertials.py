@@ -10,7 +10,7 @@ from flexcal.dynamics.estimators import noise_levels, weighted_system
 from flexcal.dynamics.inverse_model import Observation
 from flexcal.dynamics.regression import RegressionData
 from flexcal.estimation import Estimate
-from flexcal.model.robot import declared_parameter, uncertain_inertials
+from flexcal.model.robot import declared_parameter, uncertain_inertials, uncertain_tensor_entries
 
 _STEP = 1e-4
 """Step of the central differences, in estimation coordinates."""
@@ -21,7 +21,7 @@ def with_nominal_uncertainty(data: RegressionData, estimate: Estimate) -> Estima
 
     In a rigid arm the others absorb these exactly, by the regrouping. In the equation of a bearing a link also adds torque in proportion to
     the tilt and to its acceleration, too little to be told from the spring's, so that errors of CAD bias the stiffness. With δ the
-    deviations that robot.yaml's `prior:` admits (masses, centres of mass, and moments of inertia by the share of the masses), the estimate
+    deviations that robot.yaml's `prior:` admits (masses, centres of mass, and inertia tensors), the estimate
     deviates by (W_k⁺ W_d - β) δ_d, with β the regrouping (parameters considered but not estimated: Schmidt 1966). Without tilts nothing
     changes. Raises `FlexcalError` as `noise_levels` does.
     """
@@ -58,11 +58,8 @@ def _deviations(observation: Observation) -> np.ndarray:
         ]
         columns.append(item.prior_std * (ends[0] - ends[1]) / (2 * _STEP))
     names = list(observation.names)
-    for number, joint in enumerate(model.joints):
-        for axis, key in enumerate(("Ixx", "Iyy", "Izz")):
-            column = np.zeros(len(names))
-            column[names.index(f"{joint.link}.{key}")] = (
-                model.prior.mass * model.links.inertia[number, axis, axis]
-            )
-            columns.append(column)
+    for number, entry, std in uncertain_tensor_entries(model):
+        column = np.zeros(len(names))
+        column[names.index(f"{model.joints[number].link}.{entry}")] = std
+        columns.append(column)
     return np.array(columns).T

@@ -21,6 +21,7 @@ from flexcal.model.robot import (
     declared_parameter,
     uncertain_drive_gains,
     uncertain_inertials,
+    uncertain_tensor_entries,
 )
 from flexcal.model.torques import torque_regressor
 from flexcal.model.vibration import ElasticArm, periodic_torque
@@ -58,7 +59,7 @@ def unknowns(model: RobotModel) -> tuple[Parameters, tuple[str, ...]]:
     gains = uncertain_drive_gains(model, range(model.n))
     items = [*(declared_parameter(start, name) for name in (*own, *beside)), *gains]
     own += [item.name for item in gains]
-    shapes = [_tensor(model, i, entry) for i, entry, _ in _tensor_entries(model)]
+    shapes = [_tensor(model, i, entry) for i, entry, _ in uncertain_tensor_entries(model)]
     items += [
         Parameter(name, "1", 0.0, prior_std=1.0) for name in (*map(_reversal, model.joint_names), *shapes)
     ]
@@ -169,22 +170,10 @@ def _reversals(model: RobotModel, motion: PeriodicMotion) -> Iterator[tuple[str,
         yield _reversal(name), joint, motion.rows(rounded[:, joint])
 
 
-def _tensor_entries(model: RobotModel) -> Iterator[tuple[int, str, float]]:
-    """Link, entry and 1σ (kg m²) of the uncertain inertia tensors about centres of mass: moments and products to the prior's share of
-    the moments."""
-    share = model.prior.inertia
-    for i, tensor in enumerate(model.links.inertia):
-        moments = np.diag(tensor)
-        if share > 0 and model.links.mass[i] > 0 and np.all(moments > 0):
-            for entry in LINK_PARAMETERS[4:]:
-                a, b = ("xyz".index(axis) for axis in entry[1:])
-                yield i, entry, share * float(np.sqrt(moments[a] * moments[b]))
-
-
 def _tensors(model: RobotModel, motion: PeriodicMotion) -> Iterator[tuple[str, np.ndarray]]:
     """Parameter and rows (2 K + 1, n) of every uncertain entry of a tensor."""
     regressor = motion.rows(torque_regressor(model, *motion.states(SAMPLES_PER_LINE * motion.lines)))
-    for i, entry, std in _tensor_entries(model):
+    for i, entry, std in uncertain_tensor_entries(model):
         column = len(LINK_PARAMETERS) * i + LINK_PARAMETERS.index(entry)
         yield _tensor(model, i, entry), std * regressor[:, :, column]
 

@@ -61,6 +61,7 @@ from .prior_parameters import (
     uncertain_drive_gains,
     uncertain_inertials,
     uncertain_payload,
+    uncertain_tensor_entries,
 )
 from .robot_model import RobotModel
 from .stored_estimates import DECLARED, NUISANCE, PAYLOAD_FRAME, declared_sha256, with_blocks
@@ -135,6 +136,7 @@ __all__ = [
     "uncertain_drive_gains",
     "uncertain_inertials",
     "uncertain_payload",
+    "uncertain_tensor_entries",
     "unit_in",
     "unit_of",
     "unknown_parallel",

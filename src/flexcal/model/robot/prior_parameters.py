@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 
 import numpy as np
 
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter
+from flexcal.model.parts import LINK_PARAMETERS
 from flexcal.model.robot.arm_sensor import ArmSensor, mounting_names, sensitivity_name, sensor_delay_name
 from flexcal.model.robot.parameter_names import DRIVE_GAIN, GEOMETRY, spring_names, unit_in, unit_of
 from flexcal.model.robot.robot_model import RobotModel
@@ -46,6 +47,18 @@ def uncertain_inertials(model: RobotModel, links: Collection[int]) -> list[str]:
     keys = ["mass"] if model.prior.mass > 0 else []
     keys += ["com_x", "com_y", "com_z"] if model.prior.com > 0 else []
     return [f"{model.joints[i].link}.{key}" for i in sorted(links) if model.links.mass[i] > 0 for key in keys]
+
+
+def uncertain_tensor_entries(model: RobotModel) -> Iterator[tuple[int, str, float]]:
+    """Link, entry and 1σ (kg m²) of the uncertain inertia tensors about centres of mass: moments and products to the share of the moments
+    in robot.yaml's `prior:`."""
+    share = model.prior.inertia
+    for i, tensor in enumerate(model.links.inertia):
+        moments = np.diag(tensor)
+        if share > 0 and model.links.mass[i] > 0 and np.all(moments > 0):
+            for entry in LINK_PARAMETERS[4:]:
+                a, b = ("xyz".index(axis) for axis in entry[1:])
+                yield i, entry, share * float(np.sqrt(moments[a] * moments[b]))
 
 
 def uncertain_payload(model: RobotModel) -> tuple[str, ...]:
