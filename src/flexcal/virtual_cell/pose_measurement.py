@@ -30,11 +30,17 @@ class TruePoses:
 def true_poses(
     truth: RobotModel, config: CellConfig, plan: PosePlan, rng: np.random.Generator | None = None
 ) -> TruePoses:
-    """The first declared point at every pose of a plan; `rng` draws the state of a hysteretic drive (none without it)."""
+    """The first declared point at every pose of a plan.
+
+    A hysteretic drive lags behind its motor by all of its half width where the plan says from which side the joint comes; else `rng`
+    draws its state (none without it).
+    """
     import mujoco
 
     q, payload = plan.q, plan.payload
     slips = np.zeros(q.shape) if rng is None else rng.uniform(-1, 1, q.shape)
+    if plan.approach is not None:
+        slips = np.where(plan.approach == 0, slips, plan.approach)
     name = truth.point().name
     point, torque = np.empty((len(q), 3)), np.empty(q.shape)
     masses = np.zeros(len(q)) if payload is None else payload
@@ -99,4 +105,5 @@ def measured_poses(
         temperature=temperature,
         time=time,
         pose=plan.numbers,
+        approach=None if plan.approach is None else plan.approach.astype(float),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -56,7 +57,7 @@ class FolderCell:
         return (read_recording(file, self.model, label, fill=fill) for file, label in files)
 
     def measure(self, plan: PosePlan | None = None) -> PoseSet:
-        """The measured poses of `poses.csv` (or `.parquet`).
+        """The measured poses of `poses.csv` (or `.parquet`), approached as the plan says where the file does not say.
 
         Raises `InputError` where the folder holds another plan or the poses are not those of the plan, by number or by
         more than 0.1 rad (m), and as `read_poses` does.
@@ -86,6 +87,9 @@ class FolderCell:
                 f"{file}, column q{joint + 1}: measured pose {poses.pose[first[row]]} lies {apart[row, joint]:.3g} from the planned one; "
                 "measure in the order of the plan, or give the plan that was measured.",
             )
+        if poses.approach is None and own.approach is not None and len(np.unique(own.numbers)) == len(own):
+            _, begin, pose = np.unique(poses.pose, return_index=True, return_inverse=True)
+            poses = replace(poses, approach=own.approach[np.argsort(np.argsort(begin))[pose]].astype(float))
         return poses
 
     def _check_same(self, plan: Plan | None) -> None:

@@ -1,4 +1,7 @@
-"""A plan of poses as CSV: `pose`, `q1` … `qn` in rad (m where prismatic), and `payload` in kg where it is not the declared one."""
+"""A plan of poses as CSV: `pose`, `q1` … `qn` in rad (m where prismatic), and `payload` in kg where it is not the declared one.
+
+Where it says from which side the joints come, `approach1` … `approachn`, and for the robot's program the way there, `via1` … `vian`.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,12 @@ def write_pose_table(path: Path, plan: PosePlan) -> None:
     """Write the poses in their order; the plan's name and seed are left out."""
     columns = {"pose": plan.numbers}
     columns |= {f"q{i + 1}": plan.q[:, i] for i in range(plan.joint_count)}
-    write_table(path, columns if plan.payload is None else columns | {"payload": plan.payload})
+    if plan.payload is not None:
+        columns["payload"] = plan.payload
+    if plan.approach is not None:
+        columns |= {f"approach{i + 1}": plan.approach[:, i] for i in range(plan.joint_count)}
+        columns |= {f"via{i + 1}": plan.via[:, i] for i in range(plan.joint_count)}
+    write_table(path, columns)
 
 
 def read_pose_table(path: Path) -> PosePlan:
@@ -30,14 +38,16 @@ def read_pose_table(path: Path) -> PosePlan:
     """
     file = open_table(path)
     joints = tuple(f"q{i}" for i in range(1, sum(name.startswith("q") for name in file.columns) + 1))
-    for name in joints or ("q1",):
+    signs, ways = (tuple(f"{key}{i}" for i in range(1, len(joints) + 1)) for key in ("approach", "via"))
+    sided = not {*signs, *ways}.isdisjoint(file.columns)
+    for name in (*joints, *signs) if sided else joints or ("q1",):
         if name not in file.columns:
             raise file.error(
                 "E-PLAN-024",
-                f"the column '{name}' is missing; a plan of poses has pose, q1 … qn, and payload or not.",
+                f"the column '{name}' is missing; a plan of poses has pose, q1 … qn, and payload and approach1 … or not.",
             )
     for name in file.columns:
-        if name not in ("pose", "payload", *_OF_COMMANDS, *joints):
+        if name not in ("pose", "payload", *_OF_COMMANDS, *joints, *signs, *ways):
             raise file.error("E-PLAN-025", f"the column '{name}' is not known in a plan of poses; remove it.")
     texts = tuple(name for name in _OF_COMMANDS if name in file.columns)
     table = file.read(texts)
@@ -50,6 +60,7 @@ def read_pose_table(path: Path) -> PosePlan:
             payload=table.columns.get("payload"),
             name=path.stem,
             pose=pose,
+            approach=np.column_stack([table.columns[name] for name in signs]) if sided else None,
         )
     except FlexcalError as problem:
         raise InputError(problem.code, f"{path}: {problem}") from problem

@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 from flexcal.errors import FlexcalError
 
+OVERTRAVEL = np.deg2rad(2.0)
+"""Angle, rad, by which a joint moves in one direction before it stands at a pose, for gears to lie against the flank of that direction."""
+
 
 @dataclass(frozen=True, eq=False)
 class PosePlan:
@@ -27,6 +30,9 @@ class PosePlan:
         Name of the plan.
     pose : ndarray, optional
         Numbers (N,) of the poses; the same one again is another visit. By default counted from 1.
+    approach : ndarray, optional
+        Signs (N, n) of the last motion of each joint: 1 where it is to come from below, -1 from above, 0 from anywhere. The robot goes by
+        way of `via`.
     kind : {"poses"}
         Kind of the plan, in files.
 
@@ -42,6 +48,7 @@ class PosePlan:
     seed: int = 0
     name: str = "poses"
     pose: NDArray[np.int64] | None = None
+    approach: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
         q = np.asarray(self.q, dtype=np.float64)
@@ -68,6 +75,14 @@ class PosePlan:
                     "E-PLAN-030", f"pose has {pose.size} numbers for {q.shape[0]} poses; give one each."
                 )
             object.__setattr__(self, "pose", pose)
+        if self.approach is not None:
+            approach = np.asarray(self.approach)
+            if approach.shape != q.shape or not np.isin(approach, (-1, 0, 1)).all():
+                raise FlexcalError(
+                    "E-PLAN-035",
+                    "approach must be 1, -1 or 0 for every joint of every pose: the direction of its last motion, 0 for any.",
+                )
+            object.__setattr__(self, "approach", approach.astype(np.int64))
         if self.seed < 0:
             raise FlexcalError("E-PLAN-031", f"the seed is {self.seed}; it must not be negative.")
 
@@ -78,6 +93,11 @@ class PosePlan:
     def numbers(self) -> np.ndarray:
         """Number (N,) of every pose."""
         return np.arange(1, len(self) + 1) if self.pose is None else self.pose
+
+    @property
+    def via(self) -> np.ndarray:
+        """Joint positions (N, n), rad, from which the robot moves straight to each pose: the poses themselves without an `approach`."""
+        return self.q if self.approach is None else self.q - OVERTRAVEL * self.approach
 
     @property
     def joint_count(self) -> int:

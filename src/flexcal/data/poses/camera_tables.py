@@ -10,7 +10,13 @@ import numpy as np
 
 from flexcal.data import camera as camera_views  # loaded where a table has images
 from flexcal.data.poses.checks import check_same_pose
-from flexcal.data.poses.columns import first_point, payload_column, target_column, whole_numbers
+from flexcal.data.poses.columns import (
+    approach_columns,
+    first_point,
+    payload_column,
+    target_column,
+    whole_numbers,
+)
 from flexcal.data.poses.pose_set import PoseSet
 from flexcal.data.tables import Table, TableFile, assign, check_joint_units
 from flexcal.files.structuring import suggestion
@@ -39,15 +45,17 @@ def read_views(file: TableFile, model: RobotModel, further: Sequence[str] = ()) 
     """Read rows of `pose`, q1…qn and `image`, the path of an image beside the file, or of `pose`, q1…qn, `corner`, `u` and `v`, pixels.
 
     Optional are `camera`, a name under `measurements:` of robot.yaml, `station`, the place of the board or of the camera in the cell,
-    `target`, `payload`, and the `further` columns, which are not used. Raises `InputError` where robot.yaml declares no camera, for an
-    unknown one, for a corner that the board does not have, for an image that cannot be read or shows no board, for corners of which no
-    camera makes sense, for a mirrored board, and where several points may be what is seen. Views without
-    the board and blurred ones are left out, and noted.
+    `target`, `payload`, `approach1`…, and the `further` columns, which are not used. Raises `InputError` where robot.yaml declares no
+    camera, for an unknown one, for a corner that the board does not have, for an image that cannot be read or shows no board, for corners
+    of which no camera makes sense, for a mirrored board, and where several points may be what is seen. Views without the board and
+    blurred ones are left out, and noted.
     """
     images = "image" in file.columns
     texts = (*CAMERA_COLUMNS, "station", "target", *further)
     texts = tuple(dict.fromkeys(name for name in texts if name in file.columns))
-    signals = assign(file, model, ("pose", "q"), ("payload",), (*texts, *(() if images else _CORNERS)))
+    signals = assign(
+        file, model, ("pose", "q"), ("payload", "approach"), (*texts, *(() if images else _CORNERS))
+    )
     table = file.read(texts)
     values = {name: signal.values(table) for name, signal in signals.items()}
     check_joint_units(model, table, signals["q"], values["q"])
@@ -86,7 +94,7 @@ def read_views(file: TableFile, model: RobotModel, further: Sequence[str] = ()) 
             else []
         )
     poses = camera_views.view_poses(found, on_hand=camera.mounted == "hand")
-    payload = payload_column(table, signals, model)
+    payload, approach = payload_column(table, signals, model), approach_columns(table, signals)
     covariance = poses.covariance[usable]
     spread = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     return PoseSet(
@@ -104,6 +112,7 @@ def read_views(file: TableFile, model: RobotModel, further: Sequence[str] = ()) 
         covariance=covariance,
         camera=np.full(len(rows), name),
         by_lens=poses.by_lens[usable],
+        approach=None if approach is None else approach[rows],
         lenses={name: camera_views.Lens(found.lens, found.covariance)},
         notes=tuple(notes),
     )

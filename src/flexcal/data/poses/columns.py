@@ -43,6 +43,24 @@ def payload_column(table: Table, signals: dict[str, Signal], model: RobotModel) 
     return payload[:, 0]
 
 
+def approach_columns(table: Table, signals: dict[str, Signal]) -> np.ndarray | None:
+    """Signs (N, n) of the joints' last motions, where there are such columns; raises `InputError` at the first that is none."""
+    if "approach" not in signals:
+        return None
+    signs = signals["approach"].values(table)
+    wrong = ~np.isin(signs, (-1.0, 0.0, 1.0))
+    if wrong.any():
+        row, joint = (int(i) for i in np.argwhere(wrong)[0])
+        raise table.error(
+            "E-POSES-084",
+            row,
+            signals["approach"].column_of(joint),
+            f"approach is {signs[row, joint]:g}, but must be 1 or -1, the direction of the joint's last motion, or 0 where it is not "
+            "known; correct it.",
+        )
+    return signs
+
+
 def target_column(table: Table, model: RobotModel) -> np.ndarray:
     """Names (N,) of points; raises `InputError` at the first that robot.yaml does not have."""
     target = table.columns["target"]

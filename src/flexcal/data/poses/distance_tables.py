@@ -9,6 +9,7 @@ import numpy as np
 
 from flexcal.data.poses.checks import check_metres, check_same_pose
 from flexcal.data.poses.columns import (
+    approach_columns,
     check_noise,
     check_positive,
     first_point,
@@ -46,8 +47,8 @@ def read_distances(file: TableFile, model: RobotModel, further: Sequence[str] = 
     """Read rows of q1…qn with `length` (m) of a draw-wire, or `touched`, the name of a face, with the `reading` (m) of a dial gauge.
 
     Names are those under `measurements:` of robot.yaml; with several wires a column `wire` names them. Optional are `pose`, `target`,
-    `sigma`, `payload`, `temperature`, `t` and `tau1`…, and the `further` columns, which are not used. Raises `InputError` where robot.yaml
-    declares no such instrument, for an unknown name, and for columns of both.
+    `sigma`, `payload`, `temperature`, `t`, `tau1`… and `approach1`…, and the `further` columns, which are not used. Raises `InputError`
+    where robot.yaml declares no such instrument, for an unknown name, and for columns of both.
     """
     touched = TOUCHED in file.columns
     if touched and (measured := {LENGTH, "x", "y", "z"} & set(file.columns)):
@@ -63,7 +64,8 @@ def read_distances(file: TableFile, model: RobotModel, further: Sequence[str] = 
     texts = tuple(name for name in (name_column, "target", *further) if name in file.columns)
     texts = tuple(dict.fromkeys(texts))
     value = READING if touched else LENGTH
-    optional = ("pose", "tau", "payload", "sigma", "temperature", "t", *((READING,) if touched else ()))
+    optional = ("pose", "tau", "payload", "approach", "sigma", "temperature", "t")
+    optional = (*optional, READING) if touched else optional
     signals = assign(file, model, ("q", *(() if touched else (LENGTH,))), optional, texts)
     stamps = timestamp_columns(signals)
     (table,) = with_seconds([file.read((*texts, *stamps))], stamps)
@@ -97,6 +99,7 @@ def read_distances(file: TableFile, model: RobotModel, further: Sequence[str] = 
         time=values["t"][:, 0] if "t" in values else None,
         pose=np.arange(1, rows + 1) if pose is None else pose,
         kind=kind,
+        approach=approach_columns(table, signals),
         sigma_given=sigma is not None,
     )
     check_same_pose(poses.pose, poses.q, table)

@@ -14,6 +14,7 @@ from flexcal.data.poses.camera_tables import CAMERA_COLUMNS, measures_images, re
 from flexcal.data.poses.candidate_pool import PosePool
 from flexcal.data.poses.checks import check_metres, check_motion, check_same_pose
 from flexcal.data.poses.columns import (
+    approach_columns,
     check_noise,
     first_point,
     payload_column,
@@ -53,7 +54,7 @@ if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
 
 _NUMBERS = (
-    "quaternion", "sigma", "sigma_xyz", "sigma_angle", "tau", "payload", "force", "temperature", "t", *BASE,
+    "quaternion", "sigma", "sigma_xyz", "sigma_angle", "tau", "payload", "force", "approach", "temperature", "t", *BASE,
 )  # fmt: skip
 _TEXTS = ("target", "station")
 _TEXT_COLUMNS = (*_TEXTS, *SOCKET_COLUMNS, HOLDER, *CAMERA_COLUMNS, WIRE, TOUCHED, INCLINOMETER)
@@ -148,6 +149,7 @@ def read_pose_pool(path: str | Path, model: RobotModel) -> PosePool:
     limits, and for payloads that differ.
     """
     file, _ = without_excluded(open_table(path))
+    file = _without_ways(file, model)
     texts = tuple(name for name in _TEXTS if name in file.columns)
     signals = assign(file, model, ("pose", "q"), (*_NUMBERS, "xyz", "length"), texts)
     stamps = timestamp_columns(signals)
@@ -188,6 +190,8 @@ def write_poses(path: str | Path, poses: PoseSet) -> None:
         vectors.append(("force", poses.force))
     if poses.torque is not None:
         vectors.append(("tau", poses.torque))
+    if poses.approach is not None:
+        vectors.append(("approach", poses.approach))
     for quantity, values in vectors:
         if not np.isfinite(values).all():
             row = int(np.argmin(np.isfinite(values).all(axis=1)))
@@ -250,6 +254,7 @@ def _named_texts(file: TableFile, further: Sequence[str]) -> tuple[str, ...]:
 
 def _read(path: Path, model: RobotModel, further: tuple[str, ...]) -> PoseSet:
     file, excluded = without_excluded(open_table(path))
+    file = _without_ways(file, model)
     # a quantity of the file is read as such, even if its values group the measurements
     quantities = {column for name in (*UNITS, "pose") for column in standard_columns(name, model.n)}
     quantities |= {column for signal in model.config.signals.values() for column in signal.columns}
@@ -260,6 +265,12 @@ def _read(path: Path, model: RobotModel, further: tuple[str, ...]) -> PoseSet:
     if remarks:
         excluded = (*excluded, f"{path.name}: the texts in {', '.join(remarks)} are not used")
     return replace(poses, notes=(*poses.notes, *excluded)) if excluded else poses
+
+
+def _without_ways(file: TableFile, model: RobotModel) -> TableFile:
+    """File without the columns by which a plan leads the robot to its poses."""
+    ways = {f"via{i + 1}" for i in range(model.n)}
+    return file.leaving_out([*file.unread, *(name for name in file.columns if name in ways)])
 
 
 def _remarks(file: TableFile, known: Collection[str]) -> list[str]:
@@ -316,6 +327,7 @@ def _read_kind(file: TableFile, model: RobotModel, further: tuple[str, ...]) -> 
         else None,
         orientation_sigma=values["sigma_angle"][:, 0] if "sigma_angle" in values else None,
         force=values.get("force"),
+        approach=approach_columns(table, signals),
         sigma_given=sigma is not None,
     )
     check_same_pose(poses.pose, poses.q, table)

@@ -77,6 +77,9 @@ class PoseSet:
         Names (N,) under `measurements:` of the fixtures with these sockets; empty where an instrument measured.
     force : ndarray, optional
         Known forces (N, 3) on the measured points, N in the base frame, as of a wire that pulls; zero where there are none.
+    approach : ndarray, optional
+        Sign (N, n) of the last motion of each joint before it stood still: 1 where it came from below, -1 from above, 0 where that is not
+        known.
     notes : tuple of str
         What was left out or turned when the measurements were read, and why.
     sigma_given : bool
@@ -111,6 +114,7 @@ class PoseSet:
     socket: np.ndarray | None = None
     holder: np.ndarray | None = None
     force: np.ndarray | None = None
+    approach: np.ndarray | None = None
     notes: tuple[str, ...] = ()
     sigma_given: bool = True
     unstated: np.ndarray | None = None
@@ -178,6 +182,7 @@ class PoseSet:
             "socket": (n_rows,),
             "holder": (n_rows,),
             "force": (n_rows, 3),
+            "approach": (n_rows, n),
             "unstated": (n_rows,),
         }
         for name, shape in shapes.items():
@@ -342,7 +347,8 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
 
     Where a later set uses a pose number again, its numbers are shifted past the largest so far. Raises `FlexcalError`
     where there is nothing to join, joint counts differ, or only some sets have torques, payload, temperature or time, or some points of an
-    instrument a sigma: sockets, lengths and contacts without one are `unstated` beside those. Orientations are NaN where a set has none.
+    instrument a sigma: sockets, lengths and contacts without one are `unstated` beside those. Orientations are NaN where a set has none,
+    and the sides from which joints came are not known (0) there.
     """
     if not sets:
         raise FlexcalError("E-POSES-023", "there are no poses to join; give at least one set.")
@@ -373,6 +379,10 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
                     _absent(entry.name, len(s)) if getattr(s, entry.name) is None else getattr(s, entry.name)
                     for s in sets
                 ]
+            )
+        elif entry.name == "approach" and any(present):
+            joined[entry.name] = np.concatenate(
+                [np.zeros(s.q.shape) if s.approach is None else s.approach for s in sets]
             )
         elif entry.name == "orientation_sigma" and any(present):
             joined[entry.name] = _orientation_sigmas(sets)

@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.data.poses.columns import first_point, payload_column, target_column, whole_numbers
+from flexcal.data.poses.columns import (
+    approach_columns,
+    first_point,
+    payload_column,
+    target_column,
+    whole_numbers,
+)
 from flexcal.data.poses.pose_set import DEFAULT_SIGMA, PoseSet
 from flexcal.data.tables import Table, TableFile, assign, check_joint_units
 from flexcal.files.structuring import suggestion
@@ -26,7 +32,7 @@ def measures_sockets(file: TableFile) -> bool:
 
 
 def read_sockets(file: TableFile, model: RobotModel, further: Sequence[str] = ()) -> PoseSet:
-    """Read rows of `fixture`, `socket` and q1…qn; optional are `holder`, `pose`, `target`, `payload` and `tau1`…, and
+    """Read rows of `fixture`, `socket` and q1…qn; optional are `holder`, `pose`, `target`, `payload`, `tau1`… and `approach1`…, and
     the `further` columns, which are not used.
 
     `fixture` is any name of the place where the fixture stood, `socket` a name under `measurements:` of robot.yaml, `holder` that of
@@ -37,7 +43,7 @@ def read_sockets(file: TableFile, model: RobotModel, further: Sequence[str] = ()
     declared = _declared(file, model)
     texts = (*SOCKET_COLUMNS, *(name for name in (HOLDER, "target", *further) if name in file.columns))
     texts = tuple(dict.fromkeys(texts))
-    signals = assign(file, model, ("q",), ("pose", "tau", "payload"), texts)
+    signals = assign(file, model, ("q",), ("pose", "tau", "payload", "approach"), texts)
     table = file.read(texts)
     values = {name: signal.values(table) for name, signal in signals.items()}
     check_joint_units(model, table, signals["q"], values["q"])
@@ -79,6 +85,7 @@ def read_sockets(file: TableFile, model: RobotModel, further: Sequence[str] = ()
         pose=pose,
         socket=socket,
         holder=holder,
+        approach=approach_columns(table, signals),
         sigma_given=False,
     )
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexcal.data.poses.checks import check_same_pose
-from flexcal.data.poses.columns import check_noise, payload_column, whole_numbers
+from flexcal.data.poses.columns import approach_columns, check_noise, payload_column, whole_numbers
 from flexcal.data.poses.pose_set import DIRECTION, PoseSet
 from flexcal.data.tables import Table, TableFile, assign, check_joint_units, timestamp_columns, with_seconds
 from flexcal.files.structuring import suggestion
@@ -38,8 +38,8 @@ def read_tilts(file: TableFile, model: RobotModel, further: Sequence[str] = ()) 
     """Read rows of q1…qn with one or more of `tilt_x`, `tilt_y`, `tilt_z` (rad, or 1 where robot.yaml says `reads: component`).
 
     With several inclinometers under `measurements:` of robot.yaml a column `inclinometer` names them. Optional are `pose`, `payload`,
-    `sigma_angle`, `temperature`, `t` and `tau1`…, and the `further` columns, which are not used. Raises `InputError` where robot.yaml
-    declares no inclinometer, for an unknown name, for columns of another instrument, and for readings that its axes cannot have.
+    `sigma_angle`, `temperature`, `t`, `tau1`… and `approach1`…, and the `further` columns, which are not used. Raises `InputError` where
+    robot.yaml declares no inclinometer, for an unknown name, for columns of another instrument, and for readings that its axes cannot have.
     """
     if measured := {"x", "y", "z", "length", "touched", "fixture", "image"} & set(file.columns):
         raise file.error(
@@ -47,7 +47,7 @@ def read_tilts(file: TableFile, model: RobotModel, further: Sequence[str] = ()) 
             f"there are both tilts and {', '.join(sorted(measured))}; give every instrument a file of its own.",
         )
     texts = tuple(dict.fromkeys(n for n in (INCLINOMETER, *further) if n in file.columns))
-    optional = (*TILTS, "pose", "tau", "payload", "sigma_angle", "temperature", "t")
+    optional = (*TILTS, "pose", "tau", "payload", "approach", "sigma_angle", "temperature", "t")
     signals = assign(file, model, ("q",), optional, texts)
     stamps = timestamp_columns(signals)
     (table,) = with_seconds([file.read((*texts, *stamps))], stamps)
@@ -88,6 +88,7 @@ def read_tilts(file: TableFile, model: RobotModel, further: Sequence[str] = ()) 
         orientation_sigma=sigma if given else None,
         kind=np.full(rows, DIRECTION),
         tilt=tilt,
+        approach=approach_columns(table, signals),
         sigma_given=given,
     )
 

@@ -22,7 +22,7 @@ from flexcal.units import COLDEST, DEGREE, HOTTEST, INCH, MILLIMETRE, temperatur
 if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel, SignalConfig
 
-JOINT_QUANTITIES = ("q", "dq", "ddq", "tau", "qa", "qax", "qay", "dqa", "tau_ext", "qc")
+JOINT_QUANTITIES = ("q", "dq", "ddq", "tau", "qa", "qax", "qay", "dqa", "tau_ext", "qc", "approach")
 """Quantities with one column a joint, numbered from 1."""
 VECTORS = {
     "xyz": ("x", "y", "z"),
@@ -55,6 +55,7 @@ UNITS: dict[str, dict[str, float]] = {
     "moment": {"N m": 1.0, "Nm": 1.0},
     "payload": {"kg": 1.0, "g": 1e-3},
     "quaternion": {},
+    "approach": {},
     "base_quaternion": {},
     "sigma_angle": {"rad": 1.0, "deg": DEGREE},
     **dict.fromkeys(("tilt_x", "tilt_y", "tilt_z"), _TILT),

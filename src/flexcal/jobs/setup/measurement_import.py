@@ -61,6 +61,7 @@ _POSES = (
     "sigma",
     "sigma_xyz",
     "tau",
+    "approach",
     "payload",
     "temperature",
     "t",
