@@ -32,6 +32,9 @@ from flexcal.printable import quoted
 from flexcal.units import MILLIMETRE
 
 Planned = TypeVar("Planned")
+_APPROACHED = (
+    ", approached from both sides by way of points 2° before them (approach1… and via1… of a plan in CSV)"
+)
 _UNSEEN = 0.1
 """Share of the error from noise above which an error that no reading tells is said."""
 
@@ -131,7 +134,7 @@ class DesignPoses:
             seed=self.seed,
             command=command_line(),
         )
-        console.say(f"wrote {self.out}: {self.count} random poses")
+        console.say(f"wrote {self.out}: {self.count} random poses{_APPROACHED}")
         console.finish(
             drawn.document(),
             f"{measure_command(self.out, self.robot, 'unseen')}{import_command(self.robot, 'unseen.csv')}",
@@ -195,7 +198,7 @@ class DesignPoses:
             f"the moves between them take {document['moves_s']:.1f} s or more"
             + (f"; the straight joint motion from {ways} collides: add via points" if blocked else "")
         )
-        console.say(f"wrote {self.out}: {document['poses']} poses")
+        console.say(f"wrote {self.out}: {document['poses']} poses{_APPROACHED}")
         then = "" if prior is None else f"; then flexcal calibrate with --prior {quoted(prior['file'])}"
         console.finish(
             document,
@@ -226,7 +229,7 @@ class DesignPoses:
             f"after {document['poses']} more it is {reached:.4f} mm"
             + (f": then stop, {aim}" if stop is not None else "; more poses are needed")
         )
-        console.say(f"wrote {self.out}: the next {document['poses']} poses, best first")
+        console.say(f"wrote {self.out}: the next {document['poses']} poses, best first{_APPROACHED}")
         console.finish(
             document,
             f"{measure_command(self.out, self.robot, 'more')}{import_command(self.robot, 'more.csv')}",

@@ -1,4 +1,5 @@
 from .accuracy_curve import PoseCurve, pose_curve
+from .approaches import blocked_ways, crossed_approaches
 from .candidate_blocks import BLOCK, BlockedCandidates, ChosenOfBlock
 from .candidates import random_candidates, usable
 from .feasibility import PoseCandidates, pose_candidates
@@ -40,8 +41,10 @@ __all__ = [
     "PoseDesign",
     "WorkingVolume",
     "base_sensitivity",
+    "blocked_ways",
     "choose_poses",
     "criterion_named",
+    "crossed_approaches",
     "enough_with_prior",
     "fewest_poses",
     "geometry_jacobian",

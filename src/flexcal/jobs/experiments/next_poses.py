@@ -20,7 +20,14 @@ from flexcal.jobs.experiments.candidate_poses import (
     PoseRequest,
     PoseRequestFiles,
 )
-from flexcal.jobs.experiments.poses import flank_block, plan_page, pool_block, working_block
+from flexcal.jobs.experiments.poses import (
+    approach_block,
+    flank_block,
+    plan_page,
+    pool_block,
+    with_approaches,
+    working_block,
+)
 from flexcal.jobs.inputs import robot_provenance
 from flexcal.jobs.pages import PlottedResult
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord
@@ -101,6 +108,7 @@ class DesignedNextPoses(PlottedResult):
                 "stop_after": self.stop,
                 "working": working_block(self.working),
                 "flanks": flank_block(design),
+                "approaches": {} if self.plan is None else approach_block(self.model, self.plan),
                 "tool_error_mm": poses.tool_error / MILLIMETRE,
                 "least_possible_mm": poses.possible / MILLIMETRE,
                 **self.record.document(),
@@ -161,7 +169,7 @@ def _designed(
     stop, plan = after.enough(request.desired_error), None
     if stop != 0:
         design = after.design.in_order(np.arange(request.count if stop is None else stop))
-        plan = replace(design.plan, name="calibration")
+        plan = with_approaches(choice.checker, replace(design.plan, name="calibration"), request.seed)
         after = replace(after, design=design)
     model = choice.checker.model
     return DesignedNextPoses(

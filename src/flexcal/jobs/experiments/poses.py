@@ -20,7 +20,9 @@ from flexcal.design.poses import (
     PoseCurve,
     PoseDesign,
     WorkingVolume,
+    blocked_ways,
     choose_poses,
+    crossed_approaches,
     enough_with_prior,
     fewest_poses,
     measurement_order,
@@ -29,7 +31,7 @@ from flexcal.design.poses import (
     tool_error,
     zero_stds,
 )
-from flexcal.design.scene import MeasuringSetup
+from flexcal.design.scene import CollisionChecker, MeasuringSetup
 from flexcal.errors import naming
 from flexcal.jobs.experiments.candidate_poses import (
     DEFAULT_REQUEST,
@@ -55,11 +57,12 @@ _FEW = 1000
 
 @dataclass(frozen=True, eq=False)
 class RandomPoses:
-    """Plan of random poses for a verification, with its file, random seed and provenance."""
+    """Plan of random poses for a verification, with its file, random seed, sides of `approach_block` and provenance."""
 
     plan: PosePlan
     file: Path
     seed: int
+    approaches: dict[str, dict[str, int]]
     record: RunRecord
 
     def document(self) -> dict[str, Any]:
@@ -68,6 +71,7 @@ class RandomPoses:
             "plan": self.file,
             "poses": len(self.plan),
             "seed": self.seed,
+            "approaches": self.approaches,
             **self.record.document(),
         }
 
@@ -183,6 +187,7 @@ class DesignedPoses(PlottedResult):
                 "criteria": design.criteria,
                 "identifiability": identifiability_block(design.identifiability),
                 "flanks": flank_block(design),
+                "approaches": approach_block(self.model, self.plan),
                 "moves_s": float(self.way.seconds.sum()),
                 "blocked_moves": [[int(i) + 1, int(i) + 2] for i in np.flatnonzero(self.way.blocked)],
                 "prior": self._prior(),
@@ -247,6 +252,20 @@ def flank_block(design: PoseDesign) -> dict[str, dict[str, int]]:
     }
 
 
+def with_approaches(checker: CollisionChecker, plan: PosePlan, seed: int) -> PosePlan:
+    """Plan whose poses the joints come to from both sides, by the `seed`."""
+    return replace(plan, approach=crossed_approaches(checker, plan, np.random.default_rng([seed, 11])))
+
+
+def approach_block(model: RobotModel, plan: PosePlan) -> dict[str, dict[str, int]]:
+    """Number of poses to which every joint comes in its positive and in its negative direction."""
+    sides = np.zeros(plan.q.shape) if plan.approach is None else plan.approach
+    return {
+        joint.name: {"positive": int(np.sum(side > 0)), "negative": int(np.sum(side < 0))}
+        for joint, side in zip(model.motor_joints, sides.T, strict=True)
+    }
+
+
 def working_block(working: WorkingVolume | None) -> dict[str, Any] | None:
     """Working volume for which the tool error counts; None for anywhere."""
     if working is None:
@@ -304,7 +323,8 @@ def _designed(
     way = measurement_order(choice.checker, design.plan.q)
     design = design.in_order(way.order)
     curve = pose_curve(design, rng=np.random.default_rng([request.seed, 5]), progress=progress)
-    plan = replace(design.plan, name="calibration")
+    plan = with_approaches(choice.checker, replace(design.plan, name="calibration"), request.seed)
+    way = replace(way, blocked=blocked_ways(choice.checker, plan))
     designed = DesignedPoses(
         choice.checker.model, plan, design, curve, way, request.seed, choice.working, choice.pool
     )
@@ -366,9 +386,12 @@ def plan_verification_poses(
     """Draw `count` random verification poses over the whole workspace, and write the plan to `out` with its page beside it."""
     model = RobotModel.from_yaml(robot_file)
     setup = MeasuringSetup.declared(model, payload)
-    plan = random_poses(model, count, np.random.default_rng([seed, 4]), setup)
-    plan = replace(plan, name=VERIFICATION)
-    result = RandomPoses(plan, out, seed, RunRecord(robot_provenance(model), command))
+    checker = CollisionChecker(model)
+    plan = random_poses(model, count, np.random.default_rng([seed, 4]), setup, checker=checker)
+    plan = with_approaches(checker, replace(plan, name=VERIFICATION), seed)
+    result = RandomPoses(
+        plan, out, seed, approach_block(model, plan), RunRecord(robot_provenance(model), command)
+    )
     write_plan(out, plan)
     write_page(page_beside(out), plan_page(model, plan, result.document(), None))
     return result
