@@ -8,13 +8,14 @@ from flexcal.calibration.error_model import joint_rotation_jacobian
 from flexcal.calibration.measurement import (
     Propagation,
     covariance_root,
+    lag_rms,
     moving_parameters,
     predict_measurements,
 )
 from flexcal.data.poses import PoseSet
-from flexcal.model.robot import MASS_AND_COM
+from flexcal.model.robot import HYSTERESIS, MASS_AND_COM
 
-PARAMETERS = ("geometry", "backlash", "springs", "link masses", "payload", "instrument's place")
+PARAMETERS = ("geometry", "backlash", HYSTERESIS, "springs", "link masses", "payload", "instrument's place")
 REPEATABILITY, MODEL_ERROR = "repeatability", "model error"
 SOURCES = (*PARAMETERS, REPEATABILITY, MODEL_ERROR)
 
@@ -30,22 +31,26 @@ def source_of(name: str) -> str:
         return "springs"
     if key in MASS_AND_COM:
         return "link masses"
-    return "backlash" if key == "backlash" else "geometry"
+    return key if key in ("backlash", HYSTERESIS) else "geometry"
 
 
 def error_sources(reach: Propagation, q: np.ndarray) -> dict[str, np.ndarray]:
     """Fraction by which the variance of the tool's error at poses `q` (N, n) falls if one kind of parameter is known exactly.
 
     (N,) between 0 and 1 for each of the `SOURCES` that were estimated; the variance of the others given these is Gaussian conditioning.
-    Where kinds are correlated the shares do not add up to one.
+    Hysteresis is known exactly where its width is and the side from which a joint comes. Where kinds are correlated the shares do not add
+    up to one.
     """
     model, size = reach.model, len(q)
     names = [n for n in moving_parameters(model) if model.posterior.determines(n)]
     root = covariance_root(model, names)
     at = predict_measurements(model, PoseSet.unmeasured(q, reach.target, reach.station, 1.0), jacobians=True)
     roots = at.jacobian(names) @ root
-    turned = (joint_rotation_jacobian(at) ** 2).sum(axis=(1, 2))
+    turns = joint_rotation_jacobian(at)
+    lag = lag_rms(model)[[i for i in model.motors if model.joints[i].kind == "revolute"]]
+    turned = (turns**2).sum(axis=(1, 2))
     scatter = {
+        HYSTERESIS: ((lag * turns) ** 2).sum(axis=(1, 2)),
         REPEATABILITY: 3 * model.value("scatter.robot") ** 2 + model.value("scatter.angular") ** 2 * turned,
         MODEL_ERROR: np.full(size, 3 * model.value("scatter.model") ** 2),
     }
@@ -57,7 +62,9 @@ def error_sources(reach: Propagation, q: np.ndarray) -> dict[str, np.ndarray]:
             # what knowing the kind takes away: the part of the root's columns that its rows span
             basis = np.linalg.svd(root[kinds == kind] / _sizes(root[kinds == kind]), full_matrices=False)[2]
             shares[kind] = ((roots @ basis.T) ** 2).sum(axis=(1, 2)) / variance
-    return shares | {kind: own / variance for kind, own in scatter.items() if own.any()}
+    return shares | {
+        kind: own / variance + shares.get(kind, 0.0) for kind, own in scatter.items() if own.any()
+    }
 
 
 def _sizes(rows: np.ndarray) -> np.ndarray:

@@ -32,6 +32,7 @@ from flexcal.calibration.fit.terms import (
     LEAST_POSES,
     declared_size,
     geometric_parameters,
+    lag_parameters,
     plausible_size,
     random_waves,
 )
@@ -236,10 +237,11 @@ class PointFit:
 
     @property
     def free(self) -> Parameters:
-        """Parameters determined by rank or a declared prior, and scales that other lengths tell."""
+        """Parameters determined by rank or a declared prior, scales that other lengths tell, and hysteresis of joints."""
         kept = self.identifiability.kept_names
         geometric = Parameters(p for p in self.geometric if p.name in kept or np.isfinite(p.prior_std))
-        return geometric + Parameters(self._scales[int(self._size_is_a_scale) :])
+        scales = Parameters(self._scales[int(self._size_is_a_scale) :])
+        return geometric + scales + lag_parameters(self.start, self.poses)
 
     @cached_property
     def _beginning(self) -> dict[str, float]:

@@ -8,7 +8,7 @@ from .prediction import (
     predicted_positions,
     require_points,
 )
-from .propagated_covariance import Propagation, covariance_root, moving_parameters, propagation
+from .propagated_covariance import Propagation, covariance_root, lag_rms, moving_parameters, propagation
 from .readings import METRES, OF_INSTRUMENTS, RADIANS, ROBOT, Readings, kind_names, stated_sigma
 from .registration import register, require_orientations, with_target_axes
 from .unknown_load import sag_columns, with_load_at
@@ -25,6 +25,7 @@ __all__ = [
     "ambiguous_poses",
     "covariance_root",
     "kind_names",
+    "lag_rms",
     "moving_parameters",
     "predict_measurements",
     "predicted_positions",

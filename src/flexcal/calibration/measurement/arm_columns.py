@@ -15,6 +15,7 @@ from flexcal.model.kinematics import PointKinematics, relative_motion
 from flexcal.model.robot import (
     EXPANSION,
     GEOMETRY,
+    HYSTERESIS,
     LATERAL,
     LINK_EXPANSION,
     ORIGIN,
@@ -145,6 +146,14 @@ class ArmColumns:
         joint = self.at.model.joint_index(owner)
         return self.at.by_row(rise_of(self.at))[:, None] * self._by_motion[:, :, joint, 2]
 
+    def _lagging(self, owner: str, key: str) -> np.ndarray:
+        model, approach = self.at.model, self.at.poses.approach
+        joint = model.joint_index(owner)
+        if approach is None:
+            return np.zeros((len(self.at.readings.row), 3))
+        side = self.at.by_row(approach[:, model.motors.index(joint)])
+        return -side[:, None] * self._by_motion[:, :, joint, 2]
+
     def _expanded(self, owner: str, key: str) -> np.ndarray:
         return expansion_column(self.at, f"{owner}.{key}")
 
@@ -214,5 +223,6 @@ _BY_KEY: Mapping[str, Callable[[ArmColumns, str, str], np.ndarray]] = {
     EXPANSION.rpartition(".")[2]: ArmColumns._expanded,
     LINK_EXPANSION: ArmColumns._expanded,
     ZERO_DRIFT: ArmColumns._drifted,
+    HYSTERESIS: ArmColumns._lagging,
     **dict.fromkeys(STATION_DRIFT, ArmColumns._shifted_station),
 }

@@ -263,6 +263,7 @@ def predict_measurements(
         jacobians=jacobians,
         force=poses.force,
         temperature=poses.temperature,
+        approach=poses.approach,
     )
     if not np.isfinite(tool.kinematics.position).all():
         pose = poses.pose[int(np.argmin(np.isfinite(tool.kinematics.position).all(axis=1)))]

@@ -19,6 +19,7 @@ from flexcal.model.parts import LOOP, left_jacobian, vector_rotation
 from flexcal.model.robot import (
     EXPANSION,
     GEOMETRY,
+    HYSTERESIS,
     LATERAL,
     LINK_EXPANSION,
     MASS_AND_COM,
@@ -43,7 +44,17 @@ from flexcal.model.statics import (
 )
 
 _THERMAL = (EXPANSION.rpartition(".")[2], LINK_EXPANSION, ZERO_DRIFT, *STATION_DRIFT)
-_GEOMETRIC = (*GEOMETRY, *ORIGIN, *LOOP, *STATION, "backlash", "gravity_compliance", *LATERAL, *_THERMAL)
+_GEOMETRIC = (
+    *GEOMETRY,
+    *ORIGIN,
+    *LOOP,
+    *STATION,
+    "backlash",
+    HYSTERESIS,
+    "gravity_compliance",
+    *LATERAL,
+    *_THERMAL,
+)
 
 
 def moving_parameters(model: RobotModel, *, elastic: bool = True) -> list[str]:
@@ -58,6 +69,20 @@ def covariance_root(model: RobotModel, names: list[str]) -> np.ndarray:
     parameters = model.posterior.parameters.subset(names)
     slopes = parameters.natural_slope(parameters.coordinates())
     return slopes[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+
+
+def lag_rms(model: RobotModel) -> np.ndarray:
+    """Root mean square (joints,), rad, by which each joint is off the middle of its hysteresis where nobody knows from which side it comes.
+
+    √(h² + σ²) of what its calibration, or its prior, has of half the width h; zero where it is in the scatter of the poses, because no
+    calibration pose says from which side it was approached.
+    """
+    names = [f"{joint.name}.{HYSTERESIS}" for joint in model.joints]
+    known = [i for i, name in enumerate(names) if model.posterior.determines(name)]
+    squares = np.zeros(len(names))
+    for i in known:
+        squares[i] = model.value(names[i]) ** 2 + model.posterior.marginal([names[i]])[0, 0]
+    return np.sqrt(squares)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +105,9 @@ class Propagation:
     def roots(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points (N, 3) m at `q` (N, n), and roots A (N, 3, k) m: A Aᵀ is the covariance of the point's error.
 
-        Columns are those of the parameters, then those of the scatter, where there is any: repeatability at every joint, repeatability and
-        model error of the coordinates. Both in the base frame, as an instrument at the station finds them, without its own noise.
+        Columns are those of the parameters, then those of the scatter, where there is any: repeatability at every joint,
+        hysteresis of the joints, repeatability and model error of the coordinates. Both in the base frame, as an instrument at the station
+        finds them, without its own noise.
         Derivatives are those of the undeflected arm: they differ by its deflection angles, some 1e-3 of them.
         """
         model, axes = self.model, np.array(elastic_axes(self.model), dtype=int).reshape(-1, 2)
@@ -120,6 +146,9 @@ class Propagation:
         if angular > 0:
             revolute = [6 * i for i in model.motors if model.joints[i].kind == "revolute"]
             columns.append(angular * by_geometry[:, :, revolute])
+        lag = lag_rms(model)
+        if lag.any():
+            columns.append(by_geometry[:, :, [6 * i for i in np.flatnonzero(lag)]] * lag[lag > 0])
         size = np.hypot(model.value("scatter.robot"), model.value("scatter.model"))
         if size > 0:
             columns.append(np.broadcast_to(size * np.eye(3), (len(by_geometry), 3, 3)))
@@ -142,7 +171,7 @@ class Propagation:
                 columns[:, k] = twist_by_hardening(twist, hardening)
             elif kind == ZERO_DRIFT:
                 columns[:, k] = self.rise
-            elif kind in LATERAL:
+            elif kind in (*LATERAL, HYSTERESIS):
                 columns[:, k] = 0.0
             else:
                 columns[:, k] = transmission_column(self.model, q, joint, kind)
@@ -281,7 +310,7 @@ def propagation(
 
 def _twisting(model: RobotModel, name: str) -> tuple[int, str] | None:
     owner, _, key = name.rpartition(".")
-    if key in ("backlash", "gravity_compliance", ZERO_DRIFT, *LATERAL) or key.startswith(
+    if key in ("backlash", HYSTERESIS, "gravity_compliance", ZERO_DRIFT, *LATERAL) or key.startswith(
         ("transmission_", RATIO)
     ):
         return model.joint_index(owner), key

@@ -17,7 +17,7 @@ from flexcal.calibration.measurement import (
     predict_measurements,
 )
 from flexcal.calibration.term_selection.leave_out_errors import LeaveOutErrors, leave_out_fit
-from flexcal.model.robot import GEOMETRY, ORIGIN, STATION, RobotModel
+from flexcal.model.robot import GEOMETRY, HYSTERESIS, ORIGIN, STATION, RobotModel
 from flexcal.units import MILLIMETRE, decimals
 
 _WORSE = 1.05
@@ -262,7 +262,7 @@ class TermTrials:
             item.name: item.prior_std
             for item in every
             if np.isfinite(item.prior_std)
-            and item.name.rpartition(".")[2] in (*GEOMETRY, *ORIGIN)
+            and item.name.rpartition(".")[2] in (*GEOMETRY, *ORIGIN, HYSTERESIS)
             and item.name not in self._of_fleet
         }
 

@@ -43,6 +43,7 @@ from flexcal.jobs.calibration import (
     fitted_points,
     ignored_columns_remarks,
     lag_remark,
+    other_sides_remark,
     outside_ranges,
     subsample_document,
     verification_subsample_remark,
@@ -185,6 +186,7 @@ class Verification(ReportedResult):
             *self.temperatures,
             *([self.outside] if self.outside else []),
             *refit_remarks(self.predicted, self.poses, self.refit, self.better),
+            *other_sides_remark(self.model, self.poses, self.predicted.expected_rms),
             *lag_remark(self.lag),
         ]
         if self.uncalibrated:

@@ -1,3 +1,4 @@
+from .approaches import other_sides_remark
 from .fits import Fits, FitSettings, sampled
 from .fitted_measurements import fitted_files, fitted_points, measurement_digests
 from .held_out import held_out_group
@@ -22,6 +23,7 @@ __all__ = [
     "ignored_columns_remarks",
     "lag_remark",
     "measurement_digests",
+    "other_sides_remark",
     "outside_ranges",
     "plausible_temperatures",
     "requested_terms",

@@ -53,6 +53,7 @@ from flexcal.calibration.verification import (
 )
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, json_values
+from flexcal.jobs.calibration.approaches import Approaches
 from flexcal.jobs.calibration.held_out import HeldOut
 from flexcal.jobs.calibration.held_out_tilts import HeldOutTilts
 from flexcal.jobs.calibration.inclinations import inclination_document
@@ -294,6 +295,7 @@ class Calibration(Identification):
         misfits = coupling is not None or contradicted or lagging
         floor = None if misfits else RepeatabilityFloor.of(selected)
         sensor_lag = SensorLag.of(selected)
+        approaches = Approaches.of(selected)
         learning = LearningCurve.of(selected)
         bearings = bearing_remarks(self.bearings, selected)
         blamed = self.bearings is not None and self.bearings.contradicted
@@ -357,6 +359,7 @@ class Calibration(Identification):
             "fleet": fleet,
             "pooled_stiffness": None if pooled is None else pooled.document(),
             "temperature": thermal_document(selected, sensor_lag),
+            "approach": None if approaches is None else approaches.document(),
             "stage1": None if self.stiffness is None else {"misfit": misfit_document(self.stiffness.misfit)},
             "remarks": [
                 *calibration_subsample_remark(self.sample, self.everywhere),
@@ -370,6 +373,7 @@ class Calibration(Identification):
                     selected, self._cause, prior_misfits=contradicted, sensor_lag=sensor_lag
                 ),
                 *lag_remark(self.lag),
+                *([] if approaches is None else approaches.remarks),
                 *(() if blamed else bearings),
                 *place_remarks(agreement),
                 *(() if self._cause or misfits else floor_remark(selected, self.before.robots_own)),

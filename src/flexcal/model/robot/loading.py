@@ -167,6 +167,7 @@ def _drives(file: YamlFile, config: RobotConfig, n: int, motors: Sequence[int]) 
         drive_gain=np.ones(n),
         ratio=declared("ratio"),
         backlash=np.zeros(n),
+        hysteresis=np.zeros(n),
         transmission=np.zeros((n, len(HARMONICS), 2)),
         ratio_error=np.zeros((n, n)),
         harmonics=HARMONICS,

@@ -55,7 +55,8 @@ class Drives:
 
     (n,) each: `rotor_inertia`, kg m², of the motors at the joint; `held_inertia`, kg m², that moves with the arm of a braked joint beyond
     its links'; `viscous`, N m s/rad, and `coulomb`, N m, friction; `torque_offset`, N m; `delay` of the torque signal, s; `drive_gain`,
-    true torque over that of the log; `ratio`, motor turns per joint turn; `backlash`, half the gap, rad. `friction` (n, terms) in the order
+    true torque over that of the log; `ratio`, motor turns per joint turn; `backlash`, half the gap, rad; `hysteresis`,
+    half its width, by which the arm lags behind the last motion of its motor, rad. `friction` (n, terms) in the order
     of `FRICTION_PARAMETERS`; `parallel` (n, 3), springs and cables beside the motor, in that of `PARALLEL`; `coupling` (declared couplings,
     3) in that of `COUPLED`. `transmission` (n, harmonics, 2), rad: sine and cosine of the transmission errors of the orders `harmonics`;
     `ratio_error` (n, n): what a joint moves beyond what is declared per motion of another, or of its own motor. NaN where robot.yaml gives
@@ -74,6 +75,7 @@ class Drives:
     drive_gain: np.ndarray
     ratio: np.ndarray
     backlash: np.ndarray
+    hysteresis: np.ndarray
     transmission: np.ndarray
     ratio_error: np.ndarray
     harmonics: tuple[int, ...]

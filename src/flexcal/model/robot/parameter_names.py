@@ -20,6 +20,8 @@ EXPANSION, REFERENCE = "thermal.expansion", "thermal.reference"
 """Linear expansion coefficient of the arm, and the temperature at which the other parameters hold."""
 LINK_EXPANSION, ZERO_DRIFT = "thermal_expansion", "thermal_drift"
 """Keys of a link's own expansion beyond the arm's, and of the drift of a joint's zero with temperature."""
+HYSTERESIS = "hysteresis"
+"""Key of half the width by which a joint lags behind the last motion of its motor."""
 STATION_DRIFT = ("thermal_x", "thermal_y", "thermal_z")
 """Shift of an instrument's readings with temperature."""
 ORIGIN = ("origin_x", "origin_y", "origin_z")
@@ -71,7 +73,8 @@ _UNITS = {
     **dict.fromkeys(("thermal_x", "thermal_y", "thermal_z"), "m/K"),
     "offset": "rad", "misalignment_1": "rad", "misalignment_2": "rad", "length_x": "m", "length_y": "m", "length_z": "m",
     "origin_x": "m", "origin_y": "m", "origin_z": "m",
-    "x": "m", "y": "m", "z": "m", "zero": "m", "rx": "rad", "ry": "rad", "rz": "rad", "backlash": "rad", "gravity_compliance": "rad/(N m)",
+    "x": "m", "y": "m", "z": "m", "zero": "m", "rx": "rad", "ry": "rad", "rz": "rad", "backlash": "rad", HYSTERESIS: "rad",
+    "gravity_compliance": "rad/(N m)",
     "gravity_compliance_1": "rad/(N m)", "gravity_compliance_2": "rad/(N m)",
     "stiffness": "N m/rad", "damping": "N m s/rad",
     "rotor_inertia": "kg m²", "armature": "kg m²", "viscous": "N m s/rad", "coulomb": "N m",
@@ -92,7 +95,7 @@ _SLIDING = {
 }  # fmt: skip
 
 
-_OF_POSITIONS = ("offset", "backlash", "transmission_", ZERO_DRIFT)
+_OF_POSITIONS = ("offset", "backlash", HYSTERESIS, "transmission_", ZERO_DRIFT)
 
 
 def unit_in(model: RobotModel, name: str) -> str:
@@ -205,6 +208,7 @@ def parameter_locations(model: RobotModel) -> dict[str, Location]:
         for k, key in enumerate(ORIGIN if i in branching else ()):
             table[f"{joint.name}.{key}"] = Location("geometry", "origin_error", (i, k))
         table[f"{joint.name}.backlash"] = Location("drives", "backlash", (i,))
+        table[f"{joint.name}.{HYSTERESIS}"] = Location("drives", HYSTERESIS, (i,))
         table[f"{joint.name}.gravity_compliance"] = Location("geometry", "gravity_compliance", (i,))
         for k, key in enumerate(LATERAL):
             table[f"{joint.name}.{key}"] = Location("geometry", "lateral_compliance", (i, k))

@@ -75,6 +75,7 @@ def tool_at_rest(
     parameters: bool = True,
     force: np.ndarray | None = None,
     temperature: np.ndarray | None = None,
+    approach: np.ndarray | None = None,
 ) -> ToolAtRest:
     """Pose of measured points on the robot at rest, deflected by gravity and payload.
 
@@ -100,6 +101,9 @@ def tool_at_rest(
         Force (N, 3), N in the base frame, on the points; none by default.
     temperature : ndarray, optional
         Temperature (N,) of the arm, °C; by default that at which the robot's parameters hold.
+    approach : ndarray, optional
+        Signs (N, n) of the last motion of each motor, behind which the arm lags by half the width of its hysteresis; by default unknown
+        (0), and the arm is in the middle.
 
     Returns
     -------
@@ -129,6 +133,10 @@ def tool_at_rest(
         )
     else:
         rest = _pulled(model, q, masses, target, force, flank, elastic=elastic)
+    if approach is not None and model.drives.hysteresis.any():
+        lagging = rest.deflection.copy()
+        lagging[:, list(model.motors), 2] -= approach * model.drives.hysteresis[list(model.motors)]
+        rest = replace(rest, deflection=lagging)
     if temperature is None or not depends_on_temperature(model):
         at = points_kinematics(model, q, rest.deflection, target, jacobians=jacobians, parameters=parameters)
         return ToolAtRest(model, q, rest, at)
