@@ -135,3 +135,23 @@ def test_points_of_the_tests_are_reached() -> None:
     q = reached(arm, lambda p: p - PLACE, arm.postures(1, np.random.default_rng(1))[0])
     assert q is not None
     assert np.allclose(points(arm, q[None])[0], PLACE, atol=1e-9)
+
+
+@pytest.mark.parametrize("off", [(0.0, 0.0, 0.0), (0.008, -0.006, 0.005)])
+def test_a_misplaced_reflector_of_the_calibration_does_not_move_the_tip(
+    tmp_path: Path, run, off: tuple[float, float, float]
+) -> None:
+    """The calibration's estimates, which a folder named by --estimates has, say where the reflector is, not where the flange is."""
+    arm = StrangerArm(7, axes=tuple(SIX), point_error=off)
+    holding = StrangerArm(7, axes=tuple(SIX), point_error=(-0.03, 0.02, 0.07))
+    robot, rng = arm.write(tmp_path), np.random.default_rng(7)
+    q = arm.postures(60, rng)
+    poses = arm.write_poses(tmp_path / "points.csv", q, arm.measured(q, rng))
+    assert run("calibrate", robot, poses, "--out", tmp_path / "calibrated").status == 0
+    file = touched(holding, tmp_path / "touches.csv", 12, rng, noise=2e-5)
+    arguments = ("identify", "tool", robot, file, "--frame", "tool0", "--json")
+    stored = ("--estimates", tmp_path / "calibrated")
+    found, uncalibrated = (run(*arguments, *more).document for more in (stored, ()))
+    error = np.linalg.norm(np.array(found["xyz_m"]) - holding.true_xyz)
+    assert error < 5e-4
+    assert error < 2 * np.linalg.norm(np.array(uncalibrated["xyz_m"]) - holding.true_xyz)

@@ -9,6 +9,7 @@ from tyro.conf import Positional, arg
 
 from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import (
+    Estimates,
     Json,
     MaybePath,
     MaybeText,
@@ -43,6 +44,7 @@ class IdentifyFrame:
     """Name of the work object."""
     tip_radius: Annotated[float, arg(metavar="MM")] = 0.0
     """Radius of a ball at the tip that touched faces."""
+    estimates: Estimates = None
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: none)")] = None
     """Folder for results.json."""
     json: Json = False
@@ -59,6 +61,7 @@ class IdentifyFrame:
             point=self.point,
             name=self.name,
             tip_radius=self.tip_radius * MILLIMETRE,
+            estimates=self.estimates,
             out=self.out,
             command=command_line(),
         )

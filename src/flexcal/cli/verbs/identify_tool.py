@@ -9,6 +9,7 @@ from tyro.conf import Positional, arg
 
 from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import (
+    Estimates,
     Json,
     MaybePath,
     MaybeText,
@@ -39,6 +40,7 @@ class IdentifyTool:
     """URDF frame in which the tip is sought."""
     name: Annotated[str, arg(metavar="NAME")] = "tip"
     """Name of the tip."""
+    estimates: Estimates = None
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: none)")] = None
     """Folder for results.json."""
     json: Json = False
@@ -50,7 +52,13 @@ class IdentifyTool:
         require_robot_and_files(self.robot, self.touches, "TOUCHES")
         console = Console(self.json)
         found = identify_tool(
-            self.robot, self.touches, frame=self.frame, name=self.name, out=self.out, command=command_line()
+            self.robot,
+            self.touches,
+            frame=self.frame,
+            name=self.name,
+            estimates=self.estimates,
+            out=self.out,
+            command=command_line(),
         )
         for line in (found.headline, *found.remarks, *found.lines):
             console.say(line)

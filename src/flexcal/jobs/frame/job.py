@@ -10,9 +10,8 @@ from flexcal.data.poses import read_frame_touches
 from flexcal.files.formats import provenance
 from flexcal.jobs.frame.identification import identify_work_object
 from flexcal.jobs.frame.result import FrameIdentification
-from flexcal.jobs.inputs import require_distinct_files
+from flexcal.jobs.inputs import probable_model, require_distinct_files
 from flexcal.jobs.result_files import RunRecord, write_results
-from flexcal.model.robot import RobotModel
 
 
 def identify_frame(
@@ -22,6 +21,7 @@ def identify_frame(
     point: str | None = None,
     name: str = "work_object",
     tip_radius: float = 0.0,
+    estimates: Path | None = None,
     out: Path | None = None,
     command: str = "",
 ) -> FrameIdentification:
@@ -30,7 +30,7 @@ def identify_frame(
     Raises `FlexcalError` as reading and `identify_work_object` do; nothing is written then.
     """
     require_distinct_files(files)
-    model = RobotModel.from_yaml(robot_file)
+    model = probable_model(robot_file, estimates)
     given = read_frame_touches(list(files), model)
     found = identify_work_object(model, given, point=point, name=name, tip_radius=tip_radius)
     found = replace(found, record=RunRecord(provenance([robot_file, model.urdf, *files]), command))

@@ -214,6 +214,20 @@ def measured_points(nominal: RobotModel, blocks: Mapping[Block, Estimate]) -> tu
     return tuple(dict.fromkeys([*list(nominal.points)[:1], *further]))
 
 
+def probable_model(path: Path, estimates: Path | None = None) -> RobotModel:
+    """The robot of a robot.yaml with its estimates, for frames that were not measured: a calibrated one as in `CalibratedRobot.probable`.
+
+    `estimates` are as in `stored_estimates`; without any, the nominal robot. Raises `FlexcalError` as reading does.
+    """
+    nominal = RobotModel.from_yaml(path, estimates=False)
+    stored = stored_estimates(nominal, estimates)
+    if estimates is None and not stored.exists():
+        return nominal
+    blocks = read_estimates(stored)
+    robot = CalibratedRobot(nominal, with_blocks(nominal, blocks, stored), blocks, stored)
+    return robot.probable if "calibration" in blocks else robot.model
+
+
 def stored_estimates(nominal: RobotModel, estimates: Path | None) -> Path:
     """Path of a robot's estimates.yaml: the named file or that in the named folder, else that beside robot.yaml.
 

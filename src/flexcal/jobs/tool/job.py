@@ -8,11 +8,10 @@ from pathlib import Path
 
 from flexcal.data.poses import read_touches
 from flexcal.files.formats import provenance
-from flexcal.jobs.inputs import require_distinct_files
+from flexcal.jobs.inputs import probable_model, require_distinct_files
 from flexcal.jobs.result_files import RunRecord, write_results
 from flexcal.jobs.tool.identification import identify_tip
 from flexcal.jobs.tool.result import ToolIdentification
-from flexcal.model.robot import RobotModel
 
 
 def identify_tool(
@@ -21,6 +20,7 @@ def identify_tool(
     *,
     frame: str | None = None,
     name: str = "tip",
+    estimates: Path | None = None,
     out: Path | None = None,
     command: str = "",
 ) -> ToolIdentification:
@@ -29,7 +29,7 @@ def identify_tool(
     Raises `FlexcalError` as reading and `identify_tip` do; nothing is written then.
     """
     require_distinct_files(files)
-    model = RobotModel.from_yaml(robot_file)
+    model = probable_model(robot_file, estimates)
     found = identify_tip(model, read_touches(list(files), model), frame=frame, name=name)
     found = replace(found, record=RunRecord(provenance([robot_file, model.urdf, *files]), command))
     if out is not None:
