@@ -16,7 +16,7 @@ from dh_arm import DHArm, postures, rz, write_robot
 from over_seeds import over_seeds
 from refusals import refused
 
-from flexcal import PoseRequest, PoseSet, RobotModel, calibrate, design_poses, read_poses, verify
+from flexcal import PoseRequest, PoseSet, RobotModel, calibrate, design_poses, read_poses, recheck, verify
 from flexcal.calibration.measurement import predict_measurements, propagation
 from flexcal.calibration.verification import prediction_errors, prediction_errors_with_covariance
 from flexcal.data.experiments import FolderCell, write_measured_poses
@@ -172,6 +172,15 @@ def test_verification_says_what_holds_for_its_sides_alone() -> None:
     unsaid = verify(found.robot, replace(poses, approach=None))
     assert unsaid.document()["prediction"]["verdict"] in ("right", "cautious")
     assert not any("any side" in r for r in unsaid.remarks)
+
+
+def test_a_visit_from_an_unknown_side_is_no_change_of_the_robot() -> None:
+    """A robot whose half widths are known is rechecked at poses approached from one side, which the files do not say."""
+    for seed in range(4):
+        arm = LaggingArm.made(seed)
+        robot = calibrated(arm.measured(postures(arm.rng, 50), arm.sides(50))).robot
+        visit = arm.measured(postures(arm.rng, 12), np.ones((12, 6)), said=False)
+        assert recheck(robot, seen_from(robot.probable, visit)).verdict == "as_calibrated"
 
 
 def test_reversed_signs_are_found() -> None:

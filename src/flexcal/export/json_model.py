@@ -13,7 +13,7 @@ from flexcal.export.transforms import transform
 from flexcal.export.written_file import RenderedModel
 from flexcal.model.kinematics import bearing_placement, link_placement, point_placement
 from flexcal.model.parts import LoopEnd, rotation_wxyz, vector_rotation
-from flexcal.model.robot import LATERAL, RATIO, RobotModel, ratio_errors, unit_in
+from flexcal.model.robot import HYSTERESIS, LATERAL, RATIO, RobotModel, ratio_errors, unit_in
 
 FORMAT = "flexcal robot"
 VERSION = 1
@@ -66,6 +66,7 @@ def _joint(model: RobotModel, i: int, parent: str | None) -> dict[str, Any]:
             for key in ("lower", "upper", "velocity", "effort")
         },
         "backlash": _quantity(model, f"{joint.name}.backlash"),
+        HYSTERESIS: _quantity(model, f"{joint.name}.{HYSTERESIS}"),
         "gravity_compliance": _quantity(model, f"{joint.name}.gravity_compliance"),
         "lateral_compliance": [_quantity(model, f"{joint.name}.{key}") for key in LATERAL],
         "transmission": [

@@ -8,9 +8,9 @@ from flexcal.calibration.error_model import joint_rotation_jacobian
 from flexcal.calibration.measurement import (
     Propagation,
     covariance_root,
-    lag_rms,
     moving_parameters,
     predict_measurements,
+    unknown_sides,
 )
 from flexcal.data.poses import PoseSet
 from flexcal.model.robot import HYSTERESIS, MASS_AND_COM
@@ -46,11 +46,9 @@ def error_sources(reach: Propagation, q: np.ndarray) -> dict[str, np.ndarray]:
     root = covariance_root(model, names)
     at = predict_measurements(model, PoseSet.unmeasured(q, reach.target, reach.station, 1.0), jacobians=True)
     roots = at.jacobian(names) @ root
-    turns = joint_rotation_jacobian(at)
-    lag = lag_rms(model)[[i for i in model.motors if model.joints[i].kind == "revolute"]]
-    turned = (turns**2).sum(axis=(1, 2))
+    turned = (joint_rotation_jacobian(at) ** 2).sum(axis=(1, 2))
     scatter = {
-        HYSTERESIS: ((lag * turns) ** 2).sum(axis=(1, 2)),
+        HYSTERESIS: (unknown_sides(at) ** 2).sum(axis=(1, 2)),
         REPEATABILITY: 3 * model.value("scatter.robot") ** 2 + model.value("scatter.angular") ** 2 * turned,
         MODEL_ERROR: np.full(size, 3 * model.value("scatter.model") ** 2),
     }

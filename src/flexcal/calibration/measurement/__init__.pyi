@@ -8,7 +8,14 @@ from .prediction import (
     predicted_positions,
     require_points,
 )
-from .propagated_covariance import Propagation, covariance_root, lag_rms, moving_parameters, propagation
+from .propagated_covariance import (
+    Propagation,
+    covariance_root,
+    lag_rms,
+    moving_parameters,
+    propagation,
+    unknown_sides,
+)
 from .readings import METRES, OF_INSTRUMENTS, RADIANS, ROBOT, Readings, kind_names, stated_sigma
 from .registration import register, require_orientations, with_target_axes
 from .unknown_load import sag_columns, with_load_at
@@ -39,6 +46,7 @@ __all__ = [
     "sag_columns",
     "seen_from_base",
     "stated_sigma",
+    "unknown_sides",
     "with_camera_places",
     "with_load_at",
     "with_places_of",

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexcal.calibration.measurement.prediction import PredictedMeasurements
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import (
     carrier_kinematics,
@@ -83,6 +84,21 @@ def lag_rms(model: RobotModel) -> np.ndarray:
     for i in known:
         squares[i] = model.value(names[i]) ** 2 + model.posterior.marginal([names[i]])[0, 0]
     return np.sqrt(squares)
+
+
+def unknown_sides(at: PredictedMeasurements) -> np.ndarray:
+    """Columns (R, 3, k) of the readings by the hysteresis, of the size `lag_rms`, of joints of which the side of approach is not known.
+
+    Common to all poses: which of them came from the same side is not known either, and all may have.
+    """
+    model, poses, lag = at.model, at.poses, lag_rms(at.model)
+    joints = [k for k, i in enumerate(model.motors) if lag[i] > 0]
+    owners = [model.motors[k] for k in joints]
+    unknown = (
+        np.ones((len(poses), len(joints)), bool) if poses.approach is None else poses.approach[:, joints] == 0
+    )
+    turns = at.jacobian([f"{model.joints[i].name}.offset" for i in owners])
+    return turns * (at.by_row(unknown) * lag[owners])[:, None]
 
 
 @dataclass(frozen=True, eq=False)

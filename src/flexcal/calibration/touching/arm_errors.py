@@ -8,7 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.calibration.fit import TOLERANCE, declared_size
-from flexcal.calibration.measurement import PredictedMeasurements, covariance_root, moving_parameters
+from flexcal.calibration.measurement import (
+    PredictedMeasurements,
+    covariance_root,
+    moving_parameters,
+    unknown_sides,
+)
 from flexcal.data.poses import Touches
 from flexcal.model.kinematics import PointKinematics
 from flexcal.model.robot import GEOMETRY, RobotModel, geometric_errors, unit_in
@@ -94,6 +99,7 @@ def arm_errors(frames: TouchedFrames, *, tool: bool) -> ArmErrors:
     rows = 3 * len(touches)
     columns = [np.zeros((rows, 0))]
     if known:
+        columns.append(unknown_sides(prediction).reshape(rows, -1))
         columns.append(prediction.jacobian(known).reshape(rows, -1) @ covariance_root(model, known))
     std: dict[str, float] = {}
     if not calibrated:

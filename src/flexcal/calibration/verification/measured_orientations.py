@@ -12,6 +12,7 @@ from flexcal.calibration.measurement import (
     covariance_root,
     moving_parameters,
     predict_measurements,
+    unknown_sides,
     with_target_axes,
 )
 from flexcal.data.poses import PoseSet
@@ -71,7 +72,8 @@ def orientation_errors(
         *(name for name in cameras if name in standing.posterior.parameters),
         *(f"point.{t}.r{axis}" for t in known for axis in "xyz"),
     ]
-    roots = (at.jacobian(names) @ covariance_root(standing, names))[len(own) :]
+    roots = np.concatenate([at.jacobian(names) @ covariance_root(standing, names), unknown_sides(at)], axis=2)
+    roots = roots[len(own) :]
     scatter = replace(scatter, orientation=standing.value("scatter.orientation"))
     noise = scatter.independent(at.readings, joint_rotation_jacobian(at))[len(own) :]
     squares = (roots**2).sum(axis=(1, 2)) + np.trace(noise, axis1=1, axis2=2)

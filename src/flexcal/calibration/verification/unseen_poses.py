@@ -19,10 +19,10 @@ from flexcal.calibration.measurement import (
     Readings,
     ambiguous_poses,
     covariance_root,
-    lag_rms,
     moving_parameters,
     predict_measurements,
     require_points,
+    unknown_sides,
 )
 from flexcal.data.poses import PoseSet
 from flexcal.model.robot import BOARD_SCALE, LENS, RobotModel
@@ -152,9 +152,7 @@ def prediction_errors_with_covariance(
     poses = poses.without_orientations()
     at = predict_measurements(model, poses, elastic=elastic, jacobians=True)
     used = [*moving_parameters(model, elastic=elastic), *_of_cameras(model, poses)]
-    roots = np.concatenate(
-        [at.jacobian(used) @ covariance_root(model, used), _unknown_sides(model, at)], axis=2
-    )
+    roots = np.concatenate([at.jacobian(used) @ covariance_root(model, used), unknown_sides(at)], axis=2)
     cells = ErrorGroups.of(poses)
     shared = _shared_errors(model, cells)
     scatter = None if noise_free else known_scatter(model, stated=poses.sigma_given)
@@ -185,21 +183,6 @@ def prediction_errors_with_covariance(
         None if common is None else cells.pose,
         common,
     )
-
-
-def _unknown_sides(model: RobotModel, at: PredictedMeasurements) -> np.ndarray:
-    """Columns (R, 3, k) m of the hysteresis of each joint where no one knows from which side it came.
-
-    Common to all poses: which of them came from the same side is not known either, so that they are worth no more than one for each joint.
-    """
-    lag = lag_rms(model)
-    joints = [k for k, i in enumerate(model.motors) if lag[i] > 0]
-    names = [f"{model.joints[model.motors[k]].name}.offset" for k in joints]
-    sides = (
-        np.zeros((len(at.poses), len(joints))) if at.poses.approach is None else at.poses.approach[:, joints]
-    )
-    unknown = at.by_row(sides) == 0
-    return at.jacobian(names) * np.where(unknown, lag[[model.motors[k] for k in joints]], 0.0)[:, None]
 
 
 def _of_cameras(model: RobotModel, poses: PoseSet) -> list[str]:

@@ -111,9 +111,14 @@ class Approaches:
 
 
 def other_sides_remark(model: RobotModel, poses: PoseSet, expected: np.ndarray) -> tuple[str, ...]:
-    """Remark on a prediction `expected` (N,), m, of the errors at `poses` that holds for their sides of approach alone."""
-    if poses.approach is None or not lag_rms(model).any():
+    """Remark on the sides for which errors at `poses` were predicted as `expected` (N,), m, where it matters."""
+    if not lag_rms(model).any():
         return ()
+    if poses.approach is None:
+        return (
+            "the files do not say from which side the joints came (columns approach1…), so that all may have come from any, and what is "
+            "predicted has hysteresis of gears in it",
+        )
     anywhere = prediction_errors(model, replace(poses, approach=None)).expected_rms
     there, here = (float(np.sqrt(np.mean(size**2))) for size in (anywhere, expected))
     if there < _OTHERWISE * here:
