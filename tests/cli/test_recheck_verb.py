@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from cli_files import read_csv, write_csv
 from refusals import assert_refusal
+from stranger_arm import SIX, StrangerArm
 
 from flexcal.cli.main import main
 
@@ -159,3 +161,28 @@ def test_visits_out_of_order_are_said_to_be(folder: Path, tmp_path: Path, capsys
     capsys.readouterr()
     arguments = ["recheck", str(robot), str(folder / "first.csv"), "--out", str(tmp_path)]
     assert main(arguments) == 0 and ": 4 visits since this calibration" in capsys.readouterr().out
+
+
+def test_readings_rounded_to_more_than_they_scatter(tmp_path: Path, run) -> None:
+    """Repeated readings are equal then, and what their digits can carry is what they are known to; without any noise nothing is tested."""
+    arm, rng = StrangerArm(3, axes=tuple(SIX)), np.random.default_rng(3)
+    robot, q, visited = (
+        arm.write(tmp_path),
+        arm.postures(40, rng),
+        np.repeat(arm.postures(10, rng), 3, axis=0),
+    )
+
+    def written(name: str, q: np.ndarray, sigma: float, decimals: int = 4) -> Path:
+        readings = arm.measured(q, rng, sigma=sigma).round(decimals)
+        return arm.write_poses(tmp_path / f"{name}.csv", q, readings, sigma=None)
+
+    def visit(day: int, file: Path):
+        return run("recheck", robot, file, "--date", f"2026-01-{day:02d}", "--out", tmp_path / "visits")
+
+    assert run("calibrate", robot, written("points", q, 3e-6)).status == 0
+    for day in (1, 2):
+        assert "as calibrated" in visit(day, written(f"visit{day}", visited, 3e-6)).out
+    arm.zeros = arm.zeros + np.array([0, 3e-4, 0, 0, 0, 0])
+    assert re.search(r"a2 shifted by \+0\.(29|30)", visit(3, written("shifted", visited, 3e-6)).out)
+    assert run("calibrate", robot, written("exact", q, 0.0, 17)).status == 0
+    assert_refusal(visit(4, written("exact_visit", visited, 0.0, 17)).err, "E-RECHECK-002", "sigma")

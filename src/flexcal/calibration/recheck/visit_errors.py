@@ -21,10 +21,11 @@ from flexcal.calibration.verification import (
     prediction_errors_with_covariance,
     rigid_placement,
 )
-from flexcal.data.poses import PoseSet
+from flexcal.data.poses import PoseSet, last_digit
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import depends_on_temperature
 from flexcal.model.robot import RobotModel
+from flexcal.units import LEAST_STD
 
 LEAST_MATCHED = 4
 """Least number of poses that two visits must have in common to be compared with each other."""
@@ -105,7 +106,7 @@ def errors_from_calibration(model: RobotModel, poses: PoseSet, *, placed: bool) 
         model,
         first,
         groups.mean(every).ravel(),
-        _independent(covariance, model),
+        _independent(covariance, model) + _rounding(poses) * np.eye(3 * len(first)),
         roots @ roots.T + _of_the_day(model, len(first)),
         covariance.freedom,
         "calibration",
@@ -148,7 +149,10 @@ def errors_from_reference(
         freedom, noise, size = float(count), "repeats", squares / count
     turned = frame_turns(here, base, first)
     weights = [np.repeat(1 / np.sqrt(group.count[pairs[:, k]]), 3) for k, group in enumerate((now, then))]
-    own, common = (size * w[:, None] * independent * w for w in weights)
+    own, common = (
+        size * w[:, None] * independent * w + _rounding(rows) * np.eye(len(w))
+        for w, rows in zip(weights, (poses, reference), strict=True)
+    )
     warmed = _warmed(here, first, reference.subset(then.first[pairs[:, 1]]), covariance)
     common = common + warmed @ warmed.T
     return VisitErrors(
@@ -294,9 +298,16 @@ def frame_turns(here: RobotModel, base: RobotModel, poses: PoseSet) -> np.ndarra
     return np.array(turned)
 
 
+def _rounding(poses: PoseSet) -> float:
+    """Variance, m², of coordinates by what their digits can carry, which repeating does not average."""
+    return max(last_digit(poses.position) / np.sqrt(12), LEAST_STD) ** 2
+
+
 def _independent(covariance: ErrorCovariance, model: RobotModel) -> np.ndarray:
     """Covariance (3 K, 3 K) m² of instrument and repeatability, with what the points of one pose share."""
-    if covariance.independent is None:
+    if (
+        covariance.independent is None or covariance.freedom < 1
+    ):  # as where points were simulated without noise
         raise FlexcalError(
             "E-RECHECK-002",
             f"neither the noise of the instrument nor the scatter of {model.name} is known, so nothing can be tested; give the "
