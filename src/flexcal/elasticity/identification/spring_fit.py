@@ -37,6 +37,8 @@ from flexcal.frequency.periodic import FrequencyResponse
 from flexcal.model.robot import MASS_AND_COM, RobotModel, spring_names
 from flexcal.progress import Progress, silent
 
+_HAUSMAN = 2.58
+"""Difference from the efficient estimate, in its standard deviations, that one in a hundred passes by chance."""
 SPRING_VALUES = (".stiffness", ".damping", ".hardening")
 
 
@@ -165,6 +167,8 @@ def fit_springs(
     if not isinstance(weighting, CovarianceWeighting | None):
         fit = reweighted_fit(model, replace(data, weighting=weighting), likelihood)
     estimate = _widened(fit, likelihood, data, scale)
+    if fit is not likelihood:
+        estimate = _no_better_known(estimate, _widened(likelihood, likelihood, data, scale))
     progress("fitting", 1.0)
     stacked, axes = fit.predicted(), len(responses[0].joints)
     pairs = zip(fit.residual.poses, stacked, strict=True)
@@ -187,6 +191,30 @@ def fit_springs(
         tuple(g[:, axes:] for g in stacked),
         scale,
     )
+
+
+def _no_better_known(estimate: Estimate, efficient: Estimate) -> Estimate:
+    """Estimate by some weights in which nothing is better known than in the `efficient` one, by those of the measurement's covariance.
+
+    No others make a smaller variance (Gauss and Markov), and the difference of both has the difference of their variances (Hausman 1978).
+    Where it is larger than by chance, the other weights' cost has another minimum, or is far from its expansion, and the variance is that
+    of the efficient estimate and the square of the difference.
+    """
+    own, least = np.diag(estimate.covariance), np.diag(efficient.covariance)
+    squared = (estimate.parameters.coordinates() - efficient.parameters.coordinates()) ** 2
+    other = squared > _HAUSMAN**2 * np.maximum(own - least, 0.0)
+    lacking = np.maximum(np.where(other, least + squared, least) - own, 0.0)
+    covariance = estimate.covariance + np.diag(lacking)
+    sized = is_log_identified(estimate.parameters, covariance)
+    flags = zip(estimate.identifiable, efficient.identifiable, sized, strict=True)
+    known = dict(zip(estimate.parameters.names, map(all, flags), strict=True))
+    identifiable = tuple(flag and known.get(_stiffness_of(name), True) for name, flag in known.items())
+    return replace(estimate, covariance=covariance, identifiable=identifiable)
+
+
+def _stiffness_of(name: str) -> str:
+    """Name of the stiffness that belongs to a damping, which is not identifiable without it."""
+    return name.replace(".damping", ".stiffness")
 
 
 def _with_held_joints(
@@ -285,7 +313,7 @@ def _widened(
     absorbing = misfit is not None and misfit.inertials > 0
     identifiable = tuple(
         flag
-        and small.get(name.replace(".damping", ".stiffness"), True)
+        and small.get(_stiffness_of(name), True)
         and not (absorbing and name.rpartition(".")[2] in MASS_AND_COM)
         for name, flag in small.items()
     )
