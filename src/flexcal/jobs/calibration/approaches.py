@@ -22,6 +22,8 @@ _OTHERWISE = 1.2
 """Ratio of the error from any side to that from the sides of a verification from which it has a sentence."""
 _CERTAINLY = 3.0
 """Standard deviations from which a joint that leads its motor is a finding."""
+_MOVED, _FEW = 1e-3, 0.1
+"""Motion of a joint, rad, and the share of the moves in either direction from which it came to the poses from both sides."""
 _SHOWN = 3
 
 
@@ -83,10 +85,20 @@ class Approaches:
             )
         elif self.unknown:
             remarks.append(
-                "the files do not say from which side the joints came (columns approach1…): if always from the same one, a program that "
-                f"comes from the other {size}, and no predicted error has that in it"
+                f"the files do not say from which side the joints came (columns approach1…): {self._by_order()}if always from the same, "
+                f"a program that comes from the other {size}, and no predicted error has that in it"
             )
         return tuple(remarks)
+
+    def _by_order(self) -> str:
+        """Clause on poses that were reached straight from those before them, if rows are in the order of measuring."""
+        q = self.fit.poses.pointed.q
+        joints = [name in self.unknown for name in (joint.name for joint in self.fit.model.motor_joints)]
+        moves = np.diff(q[:, joints], axis=0)
+        rarer = np.minimum((moves > _MOVED).mean(axis=0), (moves < -_MOVED).mean(axis=0))
+        if rarer.min() < _FEW:
+            return ""
+        return "if the robot went straight from row to row, from both, and hysteresis is in the scatter; "
 
     def _leading(self) -> tuple[str, ...]:
         """Clauses on joints whose half width is negative beyond three standard deviations."""
