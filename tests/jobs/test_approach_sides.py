@@ -16,7 +16,19 @@ from dh_arm import DHArm, postures, rz, write_robot
 from over_seeds import over_seeds
 from refusals import refused
 
-from flexcal import PoseRequest, PoseSet, RobotModel, calibrate, design_poses, read_poses, recheck, verify
+from flexcal import (
+    PoseRequest,
+    PoseSet,
+    RobotModel,
+    calibrate,
+    compensate,
+    design_poses,
+    predict,
+    read_poses,
+    read_targets,
+    recheck,
+    verify,
+)
 from flexcal.calibration.measurement import predict_measurements, propagation
 from flexcal.calibration.verification import prediction_errors, prediction_errors_with_covariance
 from flexcal.data.experiments import FolderCell, write_measured_poses
@@ -184,6 +196,36 @@ def test_a_visit_from_an_unknown_side_is_no_change_of_the_robot() -> None:
         robot = calibrated(arm.measured(postures(arm.rng, 50), arm.sides(50))).robot
         visit = arm.measured(postures(arm.rng, 12), np.ones((12, 6)), said=False)
         assert recheck(robot, seen_from(robot.probable, visit)).verdict == "as_calibrated"
+
+
+def test_commands_are_for_the_side_that_a_program_comes_from(tmp_path: Path) -> None:
+    """The real arm, commanded for its side, is at its target to its scatter, and predicted there; a plan is a file of targets too."""
+    arm = LaggingArm.made(7)
+    robot = calibrated(arm.measured(postures(arm.rng, 60), arm.sides(60))).robot
+    side = arm.sides(30)
+    write_plan(tmp_path / "plan.csv", PosePlan(q=postures(arm.rng, 30), approach=side.astype(int)))
+    targets = read_targets(tmp_path / "plan.csv", robot.probable)
+    aims = predict(
+        robot, replace(targets, approach=None)
+    ).tool.position  # where the arm would be in the middle
+    errors = []
+    for own in (targets, replace(targets, approach=None)):
+        # targets of the nominal robot are other points: those of the arm in the middle are given
+        commands = compensate(robot, replace(own, position=aims)).commands
+        assert commands.reached.all()
+        there = predict(robot, replace(targets, q=commands.q)).tool.position
+        stands = arm.arm.points(commands.q - side * arm.half)
+        errors.append((float(np.linalg.norm(there - aims, axis=1).max()), _apart(stands, aims)))
+    assert errors[0][0] < 1e-8 < 5e-5 < errors[1][0]
+    assert errors[0][1] < 0.5 * errors[1][1]
+
+
+def _apart(points: np.ndarray, others: np.ndarray) -> float:
+    """Root mean square distance (m) of points from others after best-fit registration."""
+    a, b = points - points.mean(axis=0), others - others.mean(axis=0)
+    u, _, v = np.linalg.svd(a.T @ b)
+    turn = u @ np.diag([1, 1, np.sign(np.linalg.det(u @ v))]) @ v
+    return float(np.sqrt(((a @ turn - b) ** 2).sum(axis=1).mean()))
 
 
 def test_reversed_signs_are_found() -> None:

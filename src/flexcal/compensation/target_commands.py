@@ -154,6 +154,9 @@ def _take(found: MotorCommands, rows: _Rows, targets: ToolTargets) -> None:
     found.reason[number[~search.reached]] = real_reasons(search.subset(~search.reached))
     done, there = number[search.reached], search.subset(search.reached)
     found.q[done] = there.q
+    if targets.approach is not None:
+        # the arm lags behind the last motion of its motors
+        found.q[done] += targets.approach[done] * search.model.drives.hysteresis[list(search.model.motors)]
     mass = carried_mass(search.model, targets.payload, len(targets))[done]
     certain = certain_flank(search.model, there.q, there.torque, mass)
     found.unambiguous[done] = certain[:, list(search.model.backlash_joints)].all(axis=1)

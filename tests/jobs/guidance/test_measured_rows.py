@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ import pytest
 from measured_dh_arm import DHArm
 from refusals import refused
 
-from flexcal import RobotModel, read_poses
+from flexcal import PoseSet, RobotModel, read_poses
 from flexcal.jobs.guidance import FollowedFile, MeasuredRows, RowReader, Source, cells_of, in_columns
 
 
@@ -120,6 +121,18 @@ def test_a_row_takes_the_columns_of_a_table_of_another_program(cells: list[dict[
     assert in_columns([other], names, ur5) == [plain | {"target": "another"}]
     assert in_columns([warm], names, ur5) == [plain | {"temperature": "20.0"}]
     assert in_columns([plain], [*names, "t"], ur5) == [plain]
+    sides = {f"approach{k}": "1.0" for k in range(1, 7)}
+    assert in_columns([plain | sides], names, ur5) == [plain]
+    assert in_columns([plain], [*names, *sides], ur5) == [plain | dict.fromkeys(sides, "0")]
+    assert in_columns([plain | sides], [*names, *sides], ur5) == [plain | sides]
+
+
+def test_rows_carry_the_sides_of_approach(ur5: RobotModel, tmp_path: Path):
+    sides = np.array([[1.0, -1, 0, 1, 1, -1]])
+    poses = replace(PoseSet.unmeasured(np.zeros((1, 6)), ur5.point().name, "tracker"), approach=sides)
+    (cells,) = cells_of(poses)
+    read = RowReader(tmp_path / "poses.csv", tuple(cells), ur5).poses([cells])
+    np.testing.assert_array_equal(read.approach, sides)
 
 
 def test_texts_and_comments_of_a_file_that_is_there_stay(tmp_path: Path, cells: list[dict[str, str]]):

@@ -21,6 +21,7 @@ from flexcal.data.poses.columns import (
     target_column,
     unit_quaternions,
     whole_numbers,
+    without_ways,
 )
 from flexcal.data.poses.distance_tables import (
     LENGTH,
@@ -149,7 +150,7 @@ def read_pose_pool(path: str | Path, model: RobotModel) -> PosePool:
     limits, and for payloads that differ.
     """
     file, _ = without_excluded(open_table(path))
-    file = _without_ways(file, model)
+    file = without_ways(file, model)
     texts = tuple(name for name in _TEXTS if name in file.columns)
     signals = assign(file, model, ("pose", "q"), (*_NUMBERS, "xyz", "length"), texts)
     stamps = timestamp_columns(signals)
@@ -254,7 +255,7 @@ def _named_texts(file: TableFile, further: Sequence[str]) -> tuple[str, ...]:
 
 def _read(path: Path, model: RobotModel, further: tuple[str, ...]) -> PoseSet:
     file, excluded = without_excluded(open_table(path))
-    file = _without_ways(file, model)
+    file = without_ways(file, model)
     # a quantity of the file is read as such, even if its values group the measurements
     quantities = {column for name in (*UNITS, "pose") for column in standard_columns(name, model.n)}
     quantities |= {column for signal in model.config.signals.values() for column in signal.columns}
@@ -265,12 +266,6 @@ def _read(path: Path, model: RobotModel, further: tuple[str, ...]) -> PoseSet:
     if remarks:
         excluded = (*excluded, f"{path.name}: the texts in {', '.join(remarks)} are not used")
     return replace(poses, notes=(*poses.notes, *excluded)) if excluded else poses
-
-
-def _without_ways(file: TableFile, model: RobotModel) -> TableFile:
-    """File without the columns by which a plan leads the robot to its poses."""
-    ways = {f"via{i + 1}" for i in range(model.n)}
-    return file.leaving_out([*file.unread, *(name for name in file.columns if name in ways)])
 
 
 def _remarks(file: TableFile, known: Collection[str]) -> list[str]:

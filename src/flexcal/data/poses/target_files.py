@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexcal.data.poses.columns import (
+    approach_columns,
     first_point,
     payload_column,
     target_column,
     unit_quaternions,
     whole_numbers,
+    without_ways,
 )
 from flexcal.data.poses.length_units import unit_advice
 from flexcal.data.poses.tool_targets import ToolTargets
@@ -42,7 +44,7 @@ def read_targets(path: str | Path, model: RobotModel) -> ToolTargets:
     ----------
     path : str or Path
         Table with `pose` and joint positions q1…qn (rad or m), or points x, y, z (m) and optionally qw, qx, qy, qz, or both;
-        `target`, `station`, `payload` (kg) and `temperature` (°C) are optional.
+        `target`, `station`, `payload` (kg), `temperature` (°C) and `approach1`… are optional.
     model : RobotModel
         Robot whose joints, points and stations the columns name.
 
@@ -72,9 +74,11 @@ def read_targets(path: str | Path, model: RobotModel) -> ToolTargets:
     array([[ 0.4,  0.1,  0.3],
            [ 0.4, -0.1,  0.3]])
     """
-    file = open_table(path)
+    file = without_ways(open_table(path), model)
     texts = tuple(name for name in ("target", "station") if name in file.columns)
-    signals = assign(file, model, ("pose",), ("q", "xyz", "quaternion", "payload", "temperature"), texts)
+    signals = assign(
+        file, model, ("pose",), ("q", "xyz", "quaternion", "payload", "temperature", "approach"), texts
+    )
     if "q" not in signals and "xyz" not in signals:
         raise file.error(
             "E-POSES-027",
@@ -106,6 +110,7 @@ def read_targets(path: str | Path, model: RobotModel) -> ToolTargets:
         station=table.columns["station"] if "station" in texts else None,
         payload=payload_column(table, signals, model),
         temperature=values["temperature"][:, 0] if "temperature" in values else None,
+        approach=approach_columns(table, signals),
     )
     _check_once(table, pose)
     return targets
@@ -114,7 +119,7 @@ def read_targets(path: str | Path, model: RobotModel) -> ToolTargets:
 def write_commands(
     path: str | Path, model: RobotModel, commands: ToolTargets, unambiguous: np.ndarray, like: TableFile
 ) -> None:
-    """Write motor commands as CSV or Parquet: `pose`, q1…qn, `target`, `payload` and `temperature` where given,
+    """Write motor commands as CSV or Parquet: `pose`, q1…qn, `target`, `payload`, `temperature` and `approach1`… where given,
     `unambiguous` (N,).
 
     Where the file `like` has the columns that `signals:` maps to q, the commands stand in these, in their units. Raises `InputError`
@@ -130,13 +135,13 @@ def write_commands(
 
 
 def read_commands(path: str | Path, model: RobotModel) -> ToolTargets:
-    """Read motor commands: `pose`, q1…qn, and where given `target`, `payload` and `temperature`; `unambiguous` is not looked at.
+    """Read motor commands: `pose`, q1…qn, and where given `target`, `payload`, `temperature` and `approach1`…; not `unambiguous`.
 
     Raises `InputError` as `read_targets` does.
     """
-    file = open_table(path)
+    file = without_ways(open_table(path), model)
     texts = tuple(name for name in ("target", "unambiguous") if name in file.columns)
-    signals = assign(file, model, ("pose", "q"), ("payload", "temperature"), texts)
+    signals = assign(file, model, ("pose", "q"), ("payload", "temperature", "approach"), texts)
     table = file.read(texts)
     q = signals["q"].values(table)
     check_joint_units(model, table, signals["q"], q)
@@ -148,6 +153,7 @@ def read_commands(path: str | Path, model: RobotModel) -> ToolTargets:
         q,
         payload=payload_column(table, signals, model),
         temperature=signals["temperature"].values(table)[:, 0] if "temperature" in signals else None,
+        approach=approach_columns(table, signals),
     )
 
 
@@ -159,7 +165,8 @@ def write_targets(path: str | Path, targets: ToolTargets) -> None:
 def _columns(targets: ToolTargets) -> dict[str, np.ndarray]:
     columns: dict[str, np.ndarray] = {"pose": targets.pose}
     turn = None if targets.rotation is None else rotation_wxyz(targets.rotation)
-    for quantity, values in (("q", targets.q), ("xyz", targets.position), ("quaternion", turn)):
+    vectors = {"q": targets.q, "xyz": targets.position, "quaternion": turn, "approach": targets.approach}
+    for quantity, values in vectors.items():
         if values is not None:
             names = standard_columns(quantity, values.shape[1])
             columns |= {name: values[:, i] for i, name in enumerate(names)}

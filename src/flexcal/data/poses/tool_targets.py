@@ -32,6 +32,8 @@ class ToolTargets:
         Mass (N,), kg, at the declared payload's centre of mass; by default as declared in robot.yaml.
     temperature : ndarray, optional
         Temperature (N,) of the arm, °C; by default that at which the calibrated parameters hold.
+    approach : ndarray, optional
+        Signs (N, n) of the joints' last motions, 1 or -1, 0 where they are not known; by default none is.
 
     Raises
     ------
@@ -47,6 +49,7 @@ class ToolTargets:
     station: np.ndarray | None = None
     payload: np.ndarray | None = None
     temperature: np.ndarray | None = None
+    approach: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         if self.q is None and self.position is None:
@@ -70,10 +73,11 @@ class ToolTargets:
                 raise FlexcalError(
                     "E-POSES-034", f"{name} of targets has shape {values.shape}; {shape} is needed."
                 )
-        if self.q is not None and (self.q.ndim != 2 or len(self.q) != rows):
-            raise FlexcalError(
-                "E-POSES-035", f"q of targets has shape {self.q.shape}; ({rows}, joints) is needed."
-            )
+        for name, values in (("q", self.q), ("approach", self.approach)):
+            if values is not None and (values.ndim != 2 or len(values) != rows):
+                raise FlexcalError(
+                    "E-POSES-035", f"{name} of targets has shape {values.shape}; ({rows}, joints) is needed."
+                )
 
     def __len__(self) -> int:
         return len(self.pose)

@@ -17,7 +17,7 @@ from flexcal.errors import InputError
 if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
 
-_UNUSED = ("tau", "temperature", "t")
+_UNUSED = ("tau", "temperature", "t", "approach")
 DEFAULT_POINT = "point"
 """Name of the fixed point where a file does not name it."""
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.data.poses.columns import first_point, target_column
+from flexcal.data.poses.columns import first_point, target_column, without_ways
 from flexcal.data.tables import Table, assign, check_joint_limits, check_joint_units, open_table
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ def read_working(path: Path, model: RobotModel) -> tuple[np.ndarray | None, np.n
     column for what is missing or not understood, for a pose outside the joint limits, and for x, y, z of another point than the first
     one under `points:`, which maps and designs are of.
     """
-    file = open_table(path)
+    file = without_ways(open_table(path), model)
     texts = tuple(name for name in ("target", "unambiguous") if name in file.columns)
     if {"x", "y", "z"} <= set(file.columns) and "q1" not in file.columns:
         signals = assign(file, model, ("xyz",), ("pose",), texts)
@@ -29,7 +29,7 @@ def read_working(path: Path, model: RobotModel) -> tuple[np.ndarray | None, np.n
         if "target" in texts:
             _require_first_point(table, model)
         return None, signals["xyz"].values(table)
-    signals = assign(file, model, ("pose", "q"), ("xyz", "payload"), texts)
+    signals = assign(file, model, ("pose", "q"), ("xyz", "payload", "approach"), texts)
     table = file.read(texts)
     if "target" in texts:
         target_column(table, model)

@@ -270,6 +270,7 @@ def compensate_robot(
         commands.q[commands.reached],
         payload=reached.payload,
         temperature=reached.temperature,
+        approach=reached.approach,
     )
     write_commands(out, result.model, rows, commands.unambiguous[commands.reached], table)
     return result

@@ -72,7 +72,8 @@ def predict(
     temperature: float | None = None,
     progress: Progress = silent,
 ) -> Prediction:
-    """Predict the pose of the real tool for motor commands: geometry, deflection under gravity and payload, backlash.
+    """Predict the pose of the real tool for motor commands: geometry, deflection under gravity and payload, backlash, and
+    hysteresis where it is said from which side the joints come.
 
     Parameters
     ----------
@@ -80,7 +81,7 @@ def predict(
         `Calibration.robot`, or ``CalibratedRobot.from_yaml(path)``.
     commands : ToolTargets
         Commanded joint positions `q` (N, n), rad or m, the names of the points (N,) that are looked at, and payloads (N,), kg, where
-        they are not as declared, and temperatures (N,), °C.
+        they are not as declared, temperatures (N,), °C, and the sides (N, n) from which the joints come.
     temperature : float, optional
         Temperature of the arm, °C, for commands that have none; by default that at which the calibrated parameters hold.
     progress : Progress
@@ -155,7 +156,14 @@ def _predicted(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Positions (N, 3), orientations (N, 3, 3), deviations from the nominal positions (N, 3), and mask of certain flanks (N,)."""
     assert commands.q is not None
-    at = tool_at_rest(model, commands.q, commands.payload, commands.target, temperature=commands.temperature)
+    at = tool_at_rest(
+        model,
+        commands.q,
+        commands.payload,
+        commands.target,
+        temperature=commands.temperature,
+        approach=commands.approach,
+    )
     there = points_kinematics(nominal, commands.q, None, commands.target, jacobians=False).position
     payload = carried_mass(model, commands.payload, len(commands))
     certain = certain_flank(model, commands.q, at.rest.torque, payload)[:, list(model.backlash_joints)]

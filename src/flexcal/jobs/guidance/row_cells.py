@@ -14,7 +14,18 @@ from flexcal.errors import InputError
 from flexcal.model.robot import RobotModel
 
 _TEXTS = ("target", "station")
-_NUMBERS = ("sigma", "sigma_xyz", "payload", "temperature", "t", "tau", "quaternion", "sigma_angle", "force")
+_NUMBERS = (
+    "sigma",
+    "sigma_xyz",
+    "payload",
+    "temperature",
+    "t",
+    "tau",
+    "quaternion",
+    "sigma_angle",
+    "force",
+    "approach",
+)
 
 
 @dataclass(frozen=True)
@@ -65,6 +76,7 @@ class RowReader:
             temperature=values["temperature"][:, 0] if "temperature" in values else None,
             time=values["t"][:, 0] if "t" in values else None,
             pose=values["pose"][:, 0].astype(int) if "pose" in values else np.arange(1, count + 1),
+            approach=values.get("approach"),
             sigma_given=sigma is not None,
         )
 
@@ -80,16 +92,18 @@ def in_columns(
 ) -> list[dict[str, str]]:
     """Rows, texts by column, with the columns of a table that is there, as far as no measured number is made up or lost for it.
 
-    The target, of a robot's first point, is added or left out, the number of the pose left out, and remarks of the table are empty.
+    The target, of a robot's first point, is added or left out, the number of the pose and the sides of approach left out, and remarks of
+    the table are empty; sides that a table has are not known (0) of others.
     """
     if not columns:
         return [dict(cells) for cells in rows]
-    first, numbers = model.point().name, number_columns(model)
+    first, numbers, sides = model.point().name, number_columns(model), standard_columns("approach", model.n)
     fitted = []
     for cells in rows:
         named = {"target": first, **cells}
         remarks = {name: "" for name in columns if name not in numbers and name not in _TEXTS}
-        left_out = ("pose", "target") if named["target"] == first else ("pose",)
+        remarks |= {name: "0" for name in columns if name in sides}
+        left_out = ("pose", *sides, *(("target",) if named["target"] == first else ()))
         fitted.append(remarks | {k: v for k, v in named.items() if k in columns or k not in left_out})
     return fitted
 
@@ -99,6 +113,8 @@ def cells_of(poses: PoseSet) -> list[dict[str, str]]:
     n = poses.q.shape[1]
     numbers = {name: poses.q[:, k] for k, name in enumerate(standard_columns("q", n))}
     numbers |= {name: poses.position[:, k] for k, name in enumerate("xyz")}
+    if poses.approach is not None:
+        numbers |= {name: poses.approach[:, k] for k, name in enumerate(standard_columns("approach", n))}
     if poses.sigma_given:
         numbers |= {name: poses.sigma[:, k] for k, name in enumerate(standard_columns("sigma_xyz", n))}
     for name, values in (("payload", poses.payload), ("temperature", poses.temperature), ("t", poses.time)):
