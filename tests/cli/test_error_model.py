@@ -92,6 +92,18 @@ def test_a_sigma_that_is_too_large_is_said(tmp_path: Path, run: Callable) -> Non
     assert "the stated sigma of 15 mm is" in said.out and "times the scatter of the points" in said.out
 
 
+@pytest.mark.parametrize("checked", [TRACKER, 1e-4])
+def test_a_sigma_that_the_calibration_did_not_have(tmp_path: Path, checked: float) -> None:
+    """Points of another instrument scatter as their file says, and no less than those of the calibration did."""
+    case = Measured.drawn(tmp_path, 66)
+    q = case.arm.postures(50, case.rng)
+    found = case.calibrated(q, case.arm.measured(q, case.rng, TRACKER), None)
+    q = case.arm.postures(100, case.rng)
+    errors = prediction_errors(found.model, case.poses(q, case.arm.measured(q, case.rng, checked), checked))
+    rms = np.sqrt(np.mean((errors.errors**2).sum(axis=1)))
+    assert rms == pytest.approx(np.sqrt(np.mean(errors.expected_rms**2)), rel=0.15)
+
+
 def test_outliers_are_found_without_asking(tmp_path: Path) -> None:
     case = Measured.drawn(tmp_path, 64)
     q = case.arm.postures(60, case.rng)

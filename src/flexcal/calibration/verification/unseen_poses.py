@@ -218,8 +218,14 @@ def _shared_errors(model: RobotModel, cells: ErrorGroups) -> np.ndarray:
 def _independent(
     model: RobotModel, scatter: ErrorComponents, at: PredictedMeasurements, poses: PoseSet
 ) -> np.ndarray:
-    """Covariance (N, 3, 3) m² of instrument and repeatability."""
-    sigma = (
-        poses.sigma if poses.sigma_given else np.full(poses.sigma.shape, model.value("scatter.instrument"))
-    )
+    """Covariance (N, 3, 3) m² of instrument and repeatability.
+
+    Where the calibration had no sigma, the robot's part holds what its instrument scattered: of a stated one only what is beyond counts.
+    """
+    instrument, sigma = model.value("scatter.instrument"), poses.sigma
+    if not poses.sigma_given:
+        sigma = np.full(sigma.shape, instrument)
+    elif instrument == 0 and model.scatter.std.any():
+        sigma = np.sqrt(np.maximum(sigma**2 - scatter.robot**2, 0.0))
+        scatter = replace(scatter, share=1.0)
     return scatter.independent(Readings.of(replace(poses, sigma=sigma)), joint_rotation_jacobian(at))
