@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
 _DISTANCES = (0.12, 1.3)
 """Usual distance of targets from the base, relative to the robot's reach."""
+OF_COMMANDS = ("target", "unambiguous")
+"""Columns of motor commands that are no numbers."""
 
 
 def read_targets(path: str | Path, model: RobotModel) -> ToolTargets:
@@ -140,7 +142,7 @@ def read_commands(path: str | Path, model: RobotModel) -> ToolTargets:
     Raises `InputError` as `read_targets` does.
     """
     file = without_ways(open_table(path), model)
-    texts = tuple(name for name in ("target", "unambiguous") if name in file.columns)
+    texts = tuple(name for name in OF_COMMANDS if name in file.columns)
     signals = assign(file, model, ("pose", "q"), ("payload", "temperature", "approach"), texts)
     table = file.read(texts)
     q = signals["q"].values(table)

@@ -10,6 +10,7 @@ import numpy as np
 
 from flexcal.data.poses.columns import payload_column, whole_numbers
 from flexcal.data.poses.frame_touches import KNOWN_BY_NAME, FrameMethod, FrameTouches
+from flexcal.data.poses.target_files import OF_COMMANDS
 from flexcal.data.poses.touches import Touches
 from flexcal.data.tables import Table, TableFile, assign, check_joint_units, open_table
 from flexcal.errors import InputError
@@ -164,6 +165,7 @@ def _require_one_place(table: Table, touched: np.ndarray, known: np.ndarray) -> 
 def _poses(
     file: TableFile, model: RobotModel, texts: tuple[str, ...], more: tuple[str, ...] = ()
 ) -> tuple[Table, np.ndarray, np.ndarray, np.ndarray | None, np.ndarray | None]:
+    file = file.leaving_out([name for name in OF_COMMANDS if name in file.columns])
     signals = assign(file, model, ("q", *more), ("pose", "payload", *_UNUSED), texts)
     table = file.read(texts)
     q = signals["q"].values(table)
