@@ -236,6 +236,16 @@ def test_reversed_signs_are_found() -> None:
     assert not any("leads" in r for r in calibrated(poses).document()["remarks"])
 
 
+def test_robot_yaml_may_know_a_gear(tmp_path: Path) -> None:
+    yaml = write_robot(tmp_path)
+    yaml.write_text(yaml.read_text() + "prior: {parameters: {joint_2.hysteresis: 1.0e-7}}\n")
+    model, arm = RobotModel.from_yaml(yaml), LaggingArm.made(2)
+    poses = seen_from(model, arm.measured(postures(arm.rng, 50), arm.sides(50)))
+    estimate = calibrate(model, poses, terms=["kinematic"]).estimate
+    assert abs(estimate.values["joint_2.hysteresis"]) < 1e-6
+    assert estimate.values["joint_3.hysteresis"] == pytest.approx(arm.half[2], abs=2e-5)
+
+
 def test_derivatives_are_those_of_differences() -> None:
     arm = LaggingArm.made(2)
     poses = arm.measured(postures(arm.rng, 5), arm.sides(5))

@@ -82,6 +82,17 @@ def pose_checks(results: Mapping[str, Any], *, has_shapes: bool = True) -> tuple
         checks.append(
             Check(f"Are both flanks of the backlash of {joint} loaded?", answer, "good" if good else "care")
         )
+    if approaches := results.get("approaches"):
+        turning = {joint: sides for joint, sides in approaches.items() if sum(sides.values())}
+        rarest = min(turning, key=lambda joint: min(turning[joint].values()), default=None)
+        if rarest is not None:
+            sides = turning[rarest]
+            answer = (
+                f"They come to the poses by way of a point 2° before, from either side: {rarest} to {sides['positive']} in its positive "
+                f"direction and to {sides['negative']} in the negative one, the others no less evenly."
+            )
+            good = min(sides.values()) >= _FEW * sum(sides.values())
+            checks.append(Check("Do the joints come from both sides?", answer, "good" if good else "care"))
     if (working := results.get("working")) is not None:
         share = working["reached_share"]
         answer = f"Of the working volume the robot reaches {100 * share:.0f} %."
