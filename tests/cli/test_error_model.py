@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from over_seeds import over_seeds
+from refusals import assert_refusal
 from scipy.optimize import least_squares
-from stranger_arm import PANDA, SIX, StrangerArm
+from stranger_arm import PANDA, SIX, StrangerArm, rigid, turn
 
 from flexcal.calibration.diagnostics import is_implausible
 from flexcal.calibration.fit import GeometricFit, fit_geometry
@@ -102,6 +103,29 @@ def test_a_sigma_that_the_calibration_did_not_have(tmp_path: Path, checked: floa
     errors = prediction_errors(found.model, case.poses(q, case.arm.measured(q, case.rng, checked), checked))
     rms = np.sqrt(np.mean((errors.errors**2).sum(axis=1)))
     assert rms == pytest.approx(np.sqrt(np.mean(errors.expected_rms**2)), rel=0.15)
+
+
+@pytest.mark.parametrize("terms", ["[kinematic]", "auto"])
+def test_a_target_that_was_mounted_anew_is_no_crowd_of_outliers(
+    tmp_path: Path, run: Callable, terms: str
+) -> None:
+    """Fifteen poses at a second station, after which the reflector was put elsewhere: said, and refused where too few agree."""
+    arm, rng = StrangerArm(5, axes=tuple(SIX)), np.random.default_rng(5)
+    robot = arm.write(tmp_path, "stations: {a: {xyz: [2.5, -1, 0.7]}, cal: {xyz: [1, 2, 0.3]}}\n")
+    robot.write_text(robot.read_text().replace("terms: [kinematic]", f"terms: {terms}"))
+    tracker = rigid(turn(np.array([0.3, 0.2, 0.5])), np.array([1.0, 2.0, 0.3]))
+    files = []
+    for name, count, own, off in (("a", 60, None, 0.0), ("cal", 15, tracker, 0.03)):
+        q = arm.postures(count, rng)
+        xyz = arm.measured(q, rng, tracker=own, xyz=arm.true_xyz + np.array([off, 0, -off]))
+        file = arm.write_poses(tmp_path / f"{name}.csv", q, xyz, None)
+        header, *rows = file.read_text().splitlines()
+        file.write_text("\n".join([f"{header},station", *(f"{row},{name}" for row in rows)]) + "\n")
+        files.append(file)
+    said = run("calibrate", robot, *files)
+    assert "14 of the 15 poses of station 'cal' are outliers" in said.out + said.err
+    if terms == "auto":
+        assert_refusal(said.err, "E-CAL-038", "cal")
 
 
 def test_outliers_are_found_without_asking(tmp_path: Path) -> None:

@@ -27,11 +27,15 @@ from flexcal.calibration.term_selection import (
     zeros_or_geometry,
 )
 from flexcal.data.poses import PoseSet
+from flexcal.errors import FlexcalError
+from flexcal.jobs.calibration.remarks import outlying_stations
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 
 _COMPARED = 1e-4
 """Relative offset at which fits to most of the poses have converged, of which nothing but errors elsewhere is told."""
+_REGISTERED = 3
+"""Least number of poses that tell where an instrument stands."""
 
 
 @dataclass(frozen=True)
@@ -124,6 +128,9 @@ class Fits:
             )
             return cls(model, terms, rigid, bearings, None, None, selected)
         good = poses.subset(np.setdiff1d(np.flatnonzero(~poses.tilted), rigid.estimate.outliers))
+        for name, told in outlying_stations(poses, rigid.estimate.outliers).items():
+            if np.sum(good.station == name) < _REGISTERED:
+                raise FlexcalError("E-CAL-038", f"{told}.")
         alone = loss == "auto" and not poses.tilted.any()
 
         def fit_of(chosen: TermSelection) -> GeometricFit:

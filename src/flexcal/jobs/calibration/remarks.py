@@ -24,6 +24,7 @@ from flexcal.calibration.diagnostics import (
     stated_noise,
 )
 from flexcal.calibration.fit import GeometricFit
+from flexcal.data.poses import PoseSet
 from flexcal.estimation import Estimate
 from flexcal.jobs.calibration.few_readings import few_readings_remarks
 from flexcal.jobs.calibration.ignored_columns import ignored_columns_remarks
@@ -141,6 +142,20 @@ def outliers_of(fit: GeometricFit) -> tuple[Outlier, ...]:
     )
 
 
+def outlying_stations(poses: PoseSet, outliers: Sequence[int]) -> dict[str, str]:
+    """Stations most of whose poses are `outliers` (rows) beside those of others, each with a sentence that says so."""
+    out = np.isin(np.arange(len(poses)), outliers)
+    found = {}
+    for name in poses.stations if len(poses.stations) > 1 else ():
+        own = poses.station == name
+        if 2 * out[own].sum() > own.sum():
+            found[name] = (
+                f"{out[own].sum()} of the {own.sum()} poses of station '{name}' are outliers: they do not agree with the others, as where "
+                "the target was mounted anew or the instrument moved between them; give these a target or a station of their own"
+            )
+    return found
+
+
 def calibration_remarks(
     fit: GeometricFit,
     cause: Sequence[str] = (),
@@ -165,6 +180,7 @@ def calibration_remarks(
         told = listed([str(outlier) for outlier in outliers], _LISTED)
         remarks.append(f"{counted(len(outliers), 'outlier')}: {told}")
         remarks += [*_mislabelled(outliers), *_turned(fit, outliers)]
+        remarks += [*outlying_stations(fit.poses, fit.estimate.outliers).values()]
     remarks += [
         *_undetermined(fit),
         *_views(fit),
