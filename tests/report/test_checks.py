@@ -72,12 +72,16 @@ def test_the_ratio_decides_with_its_interval(
 def test_the_error_budget_is_judged(study: TwoStageStudy) -> None:
     good = {"instrument_mm": 0.02, "robot_mm": 0.03, "model_mm": 0.01, "stated_mm": 0.02}
 
-    def judged(changes: dict[str, float | None], *, is_implausible: bool = False) -> str:
-        return check_error_budget(study.geometry, good | changes, is_implausible=is_implausible).status
+    def judged(changes: dict[str, float | None], *, is_implausible: bool = False) -> tuple[str, str]:
+        found = check_error_budget(study.geometry, good | changes, is_implausible=is_implausible)
+        return found.status, found.code
 
-    assert judged({}) == "good" and judged({"instrument_mm": None, "stated_mm": None}) == "good"
-    assert judged({"model_mm": 0.05}) == "care" and judged({"stated_mm": 0.2}) == "care"
-    assert judged({}, is_implausible=True) == "bad"
+    unstated = {"instrument_mm": None, "stated_mm": None}
+    assert judged({}) == judged(unstated) == ("good", "residual")
+    assert judged({"model_mm": 0.05}) == judged(unstated | {"model_mm": 0.05}) == ("care", "model_error")
+    assert judged({"instrument_mm": None, "stated_mm": None, "robot_mm": 0.0, "model_mm": 1e-6})[0] == "good"
+    assert judged({"stated_mm": 0.2}) == ("care", "residual")
+    assert judged({}, is_implausible=True) == ("bad", "residual")
 
 
 def test_few_or_much_worse_fresh_poses_are_flagged(study: TwoStageStudy) -> None:

@@ -61,7 +61,7 @@ def calibration_checks(
         ),
         check_error_budget(
             estimate, results["variances"], is_implausible=results["fit"]["is_implausible"], held=held
-        ).named("residual"),
+        ),
         check_rank(identifiable.parameters, identifiable.rank, identifiable.gap).named("rank"),
         *_checks_of_drift(results),
         *check_lag(results.get("lag")),

@@ -24,6 +24,8 @@ FEW_NUMBERS = 4.0
 OVERSTATED = 0.5
 """Noise over the stated sigma below which the stated one counts as wrong."""
 CLEAR_GAP = 3.0
+_INVISIBLE = 1e-3
+"""Model error, mm, that no instrument sees."""
 
 
 def check_fresh_poses(fitted: ErrorStatistics, fresh: ErrorStatistics) -> Check:
@@ -111,7 +113,7 @@ def check_error_budget(
         else "Are the residuals noise of instrument and robot?"
     )
     if estimate.status != "converged":
-        return Check(question, f"The fit did not converge: {estimate.message}.", "bad")
+        return Check(question, f"The fit did not converge: {estimate.message}.", "bad").named("residual")
     instrument, stated = variances["instrument_mm"], variances["stated_mm"]
     robot, model = (float(variances[key] or 0.0) for key in ("robot_mm", "model_mm"))
     said = "" if instrument is None else f"instrument {instrument:.3f}, "
@@ -125,16 +127,14 @@ def check_error_budget(
             question,
             f"No: the data do not fit the robot as its files describe it; the remarks say what is implausible. {answer}",
             "bad",
-        )
-    if model > np.hypot(instrument or 0.0, robot):
-        return Check(
-            question,
-            f"No: systematic model errors are larger than the noise. {answer}",
-            "care",
-        )
+        ).named("residual")
+    if model > max(np.hypot(instrument or 0.0, robot), _INVISIBLE):
+        what = f"No: systematic model errors are larger than the noise. {answer}"
+        return Check(question, what, "care").named("model_error")
     if instrument is not None and stated is not None and instrument < OVERSTATED * stated:
-        return Check(question, f"Yes, but the stated sigma of {stated:.3g} mm is too large. {answer}", "care")
-    return Check(question, f"Yes. {answer}", "good")
+        what = f"Yes, but the stated sigma of {stated:.3g} mm is too large. {answer}"
+        return Check(question, what, "care").named("residual")
+    return Check(question, f"Yes. {answer}", "good").named("residual")
 
 
 def check_residual(question: str, estimate: Estimate) -> Check:

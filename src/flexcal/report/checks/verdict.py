@@ -152,6 +152,7 @@ PHRASES: dict[str, dict[str, str]] = {
         "care": "the residuals do not agree with the stated noise",
         "else": "no measurement noise is stated",
     },
+    "model_error": {"else": "systematic model errors are larger than the noise"},
     "residual_stiffness": {
         "good": "the noise explains the residuals of the frequency responses",
         "bad": "the fit does not explain the frequency responses",

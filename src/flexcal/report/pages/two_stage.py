@@ -108,7 +108,7 @@ def two_stage_checks(study: TwoStageStudy) -> tuple[Check, ...]:
             "fresh_poses", independent=True
         ),
         check_claimed_uncertainty(study.results["prediction"]).named("claimed_uncertainty", independent=True),
-        check_error_budget(geometry, study.results["variances"], is_implausible=bad_data).named("residual"),
+        check_error_budget(geometry, study.results["variances"], is_implausible=bad_data),
         check_responses(stiffness_study),
         check_drift(study.results["calibration_fit"]["drift"]).named("drift"),
         check_springs(stiffness_study, stiffness, damping).named("springs"),
