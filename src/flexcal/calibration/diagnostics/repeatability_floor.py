@@ -1,4 +1,4 @@
-"""Floor of the accuracy: scatter of the measured points that no calibration removes, as of play in the joints."""
+"""Scatter of the measured points that the geometry does not remove, as of play in the joints."""
 
 from __future__ import annotations
 
@@ -43,14 +43,12 @@ class RepeatabilityFloor:
     @property
     def sentence(self) -> str:
         """What it means, in a sentence."""
-        whose = (
-            "the arm does not repeat better" if self.apart else "arm and instrument together repeat no better"
-        )
+        whose = "the arm repeats" if self.apart else "arm and instrument together repeat"
         return (
-            f"{self.distance / MILLIMETRE:.1f} mm (rms) of scatter from pose to pose remain beside the geometry, as if every "
-            f"joint had {self.joint_degrees:.1f}° of play (1σ), or something moved between the poses, or the robot while it was read: if "
-            f"nothing did, {whose}, "
-            "and no calibration goes much below that"
+            f"{self.distance / MILLIMETRE:.1f} mm (rms) of scatter from pose to pose remain beside the geometry, as of "
+            f"{self.joint_degrees:.2g}° at every joint (1σ): {whose} no better, or something moved between the poses or while they were "
+            "read, or the arm has errors beyond the terms of this fit; repeated visits to the same poses (flexcal repeatability) tell the "
+            "first from the others"
         )
 
     def document(self) -> dict[str, Any]:

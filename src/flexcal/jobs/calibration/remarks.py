@@ -311,7 +311,7 @@ def _views(fit: GeometricFit) -> Sequence[str]:
     return (
         *wrong,
         f"{seen.sum()} poses were measured by a camera, each with the noise of its own view: {noise:.3f} mm rms expected, {found:.3f} mm "
-        "found; the fit weighs the views by their noise, so the calibrated robot is far more accurate than one view",
+        "found; the fit weighs the views by their noise",
     )
 
 
@@ -449,12 +449,11 @@ def floor_remark(fit: GeometricFit, before: np.ndarray | None) -> tuple[str, ...
         return own
     if fit.errors.mean < _GAIN * float(np.linalg.norm(before, axis=1).mean()):
         return own
-    play = "" if floor is None else f", as if every joint had {floor.joint_degrees:.1f}° of play,"
+    play = "" if floor is None else f", as of {floor.joint_degrees:.2g}° at every joint"
     return (
-        f"the scatter from pose to pose, {robot:.2f} mm per coordinate (1σ){play or ','} is the floor, if nothing moved between the "
-        f"poses and the robot stood still at them: model errors of {model:.2f} mm and parameters known to {parameters:.2f} mm at these "
-        "poses add little to it, so neither further terms nor more poses will make this "
-        "robot much more accurate. Visits to the same poses tell how much of it is the robot's repeatability (flexcal repeatability)",
+        f"the scatter from pose to pose, {robot:.2f} mm per coordinate (1σ){play}, is most of what is left: model errors of {model:.2f} mm "
+        f"and parameters known to {parameters:.2f} mm at these poses add little to it. Visits to the same poses tell how much of it is the "
+        "robot's repeatability (flexcal repeatability), which no calibration removes",
     )
 
 
