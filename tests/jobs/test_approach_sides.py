@@ -136,7 +136,7 @@ def test_without_the_column_a_sentence_says_what_one_side_would_mean() -> None:
         assert len(approach["unknown"]) == 6
         (sentence,) = [r for r in each.document()["remarks"] if "do not say from which side" in r]
         assert f"{approach['other_side_mm']:.2g} mm" in sentence
-        assert "straight from row to row, from both" in sentence
+        assert "straight from row to row, they came from both" in sentence
     swept = calibrated(poses.subset(np.argsort(q[:, 1]))).document()["remarks"]
     assert not any("straight from row to row" in r for r in swept)
     observed, predicted = elsewhere(arm, found, side, said=False)

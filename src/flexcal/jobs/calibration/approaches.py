@@ -85,8 +85,8 @@ class Approaches:
             )
         elif self.unknown:
             remarks.append(
-                f"the files do not say from which side the joints came (columns approach1…): {self._by_order()}if always from the same, "
-                f"a program that comes from the other {size}, and no predicted error has that in it"
+                f"the files do not say from which side the joints came (columns approach1…): if always from the same, a program that comes "
+                f"from the other {size}, which is in no predicted error{self._by_order()}"
             )
         return tuple(remarks)
 
@@ -98,7 +98,7 @@ class Approaches:
         rarer = np.minimum((moves > _MOVED).mean(axis=0), (moves < -_MOVED).mean(axis=0))
         if rarer.min() < _FEW:
             return ""
-        return "if the robot went straight from row to row, from both, and hysteresis is in the scatter; "
+        return "; if the robot went straight from row to row, they came from both, and it is in the scatter"
 
     def _leading(self) -> tuple[str, ...]:
         """Clauses on joints whose half width is negative beyond three standard deviations."""
