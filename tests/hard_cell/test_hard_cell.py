@@ -150,6 +150,16 @@ def test_drawn_links_err_in_shape_independently_of_mass(robot: Path) -> None:
     assert {r.bearings_before for r in drawn} == {True, False}
 
 
+def test_gears_have_loops_of_a_tenth_to_one_arc_minute(robot: Path) -> None:
+    described = read_description(robot)
+    drawn = [draw_robot(described, np.random.default_rng(seed)) for seed in range(60)]
+    full = np.degrees(2 * np.array([r.hysteresis for r in drawn])) * 60
+    assert 0.1 < full.min() < 0.13 and 0.8 < full.max() < 1.0
+    assert np.median(full) == pytest.approx(0.32, rel=0.15)
+    share = np.array([r.hysteresis / r.slip_twist for r in drawn])
+    assert share.min() > 0.1 and share.max() < 0.5
+
+
 def test_counterparts_are_parameters_of_the_model(robot: Path, tx90l: RobotModel) -> None:
     cell = HardCell.drawn(robot, 1)
     values = counterparts(cell.robot)

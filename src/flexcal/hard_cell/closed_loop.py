@@ -10,7 +10,7 @@ import numpy as np
 from flexcal.errors import FlexcalError
 from flexcal.hard_cell.equilibrium import StaticEquilibrium, stand, transmission_error
 from flexcal.hard_cell.multibody import Multibody, build
-from flexcal.hard_cell.true_parameters import HYSTERESIS_TWIST, HardRobot
+from flexcal.hard_cell.true_parameters import HardRobot
 from flexcal.mujoco_library import step_address
 
 ENCODER_COUNTS = 2**18  # a turn at the joint
@@ -131,8 +131,8 @@ def _hinges(robot: HardRobot, arm: Multibody) -> np.ndarray:
     backlash, slipping, limit = none.copy(), none.copy(), none.copy()
     backlash[:, 2] = robot.backlash
     stiffness = np.where(np.isfinite(robot.arm.springs), robot.arm.springs, 0.0)
-    slipping[:, 2] = stiffness[:, 2] * robot.hysteresis / HYSTERESIS_TWIST
-    limit[:, 2] = HYSTERESIS_TWIST
+    slipping[:, 2] = stiffness[:, 2] * robot.hysteresis / robot.slip_twist
+    limit[:, 2] = robot.slip_twist
     return np.column_stack(
         [arm.springs(v) for v in (stiffness, robot.arm.dampers, backlash, robot.hardening, slipping, limit)]
     )

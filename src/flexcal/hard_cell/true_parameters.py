@@ -20,10 +20,8 @@ WRIST, WRIST_DAMPING = (50e3, 200e3), 3e-4  # N m/rad; s: damping over stiffness
 GAP = (2e-5, 5e-5)  # rad, half
 HARDENING = 0.2  # relative, at most, at HARDENING_TWIST
 HARDENING_TWIST = 1e-3  # rad
-HYSTERESIS, HYSTERESIS_TWIST = (
-    1e-5,
-    1e-4,
-)  # rad: half width of the loop at most, and the twist that turns it over
+HYSTERESIS = (1.5e-5, 1.45e-4)  # rad, half width of the loop: full 0.1 to 1 arc minute (Nabtesco)
+SLIP_SHARE = (0.1, 0.5)  # stiffness of the slipping element over that of the drive
 JOINT_ERROR, MOTOR_ERROR = 6e-5, 2e-5  # rad, at most: transmission error, harmonic 1; half of it harmonic 2
 REPEATABILITY = (3e-5, 1e-4)  # m: root mean square distance of visits to a pose from their mean
 SIGMA_FACTOR = (0.2, 5.0)  # stated over true standard deviation of the tracker
@@ -34,18 +32,19 @@ WARMING, EXPANSION = 6.0, 2.3e-5  # K at most, 1/K (aluminium)
 class HardRobot:
     """True parameters of an arm; n joints, SI, at the joint.
 
-    `bearings_before`: the bearing's axes are fixed to the parent, before the joint's rotation; else they turn with it. `hardening` (n, 3)
-    1/rad²; `hysteresis` (n,) half width of the drive's loop, rad; `backlash` (n,) half, rad; `stribeck`, `stribeck_velocity`, `per_load`,
-    `bristle` (rad) of friction; `error_amplitude`, `error_phase` (n, 4) of the gear; `torque_gain` (n,) true over believed
-    torque; `joint_scatter` (n,) rad and `point_scatter` m an axis of every visit, 1σ; `expansion` (links,) relative, at the end of a
-    measurement; `payload_excess` kg beyond what is
-    declared; `sigma_factor` stated over true tracker sigma; `station` its frame's rotation (3, 3) and place.
+    `bearings_before`: the bearing's axes are fixed to the parent, before the joint's rotation; else they turn with it. `hardening` (n,
+    3) 1/rad²; `hysteresis` (n,) half width of the drive's loop, rad, `slip_twist` (n,) the twist at which its element slips; `backlash`
+    (n,) half, rad; `stribeck`, `stribeck_velocity`, `per_load`, `bristle` (rad) of friction; `error_amplitude`, `error_phase` (n, 4) of
+    the gear; `torque_gain` (n,) true over believed torque; `joint_scatter` (n,) rad and `point_scatter` m an axis of every visit, 1σ;
+    `expansion` (links,) relative, at the end of a measurement; `payload_excess` kg beyond what is declared; `sigma_factor` stated over
+    true tracker sigma; `station` its frame's rotation (3, 3) and place.
     """
 
     arm: ArmDescription
     bearings_before: bool
     hardening: np.ndarray
     hysteresis: np.ndarray
+    slip_twist: np.ndarray
     backlash: np.ndarray
     stribeck: np.ndarray
     stribeck_velocity: np.ndarray
@@ -80,6 +79,7 @@ def ideal_robot(arm: ArmDescription, *, bearings_before: bool = True) -> HardRob
         bearings_before=bearings_before,
         hardening=np.zeros((n, 3)),
         hysteresis=zero,
+        slip_twist=np.full(n, 1e-4),
         backlash=zero,
         stribeck=zero,
         stribeck_velocity=np.ones(n),
@@ -135,7 +135,7 @@ def draw_robot(described: ArmDescription, rng: np.random.Generator) -> HardRobot
         arm=arm,
         bearings_before=bool(rng.integers(2)),
         hardening=np.column_stack([np.zeros((n, 2)), uniform(0, HARDENING, n)]) / HARDENING_TWIST**2,
-        hysteresis=uniform(0, HYSTERESIS, n),
+        hysteresis=(half_width := np.exp(uniform(np.log(HYSTERESIS[0]), np.log(HYSTERESIS[1]), n))),
         backlash=backlash,
         stribeck=arm.coulomb * uniform(0, 0.4, n),
         stribeck_velocity=uniform(0.02, 0.1, n),
@@ -151,6 +151,7 @@ def draw_robot(described: ArmDescription, rng: np.random.Generator) -> HardRobot
         payload_excess=float(arm.payload_std * normal()),
         sigma_factor=float(np.exp(uniform(*np.log(SIGMA_FACTOR)))),
         station=(turn.as_matrix(), stand),
+        slip_twist=half_width / uniform(*SLIP_SHARE, n),
     )
 
 
