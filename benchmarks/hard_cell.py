@@ -39,6 +39,11 @@ PER_VISIT = {
 """What 0.1 mm of repeatability can mean, over 1σ of a coordinate where all three are alike."""
 
 
+NORMAL_95 = 1.96
+CHANCE_FAR = 0.0027
+"""Probability of an error of more than three standard deviations."""
+
+
 @dataclass(frozen=True)
 class Judged:
     """One hard robot: what was drawn, what is true, and what the program says of it; mm and shares."""
@@ -55,9 +60,20 @@ class Judged:
     noise_free: dict[str, float]
     expected_rms_mm: float
     springs: dict[str, float]
-    within: float
+    normalised: dict[str, float]
+    widths: dict[str, float]
     chi2: tuple[float, float]
     seconds: float
+
+    @property
+    def inside_intervals(self) -> list[bool]:
+        """Whether each interval of a stiffness holds the true one."""
+        return [abs(z) < NORMAL_95 for z in self.normalised.values()]
+
+    @property
+    def far(self) -> int:
+        """Number of stiffnesses that are more than three standard deviations from the true one."""
+        return sum(abs(z) > 3 for z in self.normalised.values())
 
     @property
     def confidently_wrong(self) -> bool:
@@ -73,8 +89,8 @@ def one_seed(seed: int) -> Judged:
     prediction = run.results["prediction"]
     estimate, verification = run.stiffness.estimate, run.results["verification"]
     names = [name for name in estimate.parameters.names if name in run.truth and name.endswith(".stiffness")]
-    intervals = [(estimate.interval(name), run.truth[name]) for name in names]
-    known = [low <= true <= high for bounds, true in intervals if bounds for low, high in (bounds,)]
+    stds = dict(zip(estimate.parameters.names, np.sqrt(np.diag(estimate.covariance)), strict=True))
+    known = [name for name in names if estimate.interval(name) is not None]
     return Judged(
         seed=seed,
         bearings="before" if robot.bearings_before else "after",
@@ -88,7 +104,8 @@ def one_seed(seed: int) -> Judged:
         noise_free=verification["elastic"],
         expected_rms_mm=verification["expected_rms_mm"],
         springs={name: estimate.values[name] / run.truth[name] - 1 for name in names},
-        within=float(np.mean(known)) if known else float("nan"),
+        normalised={n: float(np.log(estimate.values[n] / run.truth[n]) / stds[n]) for n in known},
+        widths={n: float(stds[n]) for n in known},
         chi2=(estimate.reduced_chi2, run.calibration.estimate.reduced_chi2),
         seconds=run.results["seconds"]["total"],
     )
@@ -127,11 +144,29 @@ def table(runs: list[Judged]) -> str:
             f"{label}: P90 median {p90:.3f}, worst {worst_p90:.3f} mm; max median {largest:.3f}, worst {worst:.3f} mm"
         )
     springs = [abs(x) for r in runs for x in r.springs.values()]
+    inside = [r.inside_intervals for r in runs]
+    share, width = clustered_share(inside)
     lines.append(
-        f"stiffness error median {100 * np.median(springs):.1f} %, worst {100 * max(springs):.0f} %; intervals hold the truth in "
-        f"{100 * np.nanmean([r.within for r in runs]):.0f} %"
+        f"stiffness error median {100 * np.median(springs):.1f} %, worst {100 * max(springs):.0f} %; of {sum(map(len, inside))} "
+        f"intervals, 1σ {100 * np.median([w for r in runs for w in r.widths.values()]):.1f} % in the median, "
+        f"{100 * share:.1f} ± {100 * width:.1f} % hold the truth (95 %, clustered by robot)"
+    )
+    chance = np.mean([1 - (1 - CHANCE_FAR) ** len(r.normalised) for r in runs])
+    lines.append(
+        f"a stiffness beyond 3σ in {sum(r.far > 0 for r in runs)} of {len(runs)} robots, in {sum(r.far > 0 for r in trusted)} of "
+        f"{len(trusted)} trusted ones; by chance in {100 * chance:.1f} %"
     )
     return "\n".join(lines)
+
+
+def clustered_share(hits: list[list[bool]]) -> tuple[float, float]:
+    """Share of hits, and the half width of its 95 % interval, of robots whose own hits depend on each other."""
+    total = sum(map(len, hits))
+    share = sum(map(sum, hits)) / total
+    off = [sum(own) - share * len(own) for own in hits]
+    count = len(hits)
+    variance = count / max(count - 1, 1) * sum(x**2 for x in off) / total**2
+    return share, NORMAL_95 * float(np.sqrt(variance))
 
 
 def like_for_like(seed: int) -> dict[str, dict[str, float]]:

@@ -92,7 +92,10 @@ def produced(model: RobotModel) -> dict[str, str]:
     forked = replace(model, joints=(*model.joints[:-1], replace(model.joints[-1], parent=3)))
     loops = [*(f"loop.four_bar.{key}" for key in LOOP), f"joint_3.{RATIO}joint_2"]
     names = {name: unit_of(name) for name in (*model.values, *forked.values, *gains, *loops, *servos)}
-    return names | {item.name: item.unit for item in stiffness_parameters(model, [response], backlash=True)}
+    return names | {
+        item.name: item.unit
+        for item in stiffness_parameters(model, [response], backlash=True, hysteresis=True)
+    }
 
 
 def test_every_name_is_in_the_table_with_its_unit(root: Path, tx90l: RobotModel) -> None:

@@ -47,6 +47,16 @@ def part(element: ET.Element, name: str) -> ET.Element:
     return found
 
 
+def _stretched(tensor: np.ndarray, size: float, rng: np.random.Generator) -> np.ndarray:
+    """The inertia of a body whose second moments along its principal axes are off, so that it still is one of a body."""
+    if size == 0:
+        return tensor
+    second = np.trace(tensor) / 2 * np.eye(3) - tensor
+    moments, axes = np.linalg.eigh(second)
+    second = axes @ np.diag(np.maximum(moments, 0) * np.exp(size * rng.standard_normal(3))) @ axes.T
+    return np.trace(second) * np.eye(3) - second
+
+
 @dataclass(frozen=True)
 class Arm:
     """Numbers of an arm; n joints, of which the first e have rotor, drive and two bearings: `springs`, `dampers` (e, 3) about x, y, z.
@@ -216,9 +226,11 @@ class Arm:
         return (s**2 * moved)[:, :e] * self.gain
 
     def drawn(
-        self, rng: np.random.Generator, *, mass=0.07, com=0.010, rotor=0.05, held=0.02, gain=0.0
+        self, rng: np.random.Generator, *, mass=0.07, com=0.010, rotor=0.05, held=0.02, gain=0.0, tensor=0.0
     ) -> Arm:
-        """An arm whose springs are 15 % and dampers 30 % off, and the rest as far as said; tensors go with their masses."""
+        """An arm whose springs are 15 % and dampers 30 % off, and the rest as far as said; tensors go with their masses, and their second
+        moments are off by `tensor` (of the logarithm) besides.
+        """
         normal = rng.standard_normal
         heavier = np.exp(mass * normal(len(self.mass)))
         return replace(
@@ -226,7 +238,7 @@ class Arm:
             springs=self.springs * np.exp(0.15 * normal(self.springs.shape)),
             dampers=self.dampers * np.exp(0.3 * normal(self.springs.shape)),
             mass=self.mass * heavier,
-            inertia=self.inertia * heavier[:, None, None],
+            inertia=np.array([_stretched(own, tensor, rng) for own in self.inertia]) * heavier[:, None, None],
             com=self.com + com * normal(self.com.shape),
             rotor=self.rotor * np.exp(rotor * normal(len(self.rotor))),
             held=self.held + held * normal(),

@@ -53,6 +53,9 @@ def test_hardening_is_found_and_not_invented(stiff, poses, synthesise, rng, true
         )
         if true:
             assert estimate.values[f"{name}.hardening"] == pytest.approx(true[joint], abs=0.01)
+            assert estimate.values[f"{name}.damping"] == pytest.approx(
+                stiff.value(f"{name}.damping"), rel=0.15
+            )
 
 
 def test_the_equivalent_stiffness_of_a_random_twist(rng: np.random.Generator) -> None:
@@ -60,7 +63,7 @@ def test_the_equivalent_stiffness_of_a_random_twist(rng: np.random.Generator) ->
     stiffness, share, mean, size = 2e5, 0.2, 8e-4, 3e-4
     loaded = DriveTorque(
         slow=np.array([[stiffness * mean * (1 + share * (mean / 1e-3) ** 2)]]),
-        size=np.array([stiffness * size]),
+        lines=np.array([[stiffness * size * np.sqrt(2)]]),
         stiffness=np.array([stiffness]),
     )
     twist = mean + size * rng.standard_normal(400_000)

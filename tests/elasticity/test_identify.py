@@ -82,6 +82,7 @@ def test_paper_plan_leaves_the_forearm_torsion_unidentified(tx90l, poses, synthe
         synthesise(truth, poses["default"][[0, 1, 3]], noise=0.05, rng=rng, step=8),
         rng=rng,
         search=ONE_START,
+        tolerances=Tolerances(inertia=False),  # tensors are exact here
     )
     assert all(default.quantity(n)["identifiable"] for n in spring_names(tx90l) if n.endswith(".stiffness"))
 

@@ -108,6 +108,32 @@ def test_intervals_with_torque_constants_that_are_off() -> None:
     )
 
 
+def deviations_by_tensors(seed: int, known: bool) -> tuple[list[float], bool]:
+    """As `deviations`, of an arm whose inertia tensors are off by 15 %, and of which that is `known` of them or nothing."""
+    rng = np.random.default_rng(seed)
+    arm = Arm.read(ROBOT).drawn(rng, tensor=0.15)
+    responses = arm.measured(poses("default"), rng, noise=0.02, frequencies_hz=LINES)
+    tolerances = replace(Tolerances.none(), inertia=known)
+    estimate = fit_springs(
+        declared(0.0), responses, rng=rng, tolerances=tolerances, search=ONE_START
+    ).estimate
+    found = []
+    for name, value in arm.truth().items():
+        number = estimate.parameters.index(name)
+        if estimate.identifiable[number]:
+            std = np.sqrt(estimate.covariance[number, number])
+            found.append(float(np.log(estimate.values[name] / value) / std))
+    return found, estimate.misfit is None
+
+
+@pytest.mark.slow
+def test_intervals_with_inertia_tensors_that_are_off() -> None:
+    """Held for exact they are the springs' error; their prior is in the intervals."""
+    check_coverage(over_seeds(deviations_by_tensors, range(700, 720), True), 0.92, 0.99)
+    bare = np.concatenate([own for own, _ in over_seeds(deviations_by_tensors, range(700, 710), False)])
+    assert np.mean(np.abs(bare) < 1.96) < 0.92
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [102, 303])
 def test_the_papers_cost_ends_where_the_default_does(seed: int) -> None:

@@ -124,7 +124,7 @@ def test_moving_arm_and_open_gaps(tx90l, poses, motion, bearings):
     share = np.zeros((64, 3))
     share[:, 2] = 0.25 * np.exp(-0.5 * ((phases - 4.0) / 0.7) ** 2)
     share[:, 1] = 0.1 * np.exp(-0.5 * ((phases - 2.0) / 0.5) ** 2)
-    shift = reference_shift(tx90l, q, None, FREQUENCIES, motion, share)
+    shift = reference_shift(tx90l, q, None, FREQUENCIES, motion, np.stack([share, share]))
     twists = [k for k, (_, component) in enumerate(elastic_axes(tx90l)) if component == 2]
     rest = arm_matrices(arm, next(replace(motion, amplitude=0.0).states(tx90l, arm, q, 1)))
     states = list(motion.states(tx90l, arm, q, 2 * STEPS))[1::2]

@@ -69,7 +69,8 @@ def with_fitting_bearings(
     comparison.
 
     Where completing the better one adds springs, bearings were not all that was missing: the other is then fitted with the same springs,
-    from there, before they are compared. The last is None for a robot without bearings, or where one with the others has no fit.
+    from there, before they are compared; where drives slip, which wrong axes take up, the other is completed by itself as well. The last
+    is None for a robot without bearings, or where one with the others has no fit.
     """
     if not model.has_bearings:
         return *complete(model, first), None
@@ -94,5 +95,9 @@ def with_fitting_bearings(
             ended[worse] = robot, fit_responses(robot, data, fit.x)
         except FlexcalError:
             return *ended[better], comparison
+        if data.hysteresis:
+            ended[worse] = min(
+                ended[worse], complete(*begun[worse]), key=lambda found: found[1].estimate.reduced_chi2
+            )
         comparison = compared(ended[model.bearings][1], ended[other.bearings][1])
     return *(ended.get(comparison.taken) or complete(*begun[comparison.taken])), comparison

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -39,7 +39,7 @@ class ResponseData:
     """Measured responses, with the conditions of measurement and their weights.
 
     With the `plan`, the reference motion is part of the prediction. `tolerances` are the standard deviations of what the model leaves out.
-    `inertias_known` keeps link and payload inertias at the model's; with `hardening` that of the drives is estimated.
+    `inertias_known` keeps link and payload inertias at the model's; with `hardening` and `hysteresis` those of the drives are estimated.
     """
 
     responses: tuple[FrequencyResponse, ...]
@@ -48,6 +48,7 @@ class ResponseData:
     tolerances: Tolerances = field(default_factory=Tolerances)
     inertias_known: bool = False
     hardening: bool = False
+    hysteresis: bool = False
 
     @property
     def effects(self) -> bool:
@@ -63,6 +64,7 @@ class ResponseData:
                 inertias_known=self.inertias_known,
                 backlash=self.plan is not None,
                 hardening=self.hardening,
+                hysteresis=self.hysteresis,
             )
         )
 
@@ -143,7 +145,8 @@ def _fit(model: RobotModel, data: ResponseData, x: np.ndarray, tolerance: float)
             effects = experiment_effects(predicting, x, ReferenceMotion.of(plan))
     residual = ResponseResidual.of(predicting, responses, data.weighting)
     residual = residual.shifted(predicting, [effect.shift for effect in effects])
-    error = ModelError.of(residual, responses, x, effects, data.tolerances) if data.tolerances.any else None
+    tolerances = replace(data.tolerances, inertia=data.tolerances.inertia and not data.inertias_known)
+    error = ModelError.of(residual, responses, x, effects, tolerances) if tolerances.any else None
     problem = _problem(residual, error, parameters, prior)
     iterations = COARSE_ITERATIONS if tolerance == COARSE else 200
     fitted = solve(problem, starts=x[None], tolerance=tolerance, max_iterations=iterations)

@@ -18,13 +18,15 @@ from flexcal.elasticity.identification.fit import (
     fit_responses,
     reweighted_fit,
 )
-from flexcal.elasticity.identification.hardening_drives import with_hardening
 from flexcal.elasticity.identification.held_joints import CompliantHeldJoints
 from flexcal.elasticity.identification.lack_of_fit import find_misfit, misfit_std
+from flexcal.elasticity.identification.nonlinear_drives import with_hardening, with_hysteresis
+from flexcal.elasticity.identification.pose_jackknife import jackknife_std
 from flexcal.elasticity.identification.profile_std import profile_std_ratio
 from flexcal.elasticity.identification.search import MultiStart, Search
 from flexcal.elasticity.identification.torque_scale import TorqueScale
 from flexcal.elasticity.response_model import (
+    SLIP_SHARE,
     CovarianceWeighting,
     Tolerances,
     Weighting,
@@ -39,6 +41,10 @@ from flexcal.progress import Progress, silent
 
 _HAUSMAN = 2.58
 """Difference from the efficient estimate, in its standard deviations, that one in a hundred passes by chance."""
+UNSLIPPED = float(np.log1p(SLIP_SHARE))
+"""Least 1σ of the logarithm of a drive's stiffness where drives slip: one whose spring never slipped in the experiment is that much softer
+under load, and nothing in the responses tells it."""
+
 SPRING_VALUES = (".stiffness", ".damping", ".hardening")
 
 
@@ -152,6 +158,10 @@ def fit_springs(
         starts = (first.estimate.values, {item.name: item.value for item in began})
         fits = [first_fit(model, harder, parameters.coordinates(values)) for values in starts]
         data, first = harder, min(fits, key=lambda fit: fit.estimate.reduced_chi2)
+    slipping = with_hysteresis(model, data, first)
+    if slipping is not data:
+        x = slipping.parameters(model)[0].coordinates(first.estimate.values)
+        data, first = slipping, first_fit(model, slipping, x)
     progress("fitting", 0.3)
 
     def completed(robot: RobotModel, begun: ResponseFit) -> tuple[RobotModel, ResponseFit]:
@@ -235,6 +245,10 @@ def _with_held_joints(
             fit = fit_responses(wider, data, x)
         else:
             fit = _searched_fit(wider, data, search, rng, progress)
+        if (
+            data.hysteresis
+        ):  # the others' intervals would be conditional on a choice that such data do not tell
+            return wider, fit
         least_significant = candidates.least_significant(wider, data, fit)
         if least_significant is None:
             return wider, fit
@@ -297,6 +311,11 @@ def _widened(
         wider = np.sqrt(np.diag(robust.covariance))
     if misfit is not None:
         wider = np.maximum(wider, misfit_std(fit, misfit))
+    if data.hysteresis:
+        scatter = jackknife_std(fit)
+        wider = np.maximum(std, wider) if scatter is None else np.hypot(np.maximum(std, wider), scatter)
+        drives = [name.endswith(".drive.stiffness") for name in fitted.parameters.names]
+        wider = np.maximum(wider, np.where(drives, UNSLIPPED, 0.0))
     factor = np.divide(wider, std, out=np.ones_like(std), where=std > 0)
     factor = np.maximum(factor, np.sqrt(excess)) * profile_std_ratio(problem, fitted, std)
     springs = np.array([name.endswith(SPRING_VALUES) for name in fitted.parameters.names])

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,8 @@ from flexcal.model.robot import (
     GEOMETRY,
     LENGTH_TOLERANCE,
     SHARED_DISTORTION,
+    RobotModel,
+    uncertain_tensor_entries,
 )
 from flexcal.model.vibration import (
     KNOT_OCTAVES,
@@ -26,6 +28,9 @@ from flexcal.model.vibration import (
     sensitivity_response_change,
 )
 
+NEGLIGIBLE = 1e-3
+"""Size of a model error, in standard deviations of the measurement, from which it counts: the variance is 1e-6 more."""
+
 
 @dataclass(frozen=True)
 class Tolerances:
@@ -33,11 +38,13 @@ class Tolerances:
 
     `length` (m) and `angle` (rad) of every geometric error, unknown before stage 2; `strength` and `width` of the friction pulses of a
     motor, relative, common to all poses and half as much in each; `friction`: other deviation of a motor's impedance from a viscous
-    coefficient, relative to that; `backlash`: deviation of a gap's effect from the softening of its drive, relative to that; these two
-    are complex random functions of frequency in every pose, with knots every `octave`. `distortion` is the share of the stochastic
-    nonlinear distortion that all realisations have in common, for reference motion and friction are the same in all: averaging over
-    realisations does not lower it. With `flatness`, sensors on the arm are not flat over frequency, each as its `flatness_std` says: in
-    common in all poses and half as much in each, where the reference motion turns them.
+    coefficient, relative to that; `backlash`: deviation of a gap's effect from the softening of its drive, relative to that, and
+    `hysteresis` of a slipping spring's from its mean stiffness and damping; these are complex random functions of frequency in every
+    pose, with knots every `octave`. `distortion` is the share of the stochastic nonlinear distortion that all realisations have in
+    common, for reference motion and friction are the same in all: averaging over realisations does not lower it. With `flatness`,
+    sensors on the arm are not flat over frequency, each as its `flatness_std` says: in common in all poses and half as much in each,
+    where the reference motion turns them.
+    With `inertia`, the links' inertia tensors err by `prior: inertia` of robot.yaml beside their change with the mass.
     """
 
     length: float = LENGTH_TOLERANCE
@@ -46,19 +53,30 @@ class Tolerances:
     width: float = 0.3
     friction: float = FRICTION_TOLERANCE
     backlash: float = 0.3
+    hysteresis: float = 0.3
     distortion: float = SHARED_DISTORTION
     octave: float = KNOT_OCTAVES
     flatness: bool = True
+    inertia: bool = True
 
     @classmethod
     def none(cls) -> Tolerances:
         """Zero tolerances of an exact model."""
-        return cls(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, flatness=False)
+        return cls(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, flatness=False, inertia=False)
 
     @property
     def any(self) -> bool:
         """Whether any tolerance is nonzero."""
-        return max(self.length, self.angle, self.strength, self.width, self.friction, self.backlash) > 0
+        sizes = (
+            self.length,
+            self.angle,
+            self.strength,
+            self.width,
+            self.friction,
+            self.backlash,
+            self.hysteresis,
+        )
+        return max(sizes) > 0 or self.inertia
 
     def inflation(self, responses: Sequence[FrequencyResponse]) -> float:
         """Variance inflation of the responses relative to independent realisations."""
@@ -82,6 +100,7 @@ class LowRank:
         """Whitening for B (m, k) in whitened rows."""
         factor, triangle = np.linalg.qr(columns)
         turn, size, _ = np.linalg.svd(triangle)
+        turn, size = turn[:, size > NEGLIGIBLE], size[size > NEGLIGIBLE]
         return cls(factor @ turn, 1 - 1 / np.sqrt(1 + size**2), float(np.log1p(size**2).sum()))
 
     def whiten(self, rows: np.ndarray) -> np.ndarray:
@@ -111,7 +130,7 @@ class ModelError:
         model = residual.model
         blocks, columns = [], []
         predictions = model.predict(x)
-        shifts = geometric_shifts(model, x, tolerances)
+        shifts = unknown_shifts(model, x, tolerances)
         natural = model.parameters.natural(x)
         values = dict(zip(model.parameters.names, natural, strict=True))
         labels = pose_labels(responses)
@@ -123,11 +142,14 @@ class ModelError:
             change = friction_response_change(
                 nominal, response.frequencies_hz, tolerances.friction * viscous, tolerances.octave
             )
-            number = list(model.poses[k].backlash.values())
+            gaps = list(model.poses[k].backlash.values())
+            slip = [share for share, _ in model.poses[k].slip.values()]
+            number = gaps + slip
             column = [list(predictions[k].columns).index(n) for n in number]
-            backlash = tolerances.backlash * natural[number] * predictions[k].derivatives[..., column]
+            size = np.append(tolerances.backlash * natural[gaps], np.full(len(slip), tolerances.hysteresis))
+            drives = size * predictions[k].derivatives[..., column]
             change = np.concatenate(
-                [change, over_frequency(backlash, response.frequencies_hz, tolerances.octave)], axis=-1
+                [change, over_frequency(drives, response.frequencies_hz, tolerances.octave)], axis=-1
             )
             none = np.empty(0, dtype=int)
             half = effects[k].by_friction.shape[-1] // 2
@@ -151,30 +173,42 @@ class ModelError:
 
     def whiten(self, rows: np.ndarray) -> np.ndarray:
         """Rows (m,) or (m, c), whitened by the measurement alone, after whitening by both."""
-        return self.common.whiten(self._by_pose(rows))
+        return self.common.whiten(self.by_pose(rows))
 
     def transposed(self, rows: np.ndarray) -> np.ndarray:
         """Sᵀ `rows` (m, c) of S, by which `whiten` multiplies."""
-        return self._by_pose(self.common.whiten(rows))
+        return self.by_pose(self.common.whiten(rows))
 
-    def _by_pose(self, rows: np.ndarray) -> np.ndarray:
+    def by_pose(self, rows: np.ndarray) -> np.ndarray:
+        """Rows (m,) or (m, c), whitened by the errors of each pose alone."""
         ends = np.cumsum([len(block.basis) for block in self.poses])
         return np.concatenate(
             [block.whiten(part) for block, part in zip(self.poses, np.split(rows, ends[:-1]), strict=True)]
         )
 
 
-def geometric_shifts(model: ResponseModel, x: np.ndarray, tolerances: Tolerances) -> list[np.ndarray]:
-    """∂G (lines, E + S, E, g) of every pose by one standard deviation of each geometric error, by forward differences."""
+def unknown_shifts(model: ResponseModel, x: np.ndarray, tolerances: Tolerances) -> list[np.ndarray]:
+    """∂G (lines, E + S, E, g) of every pose by one standard deviation of each geometric error and of each entry of an inertia tensor, by
+    forward differences.
+    """
     base = model.responses(x)
     shifts: list[list[np.ndarray]] = [[] for _ in base]
-    for joint in model.robot.joints:
+    for robot in _erring(model.robot, tolerances):
+        for k, response in enumerate(ResponseModel(robot, model.parameters, model.poses).responses(x)):
+            shifts[k].append(response - base[k])
+    return [np.stack(columns, axis=-1) for columns in shifts]
+
+
+def _erring(robot: RobotModel, tolerances: Tolerances) -> Iterator[RobotModel]:
+    """The robot with one error of one standard deviation after the other."""
+    for joint in robot.joints:
         for key in GEOMETRY:
             size = tolerances.length if key.startswith("length") else tolerances.angle
             name = f"{joint.name}.{key}"
-            moved = ResponseModel(
-                model.robot.with_values({name: model.robot.value(name) + size}), model.parameters, model.poses
-            )
-            for k, response in enumerate(moved.responses(x)):
-                shifts[k].append(response - base[k])
-    return [np.stack(columns, axis=-1) for columns in shifts]
+            yield robot.with_values({name: robot.value(name) + size})
+    for link, entry, std in uncertain_tensor_entries(robot) if tolerances.inertia else ():
+        a, b = ("xyz".index(axis) for axis in entry[1:])
+        inertia = robot.links.inertia.copy()
+        inertia[link, a, b] += std
+        inertia[link, b, a] = inertia[link, a, b]
+        yield replace(robot, links=replace(robot.links, inertia=inertia))

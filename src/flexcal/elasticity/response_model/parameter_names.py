@@ -30,6 +30,16 @@ def hardening_name(joint: str) -> str:
     return f"{joint}.drive.hardening"
 
 
+def slip_share_name(joint: str) -> str:
+    """Name of the stiffness of a drive's slipping spring, over that of the drive: its hysteresis."""
+    return f"{joint}.drive.slip_share"
+
+
+def slip_twist_name(joint: str) -> str:
+    """Name of the twist at which a drive's slipping spring slips."""
+    return f"{joint}.drive.slip_twist"
+
+
 def held_inertia_name(joint: str) -> str:
     """Name of the inertia that moves with the arm at a joint with held motor."""
     return f"{joint}.held_inertia"

@@ -11,6 +11,8 @@ from flexcal.elasticity.response_model.parameter_names import (
     hardening_name,
     held_inertia_name,
     pose_labels,
+    slip_share_name,
+    slip_twist_name,
     viscous_name,
 )
 from flexcal.errors import FlexcalError
@@ -36,6 +38,12 @@ SENSOR_RANGE = 4.0
 HARDENING_STD = 0.3
 """Prior 1σ of a drive's hardening."""
 
+SLIP_SHARE, SLIP_SHARE_LOG_STD = 0.2, 0.7
+"""Prior median, and 1σ of the logarithm, of the stiffness of a drive's slipping spring over that of the drive."""
+
+SLIP_TWIST, SLIP_TWIST_LOG_STD = 2e-4, 0.8
+"""Prior median, rad, and 1σ of the logarithm, of the twist at which it slips: with the share, gears' hysteresis of 0.1 to 1 arc minute."""
+
 
 def stiffness_parameters(
     model: RobotModel,
@@ -44,6 +52,7 @@ def stiffness_parameters(
     inertias_known: bool = False,
     backlash: bool = False,
     hardening: bool = False,
+    hysteresis: bool = False,
 ) -> Parameters:
     """All parameters of stage 1 with their priors.
 
@@ -52,7 +61,8 @@ def stiffness_parameters(
     time, one drive gain that of the torque constants; a sensor on the arm has its sensitivity, delay and errors of mounting. Rotor inertias
     have the prior of robot.yaml; so have mass and centre of mass of every link that an elastic joint moves, and the payload's mass, unless
     `inertias_known`. With `backlash`, a drive with backlash has its half gap: while it stands open, the drive appears softer. With
-    `hardening`, every drive may be stiffer where it carries more torque. Raises `FlexcalError` where responses do not fit the robot.
+    `hardening`, every drive may be stiffer where it carries more torque, with `hysteresis` it has a spring that slips. Raises
+    `FlexcalError` where responses do not fit the robot.
     """
     check_responses(model, responses)
     loaded = any(r.payload != 0 for r in responses)
@@ -97,6 +107,12 @@ def stiffness_parameters(
                 prior_std=HARDENING_STD,
             )
             for joint in model.driven
+        ]
+    for e in model.elastic if hysteresis else ():
+        share, twist = slip_share_name(e.name), slip_twist_name(e.name)
+        items += [
+            Parameter(share, "1", SLIP_SHARE, prior_std=SLIP_SHARE_LOG_STD, scale="log"),
+            Parameter(twist, "rad", SLIP_TWIST, prior_std=SLIP_TWIST_LOG_STD, scale="log"),
         ]
     return Parameters(items)
 

@@ -7,15 +7,18 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from flexcal.data.plans import MultisinePlan
 from flexcal.elasticity.response_model.parameter_names import (
     backlash_name,
     hardening_name,
     pose_labels,
+    slip_share_name,
+    slip_twist_name,
     viscous_name,
 )
-from flexcal.elasticity.time_periodic import DriveTorque, HardenedStiffness
+from flexcal.elasticity.time_periodic import DriveTorque, HardenedStiffness, SlippingSprings
 from flexcal.estimation import Parameters
 from flexcal.frequency.periodic import FrequencyResponse
 from flexcal.model.robot import (
@@ -44,15 +47,45 @@ class PredictedMeasurements:
 
 
 @dataclass(frozen=True, eq=False)
+class DriveChange:
+    """Effective `stiffness` N m/rad and `damping` N m s/rad of a drive in one pose, on the mean over the reference motion, and the
+    derivatives of both by the parameters that change them, in estimation coordinates.
+    """
+
+    stiffness: float
+    damping: float
+    derivatives: dict[int, np.ndarray]
+
+    def with_spring(
+        self,
+        stiffness: float,
+        gains: np.ndarray,
+        slopes: np.ndarray,
+        share: int,
+        twist: int,
+        drive: int | None,
+    ) -> DriveChange:
+        """The drive with a slipping spring of `stiffness` N m/rad and `gains` (2,), of `slopes` (2,) by the logarithm of its twist; numbers
+        of its `share` and `twist`, and of the stiffness of the `drive`, all logarithms.
+        """
+        added = stiffness * gains
+        by = self.derivatives | {share: added, twist: stiffness * slopes}
+        if drive is not None:
+            by[drive] = by[drive] + added
+        return DriveChange(self.stiffness + float(added[0]), self.damping + float(added[1]), by)
+
+
+@dataclass(frozen=True, eq=False)
 class PoseModel:
     """Model of one pose: lines (L,), rest position, and the mapping of parameter numbers to the robot's.
 
-    `robot_names` maps names of the robot's own values to parameter numbers. `backlash` maps the axes with backlash to the numbers of their
-    half gaps; `backlash_compliance` (phases, E) is the relative compliance that each adds along the reference motion, per rad. `hardening`
-    maps the axes whose drives harden under their `torque` to the numbers of hardening and stiffness. `delays` and `gains` (E,) are the
-    numbers of the axes' delays and drive gains, -1 where there is none; `payload` is the nominal payload mass in kg, None for the declared.
-    `sensors` (S) on the arm have their sensitivities and delays at `sensitivities` and `late` (S,), and their errors of mounting at
-    `mounting` (S, 5), -1 where there is none.
+    `robot_names` maps names of the robot's own values to parameter numbers. `backlash` maps the axes with backlash to the numbers of
+    their half gaps; `backlash_compliance` (phases, E) is the relative compliance that each adds along the reference motion, per rad.
+    `hardening` maps the axes whose drives harden under their `torque` to their numbers; `slip` maps the joints with a spring that slips
+    to the numbers of its share and twist, `slipping` are its gains. `delays` and `gains` (E,) are the numbers of the axes' delays and
+    drive gains, -1 where there is none; `payload` is the nominal payload mass in kg, None for the declared. `sensors` (S) on the arm
+    have their sensitivities and delays at `sensitivities` and `late` (S,), and their errors of mounting at `mounting` (S, 5), -1 where
+    there is none.
     """
 
     frequencies_hz: np.ndarray
@@ -61,8 +94,10 @@ class PoseModel:
     robot_names: dict[str, int]
     backlash: dict[int, int]
     backlash_compliance: np.ndarray
-    hardening: dict[int, tuple[int, int]]
+    hardening: dict[int, int]
     torque: DriveTorque | None
+    slip: dict[str, tuple[int, int]]
+    slipping: SlippingSprings | None
     delays: np.ndarray
     gains: np.ndarray
     sensors: tuple[ArmSensor, ...]
@@ -91,53 +126,121 @@ class PoseModel:
     def values(self, robot: RobotModel, natural: np.ndarray) -> tuple[dict[str, float], float | None]:
         """Values of the robot and payload (kg) in this pose for natural parameter values (p,)."""
         known = {name: float(natural[number]) for name, number in self.robot_names.items()}
-        kept = self.stiffness_ratio(natural).mean(axis=0)
-        for axis in self.changing:
-            for name in _drive(robot, axis):
-                known[name] = known.get(name, robot.value(name)) * float(kept[axis])
+        for joint, change in self.drives(robot, natural).items():
+            stiffness, damping = _drive(joint)
+            known |= {stiffness: change.stiffness, damping: change.damping}
         payload = self.payload
         if payload is not None and payload > 0 and "payload.mass" in known:
             payload *= known["payload.mass"] / robot.payload_mass
             known["payload.mass"] = payload
         return known, payload
 
-    @property
-    def changing(self) -> tuple[int, ...]:
-        """Axes whose drive stiffness changes along the reference motion."""
-        return tuple(sorted({*self.backlash, *self.hardening}))
-
-    def stiffness_ratio(self, natural: np.ndarray) -> np.ndarray:
-        """Stiffness and damping (phases, E) of every drive along the reference motion relative to those at no load with closed gap."""
-        return self._hardened(natural).ratio / self._softer(natural)
-
-    def slopes(self, natural: np.ndarray) -> list[tuple[int, int, float]]:
-        """Axis, parameter number, and derivative of the logarithm of the drive's mean stiffness and damping by gap, hardening or, beyond
-        its direct effect, the logarithm of the stiffness at no load.
+    def opening(self, robot: RobotModel, natural: np.ndarray) -> np.ndarray:
+        """Shares (2, phases, E) of every drive's effective stiffness and damping that gap, hardening and slip take away along the
+        reference motion, with mean 0.
         """
-        hardened, softer = self._hardened(natural), self._softer(natural)
-        mean = np.mean(hardened.ratio / softer, axis=0)
-        by_backlash = -np.mean(hardened.ratio * self.backlash_compliance / softer**2, axis=0) / mean
-        by_hardening, by_stiffness = (
-            np.mean(slope / softer, axis=0) / mean for slope in (hardened.by_hardening, hardened.by_stiffness)
+        ratio = self._ratio(robot, natural)
+        missing = ratio.mean(axis=1, keepdims=True) - ratio
+        drives = self.drives(robot, natural)
+        for axis, joint in enumerate(robot.driven):
+            if joint.name not in drives:
+                continue
+            k, d = at_no_load = np.array(self.at_no_load(robot, natural, joint.name))
+            if self.slipping is not None:
+                share, limits = natural[list(self.slip.values())].T
+                number = list(self.slip).index(joint.name)
+                course = self.slipping.course(limits, ratio.shape[1])[..., number]
+                missing[..., axis] -= share[number] * course * np.array([[1.0], [k / d]])
+            effective = [drives[joint.name].stiffness, drives[joint.name].damping]
+            missing[..., axis] *= (at_no_load / effective)[:, None]
+        return missing
+
+    def _ratio(self, robot: RobotModel, natural: np.ndarray) -> np.ndarray:
+        """Stiffness and damping (2, phases, E) of every drive along the reference motion relative to those at no load with closed gap:
+        an open gap has neither, and hardening leaves the damping as it is.
+        """
+        hardened = self._hardened(robot, natural).ratio
+        return np.stack([hardened, np.ones_like(hardened)]) / self._softer(natural)
+
+    def drives(self, robot: RobotModel, natural: np.ndarray) -> dict[str, DriveChange]:
+        """Effect of gap, hardening and slip on the drives that have one of them, by joint."""
+        hardened, softer, ratio = (
+            self._hardened(robot, natural),
+            self._softer(natural),
+            self._ratio(robot, natural),
         )
-        slopes = [(axis, number, float(by_backlash[axis])) for axis, number in self.backlash.items()]
-        for axis, (hardening, stiffness) in self.hardening.items():
-            slopes.append((axis, hardening, float(by_hardening[axis])))
-            slopes.append((axis, stiffness, float(by_stiffness[axis])))
-        return slopes
+        mean, by_gap = ratio.mean(axis=1), -np.mean(ratio * self.backlash_compliance / softer, axis=1)
+        by_hardening, by_stiffness = (
+            np.stack([np.mean(slope / softer, axis=0), np.zeros(softer.shape[1])])
+            for slope in (hardened.by_hardening, hardened.by_stiffness)
+        )
+        changes: dict[str, DriveChange] = {}
+        for axis, joint in enumerate(robot.driven):
+            k, d = both = np.array(self.at_no_load(robot, natural, joint.name))
+            by: dict[int, np.ndarray] = {}
+            if axis in self.backlash:
+                by[self.backlash[axis]] = both * by_gap[:, axis]
+            if axis in self.hardening:
+                by[self.hardening[axis]] = both * by_hardening[:, axis]
+            if not by:
+                continue
+            own = (both * by_stiffness[:, axis] + [k * mean[0, axis], 0.0], [0.0, d * mean[1, axis]])
+            changes[joint.name] = self._changed(joint.name, both * mean[:, axis], by, own)
+        if self.slipping is not None:
+            gains, slopes = self.slipping.mean(natural[[twist for _, twist in self.slip.values()]])
+            for column, (joint, (share, twist)) in enumerate(self.slip.items()):
+                k, d = both = np.array(self.at_no_load(robot, natural, joint))
+                without = changes.get(joint) or self._changed(joint, both, {}, ([k, 0.0], [0.0, d]))
+                changes[joint] = without.with_spring(
+                    k * natural[share],
+                    gains[:, column],
+                    slopes[:, column],
+                    share,
+                    twist,
+                    self.robot_names.get(_drive(joint)[0]),
+                )
+        return changes
+
+    def _changed(
+        self, joint: str, effective: np.ndarray, by: dict[int, np.ndarray], own: Sequence[ArrayLike]
+    ) -> DriveChange:
+        """A drive of `effective` stiffness and damping, with derivatives `by` further parameters and by those of its `own`."""
+        for name, slope in zip(_drive(joint), own, strict=True):
+            if name in self.robot_names:
+                by[self.robot_names[name]] = np.array(slope)
+        return DriveChange(float(effective[0]), float(effective[1]), by)
+
+    def at_no_load(self, robot: RobotModel, natural: np.ndarray, joint: str) -> tuple[float, float]:
+        """Stiffness and damping of a drive at no load, with closed gap and without slip."""
+        stiffness, damping = (
+            float(natural[self.robot_names[name]]) if name in self.robot_names else robot.value(name)
+            for name in _drive(joint)
+        )
+        return stiffness, damping
+
+    def uneven_slip(self, robot: RobotModel, natural: np.ndarray) -> np.ndarray | None:
+        """Complex stiffness (L, D) N m/rad at the lines of the slipping springs of all elastic drives beyond their mean stiffness and
+        damping.
+        """
+        if self.slipping is None:
+            return None
+        share, limits = natural[list(self.slip.values())].T
+        stiffness = [self.at_no_load(robot, natural, joint)[0] for joint in self.slip]
+        return share * stiffness * self.slipping.at(limits, self.frequencies_hz)
 
     def _softer(self, natural: np.ndarray) -> np.ndarray:
         half_width = np.zeros(self.backlash_compliance.shape[1])
         half_width[list(self.backlash)] = natural[list(self.backlash.values())]
         return 1.0 + self.backlash_compliance * half_width
 
-    def _hardened(self, natural: np.ndarray) -> HardenedStiffness:
+    def _hardened(self, robot: RobotModel, natural: np.ndarray) -> HardenedStiffness:
         """Whether the drives harden, all or none."""
         if self.torque is None or not self.hardening:
             none = np.zeros_like(self.backlash_compliance)
             return HardenedStiffness(none + 1.0, none, none)
-        numbers = np.array([self.hardening[axis] for axis in sorted(self.hardening)])
-        return self.torque.hardened(natural[numbers[:, 1]], natural[numbers[:, 0]])
+        axes = sorted(self.hardening)
+        stiffness = np.array([self.at_no_load(robot, natural, robot.driven[axis].name)[0] for axis in axes])
+        return self.torque.hardened(stiffness, natural[[self.hardening[axis] for axis in axes]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,12 +274,17 @@ class ResponseModel:
             if backlash_name(joint.name) in parameters
         }
         hardening = {
-            axis: (
-                parameters.index(hardening_name(joint.name)),
-                parameters.index(f"{joint.name}.drive.stiffness"),
-            )
+            axis: parameters.index(hardening_name(joint.name))
             for axis, joint in enumerate(robot.driven)
             if hardening_name(joint.name) in parameters
+        }
+        slip = {
+            e.name: (
+                parameters.index(slip_share_name(e.name)),
+                parameters.index(slip_twist_name(e.name)),
+            )
+            for e in robot.elastic
+            if slip_share_name(e.name) in parameters
         }
 
         def number(name: str) -> int:
@@ -209,6 +317,8 @@ class ResponseModel:
                     np.zeros((1, len(robot.driven))),
                     hardening,
                     None,
+                    slip,
+                    None,
                     at,
                     gains,
                     sensors,
@@ -228,9 +338,20 @@ class ResponseModel:
         for pose in self.poses:
             known, payload = pose.values(self.robot, natural)
             loaded = DriveTorque.of(self.robot.with_values(known), pose.q, payload, plan)
-            mean = pose.stiffness_ratio(natural).mean(axis=0)
-            loaded = replace(loaded, stiffness=loaded.stiffness / mean)  # at no load
-            poses.append(replace(pose, backlash_compliance=loaded.backlash_compliance(), torque=loaded))
+            still = [pose.at_no_load(self.robot, natural, joint.name)[0] for joint in self.robot.driven]
+            loaded = replace(loaded, stiffness=np.array(still))
+            slipping = None
+            if pose.slip:
+                moved = DriveTorque.of(self.robot.with_values(known), pose.q, payload, plan, held=True)
+                linear = [pose.at_no_load(self.robot, natural, e.name)[0] for e in self.robot.elastic]
+                slipping = SlippingSprings.of(
+                    moved.slow / linear,
+                    moved.lines / moved.stiffness,
+                    plan.frequencies_hz,
+                    plan.reference_frequency_hz or plan.base_frequency_hz,
+                )
+            compliance = loaded.backlash_compliance()
+            poses.append(replace(pose, backlash_compliance=compliance, torque=loaded, slipping=slipping))
         return replace(self, poses=tuple(poses))
 
     @cached_property
@@ -253,8 +374,9 @@ class ResponseModel:
     ) -> PredictedMeasurements:
         known, payload = pose.values(self.robot, values)
         robot = self.robot.with_values(known)
-        softened = {name: axis for axis in pose.changing for name in _drive(robot, axis)}
-        names = tuple(dict.fromkeys((*pose.robot_names, *softened))) if derivatives else ()
+        changing = pose.drives(self.robot, values) if derivatives else {}
+        drives = [name for joint in changing for name in _drive(joint)]
+        names = tuple(dict.fromkeys((*pose.robot_names, *drives))) if derivatives else ()
         sensors = pose.placed(values)
         system = linearise(robot, pose.q, payload, derivatives=names, sensors=sensors, like=self._arm)
         s = 2j * np.pi * pose.frequencies_hz
@@ -265,18 +387,16 @@ class ResponseModel:
         if not derivatives:
             return PredictedMeasurements(response, np.empty((*response.shape, 0)), np.empty(0, dtype=int))
         change = change * factor[..., None]
-        drive_changes = {axis: np.zeros_like(response) for axis in pose.changing}
         blocks: dict[int, np.ndarray] = {}
         for k, name in enumerate(names):
-            slope = known[name]  # ∂/∂ log of it
             if name in pose.robot_names:
                 number = pose.robot_names[name]
                 log = self.parameters[number].scale == "log"
-                blocks[number] = change[..., k] * (slope if log else 1.0)
-            if name in softened:
-                drive_changes[softened[name]] += change[..., k] * slope
-        for axis, number, by_parameter in pose.slopes(values):
-            blocks[number] = blocks.get(number, 0.0) + drive_changes[axis] * by_parameter
+                blocks[number] = change[..., k] * (known[name] if log else 1.0)
+        for joint, drive in changing.items():
+            by_stiffness, by_damping = (change[..., names.index(name)] for name in _drive(joint))
+            for number, (stiffer, damped) in drive.derivatives.items():
+                blocks[number] = by_stiffness * stiffer + by_damping * damped
         for axis in np.flatnonzero(pose.delays >= 0):
             number = int(pose.delays[axis])
             blocks[number] = np.zeros_like(response)
@@ -306,6 +426,5 @@ class ResponseModel:
         )
 
 
-def _drive(robot: RobotModel, axis: int) -> tuple[str, str]:
-    drive = f"{robot.driven[axis].name}.drive"
-    return f"{drive}.stiffness", f"{drive}.damping"
+def _drive(joint: str) -> tuple[str, str]:
+    return f"{joint}.drive.stiffness", f"{joint}.drive.damping"

@@ -10,7 +10,7 @@ from flexcal.data.plans import MultisinePlan
 from flexcal.elasticity.time_periodic.reference_motion import ReferenceMotion
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import REFERENCE_TWIST, tangent_ratio, twist_by_hardening, twist_from_torque
-from flexcal.model.vibration import ElasticArm, linearise, multisine_torque
+from flexcal.model.vibration import ElasticArm, linearise, strain_power
 
 PHASES = 64
 """Number of instants of the reference motion at which the torque is evaluated."""
@@ -29,28 +29,43 @@ class HardenedStiffness:
 
 @dataclass(frozen=True, eq=False)
 class DriveTorque:
-    """Torque of the E elastic drives: `slow` (phases, E) N m of gravity and reference motion, `size` (E,) the multisine's 1σ on top of it,
-    close to Gaussian; `stiffness` (E,) N m/rad of their springs at no load."""
+    """Torque of the E elastic drives: `slow` (phases, E) N m of gravity and reference motion, and that of the multisine on top of it,
+    close to Gaussian, whose lines have the amplitudes `lines` (L, E); `stiffness` (E,) N m/rad of their springs at no load."""
 
     slow: np.ndarray
-    size: np.ndarray
+    lines: np.ndarray
     stiffness: np.ndarray
 
+    @property
+    def size(self) -> np.ndarray:
+        """Standard deviation (E,) N m of the multisine's torque."""
+        return np.sqrt(0.5 * np.sum(self.lines**2, axis=0))
+
     @classmethod
-    def of(cls, robot: RobotModel, q: np.ndarray, payload: float | None, plan: MultisinePlan) -> DriveTorque:
-        """Torque at the mean motor position `q` (n,) rad and `payload` in kg."""
+    def of(
+        cls,
+        robot: RobotModel,
+        q: np.ndarray,
+        payload: float | None,
+        plan: MultisinePlan,
+        *,
+        held: bool = False,
+    ) -> DriveTorque:
+        """Torque at the mean motor position `q` (n,) rad and `payload` in kg; with `held`, of the held drives too."""
         import pinocchio as pin
 
         arm = ElasticArm(robot, payload)
-        axes = arm.joint_velocity[[joint.index for joint in robot.driven]]
+        drives = robot.elastic if held else robot.driven
+        axes = arm.joint_velocity[[joint.index for joint in drives]]
         motion = ReferenceMotion.of(plan)
         states = motion.states(robot, arm, q, PHASES)
         slow = np.array(
             [pin.rnea(arm.model, arm.data, s.configuration, s.velocity, s.acceleration)[axes] for s in states]
         )
         system = linearise(robot, q, payload)
-        size = multisine_torque(robot, system, plan.frequencies_hz, motion.excitation, motion.kp, motion.kd)
-        return cls(slow, size, np.array([joint.stiffness[2] for joint in robot.driven]))
+        power = strain_power(robot, system, plan.frequencies_hz, motion.kp, motion.kd, held=held)
+        lines = np.sqrt(2 * np.einsum("Lij,jL->Li", power, motion.excitation**2))
+        return cls(slow, lines, np.array([joint.stiffness[2] for joint in drives]))
 
     def backlash_compliance(self) -> np.ndarray:
         """Added compliance of each drive due to a gap along the reference motion, relative, per rad of half gap, (phases, E).

@@ -42,8 +42,8 @@ def reference_shift(
 
     Rows are rad/s² per N m, then the sensors' readings.
 
-    `opening` (phases, E) of the stiffness and damping of every drive of `robot` is missing at that phase of the motion, with their mean
-    put back: the drives of `robot` have their mean softness. The arm follows its motors rigidly.
+    `opening` (2, phases, E) are the shares of stiffness and damping of every drive of `robot` that are missing at that phase of the motion,
+    with their mean put back: the drives of `robot` have their mean softness. The arm follows its motors rigidly.
     """
     rest = linearise(robot, q, payload, sensors=sensors)
     still = transfer_matrix(rest, frequencies_hz).response
@@ -57,10 +57,13 @@ def reference_shift(
     stiffness[2 * sidebands] += rest.stiffness
     if opening is not None:
         pull = drive_stretch(robot, rest)
-        released = np.einsum("kg,dg,eg->kgde", harmonics(opening, 2 * sidebands), pull, pull)
-        released[2 * sidebands] = 0.0
-        stiffness -= np.einsum("g,kgde->kde", [drive.stiffness[2] for drive in robot.driven], released)
-        damping -= np.einsum("g,kgde->kde", [drive.damping[2] for drive in robot.driven], released)
+        for changed, share, of in (
+            (stiffness, opening[0], [drive.stiffness[2] for drive in robot.driven]),
+            (damping, opening[1], [drive.damping[2] for drive in robot.driven]),
+        ):
+            released = np.einsum("g,kg,dg,eg->kde", of, harmonics(share, 2 * sidebands), pull, pull)
+            released[2 * sidebands] = 0.0
+            changed -= released
     orders = np.arange(-sidebands, sidebands + 1)
     s = 2j * np.pi * (frequencies_hz[:, None] + orders * motion.frequency_hz)
     system = np.empty((len(s), len(orders), size, len(orders), size), dtype=complex)

@@ -11,7 +11,7 @@ from flexcal.estimation import Estimate
 from flexcal.jobs.stiffness.bearing_axes import response_bearings_remarks
 from flexcal.model.robot import RobotModel, mounting_names, sensitivity_name
 from flexcal.report.checks import drive_gain_sentence, misfit_sentences, torque_scale_sentence
-from flexcal.report.sections import hardening_sentence
+from flexcal.report.sections import hardening_sentence, hysteresis_sentence
 
 _ONE_SIDED = 1.645
 _ODD = 3.0
@@ -49,8 +49,9 @@ def stiffness_remarks(result: SpringFit, model: RobotModel) -> tuple[str, ...]:
             "spring then contains the stiffness of the controller; apply the brakes and repeat, or use this spring with care"
         )
     remarks += sensor_remarks(result, model)
-    if hardening := hardening_sentence(estimate):
-        remarks.append(hardening[0].lower() + hardening.rstrip(".")[1:])
+    for sentence in (hardening_sentence(estimate), hysteresis_sentence(estimate)):
+        if sentence:
+            remarks.append(sentence[0].lower() + sentence.rstrip(".")[1:])
     if gains := drive_gain_sentence(estimate):
         remarks.append(gains)
     if estimate.misfit is not None:

@@ -26,7 +26,7 @@ PAYLOAD_FRAME = "frame"
 BEARINGS = "option.bearings"
 """Provenance key of the blocks `stiffness` and `calibration`: the bearings assumed in the identification."""
 NUISANCE = re.compile(
-    r".*\.(pose_[0-9]+|half_gap|held_inertia|arm_inertia|arm_viscous|arm_coulomb|(drive|bearing_x|bearing_y)\.torque_offset"
+    r".*\.(pose_[0-9]+|half_gap|slip_share|slip_twist|held_inertia|arm_inertia|arm_viscous|arm_coulomb|(drive|bearing_x|bearing_y)\.torque_offset"
     r"|drive\.gap_torque|drive\.(stiffness|damping)_at_.+)|force_sensor\.[fm][xyz]_offset"
     r"|sensor\..+\.(sensitivity|delay|position_[xyz]|direction_[12])"
 )

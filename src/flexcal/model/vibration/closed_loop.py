@@ -24,25 +24,35 @@ def closed_loop_motion(
     return np.linalg.solve(dynamics, np.broadcast_to(forces, (len(s), *forces.shape)))
 
 
-def drive_stretch(robot: RobotModel, system: Linearisation) -> np.ndarray:
-    """Direction (E + d, E) in which each drive's spring is stretched: its twist less its motor."""
-    driven = {joint.index for joint in robot.driven}
-    twists = [
-        k for k, (joint, component) in enumerate(elastic_axes(robot)) if component == 2 and joint in driven
-    ]
-    pull = np.zeros((len(system.mass), system.inputs))
-    pull[range(system.inputs), range(system.inputs)] = -1.0
-    pull[system.inputs + np.array(twists), range(system.inputs)] = 1.0
+def drive_stretch(robot: RobotModel, system: Linearisation, *, held: bool = False) -> np.ndarray:
+    """Direction (E + d, E) in which each drive's spring is stretched: its twist less its motor. With `held`, those of the held drives,
+    whose motors stand still, are among them.
+    """
+    drives = robot.elastic if held else robot.driven
+    axes, driven = elastic_axes(robot), [joint.index for joint in robot.driven]
+    pull = np.zeros((len(system.mass), len(drives)))
+    for column, joint in enumerate(drives):
+        pull[system.inputs + axes.index((joint.index, 2)), column] = 1.0
+        if joint.index in driven:
+            pull[driven.index(joint.index), column] = -1.0
     return pull
 
 
 def strain_power(
-    robot: RobotModel, system: Linearisation, frequencies_hz: np.ndarray, kp: np.ndarray, kd: np.ndarray
+    robot: RobotModel,
+    system: Linearisation,
+    frequencies_hz: np.ndarray,
+    kp: np.ndarray,
+    kd: np.ndarray,
+    *,
+    held: bool = False,
 ) -> np.ndarray:
-    """Mean square (L, E, E) of the torque in each elastic drive's spring due to a cosine of 1 N m added to each motor (last)."""
-    stiffness = np.array([joint.stiffness[2] for joint in robot.driven])
+    """Mean square (L, E, E) of the torque in each elastic drive's spring due to a cosine of 1 N m added to each motor (last); with `held`,
+    of the held drives (second) too.
+    """
+    stiffness = np.array([joint.stiffness[2] for joint in (robot.elastic if held else robot.driven)])
     moved = closed_loop_motion(system, frequencies_hz, kp, kd)
-    return 0.5 * np.abs(stiffness[:, None] * (drive_stretch(robot, system).T @ moved)) ** 2
+    return 0.5 * np.abs(stiffness[:, None] * (drive_stretch(robot, system, held=held).T @ moved)) ** 2
 
 
 def multisine_torque(

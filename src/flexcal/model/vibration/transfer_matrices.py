@@ -25,8 +25,11 @@ class TransferMatrix:
     derivatives: np.ndarray
 
 
-def transfer_matrix(system: Linearisation, frequencies_hz: np.ndarray) -> TransferMatrix:
-    """Evaluate G and its derivatives by all of `system.derivatives` at `frequencies_hz` (lines,).
+def transfer_matrix(
+    system: Linearisation, frequencies_hz: np.ndarray, *, added: np.ndarray | float = 0.0
+) -> TransferMatrix:
+    """Evaluate G and its derivatives by all of `system.derivatives` at `frequencies_hz` (lines,), with a complex stiffness `added`
+    (lines, d, d) that differs from line to line.
 
     With X = A⁻¹B, ∂G_ij = -s² Σ_ab X_ai X_bj (s² ∂M + s ∂D + ∂K)_ab. The products X X for a ≤ b and i ≤ j are formed once (both
     are symmetric), and multiply each kind's derivatives, stacked, in one real matrix product.
@@ -35,7 +38,7 @@ def transfer_matrix(system: Linearisation, frequencies_hz: np.ndarray) -> Transf
     count, size = system.inputs, len(system.mass)
     at = s[:, None, None]
     forces = np.broadcast_to(np.eye(size, count), (len(s), size, count))
-    moved = np.linalg.solve(at**2 * system.mass + at * system.damping + system.stiffness, forces)
+    moved = np.linalg.solve(at**2 * system.mass + at * system.damping + system.stiffness + added, forces)
     names = tuple(system.derivatives)
     response, change = at**2 * moved[:, :count], _derivatives(system, names, s, moved)
     if system.sensed is not None:

@@ -19,7 +19,7 @@ from .residuals import residual_blocks, residuals_section
 from .response_levels import levels_block
 from .selected_terms import terms_section
 from .signal_processing import signals_table
-from .springs import hardening_sentence, spring_table, unseen_springs
+from .springs import hardening_sentence, hysteresis_sentence, spring_table, unseen_springs
 from .stiffness import response_blocks, stiffness_section
 from .study_coverage import coverage_range, coverage_section
 from .study_effects import effects_section
@@ -52,6 +52,7 @@ __all__ = [
     "hardening_sentence",
     "headline_facts",
     "held_out_section",
+    "hysteresis_sentence",
     "identifiability_blocks",
     "input_files",
     "learned_section",

@@ -62,6 +62,24 @@ def hardening_sentence(estimate: Estimate) -> str:
     )
 
 
+def hysteresis_sentence(estimate: Estimate) -> str:
+    """Sentence on the estimated hysteresis of the drives; "" without an estimate."""
+    joints = [
+        n.removesuffix(key) for n in estimate.parameters.names if n.endswith(key := ".drive.slip_share")
+    ]
+    if not joints:
+        return ""
+    widths = (
+        f"{joint} {2e6 * estimate.values[f'{joint}.drive.slip_share'] * estimate.values[f'{joint}.drive.slip_twist']:.0f} µrad"
+        for joint in joints
+    )
+    return (
+        f"The drives have hysteresis, in loops of about {', '.join(widths)}. Under the small motion of the experiment they are stiffer "
+        "than under changes of load, to which the stiffnesses here belong; their intervals contain what that leaves open, and how much "
+        "the poses differ."
+    )
+
+
 def _row(
     estimate: Estimate,
     name: str,

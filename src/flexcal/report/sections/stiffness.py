@@ -11,7 +11,12 @@ from flexcal.report.figures import response_fit, sensor_fit, spring_intervals
 from flexcal.report.layout import Block, FigureBlock, Section, Selector, Table, Text, percent, significant
 from flexcal.report.results import FittedResponse, TwoStageStudy
 from flexcal.report.sections.response_levels import levels_block
-from flexcal.report.sections.springs import hardening_sentence, spring_table, unseen_springs
+from flexcal.report.sections.springs import (
+    hardening_sentence,
+    hysteresis_sentence,
+    spring_table,
+    unseen_springs,
+)
 from flexcal.units import DEGREE
 
 
@@ -28,6 +33,8 @@ def stiffness_section(study: TwoStageStudy) -> Section:
     ]
     if hardening := hardening_sentence(estimate):
         blocks.append(Text((), "Hardening", (hardening,)))
+    if hysteresis := hysteresis_sentence(estimate):
+        blocks.append(Text((), "Hysteresis", (hysteresis,)))
     if unseen:
         blocks.append(Text((), "Not determined by these data", unseen))
     blocks += [

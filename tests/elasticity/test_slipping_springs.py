@@ -1,0 +1,115 @@
+"""Drives with hysteresis: equivalent gains of an element that slips, and what stage 1 makes of responses that have one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_hardening_drives import still_plan
+
+from flexcal.elasticity.identification import MultiStart, fit_springs
+from flexcal.elasticity.response_model import Tolerances
+from flexcal.elasticity.time_periodic import SlippingSprings
+from flexcal.model.robot import RobotModel
+from flexcal.model.vibration import closed_loop_motion, linearise
+
+
+def slipped(twist: np.ndarray, limit: float) -> np.ndarray:
+    """Extension (N,) of a spring that follows a twist (N,) and slips at `limit`."""
+    extension, found = 0.0, np.zeros(len(twist))
+    for k in range(1, len(twist)):
+        extension += twist[k] - twist[k - 1]
+        extension = min(max(extension, -limit), limit)
+        found[k] = extension
+    return found
+
+
+@pytest.mark.parametrize("share", [0.1, 0.3, 0.7])
+def test_gains_under_a_sine_are_those_of_the_closed_form(share: float) -> None:
+    """Describing function of a Jenkins element: with cos φ = 1 - 2 share, (φ - sin φ cos φ)/π, and sin² φ / π that is lost."""
+    size = np.array([[3e-4], [0.0]])
+    springs = SlippingSprings.of(np.zeros((1, 1)), size, np.array([10.0, 80.0]), 2.0)
+    gain, loss = springs.mean(np.array([share * 3e-4]))[0][:, 0]
+    angle = np.arccos(1 - 2 * share)
+    assert gain == pytest.approx((angle - np.sin(angle) * np.cos(angle)) / np.pi, abs=0.04)
+    assert 2 * np.pi * 10 * loss == pytest.approx(np.sin(angle) ** 2 / np.pi, abs=0.04)
+
+
+def test_gains_with_a_slow_motion_by_the_regression_of_a_simulated_element(rng: np.random.Generator) -> None:
+    """Mean gains, gains along the slow motion and at the lines; other phases, four times the samples."""
+    lines, slow_hz, limit = np.arange(53, 320, 6) * 0.25, 2.125, 1.2e-4
+    size = 4e-5 / (1 + (lines / 24) ** 2)[:, None]
+    turn = np.arange(64) / 64
+    springs = SlippingSprings.of(4e-4 * np.sin(2 * np.pi * turn)[:, None], size, lines, slow_hz)
+    time = np.arange(64_000) / 2560
+    wave = np.exp(2j * np.pi * np.outer(time, lines)) * (
+        size[:, 0] * np.exp(2j * np.pi * rng.uniform(size=len(lines)))
+    )
+    small = np.real(wave.sum(axis=1))
+    rate = np.real(wave @ (2j * np.pi * lines))
+    phase = (slow_hz * time) % 1.0
+    extension = slipped(small + 4e-4 * np.sin(2 * np.pi * phase), limit)
+    cell = (64 * phase).astype(int)
+    extension -= (np.bincount(cell, extension) / np.bincount(cell))[cell]
+    gains = springs.mean(np.array([limit]))[0][:, 0]
+    for gain, x in zip(gains, (small, rate), strict=True):
+        assert gain == pytest.approx(extension @ x / (x @ x), rel=0.15)
+    turning = np.abs((phase - 0.25 + 0.5) % 0.5 - 0.25)  # from the middle between reversals
+    course = springs.course(np.array([limit]), 16)[0, :, 0] + gains[0]
+    for p, near in ((4, turning > 0.25 - 1 / 32), (0, turning < 1 / 32)):
+        assert (course[p] + course[p + 8]) / 2 == pytest.approx(
+            extension[near] @ small[near] / (small[near] @ small[near]), abs=0.1
+        )
+    spectrum, own = (np.fft.rfft(x[-51_200:])[np.rint(lines * 20).astype(int)] for x in (extension, small))
+    complex_gain = springs.at(np.array([limit]), lines)[:, 0] + gains[0] + 2j * np.pi * lines * gains[1]
+    for band in (slice(0, 12), slice(12, 30)):
+        seen = np.vdot(own[band], spectrum[band]) / np.vdot(own[band], own[band])
+        expected = np.sum(np.abs(own[band]) ** 2 * complex_gain[band]) / np.sum(np.abs(own[band]) ** 2)
+        assert abs(seen - expected) < 0.1
+
+
+@pytest.mark.parametrize("true", [{}, {0: 0.4, 1: 0.3, 2: 0.4}], ids=["linear", "slipping"])
+def test_hysteresis_is_found_and_not_invented(
+    stiff: RobotModel, poses, synthesise, rng: np.random.Generator, true: dict[int, float]
+) -> None:
+    """The stiffness is that under a load, when the springs have slipped; gains are of elements simulated here, in every pose."""
+    plan = still_plan(stiff, poses["default"])
+    plan = replace(plan, amplitude=np.full_like(plan.amplitude, 6.0))
+    time = np.arange(0, 12, 1 / 640)
+    wave = np.exp(2j * np.pi * np.outer(time, plan.frequencies_hz))
+    responses = []
+    for q in poses["default"]:
+        system = linearise(stiff, q)
+        moved = closed_loop_motion(system, plan.frequencies_hz, plan.kp[:3], plan.kd[:3])
+        changed = {}
+        for joint, share in true.items():
+            twists = 6.0 / np.sqrt(3) * (moved[:, 3 + 3 * joint + 2] - moved[:, joint])
+            own = twists * np.exp(2j * np.pi * rng.uniform(size=twists.shape))
+            small = np.real(wave @ own).sum(axis=1)
+            rate = np.real(wave @ (2j * np.pi * plan.frequencies_hz[:, None] * own)).sum(axis=1)
+            extension = slipped(small, 8e-5)
+            name = f"joint_{joint + 1}.drive"
+            k = stiff.value(f"{name}.stiffness")
+            changed[f"{name}.stiffness"] = k * (1 + share * (extension @ small) / (small @ small))
+            changed[f"{name}.damping"] = stiff.value(f"{name}.damping") + k * share * (extension @ rate) / (
+                rate @ rate
+            )
+        response = synthesise(stiff.with_values(changed), q[None], noise=0.03, rng=rng, step=8)[0]
+        responses.append(replace(response, pose=len(responses)))
+    estimate = fit_springs(
+        stiff,
+        responses,
+        rng=rng,
+        inertias_known=True,
+        tolerances=Tolerances.none(),
+        plan=plan,
+        search=MultiStart(agreement=1),
+    ).estimate
+    assert any(name.endswith("slip_share") for name in estimate.parameters.names) == bool(true)
+    for joint in range(3):
+        name = f"joint_{joint + 1}.drive.stiffness"
+        error = abs(np.log(estimate.values[name] / stiff.value(name)))
+        std = np.sqrt(estimate.covariance[(k := estimate.parameters.index(name)), k])
+        assert error < 3 * std
+        assert true or std < 0.01
