@@ -227,8 +227,8 @@ def test_ways_of_the_paper(
     usual = json.loads((stiff_robot / "stiffness.json").read_text("utf-8"))["parameters"]
     paper = run(*stiffness, tmp_path / "paper", "--weighting", "paper").document["parameters"]
     for name in ("joint_1.drive.stiffness", "joint_2.drive.stiffness", "joint_3.drive.stiffness"):
-        assert paper[name]["estimate"] == pytest.approx(usual[name]["estimate"], rel=0.05), name
-        assert paper[name]["estimate"] != usual[name]["estimate"]
+        difference = paper[name]["estimate"] - usual[name]["estimate"]
+        assert 0 < abs(difference) < 2 * np.sqrt(paper[name]["std"] ** 2 - usual[name]["std"] ** 2), name
     asked: list[str] = []
 
     def find(
