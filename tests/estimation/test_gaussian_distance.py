@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.special import elliprg
 from scipy.stats import chi
 
 from flexcal.estimation import distance_probability, distance_quantile, mean_distance, principal_variances
@@ -42,6 +43,12 @@ def test_the_series_is_right_between_its_nodes(rng: np.random.Generator) -> None
     std = np.sort(rng.uniform(size=(500, 3)), axis=1)[:, ::-1] * np.array([1.0, 0.7, 0.5])
     variances = np.sort(std**2, axis=1)[:, ::-1]
     assert np.abs(distance_probability(distance_quantile(variances), variances) - 0.95).max() < 2e-6
+
+
+def test_mean_distances_against_scipys_elliptic_integral(rng: np.random.Generator) -> None:
+    variances = np.vstack([10 ** rng.uniform(-14, 2, (5000, 3)), [[1, 0, 0], [1, 1, 0], [1, 1e-6, 0]]])
+    expected = np.sqrt(8 / np.pi) * elliprg(*variances.T)
+    assert mean_distance(variances) == pytest.approx(expected, rel=1e-13)
 
 
 def test_no_error_at_all_is_no_distance() -> None:

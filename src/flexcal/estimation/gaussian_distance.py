@@ -12,6 +12,9 @@ _KNOWN = 1e9
 """Degrees of freedom from which variances count as known."""
 _DIRECTIONS = 24
 """Number of nodes per coordinate of the quadrature over an octant of directions."""
+_ALIKE = 3e-3
+"""Relative differences from which the series of the elliptic integrals are exact to rounding."""
+_NO_VARIANCE = 1e-280
 
 
 def principal_variances(covariance: np.ndarray) -> np.ndarray:
@@ -23,11 +26,38 @@ def mean_distance(variances: np.ndarray) -> np.ndarray:
     """Expected length (N,) of zero-mean Gaussian vectors with principal `variances` (N, 3).
 
     √(8/π) R_G(λ1, λ2, λ3) with the eigenvalues λ and Carlson's symmetric elliptic integral of the second kind, which is the mean of
-    √(Σ λ u²) over all directions u (Carlson, Numerical Algorithms, 1995).
+    √(Σ λ u²) over all directions u (Carlson, Numerical Algorithms, 1995). `scipy.special.elliprg` gives the same to 1e-14, but its import
+    takes a tenth of a verb's time.
     """
-    from scipy.special import elliprg
+    ordered = np.sort(np.maximum(variances, 0.0), axis=1)
+    size = ordered[:, 2]
+    y, z, x = (ordered / np.where(size > 0, size, 1.0)[:, None]).T
+    x, z = np.where(size > 0, x, 1.0), np.maximum(z, _NO_VARIANCE)  # z the middle one: no difference cancels
+    first, second = _symmetric_integrals(x, y, z)
+    return np.sqrt(8 / np.pi * size) * 0.5 * (z * first + (x - z) * (z - y) * second / 3 + np.sqrt(x * y / z))
 
-    return np.sqrt(8 / np.pi) * elliprg(*variances.T)
+
+def _symmetric_integrals(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """R_F and R_D (N,) of `x`, `y`, `z` (N,), by duplication until they are alike, and series (Carlson 1995, sections 2 and 4)."""
+    power, total = 1.0, np.zeros_like(x)
+    while True:
+        roots = np.sqrt([x, y, z])
+        shift = roots[0] * roots[1] + roots[0] * roots[2] + roots[1] * roots[2]
+        total = total + power / (roots[2] * (z + shift))
+        x, y, z, power = (x + shift) / 4, (y + shift) / 4, (z + shift) / 4, power / 4
+        mean, weighted = (x + y + z) / 3, (x + y + 3 * z) / 5
+        if np.max(np.abs(np.stack([x, y, z]) / mean - 1), initial=0.0) < _ALIKE:
+            break
+    a, b = 1 - x / mean, 1 - y / mean
+    c = -a - b
+    e2, e3 = a * b - c * c, a * b * c
+    first = (1 - e2 / 10 + e3 / 14 + e2 * e2 / 24 - 3 * e2 * e3 / 44) / np.sqrt(mean)
+    a, b = 1 - x / weighted, 1 - y / weighted
+    c = -(a + b) / 3
+    e2, e3 = a * b - 6 * c * c, (3 * a * b - 8 * c * c) * c
+    e4, e5 = 3 * (a * b - c * c) * c * c, a * b * c**3
+    series = 1 - 3 * e2 / 14 + e3 / 6 + 9 * e2 * e2 / 88 - 3 * e4 / 22 - 9 * e2 * e3 / 52 + 3 * e5 / 26
+    return first, 3 * total + power * series / (weighted * np.sqrt(weighted))
 
 
 def distance_quantile(variances: np.ndarray) -> np.ndarray:
