@@ -51,6 +51,11 @@ def test_mean_distances_against_scipys_elliptic_integral(rng: np.random.Generato
     assert mean_distance(variances) == pytest.approx(expected, rel=1e-13)
 
 
+def test_what_is_no_number_is_no_distance_and_costs_the_others_nothing() -> None:
+    found = mean_distance(np.array([[np.nan, 1.0, 1.0], [4.0, 0.0, 0.0]]))
+    assert np.isnan(found[0]) and found[1] == pytest.approx(2 * chi(1).mean(), rel=1e-12)
+
+
 def test_no_error_at_all_is_no_distance() -> None:
     assert distance_quantile(np.zeros((1, 3)))[0] == 0 and mean_distance(np.zeros((1, 3)))[0] == 0
 

@@ -12,9 +12,9 @@ _KNOWN = 1e9
 """Degrees of freedom from which variances count as known."""
 _DIRECTIONS = 24
 """Number of nodes per coordinate of the quadrature over an octant of directions."""
-_ALIKE = 3e-3
-"""Relative differences from which the series of the elliptic integrals are exact to rounding."""
-_NO_VARIANCE = 1e-280
+_NO_VARIANCE, _DUPLICATIONS = 1e-280, 13
+"""Least ratio of the middle variance to the largest, and the number of duplications after which arguments of any ratio down to it differ
+by less than 0.3 %, from where the series of the elliptic integrals are exact to rounding."""
 
 
 def principal_variances(covariance: np.ndarray) -> np.ndarray:
@@ -38,16 +38,14 @@ def mean_distance(variances: np.ndarray) -> np.ndarray:
 
 
 def _symmetric_integrals(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """R_F and R_D (N,) of `x`, `y`, `z` (N,), by duplication until they are alike, and series (Carlson 1995, sections 2 and 4)."""
+    """R_F and R_D (N,) of `x`, `y`, `z` (N,), by duplications, which make them alike, and series (Carlson 1995, sections 2 and 4)."""
     power, total = 1.0, np.zeros_like(x)
-    while True:
+    for _ in range(_DUPLICATIONS):
         roots = np.sqrt([x, y, z])
         shift = roots[0] * roots[1] + roots[0] * roots[2] + roots[1] * roots[2]
         total = total + power / (roots[2] * (z + shift))
         x, y, z, power = (x + shift) / 4, (y + shift) / 4, (z + shift) / 4, power / 4
-        mean, weighted = (x + y + z) / 3, (x + y + 3 * z) / 5
-        if np.max(np.abs(np.stack([x, y, z]) / mean - 1), initial=0.0) < _ALIKE:
-            break
+    mean, weighted = (x + y + z) / 3, (x + y + 3 * z) / 5
     a, b = 1 - x / mean, 1 - y / mean
     c = -a - b
     e2, e3 = a * b - c * c, a * b * c

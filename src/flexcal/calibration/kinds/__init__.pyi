@@ -1,12 +1,13 @@
 from .directions import Directions, declared_level, inclinometer, is_inclinometer
 from .kind import Kind
 from .registry import ANGULAR, KINDS, LOCATING, kind_of, tells_lengths
-from .rigid_motions import best_motion, rigid_motion, wrong_readings
+from .rigid_motions import LEAST_REGISTERED, best_motion, rigid_motion, wrong_readings
 from .robust_start import turn_to_z
 
 __all__ = [
     "ANGULAR",
     "KINDS",
+    "LEAST_REGISTERED",
     "LOCATING",
     "Directions",
     "Kind",

@@ -14,6 +14,8 @@ ALREADY_ALIGNED = 0.010
 """Median distance, m, between nominal and measured points below which instrument and base frame are the same."""
 _GROSS = 10.0
 """Ratio to the median misfit beyond which a point's, if it is more than `ALREADY_ALIGNED` larger, is that of a wrong reading."""
+LEAST_REGISTERED = 3
+"""Least number of points that tell where an instrument stands."""
 _FEWEST, _REFERENCES = 4, 200
 """Number of points that are registered at least, and of those that each is compared with."""
 
@@ -112,9 +114,10 @@ def best_motion(source: np.ndarray, target: np.ndarray, name: str = "") -> tuple
 def _correlation(
     source: np.ndarray, target: np.ndarray, name: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    if len(source) < 3:
+    if len(source) < LEAST_REGISTERED:
         raise FlexcalError(
-            "E-CAL-015", f"station '{name}' has {len(source)} poses; at least 3 are needed to register it."
+            "E-CAL-015",
+            f"station '{name}' has {len(source)} poses; at least {LEAST_REGISTERED} are needed to register it.",
         )
     return np.linalg.svd((target - target.mean(axis=0)).T @ (source - source.mean(axis=0)))
 

@@ -305,9 +305,8 @@ def _rounding(poses: PoseSet) -> float:
 
 def _independent(covariance: ErrorCovariance, model: RobotModel) -> np.ndarray:
     """Covariance (3 K, 3 K) m² of instrument and repeatability, with what the points of one pose share."""
-    if (
-        covariance.independent is None or covariance.freedom < 1
-    ):  # as where points were simulated without noise
+    # a scatter without a degree of freedom is that of points that were simulated without noise
+    if covariance.independent is None or covariance.freedom < 1:
         raise FlexcalError(
             "E-RECHECK-002",
             f"neither the noise of the instrument nor the scatter of {model.name} is known, so nothing can be tested; give the "

@@ -10,12 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from flexcal.data.plans.poses import PosePlan
-from flexcal.data.poses import whole_numbers
+from flexcal.data.poses import OF_COMMANDS, whole_numbers
 from flexcal.data.tables import Table, open_table, write_table
 from flexcal.errors import FlexcalError, InputError
-
-_OF_COMMANDS = ("target", "unambiguous")
-"""Further columns of commands, which are ignored."""
 
 
 def write_pose_table(path: Path, plan: PosePlan) -> None:
@@ -47,9 +44,9 @@ def read_pose_table(path: Path) -> PosePlan:
                 f"the column '{name}' is missing; a plan of poses has pose, q1 … qn, and payload and approach1 … or not.",
             )
     for name in file.columns:
-        if name not in ("pose", "payload", *_OF_COMMANDS, *joints, *signs, *ways):
+        if name not in ("pose", "payload", *OF_COMMANDS, *joints, *signs, *ways):
             raise file.error("E-PLAN-025", f"the column '{name}' is not known in a plan of poses; remove it.")
-    texts = tuple(name for name in _OF_COMMANDS if name in file.columns)
+    texts = tuple(name for name in OF_COMMANDS if name in file.columns)
     table = file.read(texts)
     if "target" in texts and len(set(table.columns["target"].tolist())) > 1:
         raise file.error("E-PLAN-026", "the poses are of several targets; measure one target at a time.")

@@ -6,7 +6,7 @@ from .frame_touches import FrameMethod, FrameTouches
 from .image_folders import images_of, tables_of
 from .measured_tables import read_grouped_poses, read_pose_pool, read_poses, write_poses
 from .pose_set import DEFAULT_SIGMA, DIRECTION, DISTANCE, LINE, PLANE, PoseSet, concatenate, kind_of_face
-from .target_files import read_commands, read_targets, write_commands, write_targets
+from .target_files import OF_COMMANDS, read_commands, read_targets, write_commands, write_targets
 from .tool_targets import ToolTargets
 from .touch_tables import read_frame_touches, read_touches
 from .touches import Touches
@@ -18,6 +18,7 @@ __all__ = [
     "DISTANCE",
     "EXCLUDED",
     "LINE",
+    "OF_COMMANDS",
     "PLANE",
     "FrameMethod",
     "FrameTouches",

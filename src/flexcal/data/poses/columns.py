@@ -46,7 +46,7 @@ def payload_column(table: Table, signals: dict[str, Signal], model: RobotModel) 
 def without_ways(file: TableFile, model: RobotModel) -> TableFile:
     """File without reading the columns by which a plan leads the robot to its poses."""
     ways = {f"via{i + 1}" for i in range(model.n)}
-    return file.leaving_out([*file.unread, *(name for name in file.columns if name in ways)])
+    return file.leaving_out([name for name in file.columns if name in ways])
 
 
 def approach_columns(table: Table, signals: dict[str, Signal]) -> np.ndarray | None:

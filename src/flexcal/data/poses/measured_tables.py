@@ -262,7 +262,7 @@ def _read(path: Path, model: RobotModel, further: tuple[str, ...]) -> PoseSet:
     further = tuple(name for name in further if name not in quantities)
     known = {*quantities, *model.joint_names, *_named_texts(file, further), *_TEXT_COLUMNS, EXCLUDED}
     remarks = _remarks(file, known)
-    poses = _read_kind(file.leaving_out([*file.unread, *remarks]), model, further)
+    poses = _read_kind(file.leaving_out(remarks), model, further)
     if remarks:
         excluded = (*excluded, f"{path.name}: the texts in {', '.join(remarks)} are not used")
     return replace(poses, notes=(*poses.notes, *excluded)) if excluded else poses

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexcal.data.poses.columns import first_point, target_column, without_ways
+from flexcal.data.poses.target_files import OF_COMMANDS
 from flexcal.data.tables import Table, assign, check_joint_limits, check_joint_units, open_table
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ def read_working(path: Path, model: RobotModel) -> tuple[np.ndarray | None, np.n
     one under `points:`, which maps and designs are of.
     """
     file = without_ways(open_table(path), model)
-    texts = tuple(name for name in ("target", "unambiguous") if name in file.columns)
+    texts = tuple(name for name in OF_COMMANDS if name in file.columns)
     if {"x", "y", "z"} <= set(file.columns) and "q1" not in file.columns:
         signals = assign(file, model, ("xyz",), ("pose",), texts)
         table = file.read(texts)

@@ -91,8 +91,8 @@ class TableFile:
         return "line" if self.path.suffix == ".csv" else "row"
 
     def leaving_out(self, columns: Collection[str]) -> TableFile:
-        """The same table without reading these columns."""
-        return replace(self, unread=tuple(columns))
+        """The same table without reading these columns either."""
+        return replace(self, unread=(*self.unread, *columns))
 
     def skipping(self, rows: Collection[int]) -> TableFile:
         """The same table without these rows, counted from 0."""

@@ -245,9 +245,8 @@ def _with_held_joints(
             fit = fit_responses(wider, data, x)
         else:
             fit = _searched_fit(wider, data, search, rng, progress)
-        if (
-            data.hysteresis
-        ):  # the others' intervals would be conditional on a choice that such data do not tell
+        # where drives slip, the others' intervals would be conditional on a choice that such data do not tell
+        if data.hysteresis:
             return wider, fit
         least_significant = candidates.least_significant(wider, data, fit)
         if least_significant is None:

@@ -18,6 +18,7 @@ from flexcal.calibration.fit import (
     StratifiedSample,
     fit_geometry,
 )
+from flexcal.calibration.kinds import LEAST_REGISTERED
 from flexcal.calibration.measurement import OneFlank
 from flexcal.calibration.term_selection import (
     TermSelection,
@@ -34,8 +35,6 @@ from flexcal.progress import Progress, silent
 
 _COMPARED = 1e-4
 """Relative offset at which fits to most of the poses have converged, of which nothing but errors elsewhere is told."""
-_REGISTERED = 3
-"""Least number of poses that tell where an instrument stands."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +128,7 @@ class Fits:
             return cls(model, terms, rigid, bearings, None, None, selected)
         good = poses.subset(np.setdiff1d(np.flatnonzero(~poses.tilted), rigid.estimate.outliers))
         for name, told in outlying_stations(poses, rigid.estimate.outliers).items():
-            if np.sum(good.station == name) < _REGISTERED:
+            if np.sum(good.station == name) < LEAST_REGISTERED:
                 raise FlexcalError("E-CAL-038", f"{told}.")
         alone = loss == "auto" and not poses.tilted.any()
 
