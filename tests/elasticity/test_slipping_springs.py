@@ -11,6 +11,7 @@ from test_hardening_drives import still_plan
 from flexcal.elasticity.identification import MultiStart, fit_springs
 from flexcal.elasticity.response_model import Tolerances
 from flexcal.elasticity.time_periodic import SlippingSprings
+from flexcal.elasticity.time_periodic.slipping_springs import LIMITS
 from flexcal.model.robot import RobotModel
 from flexcal.model.vibration import closed_loop_motion, linearise
 
@@ -67,6 +68,25 @@ def test_gains_with_a_slow_motion_by_the_regression_of_a_simulated_element(rng: 
         seen = np.vdot(own[band], spectrum[band]) / np.vdot(own[band], own[band])
         expected = np.sum(np.abs(own[band]) ** 2 * complex_gain[band]) / np.sum(np.abs(own[band]) ** 2)
         assert abs(seen - expected) < 0.1
+
+
+def test_gains_have_one_derivative_everywhere() -> None:
+    """A fit ends at the wrong place where it jumps."""
+    lines = np.array([10.0, 20.0, 80.0])
+    size = np.array([[2e-4, 1e-4], [5e-5, 5e-5], [1e-5, 2e-5]])
+    springs = SlippingSprings.of(2e-4 * np.sin(np.linspace(0, 6, 16))[:, None] * [1, 2], size, lines, 2.0)
+    for limit in [0.5e-5, *LIMITS[[0, 4, 11, -1]], 7.7e-5, 4e-3]:
+        limits = np.array([limit, limit])
+        gains, slopes = springs.mean(limits)
+        above, below = (
+            (springs.mean(limits * np.exp(change))[0] - gains) / change for change in (1e-5, -1e-5)
+        )
+        size_of = 1e-3 * np.abs(gains).max(axis=1, keepdims=True)
+        assert np.all(np.abs(above - slopes) < size_of)
+        assert np.all(np.abs(below - slopes) < size_of)
+    np.testing.assert_allclose(
+        springs.mean(LIMITS[[6, 7]])[0], springs.along.mean(axis=2)[[6, 7], :, [0, 1]].T
+    )
 
 
 @pytest.mark.parametrize("true", [{}, {0: 0.4, 1: 0.3, 2: 0.4}], ids=["linear", "slipping"])

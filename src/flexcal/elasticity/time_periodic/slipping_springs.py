@@ -9,7 +9,7 @@ import numpy as np
 from flexcal.model.vibration import KNOT_OCTAVES
 
 LIMITS = np.geomspace(1e-5, 2e-3, 20)
-"""Twists (k,) rad at which the spring slips, between whose gains those of others are interpolated."""
+"""Twists (k,) rad at which the spring slips, a constant ratio apart, between whose gains those of others are interpolated."""
 
 CYCLES = 34
 """Number of cycles of the reference motion over which gains are averaged."""
@@ -100,12 +100,21 @@ class SlippingSprings:
 
 
 def _interpolated(gains: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Gains (..., E) and their derivatives by the logarithm of the `limits` (E,), of gains (k, ..., E) at `LIMITS`."""
-    logs, axis = np.log(LIMITS), np.arange(len(limits))
-    at = np.log(np.clip(limits, LIMITS[0], LIMITS[-1]))
-    k = np.clip(np.searchsorted(logs, at) - 1, 0, len(logs) - 2)
-    low, high = (
-        np.stack([gains[n, ..., e] for n, e in zip(i, axis, strict=True)], axis=-1) for i in (k, k + 1)
+    """Gains (..., E) and their derivatives by the logarithm of the `limits` (E,), of gains (k, ..., E) at `LIMITS`; constant beyond these.
+
+    Cubic Hermite interpolation with the slopes of parabolas: where a derivative jumps, a fit may end at a point that is no minimum.
+    """
+    step = np.log(LIMITS[1] / LIMITS[0])
+    at = np.clip(np.log(limits / LIMITS[0]) / step, 0, len(LIMITS) - 1)
+    k = np.minimum(at.astype(int), len(LIMITS) - 2)
+    bend = np.zeros_like(gains)
+    bend[1:-1] = (gains[2:] - gains[:-2]) / 2
+    axis = np.arange(len(limits))
+    low, high, first, last = (
+        np.moveaxis(values[i, ..., axis], 0, -1)
+        for values, i in ((gains, k), (gains, k + 1), (bend, k), (bend, k + 1))
     )
-    slope = (high - low) / (logs[k + 1] - logs[k])
-    return low + slope * (at - logs[k]), slope
+    square, cube = 3 * (high - low) - 2 * first - last, first + last - 2 * (high - low)
+    part = at - k
+    value = low + part * (first + part * (square + part * cube))
+    return value, (first + part * (2 * square + 3 * part * cube)) / step
