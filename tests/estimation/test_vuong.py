@@ -19,6 +19,8 @@ def test_it_is_the_standardised_gain_in_log_likelihood(rng: np.random.Generator)
         assert abs(expected) > 0.1
         assert vuong_statistic(first, second, groups) == pytest.approx(expected, rel=1e-9)
         assert vuong_statistic(second, first, groups) == pytest.approx(-expected, rel=1e-9)
+        more = (np.sum(gains) + 3.0) / (np.sqrt(12) * np.std(gains))
+        assert vuong_statistic(first, second, groups, 3.0) == pytest.approx(more, rel=1e-9)
 
 
 def test_a_small_spread_is_a_spread() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from statistics import NormalDist
 
 from flexcal.elasticity.identification.fit import ResponseData, ResponseFit, first_fit, fit_responses
 from flexcal.errors import FlexcalError
@@ -28,18 +29,17 @@ class ResponseBearings:
     statistic: float
 
     @classmethod
-    def compare(
-        cls, declared: Bearings | None, before: ResponseFit, after: ResponseFit, weighing: ResponseFit
-    ) -> ResponseBearings:
-        """Comparison of two fits to the same responses, both with the weights of a third (one of the two)."""
-        first, second = (weighing.whiten(fit.residual.residual(fit.x)) for fit in (before, after))
-        groups = weighing.problem.groups
+    def compare(cls, declared: Bearings | None, before: ResponseFit, after: ResponseFit) -> ResponseBearings:
+        """Comparison of two fits to the same responses, by the likelihood of each with its own model error and priors."""
+        first, second = (fit.problem.linearise(fit.x)[0] for fit in (before, after))
+        groups = before.problem.groups
         assert groups is not None
+        statistic = vuong_statistic(first, second, groups, before.log_prior - after.log_prior)
         chi2: dict[Bearings, float] = {
             "before": before.estimate.reduced_chi2,
             "after": after.estimate.reduced_chi2,
         }
-        return cls(declared, chi2, vuong_statistic(first, second, groups))
+        return cls(declared, chi2, statistic)
 
     @property
     def preferred(self) -> Bearings | None:
@@ -50,8 +50,20 @@ class ResponseBearings:
 
     @property
     def taken(self) -> Bearings:
-        """Bearings to be used: the declared ones; without a declaration the preferred ones, or as in Eq. (1)."""
-        return self.declared or self.preferred or "after"
+        """Bearings to be used: the declared ones; without a declaration those that fit better."""
+        return self.declared or ("before" if self.statistic > 0 else "after")
+
+    @property
+    def undecided(self) -> bool:
+        """Whether bearings are taken that are neither declared nor significantly preferred."""
+        return self.declared is None and self.preferred is None
+
+    @property
+    def share_of_other(self) -> float:
+        """Probability that those not taken are the better ones where nothing is declared, by the normal distribution of the statistic:
+        their weight in a mean of both (Buckland et al. 1997).
+        """
+        return NormalDist().cdf(-abs(self.statistic))
 
     @property
     def contradicted(self) -> bool:
@@ -64,26 +76,26 @@ def with_fitting_bearings(
     data: ResponseData,
     first: ResponseFit,
     complete: Callable[[RobotModel, ResponseFit], tuple[RobotModel, ResponseFit]],
-) -> tuple[RobotModel, ResponseFit, ResponseBearings | None]:
-    """Fit completed by `complete` with the bearings to be used, from the robot's `first` fit or one with the other bearings; and the
-    comparison.
+) -> tuple[RobotModel, ResponseFit, ResponseBearings | None, ResponseFit | None]:
+    """Fit completed by `complete` with the bearings to be used, from the robot's `first` fit or one with the other bearings; the
+    comparison; and where that is undecided the completed fit with the others.
 
     Where completing the better one adds springs, bearings were not all that was missing: the other is then fitted with the same springs,
-    from there, before they are compared; where drives slip, which wrong axes take up, the other is completed by itself as well. The last
-    is None for a robot without bearings, or where one with the others has no fit.
+    from there, before they are compared; where drives slip, which wrong axes take up, the other is completed by itself as well. There is
+    no comparison for a robot without bearings, or where one with the others has no fit.
     """
     if not model.has_bearings:
-        return *complete(model, first), None
+        return *complete(model, first), None, None
     other = model.with_bearings("before" if model.bearings == "after" else "after")
 
     def compared(own: ResponseFit, others: ResponseFit) -> ResponseBearings:
         before, after = (own, others) if model.bearings == "before" else (others, own)
-        return ResponseBearings.compare(model.config.bearings, before, after, own)
+        return ResponseBearings.compare(model.config.bearings, before, after)
 
     try:
         begun = {model.bearings: (model, first), other.bearings: (other, first_fit(other, data, first.x))}
     except FlexcalError:
-        return *complete(model, first), None
+        return *complete(model, first), None, None
     comparison = compared(first, begun[other.bearings][1])
     better = comparison.preferred or model.bearings
     robot, fit = complete(*begun[better])
@@ -94,10 +106,15 @@ def with_fitting_bearings(
         try:
             ended[worse] = robot, fit_responses(robot, data, fit.x)
         except FlexcalError:
-            return *ended[better], comparison
+            return *ended[better], comparison, None
         if data.hysteresis:
             ended[worse] = min(
                 ended[worse], complete(*begun[worse]), key=lambda found: found[1].estimate.reduced_chi2
             )
         comparison = compared(ended[model.bearings][1], ended[other.bearings][1])
-    return *(ended.get(comparison.taken) or complete(*begun[comparison.taken])), comparison
+    taken = comparison.taken
+    robot, fit = ended.get(taken) or complete(*begun[taken])
+    if not comparison.undecided:
+        return robot, fit, comparison, None
+    rest: Bearings = "before" if taken == "after" else "after"
+    return robot, fit, comparison, (ended.get(rest) or complete(*begun[rest]))[1]

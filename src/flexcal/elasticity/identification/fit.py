@@ -87,6 +87,12 @@ class ResponseFit:
         """Estimation coordinates (p,) of the optimum."""
         return self.estimate.parameters.coordinates()
 
+    @property
+    def log_prior(self) -> float:
+        """Logarithm of the likelihood's factors beside exp(-rᵀr / 2), up to a constant: covariance of the model error, and prior."""
+        offset = self.problem.prior_rows() @ (self.x - self.problem.parameters.prior_mean())
+        return -0.5 * float(offset @ offset + (0.0 if self.error is None else self.error.log_determinant))
+
     def whiten(self, rows: np.ndarray) -> np.ndarray:
         """Rows (m,) or (m, c), whitened by the measurement's covariance, after whitening by the model error as well."""
         return rows if self.error is None else self.error.whiten(rows)

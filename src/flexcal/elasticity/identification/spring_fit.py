@@ -171,14 +171,21 @@ def fit_springs(
             robot, fit = _with_held_joints(robot, candidates, data, search, rng, progress)
         return robot, final_fit(robot, data, begun) if fit is None else fit
 
-    model, fit, bearings = with_fitting_bearings(model, data, first, completed)
+    model, likelihood, bearings, rival = with_fitting_bearings(model, data, first, completed)
     progress("fitting", 0.8)
-    scale, likelihood = TorqueScale.of(fit), fit
-    if not isinstance(weighting, CovarianceWeighting | None):
-        fit = reweighted_fit(model, replace(data, weighting=weighting), likelihood)
-    estimate = _widened(fit, likelihood, data, scale)
-    if fit is not likelihood:
-        estimate = _no_better_known(estimate, _widened(likelihood, likelihood, data, scale))
+    scale = TorqueScale.of(likelihood)
+
+    def judged(own: ResponseFit) -> tuple[ResponseFit, Estimate]:
+        efficient = _widened(own, own, data, scale)
+        if isinstance(weighting, CovarianceWeighting | None):
+            return own, efficient
+        robot, weighted = own.residual.model.robot, replace(data, weighting=weighting)
+        fit = reweighted_fit(robot, weighted, own)
+        return fit, _no_better_known(_widened(fit, own, data, scale), efficient)
+
+    fit, estimate = judged(likelihood)
+    if bearings is not None and rival is not None:
+        estimate = _averaged(estimate, judged(rival)[1], bearings.share_of_other)
     progress("fitting", 1.0)
     stacked, axes = fit.predicted(), len(responses[0].joints)
     pairs = zip(fit.residual.poses, stacked, strict=True)
@@ -215,11 +222,33 @@ def _no_better_known(estimate: Estimate, efficient: Estimate) -> Estimate:
     other = squared > _HAUSMAN**2 * np.maximum(own - least, 0.0)
     lacking = np.maximum(np.where(other, least + squared, least) - own, 0.0)
     covariance = estimate.covariance + np.diag(lacking)
+    return _less_known(estimate, covariance, efficient.identifiable)
+
+
+def _averaged(estimate: Estimate, other: Estimate, share: float) -> Estimate:
+    """Estimate with the mean square error about it of a mixture with a `share` of the `other` one (Buckland et al. 1997).
+
+    Parameters that the other lacks are as well known there as here.
+    """
+    names, others = estimate.parameters.names, other.parameters
+    own = [k for k, name in enumerate(names) if name in others]
+    theirs = [others.index(names[k]) for k in own]
+    moved = np.zeros(len(names))
+    moved[own] = others.coordinates()[theirs] - estimate.parameters.coordinates()[own]
+    covariance = estimate.covariance.copy()
+    covariance[own], covariance[:, own] = 0.0, 0.0
+    covariance[np.ix_(own, own)] = other.covariance[np.ix_(theirs, theirs)]
+    covariance = (1 - share) * estimate.covariance + share * (covariance + np.outer(moved, moved))
+    return _less_known(estimate, covariance, estimate.identifiable)
+
+
+def _less_known(estimate: Estimate, covariance: np.ndarray, identifiable: tuple[bool, ...]) -> Estimate:
+    """Estimate with a larger covariance, in which also what is not `identifiable` is not, nor dampings without their stiffness."""
     sized = is_log_identified(estimate.parameters, covariance)
-    flags = zip(estimate.identifiable, efficient.identifiable, sized, strict=True)
+    flags = zip(estimate.identifiable, identifiable, sized, strict=True)
     known = dict(zip(estimate.parameters.names, map(all, flags), strict=True))
-    identifiable = tuple(flag and known.get(_stiffness_of(name), True) for name, flag in known.items())
-    return replace(estimate, covariance=covariance, identifiable=identifiable)
+    allowed = tuple(flag and known.get(_stiffness_of(name), True) for name, flag in known.items())
+    return replace(estimate, covariance=covariance, identifiable=allowed)
 
 
 def _stiffness_of(name: str) -> str:

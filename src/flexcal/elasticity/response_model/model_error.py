@@ -171,6 +171,11 @@ class ModelError:
             columns.append(blocks[-1].whiten(pose.jacobian(PredictedMeasurements(nominal, shared, none))))
         return cls(tuple(blocks), LowRank.of(np.concatenate(columns)))
 
+    @property
+    def log_determinant(self) -> float:
+        """Logarithm of the determinant of the whitened covariance."""
+        return self.common.log_determinant + sum(block.log_determinant for block in self.poses)
+
     def whiten(self, rows: np.ndarray) -> np.ndarray:
         """Rows (m,) or (m, c), whitened by the measurement alone, after whitening by both."""
         return self.common.whiten(self.by_pose(rows))

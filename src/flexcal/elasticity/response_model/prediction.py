@@ -65,13 +65,13 @@ class DriveChange:
         twist: int,
         drive: int | None,
     ) -> DriveChange:
-        """The drive with a slipping spring of `stiffness` N m/rad and `gains` (2,), of `slopes` (2,) by the logarithm of its twist; numbers
-        of its `share` and `twist`, and of the stiffness of the `drive`, all logarithms.
+        """The drive with a slipping spring of `stiffness` N m/rad and `gains` (2,), of `slopes` (2,) by the logarithm of the torque at
+        which it slips; numbers of its `share` and `twist`, and of the stiffness of the `drive`, all logarithms.
         """
         added = stiffness * gains
         by = self.derivatives | {share: added, twist: stiffness * slopes}
         if drive is not None:
-            by[drive] = by[drive] + added
+            by[drive] = by[drive] + added + by[twist]
         return DriveChange(self.stiffness + float(added[0]), self.damping + float(added[1]), by)
 
 
@@ -82,10 +82,10 @@ class PoseModel:
     `robot_names` maps names of the robot's own values to parameter numbers. `backlash` maps the axes with backlash to the numbers of
     their half gaps; `backlash_compliance` (phases, E) is the relative compliance that each adds along the reference motion, per rad.
     `hardening` maps the axes whose drives harden under their `torque` to their numbers; `slip` maps the joints with a spring that slips
-    to the numbers of its share and twist, `slipping` are its gains. `delays` and `gains` (E,) are the numbers of the axes' delays and
-    drive gains, -1 where there is none; `payload` is the nominal payload mass in kg, None for the declared. `sensors` (S) on the arm
-    have their sensitivities and delays at `sensitivities` and `late` (S,), and their errors of mounting at `mounting` (S, 5), -1 where
-    there is none.
+    to the numbers of its share and twist, `slipping` are its gains under the torques of drives of `linear` stiffness (E,). `delays` and
+    `gains` (E,) are the numbers of the axes' delays and drive gains, -1 where there is none; `payload` is the nominal payload mass in kg,
+    None for the declared. `sensors` (S) on the arm have their sensitivities and delays at `sensitivities` and `late` (S,), and their
+    errors of mounting at `mounting` (S, 5), -1 where there is none.
     """
 
     frequencies_hz: np.ndarray
@@ -98,6 +98,7 @@ class PoseModel:
     torque: DriveTorque | None
     slip: dict[str, tuple[int, int]]
     slipping: SlippingSprings | None
+    linear: np.ndarray
     delays: np.ndarray
     gains: np.ndarray
     sensors: tuple[ArmSensor, ...]
@@ -147,7 +148,7 @@ class PoseModel:
                 continue
             k, d = at_no_load = np.array(self.at_no_load(robot, natural, joint.name))
             if self.slipping is not None:
-                share, limits = natural[list(self.slip.values())].T
+                share, limits = self._slip(robot, natural)
                 number = list(self.slip).index(joint.name)
                 course = self.slipping.course(limits, ratio.shape[1])[..., number]
                 missing[..., axis] -= share[number] * course * np.array([[1.0], [k / d]])
@@ -187,7 +188,7 @@ class PoseModel:
             own = (both * by_stiffness[:, axis] + [k * mean[0, axis], 0.0], [0.0, d * mean[1, axis]])
             changes[joint.name] = self._changed(joint.name, both * mean[:, axis], by, own)
         if self.slipping is not None:
-            gains, slopes = self.slipping.mean(natural[[twist for _, twist in self.slip.values()]])
+            gains, slopes = self.slipping.mean(self._slip(robot, natural)[1])
             for column, (joint, (share, twist)) in enumerate(self.slip.items()):
                 k, d = both = np.array(self.at_no_load(robot, natural, joint))
                 without = changes.get(joint) or self._changed(joint, both, {}, ([k, 0.0], [0.0, d]))
@@ -218,13 +219,21 @@ class PoseModel:
         )
         return stiffness, damping
 
+    def _slip(self, robot: RobotModel, natural: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Shares (E,) of the slipping springs, and the twists (E,) rad of drives of `linear` stiffness at whose torque they slip: what a
+        spring carries is known better than its stiffness.
+        """
+        share, twist = natural[list(self.slip.values())].T
+        stiffness = np.array([self.at_no_load(robot, natural, joint)[0] for joint in self.slip])
+        return share, twist * stiffness / self.linear
+
     def uneven_slip(self, robot: RobotModel, natural: np.ndarray) -> np.ndarray | None:
         """Complex stiffness (L, D) N m/rad at the lines of the slipping springs of all elastic drives beyond their mean stiffness and
         damping.
         """
         if self.slipping is None:
             return None
-        share, limits = natural[list(self.slip.values())].T
+        share, limits = self._slip(robot, natural)
         stiffness = [self.at_no_load(robot, natural, joint)[0] for joint in self.slip]
         return share * stiffness * self.slipping.at(limits, self.frequencies_hz)
 
@@ -319,6 +328,7 @@ class ResponseModel:
                     None,
                     slip,
                     None,
+                    np.zeros(0),
                     at,
                     gains,
                     sensors,
@@ -340,10 +350,12 @@ class ResponseModel:
             loaded = DriveTorque.of(self.robot.with_values(known), pose.q, payload, plan)
             still = [pose.at_no_load(self.robot, natural, joint.name)[0] for joint in self.robot.driven]
             loaded = replace(loaded, stiffness=np.array(still))
-            slipping = None
+            slipping, linear = None, pose.linear
             if pose.slip:
                 moved = DriveTorque.of(self.robot.with_values(known), pose.q, payload, plan, held=True)
-                linear = [pose.at_no_load(self.robot, natural, e.name)[0] for e in self.robot.elastic]
+                linear = np.array(
+                    [pose.at_no_load(self.robot, natural, e.name)[0] for e in self.robot.elastic]
+                )
                 slipping = SlippingSprings.of(
                     moved.slow / linear,
                     moved.lines / moved.stiffness,
@@ -351,7 +363,9 @@ class ResponseModel:
                     plan.reference_frequency_hz or plan.base_frequency_hz,
                 )
             compliance = loaded.backlash_compliance()
-            poses.append(replace(pose, backlash_compliance=compliance, torque=loaded, slipping=slipping))
+            poses.append(
+                replace(pose, backlash_compliance=compliance, torque=loaded, slipping=slipping, linear=linear)
+            )
         return replace(self, poses=tuple(poses))
 
     @cached_property

@@ -37,6 +37,12 @@ def response_bearings_remarks(bearings: ResponseBearings | None) -> tuple[str, .
     if bearings is None:
         return ()
     chi2 = {key: f"reduced chi-square {own:.2f}" for key, own in bearings.reduced_chi2.items()}
+    if bearings.undecided:
+        both = " and ".join(f"axes {_AXES[key]} ({own})" for key, own in chi2.items())
+        return (
+            f"bearing {both} fit the responses equally well within chance: axes {_AXES[bearings.taken]} were used, and the intervals of "
+            "the springs include the difference; `bearings:` in robot.yaml declares which ones the robot has",
+        )
     return _remarks("responses", bearings, chi2, " and identify again")
 
 
