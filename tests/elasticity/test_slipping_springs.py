@@ -94,6 +94,7 @@ def test_hysteresis_is_found_and_not_invented(
     stiff: RobotModel, poses, synthesise, rng: np.random.Generator, true: dict[int, float]
 ) -> None:
     """The stiffness is that under a load, when the springs have slipped; gains are of elements simulated here, in every pose."""
+    stiff = stiff.with_bearings("after")
     plan = still_plan(stiff, poses["default"])
     plan = replace(plan, amplitude=np.full_like(plan.amplitude, 6.0))
     time = np.arange(0, 12, 1 / 640)

@@ -59,8 +59,9 @@ def minimise(
     moved.
 
     Converged: the relative offset ‖Qᵀb‖/‖b‖ (Bates & Watts 1981) or the scaled step is below `tolerance`, or the cost no
-    longer changes beyond rounding. Stalled: no step lowers the cost although the relative offset is above 1e-3, which Bates and Watts
-    suggest, and the cost not yet 1e-16 of the first one. Raises FlexcalError when the start itself cannot be evaluated.
+    longer changes beyond rounding, or after `max_iterations` the relative offset is at most 1e-3, which Bates and Watts suggest.
+    Stalled: no step lowers the cost although the relative offset is above that, and the cost not yet 1e-16 of the first one. Raises
+    FlexcalError when the start itself cannot be evaluated.
     """
     lower, upper = objective.problem.parameters.bounds()
     x = np.clip(x, lower, upper)
@@ -95,6 +96,9 @@ def minimise(
             acceleration.forget()
         best_offset = min(best_offset, offset)
         if iteration >= max_iterations:
+            if offset <= _STATIONARY:
+                status, message = "converged", f"relative offset {offset:.1e}, after {iteration} iterations"
+                break
             message = f"not converged after {iteration} iterations (relative offset {offset:.1e}); allow more"
             break
         iteration += 1
