@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from test_hardening_drives import still_plan
 
 from flexcal.elasticity.identification import MultiStart, fit_springs
-from flexcal.elasticity.response_model import Tolerances
+from flexcal.elasticity.response_model import ResponseModel, Tolerances, stiffness_parameters
 from flexcal.elasticity.time_periodic import SlippingSprings
 from flexcal.elasticity.time_periodic.slipping_springs import LIMITS
+from flexcal.jobs.experiments import frequency_plan
 from flexcal.model.robot import RobotModel
 from flexcal.model.vibration import closed_loop_motion, linearise
 
@@ -134,3 +136,26 @@ def test_hysteresis_is_found_and_not_invented(
         std = np.sqrt(estimate.covariance[(k := estimate.parameters.index(name)), k])
         assert error < 3 * std
         assert true or std < 0.01
+
+
+def test_a_stiffness_changes_the_gains_by_the_torque_at_which_springs_slip(
+    stiff: RobotModel, poses, synthesise, examples: Path
+) -> None:
+    """The derivative with tables of gains at another stiffness is nearly that with new ones: a load stays, whatever the stiffness is."""
+    plan = frequency_plan(stiff, examples / "tx90l" / "frequency_poses.csv", "default", 0)
+    responses = synthesise(stiff, poses["default"][:1], noise=0.01, step=16)
+    model = stiff.with_brakes(responses[0].joints)
+    parameters = stiffness_parameters(model, responses, hysteresis=True)
+    values = {item.name: item.value for item in parameters}
+    names = {"slip_share": 0.3, "slip_twist": 1.3e-4}
+    x = parameters.coordinates({n: names.get(n.rpartition(".")[2], v) for n, v in values.items()})
+    at_rest = ResponseModel.of(model, responses, parameters)
+    loaded = at_rest.with_loaded_drives(x, plan)
+    columns = loaded.predict(x)[0]
+    for joint in range(1, 4):
+        number = parameters.index(f"joint_{joint}.drive.stiffness")
+        step = 0.02 * np.eye(len(x))[number]
+        above, below = (at_rest.with_loaded_drives(y, plan).responses(y)[0] for y in (x + step, x - step))
+        exact = (above - below) / 0.04
+        own = columns.derivatives[..., list(columns.columns).index(number)]
+        assert np.linalg.norm(own - exact) < 0.07 * np.linalg.norm(exact)
