@@ -92,7 +92,8 @@ def test_the_reflector_is_turned_towards_the_instrument(run, tx90l_folder: Path)
         (["--working=5:6,5:6,0:1"], ["E-DESIGN-033"]),
         (["--working=nowhere.csv"], ["E-FILE-001", "nowhere.csv"]),
         (["--wanted", "0"], ["E-CLI-022", "0"]),
-        (["--count", "9"], ["E-DESIGN-026", "9", "29"]),
+        (["--count", "9", "--criterion", "E"], ["E-DESIGN-026", "9", "29"]),
+        (["--count", "2"], ["E-DESIGN-026", "2", "3"]),
         (["--random", "--measured", "poses.csv"], ["E-CLI-024"]),
     ],
 )

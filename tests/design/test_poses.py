@@ -213,7 +213,9 @@ def test_a_pool_in_which_few_flanks_are_sure(tx90l, rng):
 
 def test_bad_input(tx90l, rng):
     with refused("E-DESIGN-026", "9", "29", "10"):
-        select_poses(tx90l, 9, rng=rng, candidates=100)
+        select_poses(tx90l, 9, rng=rng, candidates=100, criterion="E")
+    with refused("E-DESIGN-026", "2", "3"):
+        select_poses(tx90l, 2, rng=rng, candidates=100)
     with refused("E-DESIGN-028", "F"):
         select_poses(tx90l, 30, rng=rng, criterion="F", candidates=100)  # type: ignore[arg-type]
     with refused("E-DESIGN-017", "200", "100"):

@@ -149,7 +149,7 @@ def test_a_light_robot_of_two_arms_yields_in_its_waist(tmp_path: Path) -> None:
 
 def test_too_few_poses_say_how_many_are_missing(tmp_path: Path) -> None:
     found, _ = calibrated(tmp_path, panda(0, KINDS), 16)
-    assert found.selected.terms == ("kinematic",)
+    assert found.selected.terms == ("kinematic", "gravity_compliance")
     assert "measure 4 more" in " ".join(found.document()["remarks"])
 
 

@@ -43,6 +43,32 @@ def _panda_like() -> list[Body]:
     ]
 
 
+def _ur_like() -> list[Body]:
+    half = np.pi / 2
+    rows = [  # place and orientation of the joint, mass, centre of mass, limits
+        ((0.0, 0.0, 0.089), (0.0, 0.0, 0.0), 3.7, (0.0, -0.02, 0.0), (-3.1, 3.1)),
+        ((0.0, 0.0, 0.0), (half, 0.0, 0.0), 8.4, (-0.2, 0.0, 0.12), (-3.1, 0.0)),
+        ((-0.425, 0.0, 0.0), (0.0, 0.0, 0.0), 2.3, (-0.17, 0.0, 0.03), (-2.6, 2.6)),
+        ((-0.392, 0.0, 0.109), (0.0, 0.0, 0.0), 1.2, (0.0, -0.02, 0.0), (-3.1, 3.1)),
+        ((0.0, -0.095, 0.0), (half, 0.0, 0.0), 1.2, (0.0, 0.02, 0.0), (-3.1, 3.1)),
+        ((0.0, 0.082, 0.0), (-half, 0.0, 0.0), 0.2, (0.0, 0.0, -0.02), (-3.1, 3.1)),
+    ]
+    return [Body(i - 1, *row) for i, row in enumerate(rows)]
+
+
+def _tx90l_like() -> list[Body]:
+    half = np.pi / 2
+    rows = [
+        ((0.0, 0.0, 0.478), (0.0, 0.0, 0.0), 30.0, (0.0, 0.02, -0.05), (-3.1, 3.1)),
+        ((0.05, 0.05, 0.0), (-half, 0.0, 0.0), 35.0, (0.2, 0.0, 0.1), (-2.1, 2.1)),
+        ((0.5, 0.0, 0.0), (0.0, 0.0, 0.0), 20.0, (0.0, 0.03, 0.0), (-2.5, 2.5)),
+        ((0.0, 0.0, 0.0), (half, 0.0, 0.0), 12.0, (0.0, 0.0, 0.25), (-4.7, 4.7)),
+        ((0.0, 0.0, 0.55), (-half, 0.0, 0.0), 3.0, (0.0, -0.02, 0.0), (-2.0, 2.2)),
+        ((0.0, 0.0, 0.0), (half, 0.0, 0.0), 0.6, (0.0, 0.0, 0.07), (-4.7, 4.7)),
+    ]
+    return [Body(i - 1, *row) for i, row in enumerate(rows)]
+
+
 def _two_arms() -> list[Body]:
     """A waist that turns and bends, and two arms of four joints each on the torso."""
     half = np.pi / 2
@@ -62,8 +88,10 @@ def _two_arms() -> list[Body]:
 
 
 PANDA_LIKE = tuple(_panda_like())
+UR_LIKE = tuple(_ur_like())
+TX90L_LIKE = tuple(_tx90l_like())
 TWO_ARMS = tuple(_two_arms())
-CARRIER = {PANDA_LIKE: 6, TWO_ARMS: 5}
+CARRIER = {PANDA_LIKE: 6, UR_LIKE: 5, TX90L_LIKE: 5, TWO_ARMS: 5}
 REFLECTOR = np.array([0.06, -0.04, 0.15])
 
 
@@ -92,19 +120,21 @@ class YieldingRobot:
         """Random poses (count, n) and what the tracker reads (count, 3)."""
         limits = np.array([body.limits for body in self.bodies])
         q = self.rng.uniform(limits[:, 0], limits[:, 1], (count, len(limits)))
+        return q, self.seen(q, noise=noise)
+
+    def seen(self, q: np.ndarray, *, noise: bool = True) -> np.ndarray:
+        """What the tracker reads (N, 3) at poses (N, n)."""
         turn, place = self.station
         seen = turn.apply([self.point(row) for row in q]) + place
-        return q, seen + self.rng.normal(0, self.noise if noise else 0.0, seen.shape)
+        return seen + self.rng.normal(0, self.noise if noise else 0.0, seen.shape)
 
     def write(self, path: Path, count: int, *, noise: bool = True) -> Path:
-        """A file of poses."""
-        q, points = self.measured(count, noise=noise)
-        rows = np.column_stack([np.arange(1, count + 1), q, points])
-        header = ",".join(["pose", *(f"q{i + 1}" for i in range(q.shape[1])), "x", "y", "z"])
-        np.savetxt(
-            path, rows, delimiter=",", header=header, comments="", fmt=["%d"] + ["%.12f"] * (q.shape[1] + 3)
-        )
-        return path
+        """A file of random poses."""
+        return _write(path, *self.measured(count, noise=noise))
+
+    def write_at(self, path: Path, q: np.ndarray) -> Path:
+        """A file of poses (N, n)."""
+        return _write(path, q, self.seen(q))
 
     def _frames(self, q: np.ndarray, bend: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
         turns: list[np.ndarray] = []
@@ -154,3 +184,12 @@ def write_robot(folder: Path, bodies: tuple[Body, ...], *, masses: bool = True) 
 
 def _text(numbers: tuple[float, ...]) -> str:
     return " ".join(f"{x:.17g}" for x in numbers)
+
+
+def _write(path: Path, q: np.ndarray, points: np.ndarray) -> Path:
+    rows = np.column_stack([np.arange(1, len(q) + 1), q, points])
+    header = ",".join(["pose", *(f"q{i + 1}" for i in range(q.shape[1])), "x", "y", "z"])
+    np.savetxt(
+        path, rows, delimiter=",", header=header, comments="", fmt=["%d"] + ["%.12f"] * (q.shape[1] + 3)
+    )
+    return path

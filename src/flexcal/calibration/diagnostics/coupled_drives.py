@@ -12,6 +12,7 @@ from flexcal.calibration.fit import TOLERANCE, GeometricFit, fit_geometry, plaus
 from flexcal.calibration.kinds import wrong_readings
 from flexcal.calibration.measurement import predict_measurements, predicted_positions, register
 from flexcal.data.poses import PoseSet
+from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import motor_motion
 from flexcal.model.robot import RobotModel
 from flexcal.units import MILLIMETRE
@@ -84,7 +85,11 @@ def undeclared_coupling(nominal: RobotModel, fit: GeometricFit) -> Coupling | No
         or not poses.located.all()
     ):
         return None
-    first = fit_geometry(nominal, poses, terms=("kinematic",), loss="squares")
+    try:
+        first = fit_geometry(nominal, poses, terms=("kinematic",), loss="squares")
+    except FlexcalError:
+        # fewer readings than parameters
+        return None
     if 3 * len(poses) < len(first.identifiability.kept_names) + _LEAST:
         return None
     gains, ratios = _explained(first)

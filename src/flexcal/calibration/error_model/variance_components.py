@@ -33,8 +33,12 @@ _START = 0.01
 """Least share of the total variance from which the search for a component begins."""
 _ALONE = 0.9
 """Share of the total variance at which the search for a stated sigma's part begins, the only error of single points then."""
-_STEPS, _HALVINGS = 60, 30
 ORIENTATION = "orientation"
+_STEPS, _HALVINGS = 60, 30
+_FEW = 20
+"""Degrees of freedom, parameters with a prior deducted, below which the scatter has a lognormal prior."""
+USUAL_SCATTER, SCATTER_SPREAD = {ROBOT: 5e-5, ORIENTATION: 2e-4}, float(np.log(2.0))
+"""Usual scatter of a coordinate, m, or of an orientation, rad, and the standard deviation of its logarithm."""
 _ALWAYS = (ROBOT, *OF_INSTRUMENTS, ORIENTATION)
 """Components that the data need not support: points and orientations scatter."""
 _STILL = 1e-5
@@ -164,7 +168,9 @@ class LinearFit:
                 best = replace(narrower, names=names, scale=scale, variances=narrower.variances[:-1])
         best = self._supported(best, share)
         stds = dict(zip(best.names, np.sqrt(best.variances).tolist(), strict=True))
-        seen = self._without(best, best.relative <= _NEGLIGIBLE, share)
+        negligible = best.relative <= _NEGLIGIBLE
+        negligible[0] &= self._tells_scatter
+        seen = self._without(best, negligible, share)
         components = ErrorComponents(share=share, **{name: stds[name] for name in seen.names})
         return components, _uncertainties(seen)
 
@@ -211,6 +217,11 @@ class LinearFit:
         if name == TRANSMISSION:
             return 1.0
         return 1.0 / len(self.cells.blocks) if name in self.cells.blocks else 0.0
+
+    @cached_property
+    def _tells_scatter(self) -> bool:
+        """Whether there are enough readings to estimate the scatter beside all parameters, those with a prior among them."""
+        return self.freedom - self.tied.shape[2] >= _FEW
 
     @property
     def _several(self) -> bool:
@@ -262,16 +273,20 @@ class LinearFit:
         x = np.clip(start, _SMALLEST, largest)
         at = self._at(names, x * scale, share)
         favoured = np.array([self._favour(name) if favour else 0.0 for name in names])
+        known, usual = np.zeros(len(names)), np.ones(len(names))
+        if not self._tells_scatter and names[0] in USUAL_SCATTER:
+            known[0], usual[0] = 0.5 / SCATTER_SPREAD**2, USUAL_SCATTER[names[0]] ** 2 / scale[0]
 
         def deviance(x: np.ndarray, at: RestrictedLikelihood) -> float:
-            return at.deviance - float(favoured @ np.log(x))
+            of_prior = 0.5 * float(known @ np.log(x / usual) ** 2)
+            return at.deviance - float(favoured @ np.log(x)) + of_prior
 
         for _ in range(_STEPS):
-            slope = at.slopes * scale - favoured / x
-            information = at.information * scale * scale[:, None] + np.diag(favoured / x**2)
+            slope = at.slopes * scale - (favoured - known * np.log(x / usual)) / x
+            information = at.information * scale * scale[:, None] + np.diag((favoured + known) / x**2)
             step = _step(x, slope, information, largest)
             # the factor's logarithm is steep near zero: a step that lands there returns by doubling
-            smallest = np.maximum(_SMALLEST, np.where(favoured > 0, _TO_ZERO * x, 0.0))
+            smallest = np.maximum(_SMALLEST, np.where(favoured + known > 0, _TO_ZERO * x, 0.0))
             for _ in range(_HALVINGS):
                 tried = np.clip(x + step, smallest, largest)
                 after = self._at(names, tried * scale, share)

@@ -27,6 +27,7 @@ from .terms import (
     plausible_size,
 )
 from .thermal_terms import THERMAL, is_thermal, thermal_parameters, with_reference_temperature
+from .tolerance_prior import error_kind, with_tolerance_prior
 
 __all__ = [
     "CONVERGED",
@@ -46,6 +47,7 @@ __all__ = [
     "all_errors",
     "base_errors",
     "declared_size",
+    "error_kind",
     "fit_geometry",
     "free_joints",
     "geometric_parameters",
@@ -62,4 +64,5 @@ __all__ = [
     "thermal_parameters",
     "with_calibrated_points",
     "with_reference_temperature",
+    "with_tolerance_prior",
 ]

@@ -10,7 +10,7 @@ import numpy as np
 
 from flexcal.calibration.error_model import ErrorComponents, LinearFit, joint_rotation_jacobian
 from flexcal.calibration.fit.least_squares_problem import GeometryProblem
-from flexcal.calibration.fit.practical_identifiability import Undetermined, undetermined
+from flexcal.calibration.fit.practical_identifiability import Undetermined, cause_of, undetermined
 from flexcal.calibration.fit.temperature_evidence import TemperatureEvidence, time_columns, widened
 from flexcal.calibration.fit.terms import plausible_size
 from flexcal.calibration.fit.thermal_terms import is_thermal
@@ -96,7 +96,7 @@ class FittedPoints:
         lever = np.where(readings.unit[rows] == RADIANS, self.fit.start.reach, 1.0).reshape(-1, 1)
         flat = (columns / np.where(scale > 0, scale, 1.0))[rows].reshape(3 * int(rows.sum()), -1)
         basis, sizes, _ = np.linalg.svd(lever * flat, full_matrices=False)
-        basis = basis[:, sizes > RANK_TOLERANCE * sizes[0]] / lever
+        basis = basis[:, sizes > RANK_TOLERANCE * sizes.max(initial=0.0)] / lever
         return LinearFit(
             residual[rows],
             basis.reshape(int(rows.sum()), 3, -1),
@@ -130,6 +130,13 @@ class FittedPoints:
         kept = Parameters(p for p in fit.free if not np.isfinite(p.prior_std))
         whitening = scatter.whitening(self.at.readings, self.turns)
         return undetermined(fit.straight, kept, whitening, fit.hidden, fit.plausible)
+
+    def told_by_prior(self) -> tuple[Undetermined, ...]:
+        """Parameters of which the points tell less than their prior, with the property of the poses that hides them."""
+        told = dict(zip(self.estimate.parameters.names, self._identifiable(), strict=True))
+        open_ = [n for n in self.fit.structural.kept_names if n in self.task.kept and not told[n]]
+        hidden = [item for item in self.task.kept.subset(open_) if np.isfinite(item.prior_std)]
+        return tuple(Undetermined(i.name, i.prior_std, cause_of(self.fit.straight, i.name)) for i in hidden)
 
     def has_residuals_of(self, other: FittedPoints) -> bool:
         """Whether the scatter would be estimated from the same residuals, outliers and parameters."""

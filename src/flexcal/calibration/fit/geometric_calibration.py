@@ -42,7 +42,8 @@ class GeometricFit:
 
     `model` is the calibrated robot; `estimate` holds all geometric parameters (dropped and undetermined ones at their start, not
     identifiable), stiffness and inertia as `prior` and points together have them, and the `scatter`; `identifiability` is that of
-    the kinematic Jacobian, `undetermined` what has full rank and is hidden by noise or the choice of poses; `readings` (R, 3),
+    the kinematic Jacobian, `undetermined` what has full rank and is hidden by noise or the choice of poses, `by_prior` what has
+    a prior that tells more of it than the points; `readings` (R, 3),
     measured minus predicted, m of the points, then rad of the orientations; `linear` the fit linearised at its solution, without outliers;
     `flank` (N, n); `ambiguous` (N,) poses whose flank is not certain; `terms` those fitted;
     `size` the length that is held where no reading tells how large the robot is; `fleet` the prior from other robots of the model, of the
@@ -62,6 +63,7 @@ class GeometricFit:
     ambiguous: np.ndarray
     terms: tuple[str, ...]
     size: tuple[str, ...] = ()
+    by_prior: tuple[Undetermined, ...] = ()
     fleet: FleetPrior | None = None
     temperature: TemperatureEvidence | None = None
 
@@ -306,6 +308,7 @@ def _calibration(fitted: FittedPoints) -> GeometricFit:
         prior=fitted.task.prior,
         identifiability=fit.identifiability,
         undetermined=fitted.fixed,
+        by_prior=fitted.told_by_prior(),
         scatter=fitted.scatter,
         poses=fitted.poses,
         readings=fitted.at.residual,

@@ -147,7 +147,11 @@ class PointFit:
         known = () if fleet is None else fleet.names
         told = Parameters(item for item in geometric if item.name not in known)
         seen = kinematic_identifiability(start, poses, told, prefer=[name for name in first if name in told])
-        require_enough(start, poses, told, seen)
+        without = Parameters(item for item in told if not np.isfinite(item.prior_std))
+        if len(without) < len(told):
+            require_enough(start, poses, without, kinematic_identifiability(start, poses, without))
+        else:
+            require_enough(start, poses, told, seen)
         if fleet is not None:
             # of the others those that pivoting keeps come first, so that the poses determine them beside what the prior tells
             first = [*first, *seen.kept_names]

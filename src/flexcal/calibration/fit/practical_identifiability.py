@@ -57,12 +57,14 @@ def undetermined(
     lost += hidden
     partners = {item.name: item.absorbed_by for item in identifiability.dropped}
     return tuple(
-        Undetermined(name, plausible[name], _cause(at, name, partners.get(name, ()))) for name in lost
+        Undetermined(name, plausible[name], cause_of(at, name, partners.get(name, ()))) for name in lost
     )
 
 
-def _cause(at: PredictedMeasurements, name: str, partners: tuple[tuple[str, float], ...]) -> str:
-    """Clause for the user: the property of the poses that hides a parameter."""
+def cause_of(
+    at: PredictedMeasurements, name: str, partners: tuple[tuple[str, float], ...] | None = None
+) -> str:
+    """Clause for the user: the property of the poses that hides a parameter; empty for none but unknown `partners`."""
     start, poses = at.model, at.poses
     owner = name.rpartition(".")[0]
     if is_thermal(name) and poses.temperature is not None:
@@ -89,6 +91,8 @@ def _cause(at: PredictedMeasurements, name: str, partners: tuple[tuple[str, floa
     shape = _shape(poses.position) if poses.located.all() else ""
     if shape:
         return shape
+    if partners is None:
+        return ""
     with_ = " and ".join(partner for partner, _ in partners[:2])
     return (
         f"it is not identifiable beside {with_} at the scatter of these measurements"

@@ -16,7 +16,7 @@ _GROSS = 10.0
 """Ratio to the median misfit beyond which a point's, if it is more than `ALREADY_ALIGNED` larger, is that of a wrong reading."""
 LEAST_REGISTERED = 3
 """Least number of points that tell where an instrument stands."""
-_FEWEST, _REFERENCES = 4, 200
+_FEWEST, _REFERENCES = 4, 64
 """Number of points that are registered at least, and of those that each is compared with."""
 
 

@@ -1,4 +1,11 @@
-from .cross_validation import CONDITIONAL, CrossValidation, TermSelection, cross_validated, select_terms
+from .cross_validation import (
+    CONDITIONAL,
+    CrossValidation,
+    TermSelection,
+    cross_validated,
+    enough_for_selection,
+    select_terms,
+)
 from .geometry_levels import ZerosOrGeometry, asks_for_levels, zeros_or_geometry
 from .stored_trials import considered_document, considered_terms
 from .trials import TermComparison
@@ -13,6 +20,7 @@ __all__ = [
     "considered_document",
     "considered_terms",
     "cross_validated",
+    "enough_for_selection",
     "select_terms",
     "zeros_or_geometry",
 ]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexcal.calibration.error_model import order_folds, repeated_pose_numbers, workspace_folds
+from flexcal.calibration.error_model import are_different, order_folds, repeated_pose_numbers, workspace_folds
 from flexcal.calibration.fit import LEAST_POSES, THERMAL, GeometricFit, fit_geometry
 from flexcal.calibration.measurement import Readings
 from flexcal.calibration.term_selection.candidates import candidates
@@ -76,13 +76,15 @@ class CrossValidation:
 
 
 def cross_validated(fit: GeometricFit) -> CrossValidation | None:
-    """Cross-validation of a fit with all its terms, linearised and without its outliers; None with fewer than 20 different poses."""
+    """Cross-validation of a fit with all its terms, linearised and without its outliers; None with fewer than 20 different poses, unless
+    all parameters have a prior.
+    """
     rows = np.setdiff1d(np.arange(len(fit.poses)), list(fit.estimate.outliers))
     inside = replace(
         fit, poses=fit.poses.subset(rows), readings=fit.readings[np.isin(Readings.of(fit.poses).row, rows)]
     )
     folds, distinct = folds_of(inside.poses)
-    if distinct < LEAST_POSES:
+    if distinct < LEAST_POSES and not fit.by_prior:
         return None
     by = left_out_by(inside.poses, distinct)
     trials = TermTrials(inside, fit.model, fit.terms, folds, by=by)
@@ -114,10 +116,16 @@ def left_out_by(poses: PoseSet, distinct: int) -> str:
     return "places" if poses.in_socket.all() else "folds"
 
 
+def enough_for_selection(poses: PoseSet) -> bool:
+    """Whether there are enough different poses for a selection of terms by cross-validation."""
+    return are_different(poses.q, LEAST_POSES)
+
+
 def select_terms(
     model: RobotModel,
     poses: PoseSet,
     fitted: GeometricFit | None = None,
+    assumed: tuple[str, ...] = (),
 ) -> TermSelection:
     """Forward selection of compliance under gravity, backlash and transmission harmonics on top of the rigid fit.
 
@@ -127,7 +135,8 @@ def select_terms(
     terms to all poses by squares. Compliances that are not supported for all joints are tried joint by joint, and must then lower the
     criterion by 2 log(number of such candidates) more (Chen and Chen 2008). Fewer than 20 different poses support no choice.
 
-    `fitted` is a fit of the base terms to these poses, or more, without springs: where there is one it is the one, or its start.
+    `fitted` is a fit of the base terms to these poses, or more, without springs: where there is one it is the one, or its start. `assumed`
+    are terms that are fitted by their prior in any case.
 
     Where a change of the instrument with temperature was taken and the expansion of single links explains the points about as well, that is
     taken in its place: it is the robot's, and compensation needs it.
@@ -138,8 +147,8 @@ def select_terms(
     base = ("kinematic", *(("backlash",) if model.backlash_joints else ()))
     folds, distinct = folds_of(poses)
     if distinct < LEAST_POSES:
-        more = LEAST_POSES - distinct
-        return TermSelection(base, model, (), "nothing", _too_few(distinct, more))
+        remark = _too_few(distinct, LEAST_POSES - distinct, assumed)
+        return TermSelection((*base, *assumed), model, (), "nothing", remark)
     if fitted is not None and len(fitted.poses) == len(poses) and not model.elastic:
         rigid = fitted
     else:
@@ -193,11 +202,18 @@ def select_terms(
         grow([kind for kind in remaining if kind not in open_terms.single], 0.0)
     excluded = [not_tried(term, chosen, reason) for term, reason in open_terms.excluded]
     kept = open_terms.model if "backlash" in chosen else model
+    chosen = tuple(dict.fromkeys([*chosen, *assumed]))
     return TermSelection(chosen, kept, (*rows, *left.values(), *excluded), by, "")
 
 
-def _too_few(distinct: int, more: int) -> str:
+def _too_few(distinct: int, more: int, assumed: tuple[str, ...]) -> str:
+    few = f"{distinct} different poses are too few for cross-validation"
+    if not assumed:
+        return (
+            f"terms beyond kinematics were not tried: {few}; measure {more} more, so that compliance under gravity, backlash and "
+            "transmission errors can be considered."
+        )
     return (
-        f"terms beyond kinematics were not tried: {distinct} different poses are too few for cross-validation; "
-        f"measure {more} more, so that compliance under gravity, backlash and transmission errors can be considered."
+        f"{few}, so terms were not chosen: compliance under gravity of every joint is estimated as likely as its prior and the points make "
+        f"it; measure {more} more, so that backlash and transmission errors can be considered too."
     )

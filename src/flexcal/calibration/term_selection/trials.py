@@ -24,6 +24,8 @@ _WORSE = 1.05
 """Factor by which the largest error at a left-out pose may rise with a term."""
 
 
+_FEW = 20
+"""Degrees of freedom, parameters with a prior deducted, below which residuals do not tell the scatter."""
 _LEAST_GAIN = 1e-12
 """Gain, m, below which it is a rounding error."""
 
@@ -251,6 +253,9 @@ class TermTrials:
 
     @cached_property
     def _noise(self) -> float:
+        if len(self._known) > self.rigid.linear.freedom - _FEW:
+            # with a prior of every parameter nearly nothing may be left
+            return float(self._variances.sum()) / self._coordinates
         freedom = max(self._coordinates - self.rigid.identifiability.rank, 1)
         return float((self._residual**2).sum()) / freedom
 

@@ -87,7 +87,8 @@ class Calibrate:
     """Column of POSES: the measurements with each of its values are left out of a further calibration in turn, and compared with it."""
     prior: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="")] = None
     """Prior from other robots of the model, as 'flexcal fleet --prior' writes it: fewer poses are then enough. Its stiffness is taken where
-    none was identified of this robot."""
+    none was identified of this robot. By default tolerances of manufacture are the prior where the poses do not determine all errors; none:
+    no prior, and what they do not determine stays nominal (Neubauer et al. 2015)."""
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
     """Folder for report.html, results.json, points.csv and estimates.yaml (then not beside robot.yaml); without it there is no report."""
     write_point: bool = False
@@ -191,6 +192,10 @@ class Calibrate:
             )
         console.finish(document, following)
 
+    @property
+    def _without_prior(self) -> bool:
+        return self.prior is not None and str(self.prior) == "none"
+
     def _calibrated(self, terms: Sequence[str], progress: Progress) -> Calibration:
         from flexcal.jobs.calibration import calibrate_robot
 
@@ -202,7 +207,8 @@ class Calibrate:
             secant_scale=self.secant_scale,
             elasticity=self.elasticity,
             hold_out=self.hold_out,
-            prior=self.prior,
+            prior=None if self._without_prior else self.prior,
+            tolerances=not self._without_prior,
             out=self.out,
             command=command_line(),
             progress=progress,

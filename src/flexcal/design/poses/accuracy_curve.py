@@ -51,7 +51,9 @@ def pose_curve(
     total = design.sample
     if not len(counts):
         most = min(total, 4 * len(design.plan))
-        counts = np.unique(np.geomspace(design.fewest, most, 16).round().astype(int)).tolist()
+        counts = np.unique(
+            np.geomspace(min(design.fewest, len(design.plan)), most, 16).round().astype(int)
+        ).tolist()
     if min(counts) < 1 or max(counts) > total:
         raise FlexcalError("E-DESIGN-020", f"counts must lie between 1 and the {total} candidates.")
     progress("how many", 0.0)

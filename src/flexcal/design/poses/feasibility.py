@@ -32,6 +32,8 @@ from flexcal.model.robot import RobotModel
 from flexcal.model.statics import gravity_torque
 from flexcal.progress import Progress, silent
 
+_PLACED = 3
+"""Fewest poses that determine the place of instrument and target."""
 WORKING_POSES = 300
 """Number of random poses over the whole workspace for the tool error of c-optimal design, unless others are given."""
 
@@ -71,6 +73,13 @@ class PoseCandidates:
         known = 0 if self.fleet is None else len(self.fleet.names)
         unknown = self.base.identifiability.rank if known == 0 else len(self.base.tolerance) - known
         return -(-unknown // self.base.sensitivity.jacobian.shape[1])
+
+    def least(self, *, uses_prior: bool) -> int:
+        """Fewest poses that may be chosen: those that determine what neither a `fleet` nor tolerances tell, which are the prior of a
+        calibration on a tracker's points, and of a criterion that `uses_prior`.
+        """
+        by_tolerances = uses_prior and self.fleet is None and self.setup.measure in (None, "pose")
+        return min(_PLACED, self.fewest) if by_tolerances else self.fewest
 
     def least_errors(self, counts: np.ndarray) -> np.ndarray:
         """Lower bounds (K,) of the tool error, m, of any choice of `counts` (K,) candidates (see `TraceBound`)."""

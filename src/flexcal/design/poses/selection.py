@@ -209,17 +209,18 @@ def choose_poses(
     progress: Progress = silent,
 ) -> PoseDesign:
     """As `select_poses`, from given candidates; `rng` draws the plan's seed."""
-    if count < candidates.fewest:
+    optimality = criterion_named(criterion, candidates.tool_error_weight)
+    least = candidates.least(uses_prior=optimality.uses_prior)
+    if count < least:
         what = (
             f"{candidates.base.identifiability.rank} parameters of {candidates.model.name} and the instrument"
-            if candidates.fleet is None
+            if candidates.fleet is None and least == candidates.fewest
             else "the place of the instrument and the target, which no prior tells"
         )
         raise FlexcalError(
             "E-DESIGN-026",
-            f"{count} poses cannot determine {what}; choose at least {candidates.fewest}, better twice as many.",
+            f"{count} poses cannot determine {what}; choose at least {least}, better twice as many.",
         )
-    optimality = criterion_named(criterion, candidates.tool_error_weight)
     if candidates.fleet is not None and not optimality.uses_prior:
         raise FlexcalError(
             "E-DESIGN-058",
@@ -238,7 +239,7 @@ def fewest_poses(candidates: PoseCandidates, most: int, desired_error: float) ->
     """
     weight, sensitivity = candidates.tool_error_weight, candidates.base.sensitivity
     order = greedy(sensitivity, most, TraceOptimal(weight, "c")).chosen
-    for count in range(candidates.fewest, most + 1):
+    for count in range(candidates.least(uses_prior=True), most + 1):
         if tool_error(candidates.base, weight, order[:count]) <= desired_error:
             return count
     reached = tool_error(candidates.base, weight, order)

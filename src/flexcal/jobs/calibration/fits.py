@@ -12,11 +12,13 @@ from flexcal.calibration.diagnostics import BearingAxes, compare_bearings
 from flexcal.calibration.error_model import TRANSMISSION
 from flexcal.calibration.fit import (
     CONVERGED,
+    PER_JOINT,
     FleetPrior,
     GeometricFit,
     LossName,
     StratifiedSample,
     fit_geometry,
+    with_tolerance_prior,
 )
 from flexcal.calibration.kinds import LEAST_REGISTERED
 from flexcal.calibration.measurement import OneFlank
@@ -24,6 +26,7 @@ from flexcal.calibration.term_selection import (
     TermSelection,
     ZerosOrGeometry,
     asks_for_levels,
+    enough_for_selection,
     select_terms,
     zeros_or_geometry,
 )
@@ -33,6 +36,8 @@ from flexcal.jobs.calibration.remarks import outlying_stations
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 
+_YIELDING = PER_JOINT[0]
+"""Term that poses which do not determine all parameters have by its prior."""
 _COMPARED = 1e-4
 """Relative offset at which fits to most of the poses have converged, of which nothing but errors elsewhere is told."""
 
@@ -46,6 +51,7 @@ class FitSettings:
     secant_scale: float
     elasticity: Literal["reestimated", "marginalised"]
     fleet: FleetPrior | None = None
+    tolerances: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +80,35 @@ class Fits:
         near: Fits | None = None,
         progress: Progress = silent,
     ) -> Fits:
-        """Fit the nominal robot `model`, starting from the fits `near` of most of these poses, where there are some, and in their frame."""
+        """Fit the nominal robot `model`, starting from the fits `near` of most of these poses, where there are some, and in their frame.
+
+        Where the poses do not determine all parameters, tolerances of manufacture are their prior; but those of `ZerosOrGeometry`, where
+        the scatter hides all but joint zeros or lengths.
+        """
         model = model.with_stations(poses.places)
+        if not by_tolerances(poses, settings):
+            return cls._of(model, poses, settings, near=near, progress=progress)
+        if enough_for_selection(poses):
+            plain = cls._of(model, poses, settings, near=near, progress=progress)
+            simpler = plain.levels is not None and plain.levels.answer.level != "kinematic"
+            if simpler or not (plain.rigid.undetermined or plain.selected.undetermined):
+                return plain
+        wide = settings.terms or (*_base(model), _YIELDING)
+        informed = with_tolerance_prior(model, poses, wide)
+        return cls._of(informed, poses, settings, near=near, informed=True, progress=progress)
+
+    @classmethod
+    def _of(
+        cls,
+        model: RobotModel,
+        poses: PoseSet,
+        settings: FitSettings,
+        *,
+        near: Fits | None,
+        informed: bool = False,
+        progress: Progress,
+    ) -> Fits:
+        """Fits of a robot with or without tolerances as prior: `informed`."""
         loss, terms = settings.loss, settings.terms
 
         def fit(
@@ -104,7 +137,7 @@ class Fits:
             progress(stage, 1.0)
             return calibration
 
-        base = ("kinematic", "backlash") if model.backlash_joints else ("kinematic",)
+        base = _base(model)
         of_rigid, of_selected = (None, None) if near is None else (near.rigid, near.selected)
         rigid = fit(model, base, "rigid fit", of_rigid, elastic=False, frame=of_rigid)
         bearings = compare_bearings(
@@ -139,7 +172,7 @@ class Fits:
         def choose(robot: RobotModel, begin: GeometricFit) -> tuple[TermSelection, GeometricFit]:
             """Terms beyond the geometry, and the fit with them."""
             progress("terms", 0.0)
-            chosen = select_terms(robot, good, begin if alone else None)
+            chosen = select_terms(robot, good, begin if alone else None, (_YIELDING,) if informed else ())
             progress("terms", 1.0)
             try:
                 return chosen, fit_of(chosen)
@@ -165,6 +198,16 @@ class Fits:
             levels,
             selected,
         )
+
+
+def by_tolerances(poses: PoseSet, settings: FitSettings) -> bool:
+    """Whether tolerances of manufacture are a prior where the poses do not determine all parameters: of points, without other robots."""
+    return settings.tolerances and bool(poses.located.all()) and settings.fleet is None
+
+
+def _base(model: RobotModel) -> tuple[str, ...]:
+    """Terms of the rigid fit."""
+    return ("kinematic", "backlash") if model.backlash_joints else ("kinematic",)
 
 
 def sampled(poses: PoseSet) -> PoseSet:

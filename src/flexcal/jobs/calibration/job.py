@@ -29,6 +29,7 @@ def calibrate_robot(
     elasticity: Literal["reestimated", "marginalised"] = "reestimated",
     hold_out: str | None = None,
     prior: Path | None = None,
+    tolerances: bool = True,
     out: Path | None = None,
     command: str = "",
     progress: Progress = silent,
@@ -41,7 +42,7 @@ def calibrate_robot(
     values are left out in turn.
 
     `prior` is a file with the prior of other robots of the model, as `pool_fleet` writes it: of the geometry, and of the stiffness of
-    springs that were not identified of this robot.
+    springs that were not identified of this robot; `tolerances` as `calibrate` has it.
 
     With `out`, estimates, results.json, points.csv, arm.npz, gravity_loads.npz and report.html go to that folder, and nothing beside
     robot.yaml changes. Raises `FlexcalError` as reading and `fit_geometry` do; nothing is written then.
@@ -74,6 +75,7 @@ def calibrate_robot(
         elasticity=elasticity,
         hold_out=labels,
         prior=None if others is None else others.geometry,
+        tolerances=tolerances,
         progress=progress,
     )
     origin = provenance([robot_file, bare.urdf, *files], None, source if blocks else None, tuple(blocks))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexcal.jobs.inputs import CalibratedRobot
+from flexcal.jobs.inputs import PREDICTED, CalibratedRobot, beyond_calibration, beyond_remark
 from flexcal.model.robot import RobotModel
 
 _BEYOND = 0.1
@@ -20,7 +20,11 @@ def joint_extents(model: RobotModel, q: np.ndarray) -> dict[str, tuple[float, fl
 
 
 def outside_ranges(calibrated: CalibratedRobot, q: np.ndarray) -> str:
-    """Remark on poses `q` (N, n) outside the joint ranges of the calibration; empty if there are hardly any."""
+    """Remark on poses `q` (N, n) where the calibration does not hold: by predicted errors, or its joint ranges where it has none; empty if
+    there are hardly any.
+    """
+    if PREDICTED in calibrated.blocks["calibration"].ranges:
+        return "".join(beyond_remark(calibrated, beyond_calibration(calibrated, q), "poses"))
     ranges, model = calibrated.blocks["calibration"].ranges, calibrated.model
     known = [name for name in model.motor_names if name in ranges]
     if not known:

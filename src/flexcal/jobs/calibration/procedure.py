@@ -28,6 +28,7 @@ from flexcal.errors import FlexcalError
 from flexcal.files.formats import provenance
 from flexcal.jobs.calibration.copied_rows import distinct_rows, without_copies
 from flexcal.jobs.calibration.deviating_parameters import without_deviating
+from flexcal.jobs.calibration.extent import Extent
 from flexcal.jobs.calibration.fits import Fits, FitSettings, sampled
 from flexcal.jobs.calibration.fitted_measurements import measurement_digests
 from flexcal.jobs.calibration.held_out import held_out_errors
@@ -52,6 +53,7 @@ def calibrate(
     elasticity: Literal["reestimated", "marginalised"] = "reestimated",
     hold_out: tuple[str, np.ndarray] | None = None,
     prior: FleetPrior | None = None,
+    tolerances: bool = True,
     progress: Progress = silent,
 ) -> Calibration:
     """Calibrate the geometry of a robot from measured points, with its elastic deflection taken into account.
@@ -82,6 +84,9 @@ def calibrate(
     prior : FleetPrior, optional
         Prior of the geometry from other robots of the model, as `flexcal fleet --prior` writes it. Its terms are fitted, and those asked
         for. Parameters in which the robot deviates from the others beyond chance, up to three, are estimated without the prior.
+    tolerances : bool
+        Whether tolerances of manufacture are the prior of all errors where the points do not determine them all: of fewer than 20 poses, or
+        of poses in a small region. Without, what they do not determine stays nominal.
     progress : Progress
         Called with the stage and the share of it that is done.
 
@@ -121,7 +126,7 @@ def calibrate(
     if prior is not None:
         _require_others(prior, measured)
         requested = _with_prior(prior, requested)
-    settings = FitSettings(requested, loss, secant_scale, elasticity, prior)
+    settings = FitSettings(requested, loss, secant_scale, elasticity, prior, tolerances)
     fits = Fits.of(nominal, poses, settings, progress=progress)
     conflict = FleetConflict.of(fits.selected)
     if prior is not None and conflict is not None:
@@ -156,10 +161,12 @@ def calibrate(
         "elasticity": elasticity,
         TARGETS: TARGETS_BETWEEN.join(poses.targets),
     } | ({"bearings": fits.model.bearings} if fits.model.has_bearings else {})
+    extent = Extent.of(selected)
+    ranges = joint_extents(selected.model, selected.poses.q) | _temperatures(selected.poses)
     estimate = replace(
         selected.estimate,
         provenance=provenance((), options),
-        ranges=joint_extents(selected.model, selected.poses.q) | _temperatures(selected.poses),
+        ranges=ranges if extent is None else ranges | extent.range_of_errors,
         measurements=measurement_digests(poses),
     )
     uncalibrated = uncalibrated_model(fits.model, poses)
@@ -181,6 +188,7 @@ def calibrate(
         held_out=held_out,
         orientation_before=uncalibrated_orientations(uncalibrated.registered, poses),
         conflict=conflict,
+        extent=extent,
     )
 
 

@@ -23,7 +23,7 @@ from flexcal.calibration.diagnostics import (
     residuals_implausible,
     stated_noise,
 )
-from flexcal.calibration.fit import GeometricFit
+from flexcal.calibration.fit import GeometricFit, error_kind
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Estimate
 from flexcal.jobs.calibration.few_readings import few_readings_remarks
@@ -65,6 +65,13 @@ _ANOTHER_CONVENTION = np.deg2rad(5)
 
 _SHOWN = 3
 _LISTED = 20
+_KINDS = {
+    "offset": ("joint zeros", 1e3, "mrad"),
+    "rad": ("other angles", 1e3, "mrad"),
+    "m": ("lengths", 1 / MILLIMETRE, "mm"),
+    "compliance": ("compliances", 1e6, "µrad/(N m)"),
+}
+"""Errors of joints that share a tolerance: name, and factor and unit in which it is given."""
 
 
 @dataclass(frozen=True)
@@ -183,6 +190,7 @@ def calibration_remarks(
         remarks += [*outlying_stations(fit.poses, fit.estimate.outliers).values()]
     remarks += [
         *_undetermined(fit),
+        *_by_prior(fit),
         *_views(fit),
         *_size(fit),
         *_noise(fit, prior_misfits=prior_misfits),
@@ -287,6 +295,32 @@ def _undetermined(fit: GeometricFit) -> Sequence[str]:
     return [
         f"not determined by these poses, held at the nominal value: {', '.join(names)} ({cause})"
         for cause, names in causes.items()
+    ]
+
+
+def _by_prior(fit: GeometricFit) -> Sequence[str]:
+    """Remarks on errors that the poses leave to the tolerances of manufacture, and on the size of these."""
+    sizes: dict[str, list[float]] = {}
+    for item in fit.estimate.parameters:
+        kind = error_kind(fit.model, item.name)
+        if kind and np.isfinite(item.prior_std) and item.name in fit.model.prior.parameters:
+            sizes.setdefault(kind, []).append(item.prior_std)
+    if not sizes or not fit.by_prior:
+        return ()
+    told = [
+        f"{_KINDS[kind][0]} {np.median(own) * _KINDS[kind][1]:.2g} {_KINDS[kind][2]}"
+        for kind, own in sizes.items()
+    ]
+    causes: dict[str, list[str]] = {}
+    for item in fit.by_prior:
+        causes.setdefault(item.cause, []).append(item.name)
+    return [
+        f"the poses do not determine all errors of the joints, which have tolerances as prior (1σ, as likely as the points make them: "
+        f"{listed(told, len(told))}); what is left open is in every interval and predicted error",
+        *(
+            f"told less by these poses than by their prior: {listed(names, _LISTED)}{f' ({cause})' if cause else ''}"
+            for cause, names in causes.items()
+        ),
     ]
 
 

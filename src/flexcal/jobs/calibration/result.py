@@ -54,6 +54,7 @@ from flexcal.calibration.verification import (
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, json_values
 from flexcal.jobs.calibration.approaches import Approaches
+from flexcal.jobs.calibration.extent import Extent
 from flexcal.jobs.calibration.held_out import HeldOut
 from flexcal.jobs.calibration.held_out_tilts import HeldOutTilts
 from flexcal.jobs.calibration.inclinations import inclination_document
@@ -129,6 +130,8 @@ class Calibration(Identification):
         Errors of the orientations of the uncalibrated robot, where they were measured.
     conflict : FleetConflict or None
         Test of the prior from other robots of the model, where there is one.
+    extent : Extent or None
+        Predicted errors near the poses and where the robot will work; None where none can be predicted.
     pooled_stiffness : PooledUse or None
         Stiffness from other robots of the model, in place of one that was identified.
     estimates : Path or None
@@ -152,6 +155,7 @@ class Calibration(Identification):
     held_out: HeldOut | HeldOutTilts | None = None
     orientation_before: OrientationErrors | None = None
     conflict: FleetConflict | None = None
+    extent: Extent | None = None
     pooled_stiffness: PooledUse | None = None
     estimates: Path | None = None
     command: str = ""
@@ -296,6 +300,7 @@ class Calibration(Identification):
         floor = None if misfits else RepeatabilityFloor.of(selected)
         sensor_lag = SensorLag.of(selected)
         approaches = Approaches.of(selected)
+        extent = self.extent
         learning = LearningCurve.of(selected)
         bearings = bearing_remarks(self.bearings, selected)
         blamed = self.bearings is not None and self.bearings.contradicted
@@ -308,6 +313,7 @@ class Calibration(Identification):
                 "selected": identifiability_block(identifiability)
                 | identifiability_spectrum(identifiability)
                 | {"undetermined": [{"name": u.name, "cause": u.cause} for u in selected.undetermined]}
+                | {"by_prior": [u.name for u in selected.by_prior]}
             },
             "terms": list(selected.terms),
             "term_selection": [considered_document(row) for row in chosen.considered] if chosen else [],
@@ -359,6 +365,7 @@ class Calibration(Identification):
             "fleet": fleet,
             "pooled_stiffness": None if pooled is None else pooled.document(),
             "temperature": thermal_document(selected, sensor_lag),
+            "extent": None if extent is None else extent.document(),
             "approach": None if approaches is None else approaches.document(),
             "stage1": None if self.stiffness is None else {"misfit": misfit_document(self.stiffness.misfit)},
             "remarks": [
@@ -374,6 +381,7 @@ class Calibration(Identification):
                 ),
                 *lag_remark(self.lag),
                 *([] if approaches is None else approaches.remarks),
+                *([] if extent is None else extent.remarks),
                 *(() if blamed else bearings),
                 *place_remarks(agreement),
                 *(() if self._cause or misfits else floor_remark(selected, self.before.robots_own)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,8 @@ from flexcal.data.tables import TableFile, open_table
 from flexcal.errors import FlexcalError, InputError, naming
 from flexcal.jobs.inputs import (
     CalibratedRobot,
+    beyond_calibration,
+    beyond_remark,
     is_station_identified,
     use_remarks,
     with_temperature,
@@ -53,6 +55,9 @@ class Compensation(Result):
         File that the targets were read from.
     remarks : tuple of str
         What makes the positions doubtful.
+    extrapolated : ndarray
+        Predicted errors (N,), m (root mean square), of the targets where they are above three times those at the poses of the calibration,
+        else 0.
     """
 
     targets: ToolTargets
@@ -62,6 +67,7 @@ class Compensation(Result):
     measured: tuple[str, ...]
     table: TableFile | None = None
     remarks: tuple[str, ...] = ()
+    extrapolated: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def headline(self) -> str:
@@ -130,6 +136,10 @@ class Compensation(Result):
             "start": None
             if self.start is None
             else dict(zip(self.model.motor_names, self.start.tolist(), strict=True)),
+            "extrapolated": [
+                {"pose": int(self.targets.pose[k]), "predicted_mm": float(self.extrapolated[k] / MILLIMETRE)}
+                for k in np.flatnonzero(self.extrapolated)
+            ],
             "from_other_postures": self.targets.pose[reached & commands.elsewhere].tolist(),
             "refused": self.refused,
             "remarks": list(self.remarks),
@@ -217,6 +227,9 @@ def compensate(
             "E-RUN-016",
             f"none of the {len(targets)} targets can be compensated; pose {targets.pose[0]}: {commands.reason[0]}.",
         )
+    far = np.zeros(len(targets))
+    done = commands.reached
+    far[done] = beyond_calibration(robot, commands.q[done], targets.target[done])
     return Compensation(
         model,
         targets,
@@ -224,7 +237,8 @@ def compensate(
         origin,
         nominal,
         robot.measured,
-        remarks=(*use_remarks(robot), *warm),
+        remarks=(*use_remarks(robot), *warm, *beyond_remark(robot, far, "targets")),
+        extrapolated=far,
     )
 
 

@@ -11,7 +11,13 @@ import numpy as np
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.data.poses import ToolTargets, read_commands, write_targets
 from flexcal.errors import FlexcalError
-from flexcal.jobs.inputs import CalibratedRobot, use_remarks, with_temperature
+from flexcal.jobs.inputs import (
+    CalibratedRobot,
+    beyond_calibration,
+    beyond_remark,
+    use_remarks,
+    with_temperature,
+)
 from flexcal.jobs.pages import Result
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import carried_mass, certain_flank, points_kinematics, tool_at_rest
@@ -111,6 +117,7 @@ def predict(
     """
     if commands.q is None:
         raise FlexcalError("E-RUN-097", "the commands hold no joint positions q; give those of the motors.")
+    far = beyond_calibration(robot, commands.q, commands.target)
     commands, warm = with_temperature(robot, commands, temperature)
     parts = []
     for first in range(0, len(commands), _BLOCK):
@@ -125,7 +132,7 @@ def predict(
         tool,
         beside,
         certain,
-        (*use_remarks(robot), *warm),
+        (*use_remarks(robot), *warm, *beyond_remark(robot, far, "poses")),
     )
 
 

@@ -17,7 +17,7 @@ from flexcal.jobs.deployment.controller_poses import ControllerPoses
 from flexcal.jobs.deployment.filtered_program import FilteredProgram, ToolPoses
 from flexcal.jobs.deployment.path_corrections import PathCorrections, deviations_of_targets, path_remarks
 from flexcal.jobs.deployment.program_files import output_places, read_program, written_files
-from flexcal.jobs.inputs import CalibratedRobot, held_at, use_remarks
+from flexcal.jobs.inputs import CalibratedRobot, beyond_calibration, beyond_remark, held_at, use_remarks
 from flexcal.jobs.result_files import RunRecord
 from flexcal.model.robot import RobotModel, with_point_at_frame
 from flexcal.model.statics import tool_at_rest
@@ -148,6 +148,7 @@ def filter_program(
         *program.remarks,
         *payload_remarks,
         *path_remarks(program, deviations, subdivide, between),
+        *beyond_remark(robot, beyond_calibration(robot, commands[done]), "targets"),
     )
     return FilteredProgram(
         model, program, new, between, missed, commands, before, corrected, tuple(reasons), remarks, reverse

@@ -1,3 +1,4 @@
+from .calibrated_extent import PREDICTED, beyond_calibration, beyond_remark
 from .distinct_files import require_distinct_files
 from .experiment_files import (
     FREQUENCY_PLAN,
@@ -36,11 +37,14 @@ from .stored_model import (
 
 __all__ = [
     "FREQUENCY_PLAN",
+    "PREDICTED",
     "REFUSED",
     "TARGETS",
     "TARGETS_BETWEEN",
     "CalibratedRobot",
     "Misreading",
+    "beyond_calibration",
+    "beyond_remark",
     "calibrated_temperatures",
     "common_plan",
     "example_robot",

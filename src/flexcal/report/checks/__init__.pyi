@@ -36,10 +36,12 @@ from .measured_responses import limit_of, response_checks, worst_pose
 from .payload import BODILESS, UNLIKE, payload_checks
 from .places import check_places
 from .pose_errors import (
+    BEYOND,
     check_claimed_uncertainty,
     check_drift,
     check_enough,
     check_error_budget,
+    check_extent,
     check_flanks,
     check_fresh_poses,
     check_held_out,
@@ -60,6 +62,7 @@ from .verification import verification_checks
 
 __all__ = [
     "ANSWERS",
+    "BEYOND",
     "BODILESS",
     "LARGE",
     "TOO_LARGE",
@@ -75,6 +78,7 @@ __all__ = [
     "check_drive_gains",
     "check_enough",
     "check_error_budget",
+    "check_extent",
     "check_external",
     "check_fit",
     "check_flanks",

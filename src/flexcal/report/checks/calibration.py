@@ -17,6 +17,8 @@ from flexcal.report.checks.places import check_places
 from flexcal.report.checks.pose_errors import (
     check_drift,
     check_error_budget,
+    check_extent,
+    check_gain,
     check_held_out,
     check_lag,
     check_left_out,
@@ -59,6 +61,7 @@ def calibration_checks(
             if groups is None
             else [check_held_out(groups, errors.mean, share).named("groups_left_out", independent=True)]
         ),
+        *([] if left_out is None else check_gain(results["before"]["own"], left_out, results["fit"])),
         check_error_budget(
             estimate, results["variances"], is_implausible=results["fit"]["is_implausible"], held=held
         ),
@@ -71,6 +74,7 @@ def calibration_checks(
         *check_fleet(results.get("fleet")),
         *check_pooled_stiffness(results.get("pooled_stiffness")),
         *_stage_one_checks(results.get("stage1")),
+        *check_extent(results.get("extent")),
     )
 
 

@@ -24,6 +24,10 @@ FEW_NUMBERS = 4.0
 OVERSTATED = 0.5
 """Noise over the stated sigma below which the stated one counts as wrong."""
 CLEAR_GAP = 3.0
+_PLACES = 9
+"""Numbers of the place of an instrument and a point."""
+BEYOND = 3.0
+"""Ratio of predicted errors where the robot works to those near the poses of its calibration from which these do not tell it."""
 _INVISIBLE = 1e-3
 """Model error, mm, that no instrument sees."""
 
@@ -182,6 +186,22 @@ def check_lag(lag: Mapping[str, Any] | None) -> tuple[Check, ...]:
     return (Check("Were joint positions and points read at the same instant?", answer, "bad").named("lag"),)
 
 
+def check_extent(extent: Mapping[str, Any] | None) -> tuple[Check, ...]:
+    """Whether the robot is as accurate where it will work as near the poses of the fit; `extent` is the block of results.json."""
+    if extent is None:
+        return ()
+    question = "Does it hold where the robot works?"
+    inside, beyond = extent["inside_mm"], extent["beyond_mm"]
+    answer = (
+        f"Predicted errors are {document_millimetres(inside)} mm at the poses of the fit and {document_millimetres(beyond)} mm over the "
+        f"{extent['of']} (rms)."
+    )
+    if beyond <= BEYOND * inside:
+        return (Check(question, answer, "good").named("extent"),)
+    told = f"Only near the calibrated poses, which the remarks give. {answer}"
+    return (Check(question, told, "care").named("extent"),)
+
+
 def check_rank(parameters: int, rank: int, gap: float) -> Check:
     """Whether the rank is unambiguous: a `gap` in decades between the parameters that are determined and the others."""
     question = "Is the rank of the identification clear?"
@@ -250,6 +270,27 @@ def check_left_out(
     if left_out is None or expected is None:
         return Check(question, f"Cannot be judged: no pose was left out. {remedy}", "unknown")
     return _compared(question, "In cross-validation the mean error is", left_out, mean, expected)
+
+
+def check_gain(
+    before: Mapping[str, float] | None, left_out: float, fit: Mapping[str, Any]
+) -> tuple[Check, ...]:
+    """Where poses left out of the fit are met no better (mean error `left_out`, m) than by the uncalibrated robot; `before` and `fit` are
+    of results.json.
+
+    Of the uncalibrated robot six numbers of the instrument and three of the point are fitted to the same poses, see `check_held_out`.
+    """
+    if before is None:
+        return ()
+    share = min(_PLACES / max(fit["coordinates"], 1), 0.9)
+    uncalibrated = before["mean_mm"] * MILLIMETRE * float(np.sqrt((1 + share) / (1 - share)))
+    if left_out < uncalibrated:
+        return ()
+    answer = (
+        f"No: poses left out of the fit are met to {millimetres(left_out)} mm on average, and by the robot before, with its base and point "
+        f"found, to {millimetres(uncalibrated)} mm. Look for wrong readings, and measure more poses."
+    )
+    return (Check("Is the robot more accurate than before?", answer, "care").named("gain"),)
 
 
 def check_held_out(held_out: Mapping[str, Any], mean: float, share: float) -> Check:

@@ -1,0 +1,178 @@
+"""Tolerances of manufacture as the prior of every error, where the poses do not determine all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.calibration.error_model import SCATTER_SPREAD, USUAL_SCATTER
+from flexcal.calibration.fit.elastic_prior import NOTHING_ELASTIC, ElasticPrior
+from flexcal.calibration.fit.point_fit import PointFit
+from flexcal.calibration.fit.terms import declared_size, geometric_parameters, plausible_size
+from flexcal.calibration.measurement import ROBOT, predict_measurements, stated_sigma
+from flexcal.data.poses import PoseSet
+from flexcal.model.robot import GEOMETRY, ORIGIN, RobotModel
+from flexcal.model.statics import carried_mass, gravity_torque
+from flexcal.progress import silent
+
+_SIZES = {"offset": 2e-3, "rad": 1e-3, "m": 5e-4}
+"""Standard deviations of manufacture before the measurements: of joint zeros, and of other angles and lengths of the joints."""
+_YIELD, _SOFTEST = 1e-3, 1e-4
+"""Rotation, rad, by which a joint yields under its largest load, and the largest compliance, rad/(N m), before the measurements."""
+_SCALE = np.log(3.0)
+"""Standard deviation of the logarithm of the factor by which the errors of a kind are larger than these."""
+_FREE = 10.0
+"""Standard deviation, m or rad, of where an instrument stands."""
+_FAR = 3.5
+"""Deviation, in standard deviations of its kind, from which a parameter has one of its own."""
+_TOLD = 0.5
+"""Standard deviation after the measurements, over that before, below which these tell a parameter."""
+_NOISE = "scatter"
+"""Key of the scatter, m, beside the factors."""
+_RELEASED = 6
+"""Largest number of parameters with a standard deviation of their own."""
+
+
+def with_tolerance_prior(model: RobotModel, poses: PoseSet, terms: Sequence[str]) -> RobotModel:
+    """Robot whose errors of some terms have a prior about nominal: what robot.yaml declares, else tolerances of manufacture.
+
+    Errors of the joints are of four kinds: zeros, other angles, lengths, and compliances. How much larger than the usual ones those of a
+    kind are is estimated from the points, by the marginal likelihood with a lognormal prior of a factor of three (empirical Bayes, Morris
+    1983); an angle that is then farther off than chance is known to be as far off alone. Places of points and instruments, and further
+    terms, have their plausible size.
+    """
+    items = geometric_parameters(model, poses, terms)
+    open_ = [n for n in items.names if declared_size(model, n) is None and not n.startswith("station.")]
+    kinds = {name: error_kind(model, name) for name in open_}
+    sizes = _usual_sizes(model, poses, kinds)
+    first = model.with_priors(sizes)
+    elastic = bool(model.elastic)
+    prior = ElasticPrior.of(first, poses) if elastic else NOTHING_ELASTIC
+    fit = PointFit.of(
+        first, poses, tuple(terms), prior, elastic, marginalised=False, near={}, progress=silent
+    )
+    evidence = _Evidence.of(fit, kinds)
+    factors = evidence.factors({})
+    own: dict[str, float] = {}
+    while len(own) < _RELEASED and (far := evidence.farthest(factors, own)):
+        own[far[0]] = far[1]
+        factors = evidence.factors(own)
+    scaled = {name: size * factors.get(kinds[name], 1.0) for name, size in sizes.items()}
+    return model.with_priors(scaled | own)
+
+
+def error_kind(model: RobotModel, name: str) -> str:
+    """Kind of a parameter that shares a factor with others, or none."""
+    owner, _, key = name.rpartition(".")
+    if key.startswith("gravity_compliance"):
+        return "compliance"
+    if key not in (*GEOMETRY, *ORIGIN):
+        return ""
+    length = key in ORIGIN or key.startswith("length")
+    if owner == "tool":
+        return "" if length else "rad"
+    if length:
+        return "m"
+    # rotations of a joint at the base take up that of the first instrument
+    at_base = model.joints[model.joint_index(owner)].parent < 0
+    return "" if at_base else "offset" if key == "offset" else "rad"
+
+
+def _usual_sizes(model: RobotModel, poses: PoseSet, kinds: dict[str, str]) -> dict[str, float]:
+    """Standard deviations, natural units, of parameters before the measurements."""
+    load = np.abs(gravity_torque(model, poses.q, carried_mass(model, poses.payload, len(poses)))).max(axis=0)
+    sizes = {}
+    for name, kind in kinds.items():
+        if kind == "compliance" and name.endswith("gravity_compliance"):
+            own = load[model.joint_index(name.partition(".")[0])]
+            sizes[name] = min(_SOFTEST, _YIELD / max(own, 1e-9))
+        else:
+            sizes[name] = _SIZES.get(kind) or plausible_size(model, name)
+    return sizes
+
+
+@dataclass(frozen=True, eq=False)
+class _Evidence:
+    """Marginal likelihood of linear readings y = A x + e, x in prior standard deviations.
+
+    `names` of the parameters, `kinds` those with a common factor, `sizes` (p,) their standard deviations; `usual` scatter, m, `count` of
+    the readings, `square` yᵀy, `along` (p,) Aᵀy and `gram` (p, p) AᵀA.
+    """
+
+    names: tuple[str, ...]
+    kinds: tuple[str, ...]
+    sizes: np.ndarray
+    usual: float
+    count: int
+    square: float
+    along: np.ndarray
+    gram: np.ndarray
+
+    @classmethod
+    def of(cls, fit: PointFit, kinds: dict[str, str]) -> _Evidence:
+        at = predict_measurements(fit.start, fit.poses, elastic=fit.elastic, jacobians=True)
+        free = fit.free
+        there = at.readings.present.ravel()
+        sizes = np.where(np.isfinite(free.prior_std()), free.prior_std(), _FREE)
+        columns = at.jacobian(free.names).reshape(-1, len(free))[there] * sizes
+        # a rad counts as the reach of the arm
+        unit = np.repeat(np.where(at.readings.points, 1.0, fit.start.reach), 3)[there]
+        y = at.residual.ravel()[there] * unit
+        columns *= unit[:, None]
+        own = tuple(kinds.get(name, "") for name in free.names)
+        usual = float(np.hypot(USUAL_SCATTER[ROBOT], stated_sigma(at.readings)))
+        return cls(free.names, own, sizes, usual, len(y), float(y @ y), columns.T @ y, columns.T @ columns)
+
+    @property
+    def shared(self) -> tuple[str, ...]:
+        """Kinds of errors with a factor."""
+        return tuple(dict.fromkeys(kind for kind in self.kinds if kind))
+
+    def factors(self, own: dict[str, float]) -> dict[str, float]:
+        """Most probable factor of every kind, some parameters having standard deviations of their `own`."""
+        from scipy.optimize import minimize
+
+        start = np.append(np.zeros(len(self.shared)), np.log(self.usual))
+        bounds = [(-4.0, 6.0)] * len(self.shared) + [(-16.0, 0.0)]
+        found = minimize(self._cost, start, args=(own,), method="L-BFGS-B", bounds=bounds).x
+        named = dict(zip(self.shared, np.exp(found[:-1]).tolist(), strict=True))
+        return named | {_NOISE: float(np.exp(found[-1]))}
+
+    def farthest(self, factors: dict[str, float], own: dict[str, float]) -> tuple[str, float] | None:
+        """Angle of a joint that is farther off than its kind explains, with its deviation."""
+        scale = self._scales(factors, own)
+        noise = factors[_NOISE] ** 2
+        inner = np.linalg.inv(scale[:, None] * self.gram * scale / noise + np.eye(len(scale)))
+        mean, std = inner @ (scale * self.along) / noise, np.sqrt(np.diag(inner))
+        open_ = [
+            k
+            for k, kind in enumerate(self.kinds)
+            if kind in ("offset", "rad")
+            and self.names[k] not in own
+            and std[k] < _TOLD
+            and abs(mean[k]) > _FAR
+        ]
+        if not open_:
+            return None
+        k = max(open_, key=lambda k: abs(mean[k]))
+        return self.names[k], float(abs(mean[k]) * scale[k] * self.sizes[k])
+
+    def _scales(self, factors: dict[str, float], own: dict[str, float]) -> np.ndarray:
+        return np.array(
+            [
+                own[name] / size if name in own else factors.get(kind, 1.0)
+                for name, kind, size in zip(self.names, self.kinds, self.sizes, strict=True)
+            ]
+        )
+
+    def _cost(self, x: np.ndarray, own: dict[str, float]) -> float:
+        """Half the deviance of log factors and the log scatter `x`."""
+        scale = self._scales(dict(zip(self.shared, np.exp(x[:-1]).tolist(), strict=True)), own)
+        noise = np.exp(2 * x[-1])
+        lower = np.linalg.cholesky(scale[:, None] * self.gram * scale / noise + np.eye(len(scale)))
+        left = np.linalg.solve(lower, scale * self.along) / noise
+        fit = 0.5 * (self.square / noise - left @ left) + np.log(np.diag(lower)).sum() + self.count * x[-1]
+        scatter = (x[-1] - np.log(self.usual)) / SCATTER_SPREAD
+        return float(fit + 0.5 * np.sum((x[:-1] / _SCALE) ** 2) + 0.5 * scatter**2)

@@ -1,0 +1,65 @@
+"""Where the predicted errors of a calibration are far larger than at its poses."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.calibration.measurement import propagation
+from flexcal.errors import FlexcalError
+from flexcal.jobs.inputs.stored_model import CalibratedRobot
+from flexcal.report.checks import BEYOND
+from flexcal.units import MILLIMETRE
+
+PREDICTED = "predicted_error"
+"""Among the ranges of a calibration: predicted errors, m (rms), at its poses, and where the robot will work."""
+_TOGETHER = 1024
+"""Poses whose derivatives are held at a time."""
+
+
+def beyond_calibration(
+    calibrated: CalibratedRobot, q: np.ndarray, targets: np.ndarray | None = None
+) -> np.ndarray:
+    """Predicted errors (N,), m, at poses `q` (N, n) where these are above three times those at the poses of the calibration, else 0.
+
+    Of the `targets` (N,), by default the first point; of frames that are no points 0. All are 0 where the calibration does not say how
+    large errors are at its poses.
+    """
+    if targets is not None:
+        found = np.zeros(len(q))
+        for name in set(targets.tolist()) & set(calibrated.probable.points):
+            own = targets == name
+            found[own] = _beyond(calibrated, q[own], name)
+        return found
+    return _beyond(calibrated, q, None)
+
+
+def _beyond(calibrated: CalibratedRobot, q: np.ndarray, target: str | None) -> np.ndarray:
+    if (
+        not len(q)
+        or "calibration" not in calibrated.blocks
+        or PREDICTED not in calibrated.blocks["calibration"].ranges
+    ):
+        return np.zeros(len(q))
+    inside = calibrated.blocks["calibration"].ranges[PREDICTED][0]
+    try:
+        reach = propagation(calibrated.probable, target=target)
+    except FlexcalError:
+        return np.zeros(len(q))
+    errors = np.concatenate(
+        [
+            np.sqrt(np.sum(reach.roots(q[first : first + _TOGETHER])[1] ** 2, axis=(1, 2)))
+            for first in range(0, len(q), _TOGETHER)
+        ]
+    )
+    return np.where(errors > BEYOND * inside, errors, 0.0)
+
+
+def beyond_remark(calibrated: CalibratedRobot, errors: np.ndarray, what: str) -> tuple[str, ...]:
+    """Remark on the `errors` (N,), m, of `beyond_calibration` at poses or targets, `what` they are; none if there are none."""
+    if not errors.any():
+        return ()
+    inside = calibrated.blocks["calibration"].ranges[PREDICTED][0]
+    return (
+        f"at {np.count_nonzero(errors)} of {len(errors)} {what} the predicted error is above three times that near the calibrated poses "
+        f"({inside / MILLIMETRE:.2g} mm rms), up to {errors.max() / MILLIMETRE:.2g} mm; calibrate on poses of the working volume",
+    )
