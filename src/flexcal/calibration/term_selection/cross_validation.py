@@ -211,9 +211,9 @@ def _too_few(distinct: int, more: int, assumed: tuple[str, ...]) -> str:
     if not assumed:
         return (
             f"terms beyond kinematics were not tried: {few}; measure {more} more, so that compliance under gravity, backlash and "
-            "transmission errors can be considered."
+            "transmission errors can be considered"
         )
     return (
         f"{few}, so terms were not chosen: compliance under gravity of every joint is estimated as likely as its prior and the points make "
-        f"it; measure {more} more, so that backlash and transmission errors can be considered too."
+        f"it; measure {more} more, so that backlash and transmission errors can be considered too"
     )
