@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from statistics import NormalDist
 
 from flexcal.elasticity.identification.fit import ResponseData, ResponseFit, first_fit, fit_responses
+from flexcal.elasticity.identification.lack_of_fit import octaves_of
 from flexcal.errors import FlexcalError
 from flexcal.estimation import vuong_statistic
 from flexcal.model.parts import Bearings
@@ -29,10 +30,15 @@ class ResponseBearings:
     statistic: float
 
     @classmethod
-    def compare(cls, declared: Bearings | None, before: ResponseFit, after: ResponseFit) -> ResponseBearings:
-        """Comparison of two fits to the same responses, by the likelihood of each with its own model error and priors."""
+    def compare(
+        cls, declared: Bearings | None, before: ResponseFit, after: ResponseFit, *, slipping: bool
+    ) -> ResponseBearings:
+        """Comparison of two fits to the same responses, by the likelihood of each with its own model error and priors.
+
+        With `slipping` drives, which gains describe on the mean only, the clusters are octaves of one pose.
+        """
         first, second = (fit.problem.linearise(fit.x)[0] for fit in (before, after))
-        groups = before.problem.groups
+        groups = octaves_of(before) if slipping else before.problem.groups
         assert groups is not None
         statistic = vuong_statistic(first, second, groups, before.log_prior - after.log_prior)
         chi2: dict[Bearings, float] = {
@@ -90,7 +96,7 @@ def with_fitting_bearings(
 
     def compared(own: ResponseFit, others: ResponseFit) -> ResponseBearings:
         before, after = (own, others) if model.bearings == "before" else (others, own)
-        return ResponseBearings.compare(model.config.bearings, before, after)
+        return ResponseBearings.compare(model.config.bearings, before, after, slipping=data.hysteresis)
 
     try:
         begun = {model.bearings: (model, first), other.bearings: (other, first_fit(other, data, first.x))}

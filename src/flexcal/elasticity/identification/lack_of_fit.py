@@ -111,7 +111,7 @@ def misfit_std(fit: ResponseFit, misfit: Misfit) -> np.ndarray:
     """
     residual, jacobian = fit.problem.linearise(fit.x)
     posterior = fit.estimate.covariance
-    clusters = _octaves(fit)
+    clusters = octaves_of(fit)
     scores = np.stack([np.bincount(clusters, weights=residual * column) for column in jacobian.T], axis=1)
     std = np.sqrt(np.diag(posterior @ (scores.T @ scores) @ posterior))
     robot = fit.residual.model.robot
@@ -151,8 +151,8 @@ def _around(means: np.ndarray, at: int) -> tuple[int, int]:
     )
 
 
-def _octaves(fit: ResponseFit) -> np.ndarray:
-    """Cluster number (m,) of every row: one octave of one pose."""
+def octaves_of(fit: ResponseFit) -> np.ndarray:
+    """Cluster number (m,) of every row: one octave of one pose, in which errors of the model are coherent."""
     labels, first = [], 0
     for pose, at in zip(fit.residual.poses, fit.residual.model.poses, strict=True):
         octave = np.floor(np.log2(at.frequencies_hz / at.frequencies_hz[0])).astype(int)
