@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from statistics import NormalDist
 
 from flexcal.elasticity.identification.fit import ResponseData, ResponseFit, first_fit, fit_responses
-from flexcal.elasticity.identification.lack_of_fit import octaves_of
+from flexcal.elasticity.identification.lack_of_fit import find_misfit, octaves_of
 from flexcal.errors import FlexcalError
 from flexcal.estimation import vuong_statistic
 from flexcal.model.parts import Bearings
@@ -31,14 +31,14 @@ class ResponseBearings:
 
     @classmethod
     def compare(
-        cls, declared: Bearings | None, before: ResponseFit, after: ResponseFit, *, slipping: bool
+        cls, declared: Bearings | None, before: ResponseFit, after: ResponseFit, *, coherent: bool
     ) -> ResponseBearings:
         """Comparison of two fits to the same responses, by the likelihood of each with its own model error and priors.
 
-        With `slipping` drives, which gains describe on the mean only, the clusters are octaves of one pose.
+        Where errors of the model are `coherent` over frequency, the clusters are octaves of one pose.
         """
         first, second = (fit.problem.linearise(fit.x)[0] for fit in (before, after))
-        groups = octaves_of(before) if slipping else before.problem.groups
+        groups = octaves_of(before) if coherent else before.problem.groups
         assert groups is not None
         statistic = vuong_statistic(first, second, groups, before.log_prior - after.log_prior)
         chi2: dict[Bearings, float] = {
@@ -95,8 +95,11 @@ def with_fitting_bearings(
     other = model.with_bearings("before" if model.bearings == "after" else "after")
 
     def compared(own: ResponseFit, others: ResponseFit) -> ResponseBearings:
+        # gains describe slipping drives on the mean only; a misfit is one of the better fit
+        better = min(own, others, key=lambda fit: fit.estimate.reduced_chi2)
+        coherent = data.hysteresis or find_misfit(better, data.responses) is not None
         before, after = (own, others) if model.bearings == "before" else (others, own)
-        return ResponseBearings.compare(model.config.bearings, before, after, slipping=data.hysteresis)
+        return ResponseBearings.compare(model.config.bearings, before, after, coherent=coherent)
 
     try:
         begun = {model.bearings: (model, first), other.bearings: (other, first_fit(other, data, first.x))}
