@@ -52,12 +52,17 @@ class ResponseBearings:
         """Bearings that fit the responses significantly better."""
         if abs(self.statistic) < CERTAIN:
             return None
-        return "before" if self.statistic > 0 else "after"
+        return self.better
 
     @property
     def taken(self) -> Bearings:
         """Bearings to be used: the declared ones; without a declaration those that fit better."""
-        return self.declared or ("before" if self.statistic > 0 else "after")
+        return self.declared or self.better
+
+    @property
+    def better(self) -> Bearings:
+        """Bearings that fit the responses better, significantly or not."""
+        return "before" if self.statistic > 0 else "after"
 
     @property
     def undecided(self) -> bool:
@@ -96,8 +101,8 @@ def with_fitting_bearings(
 
     def compared(own: ResponseFit, others: ResponseFit) -> ResponseBearings:
         # gains describe slipping drives on the mean only; a misfit is one of the better fit
-        better = min(own, others, key=lambda fit: fit.estimate.reduced_chi2)
-        coherent = data.hysteresis or find_misfit(better, data.responses) is not None
+        closer = min(own, others, key=lambda fit: fit.estimate.reduced_chi2)
+        coherent = data.hysteresis or find_misfit(closer, data.responses) is not None
         before, after = (own, others) if model.bearings == "before" else (others, own)
         return ResponseBearings.compare(model.config.bearings, before, after, coherent=coherent)
 
@@ -106,7 +111,7 @@ def with_fitting_bearings(
     except FlexcalError:
         return *complete(model, first), None, None
     comparison = compared(first, begun[other.bearings][1])
-    better = comparison.preferred or model.bearings
+    better = comparison.better
     robot, fit = complete(*begun[better])
     ended = {better: (robot, fit)}
     if robot.springs.braked != model.springs.braked:
