@@ -91,7 +91,13 @@ def test_gains_have_one_derivative_everywhere() -> None:
     )
 
 
-@pytest.mark.parametrize("true", [{}, {0: 0.4, 1: 0.3, 2: 0.4}], ids=["linear", "slipping"])
+@pytest.mark.parametrize(
+    "true",
+    [
+        pytest.param({}, id="linear"),
+        pytest.param({0: 0.4, 1: 0.3, 2: 0.4}, id="slipping", marks=pytest.mark.slow),
+    ],
+)
 def test_hysteresis_is_found_and_not_invented(
     stiff: RobotModel, poses, synthesise, rng: np.random.Generator, true: dict[int, float]
 ) -> None:
