@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from flexcal.calibration.accuracy import random_poses_in
-from flexcal.calibration.fit import GeometricFit, probable_robot
+from flexcal.calibration.fit import GeometricFit
 from flexcal.calibration.measurement import propagation
 from flexcal.errors import FlexcalError
 from flexcal.jobs.calibration.joint_ranges import joint_extents
@@ -48,7 +48,7 @@ class Extent:
         if not len(poses):
             return None
         target = str(poses.target[0])
-        model = probable_robot(fit.model, [target])
+        model = fit.model
         corners = model.config.working_volume
         box = None if corners is None else np.array([corners.lower, corners.upper])
         rng = np.random.default_rng(0)
