@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -60,18 +60,36 @@ def predicted_accuracy(
 ) -> PredictedAccuracy:
     """Mean and 95 % quantile of the tool's error at poses `q` (N, n), to first order in the parameters; `threads` None takes all cores."""
     result = PredictedAccuracy(q, np.empty((len(q), 3)), np.empty(len(q)), np.empty(len(q)))
-    starts = range(0, len(q), _BATCH)
 
-    def fill(start: int) -> None:
-        rows = slice(start, start + _BATCH)
+    def fill(rows: slice) -> None:
         result.position[rows], roots = reach.roots(q[rows])
         variances = principal_variances(roots @ np.swapaxes(roots, 1, 2))
         result.mean[rows], result.p95[rows] = mean_distance(variances), distance_quantile(variances)
 
-    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        for number, _ in enumerate(pool.map(fill, starts), start=1):
-            progress("accuracy map", number / len(starts))
+    _in_batches(fill, len(q), threads, progress)
     return result
+
+
+def predicted_rms(reach: Propagation, q: np.ndarray) -> np.ndarray:
+    """Root mean square (N,), m, of the tool's error at poses `q` (N, n), to first order in the parameters."""
+    result = np.empty(len(q))
+
+    def fill(rows: slice) -> None:
+        result[rows] = np.sqrt(np.sum(reach.roots(q[rows])[1] ** 2, axis=(1, 2)))
+
+    _in_batches(fill, len(q))
+    return result
+
+
+def _in_batches(
+    fill: Callable[[slice], None], count: int, threads: int | None = None, progress: Progress = silent
+) -> None:
+    """Call `fill` with the rows of every batch of `count` poses, in `threads`; None takes all cores."""
+    starts = range(0, count, _BATCH)
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        batches = pool.map(lambda start: fill(slice(start, start + _BATCH)), starts)
+        for number, _ in enumerate(batches, start=1):
+            progress("accuracy map", number / len(starts))
 
 
 def random_poses_in(

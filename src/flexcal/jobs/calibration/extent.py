@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration.accuracy import random_poses_in
+from flexcal.calibration.accuracy import predicted_rms, random_poses_in
 from flexcal.calibration.fit import GeometricFit
 from flexcal.calibration.measurement import propagation
 from flexcal.errors import FlexcalError
@@ -61,7 +61,7 @@ class Extent:
         inside = own[rng.permutation(len(own))[:_POSES]]
         points = point_kinematics(model, inside, point=target, jacobians=False).position
         around = np.array([points.min(axis=0), points.max(axis=0)])
-        rms = [float(np.sqrt(np.mean(np.sum(reach.roots(at)[1] ** 2, axis=(1, 2))))) for at in (inside, q)]
+        rms = [float(np.sqrt(np.mean(predicted_rms(reach, at) ** 2))) for at in (inside, q)]
         return cls(rms[0], rms[1], box is not None, _partial_ranges(model, own), around)
 
     @property

@@ -86,7 +86,7 @@ class Fits:
         the scatter hides all but joint zeros or lengths.
         """
         model = model.with_stations(poses.places)
-        if not by_tolerances(poses, settings):
+        if not _by_tolerances(poses, settings):
             return cls._of(model, poses, settings, near=near, progress=progress)
         if enough_for_selection(poses):
             plain = cls._of(model, poses, settings, near=near, progress=progress)
@@ -200,7 +200,7 @@ class Fits:
         )
 
 
-def by_tolerances(poses: PoseSet, settings: FitSettings) -> bool:
+def _by_tolerances(poses: PoseSet, settings: FitSettings) -> bool:
     """Whether tolerances of manufacture are a prior where the poses do not determine all parameters: of points, without other robots."""
     return settings.tolerances and bool(poses.located.all()) and settings.fleet is None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from flexcal.calibration.accuracy import predicted_rms
 from flexcal.calibration.measurement import propagation
 from flexcal.errors import FlexcalError
 from flexcal.jobs.inputs.stored_model import CalibratedRobot
@@ -12,8 +13,6 @@ from flexcal.units import MILLIMETRE
 
 PREDICTED = "predicted_error"
 """Among the ranges of a calibration: predicted errors, m (rms), at its poses, and where the robot will work."""
-_TOGETHER = 1024
-"""Poses whose derivatives are held at a time."""
 
 
 def beyond_calibration(
@@ -45,12 +44,7 @@ def _beyond(calibrated: CalibratedRobot, q: np.ndarray, target: str | None) -> n
         reach = propagation(calibrated.probable, target=target)
     except FlexcalError:
         return np.zeros(len(q))
-    errors = np.concatenate(
-        [
-            np.sqrt(np.sum(reach.roots(q[first : first + _TOGETHER])[1] ** 2, axis=(1, 2)))
-            for first in range(0, len(q), _TOGETHER)
-        ]
-    )
+    errors = predicted_rms(reach, q)
     return np.where(errors > BEYOND * inside, errors, 0.0)
 
 
