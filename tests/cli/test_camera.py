@@ -19,6 +19,7 @@ from flexcal import RobotModel, calibrate, prediction_errors, read_poses, verify
 from flexcal.cli.main import main
 from flexcal.data.camera import projected
 from flexcal.data.poses import concatenate, read_grouped_poses
+from flexcal.model.kinematics import point_kinematics
 
 CAMERA = np.array([[1100, 0, 630], [0, 1090, 490], [0, 0, 1.0]])
 DISTORTION = np.array([-0.2, 0.1, 0.001, -0.0005, 0.02])
@@ -223,13 +224,29 @@ def test_views_that_are_left_out_are_in_no_group(folder: Path) -> None:
     assert labels.tolist() == [f"day{number % 2}" for number in poses.pose.tolist()]
 
 
-def test_a_board_of_another_size_is_told(folder: Path) -> None:
+@pytest.mark.parametrize("larger", [0.003, -0.04])
+def test_a_board_of_another_size_is_told(folder: Path, larger: float) -> None:
+    """Nominal lengths say by how much; of a board that is known to 1 ‰ only the robot takes a part only."""
     cell = Cell(5)
-    (folder / "robot.yaml").write_text(ROBOT.format(square=1.04 * SQUARE))
+    text = ROBOT.format(square=SQUARE / (1 + larger))
+    (folder / "robot.yaml").write_text(text.replace("1.0e-4", "1.0e-3") if larger < 0.01 else text)
     model = RobotModel.from_yaml(folder / "robot.yaml")
     found = calibrate(model, read_poses(cell.corners(folder / "views.csv", 40), model), terms=["kinematic"])
-    said = re.search(r"the board is (.*)% smaller than declared", found.summary())
-    assert said is not None and float(said[1]) == pytest.approx(100 * (1 - 1 / 1.04), abs=0.5)
+    size = found.document()["size"]
+    (board,) = size["standards"]
+    assert abs(board["seen"] - larger) < 2 * board["seen_std"] + 0.1 * abs(larger)
+    assert board["seen_std"] < 1.5e-3
+    # 3 ‰ are two standard deviations of board and robot together
+    if larger < -0.01:
+        assert size["contradicted"] and {c.code: c.status for c in found.trust.checks}["size"] == "care"
+    said = re.search(r"the board is (.*) ± .* ‰ (.*) than declared", found.summary().replace("\n", " "))
+    assert said is not None and said[2] == ("larger" if larger > 0 else "smaller")
+    if larger == 0.003:
+        q = START + np.random.default_rng(5).uniform(-1, 1, (200, 6)) * [0.4, 0.3, 0.3, 0.7, 0.7, 1.2]
+        truth = np.array([cell.camera(row)[0] for row in q])
+        at = point_kinematics(found.model, q, jacobians=False).position
+        far = [np.linalg.norm(p[::2] - p[1::2], axis=1).sum() for p in (at, truth)]
+        assert abs(far[0] / far[1] - 1) < 2e-3
 
 
 def over_prediction(seed: int, folder: Path) -> float:

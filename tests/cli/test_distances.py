@@ -148,7 +148,7 @@ def test_an_arm_is_found_from_readings_of_one_number(tmp_path: Path, kind: str) 
     assert away(arm, result.model, of_any_size=sized) < 4e-6
     said = " ".join(result.document()["remarks"])
     assert ("how large the robot is" in said) == sized
-    assert ("`scale_std` of the" in said) == (not sized)
+    assert ("the lengths of east (± 0.001 ‰)" in said) == (not sized)
 
 
 @pytest.mark.parametrize("kind", ["wires", "plane", "line", "sphere"])
@@ -262,11 +262,14 @@ def test_wires_of_different_scales(tmp_path: Path, seed: int) -> None:
     found = np.array([result.estimate.values[f"station.{name}.scale"] for name in off])
     differences = found - found.mean() - (np.array(list(off.values())) - np.mean(list(off.values())))
     assert np.abs(differences).max() < 2e-4
-    assert "0.58 per mille, by the `scale_std` of the 3 wires" in " ".join(result.document()["remarks"])
+    size = result.document()["size"]
+    assert len(size["standards"]) == 3
+    # of three wires known to a per mille, and nominal lengths to half of one
+    assert 2e-4 < size["std"] < 5.8e-4
 
 
 def test_the_tracker_tells_the_scale_of_a_wire(tmp_path: Path) -> None:
-    """Beside a tracker a wire that reads one per mille too much does no harm; alone its scale stays unknown."""
+    """Beside a tracker a wire that reads one per mille too much does no harm; alone nominal lengths tell it in part."""
     arm, robot, file = measured(tmp_path, "wire", 31, SIGMA, 120)
     robot.write_text(robot.read_text().replace("scale_std: 1.0e-6", "scale_std: 1.0e-3"))
     rng = np.random.default_rng(6)
@@ -275,9 +278,14 @@ def test_the_tracker_tells_the_scale_of_a_wire(tmp_path: Path) -> None:
     model = RobotModel.from_yaml(robot)
     points, readings = read_poses(tracker, model), read_poses(file, model)
     readings.position[:, 0] *= 1.001
+    bare = calibrate(model, readings, terms=["kinematic"], tolerances=False).estimate
+    assert bare.std("station.east.scale") is None
+    assert bare.values["station.east.scale"] == pytest.approx(0.0, abs=3e-5)
     alone = calibrate(model, readings, terms=["kinematic"]).estimate
-    assert alone.std("station.east.scale") is None
-    assert alone.values["station.east.scale"] == pytest.approx(0.0, abs=3e-5)
+    std = alone.std("station.east.scale")
+    assert std is not None
+    assert 2 * std < 1.2e-3
+    assert abs(alone.values["station.east.scale"] + 1e-3) < 2 * std
     both = calibrate(model, concatenate([points, readings]), terms=["kinematic"])
     std = both.estimate.std("station.east.scale")
     assert std is not None

@@ -185,25 +185,32 @@ def test_the_learning_curve_is_that_of_robots_fitted_to_fewer_places(seven: tupl
         assert by_places[count] == pytest.approx(np.mean(errors), rel=0.35)
 
 
-def test_lengths_are_known_no_better_than_the_distance_of_the_sockets(
+def test_sockets_of_another_distance_are_told_from_a_larger_robot(
     seven: tuple[Path, Arm], tmp_path: Path
 ) -> None:
-    """Sockets that are 1 % farther apart than declared make a robot that is 1 % larger, and with that std the intervals say so."""
+    """Sockets declared 1 % too far apart: nominal lengths know better, and say by how much; without them the robot is 1 % larger."""
     folder, arm = seven
     for name in ("robot.yaml", "seven.urdf", "held.csv"):
         shutil.copy(folder / name, tmp_path)
     file = tmp_path / "robot.yaml"
     file.write_text(file.read_text().replace("0.08, 0]}, std: 2.0e-5", "0.0808, 0]}, std: 8.0e-4"))
     model = RobotModel.from_yaml(file)
-    result = calibrate(model, read_poses(tmp_path / "held.csv", model), terms=["kinematic"])
+    poses = read_poses(tmp_path / "held.csv", model)
     q = np.random.default_rng(2).uniform(-1.6, 1.6, (200, 7))
     truth = np.array([arm.ball(row) for row in q])
-    sizes = [
-        np.linalg.norm(p[::2] - p[1::2], axis=1).sum() for p in (calibrated_points(result.model, q), truth)
-    ]
-    assert sizes[0] / sizes[1] == pytest.approx(1.01, abs=1e-3)
-    lengths = [n for n in result.estimate.parameters.names if n.startswith("j") and ".length_" in n]
-    longest = max(std for n in lengths if (std := result.estimate.std(n)) is not None)
+    sizes, results = [], [calibrate(model, poses, terms=["kinematic"], tolerances=t) for t in (True, False)]
+    for result in results:
+        points = calibrated_points(result.model, q)
+        lengths = [np.linalg.norm(p[::2] - p[1::2], axis=1).sum() for p in (points, truth)]
+        sizes.append(lengths[0] / lengths[1])
+    assert sizes == [pytest.approx(1, abs=2e-3), pytest.approx(1.01, abs=1e-3)]
+    document = results[0].document()
+    (sockets,) = document["size"]["standards"]
+    assert abs(sockets["seen"] + 0.0099) < 2 * sockets["seen_std"] < 4e-3
+    assert abs(sizes[0] - 1) < 2 * document["size"]["std"] < 4e-3
+    assert f"the distance of the sockets is {-1e3 * sockets['seen']:.2g} ± " in " ".join(document["remarks"])
+    lengths = [n for n in results[1].estimate.parameters.names if n.startswith("j") and ".length_" in n]
+    longest = max(std for n in lengths if (std := results[1].estimate.std(n)) is not None)
     assert 0.7 < longest / (0.01 * 0.35) < 1.5
 
 
@@ -227,16 +234,18 @@ def test_the_arms_of_delft(examples: Path, tmp_path: Path, capsys: pytest.Captur
     found = json.loads((tmp_path / "out" / "results.json").read_text())
     held = found["held_out"]
     assert held["by"] == "fixture" and len(held["groups"]) == 6
-    assert found["scale"] == {
-        "fixture": "fixture",
-        "relative_std": pytest.approx(2e-3),
-        "distance_mm": 50.0,
-        "std_mm": 0.1,
-        "others": {},
-    }
-    assert "of 45 parameters of the robot itself 25 combinations are seen, of which 2 are hidden" in said
+    (sockets,) = found["size"]["standards"]
+    assert (
+        sockets["std"] == pytest.approx(2e-3)
+        and abs(sockets["seen"]) < 3e-3
+        and not found["size"]["contradicted"]
+    )
+    assert "of 45 parameters of the robot itself 25 combinations are seen" in said
     assert "from the axis of panda_joint7" in said and "moves the whole robot: panda_joint1.offset" in said
-    assert "± 2.0 ‰" in said and found["places"]["disagree"] == []
+    assert (
+        "the distance of the sockets (± 2 ‰) and its own nominal lengths" in said
+        and found["places"]["disagree"] == []
+    )
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert (
         "387 poses with a ball in sockets, at 6 places of the fixture" in page
@@ -380,12 +389,11 @@ def test_two_fixtures_have_a_distance_and_a_tolerance_each(seven: tuple[Path, Ar
     ]
     assert sizes[0] / sizes[1] == pytest.approx(1, abs=4e-4)
     document = result.document()
-    assert document["scale"]["fixture"] == "bar" and document["scale"]["relative_std"] == pytest.approx(5e-4)
-    found = document["scale"]["others"]["small"]["found"]
-    assert found["low"] < 3e-3 < found["high"] < found["low"] + 2.5e-3
+    found = {item["name"].rpartition(" ")[2]: item for item in document["size"]["standards"]}
+    assert found["bar"]["std"] == pytest.approx(5e-4)
+    assert abs(found["small"]["seen"] - 3e-3) < 2 * found["small"]["seen_std"] < 2.5e-3
     said = " ".join(document["remarks"])
-    assert "200 mm ± 0.1 mm of the fixture bar" in said
-    assert "the declared distances of the sockets of small are wrong by" in said
+    assert "the distance of the sockets of bar (± 0.5 ‰)" in said
     assert document["places"]["disagree"] == [] and "station" not in said.replace("station.PLACE", "")
     lengths = [n for n in result.estimate.parameters.names if n.startswith("j") and ".length_" in n]
     longest = max(std for n in lengths if (std := result.estimate.std(n)) is not None)

@@ -12,8 +12,8 @@ from .place_agreement import FEWEST_PLACES, Disagreement, PlaceAgreement, PlaceE
 from .plausibility import FarZero, far_zeros, implausible_shifts, is_implausible, residuals_implausible
 from .reading_lag import ReadingLag
 from .repeatability_floor import RepeatabilityFloor
+from .robot_size import RobotSize
 from .sensor_lag import SensorLag
-from .size_of_board import board_size
 
 __all__ = [
     "FEWEST_PLACES",
@@ -33,9 +33,9 @@ __all__ = [
     "ReadingJump",
     "ReadingLag",
     "RepeatabilityFloor",
+    "RobotSize",
     "SensorLag",
     "StatedNoise",
-    "board_size",
     "compare_bearings",
     "far_zeros",
     "gravity_loads",

@@ -79,7 +79,8 @@ def implausible_shifts(calibration: GeometricFit) -> tuple[ImplausibleShift, ...
     """
     estimate, prior = calibration.estimate.parameters, calibration.prior
     placed = base_errors(calibration.model) if calibration.poses.in_socket.any() else ()
-    kept = [name for name in calibration.identifiability.kept_names if _has_size(name) and name not in placed]
+    every = calibration.identifiability.names
+    kept = [name for name in every if name in estimate and _has_size(name) and name not in placed]
     named = [*kept, *prior.parameters.names]
     end, start = estimate.subset(named).coordinates(), estimate.subset(named).prior_mean()
     size = np.concatenate(

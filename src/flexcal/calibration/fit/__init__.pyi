@@ -18,6 +18,7 @@ from .terms import (
     LEVELS,
     PER_JOINT,
     TOLERANCE,
+    common_lengths,
     declared_size,
     free_joints,
     geometric_parameters,
@@ -27,12 +28,13 @@ from .terms import (
     plausible_size,
 )
 from .thermal_terms import THERMAL, is_thermal, thermal_parameters, with_reference_temperature
-from .tolerance_prior import error_kind, with_tolerance_prior
+from .tolerance_prior import LENGTH_TOLERANCE, error_kind, with_tolerance_prior
 
 __all__ = [
     "CONVERGED",
     "KNOWN_POINT_STD",
     "LEAST_POSES",
+    "LENGTH_TOLERANCE",
     "LEVELS",
     "OF_THE_CELL",
     "PER_JOINT",
@@ -46,6 +48,7 @@ __all__ = [
     "TemperatureEvidence",
     "all_errors",
     "base_errors",
+    "common_lengths",
     "declared_size",
     "error_kind",
     "fit_geometry",

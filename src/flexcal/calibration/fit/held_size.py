@@ -6,7 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexcal.calibration.fit.terms import geometric_parameters, manufacturing_tolerances, plausible_size
+from flexcal.calibration.fit.terms import (
+    declared_size,
+    geometric_parameters,
+    manufacturing_tolerances,
+    plausible_size,
+)
 from flexcal.calibration.kinds import tells_lengths
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import PoseSet
@@ -20,7 +25,7 @@ def held_lengths(model: RobotModel, poses: PoseSet) -> tuple[str, ...]:
     """Names of the length that tells the size of the robot best beforehand, first, and of those that move the points as it does.
 
     A robot of any size touches planes and spheres of that size: without the length of one link all readings of contacts fit a robot that
-    is a point. None where the readings tell lengths.
+    is a point. None where the readings tell lengths, or priors of all of them do.
     """
     poses = poses.pointed
     if not len(poses) or tells_lengths(poses):
@@ -32,6 +37,8 @@ def held_lengths(model: RobotModel, poses: PoseSet) -> tuple[str, ...]:
     columns = at.jacobian(parameters.names)[: len(poses)].reshape(-1, len(parameters))
     identifiability = analyse(columns, parameters.names, scale=manufacturing_tolerances(parameters))
     lengths = [name for name in identifiability.kept_names if ".length_" in name]
+    if all(declared_size(model, name) is not None for name in lengths if not name.startswith("tool.")):
+        return ()
     own = columns[:, [parameters.names.index(name) for name in lengths]]
     # a larger robot moves every point away from the middle of all, wherever the base is
     point = np.matmul(at.base, at.kinematics.position[:, :, None])[:, :, 0]

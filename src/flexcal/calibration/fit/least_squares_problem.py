@@ -12,6 +12,7 @@ from flexcal.calibration.error_model import Whitening
 from flexcal.calibration.fit.elastic_prior import ElasticPrior
 from flexcal.calibration.fit.fleet_prior import FleetPrior, prior_covariance
 from flexcal.calibration.fit.predictions import Predictions
+from flexcal.calibration.fit.terms import common_lengths
 from flexcal.calibration.measurement import PredictedMeasurements, Readings
 from flexcal.estimation import Estimate, Loss, Parameters, Problem, solve
 from flexcal.progress import Progress
@@ -37,8 +38,16 @@ class GeometryProblem:
 
     @property
     def kept_covariance(self) -> np.ndarray:
-        """Prior covariance (p, p) of the geometric parameters, infinite on the diagonal where there is none."""
-        return prior_covariance(self.kept, self.fleet)
+        """Prior covariance (p, p) of the geometric parameters, infinite on the diagonal where there is none.
+
+        Lengths with a tolerance are longer in common too, which other robots of the model would have told.
+        """
+        covariance = prior_covariance(self.kept, self.fleet)
+        if self.fleet is None:
+            start = self.predictions.start
+            common = start.prior.scale * common_lengths(start, self.kept)
+            covariance += np.outer(common, common)
+        return covariance
 
     def predicted(self, values: Mapping[str, float], *, jacobians: bool = False) -> PredictedMeasurements:
         """Predicted measurements of the robot with the given named values, on the flanks of this fit."""

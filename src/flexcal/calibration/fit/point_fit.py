@@ -278,8 +278,11 @@ class PointFit:
 
     @property
     def _size_is_a_scale(self) -> bool:
-        """Whether lengths are told by sockets and boards alone, and not by wires or an instrument that measures points."""
-        return not any(kind.tells_lengths(self.poses) and not kind.scales(self.poses) for kind in KINDS)
+        """Whether lengths are told by sockets and boards alone, and not by wires, an instrument that measures points, or priors."""
+        lengths = [p for p in self.geometric if ".length_" in p.name and not p.name.startswith("tool.")]
+        return not all(np.isfinite(p.prior_std) for p in lengths) and not any(
+            kind.tells_lengths(self.poses) and not kind.scales(self.poses) for kind in KINDS
+        )
 
     @property
     def _scales(self) -> list[Parameter]:

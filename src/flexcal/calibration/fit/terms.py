@@ -259,6 +259,27 @@ def manufacturing_tolerances(parameters: Parameters) -> np.ndarray:
     return np.array([TOLERANCE[p.unit] for p in parameters])
 
 
+def common_lengths(model: RobotModel, parameters: Parameters) -> np.ndarray:
+    """Nominal lengths (p,), m, of links of which those of the `parameters` that have a prior are a change; zero for all others.
+
+    A robot that is larger by a factor has each of these errors in proportion to them.
+    """
+    owners = {name.rpartition(".")[0] for name in parameters.names}
+    ahead: dict[str, np.ndarray] = {}
+    for joint in model.joints:
+        if joint.name in owners and joint.parent >= 0:
+            ahead.setdefault(model.joints[joint.parent].name, joint.translation)
+    return np.array(
+        [
+            float(ahead[owner]["xyz".index(key[-1])])
+            if np.isfinite(item.prior_std) and key.startswith("length_") and owner in ahead
+            else 0.0
+            for item in parameters
+            for owner, _, key in (item.name.rpartition("."),)
+        ]
+    )
+
+
 def _parameter(model: RobotModel, name: str, lower: float = -np.inf) -> Parameter:
     std = declared_size(model, name) or np.inf
     return Parameter(name, unit_in(model, name), model.value(name), lower=lower, prior_std=std)

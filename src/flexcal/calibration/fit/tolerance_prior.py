@@ -10,27 +10,39 @@ import numpy as np
 from flexcal.calibration.error_model import SCATTER_SPREAD, USUAL_SCATTER
 from flexcal.calibration.fit.elastic_prior import NOTHING_ELASTIC, ElasticPrior
 from flexcal.calibration.fit.point_fit import PointFit
-from flexcal.calibration.fit.terms import declared_size, geometric_parameters, plausible_size
+from flexcal.calibration.fit.terms import (
+    common_lengths,
+    declared_size,
+    geometric_parameters,
+    moving_joints,
+    plausible_size,
+)
+from flexcal.calibration.kinds import wrong_readings
 from flexcal.calibration.measurement import ROBOT, predict_measurements, stated_sigma
 from flexcal.data.poses import PoseSet
-from flexcal.model.robot import GEOMETRY, ORIGIN, RobotModel
+from flexcal.estimation import RANK_TOLERANCE
+from flexcal.model.robot import GEOMETRY, ORIGIN, RobotModel, geometric_errors
 from flexcal.model.statics import carried_mass, gravity_torque
 from flexcal.progress import silent
 
-_SIZES = {"offset": 2e-3, "rad": 1e-3, "m": 5e-4}
+LENGTH_TOLERANCE = 5e-4
+"""Standard deviation of manufacture, m, of a length before the measurements."""
+_SIZES = {"offset": 2e-3, "rad": 1e-3, "m": LENGTH_TOLERANCE}
 """Standard deviations of manufacture before the measurements: of joint zeros, and of other angles and lengths of the joints."""
 _YIELD, _SOFTEST = 1e-3, 1e-4
 """Rotation, rad, by which a joint yields under its largest load, and the largest compliance, rad/(N m), before the measurements."""
 _SCALE = np.log(3.0)
 """Standard deviation of the logarithm of the factor by which the errors of a kind are larger than these."""
-_FREE = 10.0
-"""Standard deviation, m or rad, of where an instrument stands."""
+_LEAST = 3.0
+"""Logarithm of the factor by which the scatter may be smaller than usual."""
 _FAR = 3.5
 """Deviation, in standard deviations of its kind, from which a parameter has one of its own."""
 _TOLD = 0.5
 """Standard deviation after the measurements, over that before, below which these tell a parameter."""
 _NOISE = "scatter"
 """Key of the scatter, m, beside the factors."""
+_PLACED = 3
+"""Number of steps by which cameras and boards are placed."""
 _RELEASED = 6
 """Largest number of parameters with a standard deviation of their own."""
 
@@ -43,8 +55,13 @@ def with_tolerance_prior(model: RobotModel, poses: PoseSet, terms: Sequence[str]
     1983); an angle that is then farther off than chance is known to be as far off alone. Places of points and instruments, and further
     terms, have their plausible size.
     """
-    items = geometric_parameters(model, poses, terms)
-    open_ = [n for n in items.names if declared_size(model, n) is None and not n.startswith("station.")]
+    # which errors contacts show depends on where the faces are, of which nothing is known yet
+    names = (
+        *geometric_parameters(model, poses, terms).names,
+        *geometric_errors(model, moving_joints(model, poses)),
+    )
+    free = ("station.", *_of_cameras(model, poses))
+    open_ = [n for n in names if declared_size(model, n) is None and not n.startswith(free)]
     kinds = {name: error_kind(model, name) for name in open_}
     sizes = _usual_sizes(model, poses, kinds)
     first = model.with_priors(sizes)
@@ -61,6 +78,13 @@ def with_tolerance_prior(model: RobotModel, poses: PoseSet, terms: Sequence[str]
         factors = evidence.factors(own)
     scaled = {name: size * factors.get(kinds[name], 1.0) for name, size in sizes.items()}
     return model.with_priors(scaled | own)
+
+
+def _of_cameras(model: RobotModel, poses: PoseSet) -> tuple[str, ...]:
+    """Beginnings of the names of parameters that place what the robot carries of cameras and boards, which the views find anywhere."""
+    seen = dict.fromkeys(poses.target[poses.seen].tolist())
+    first = next(iter(model.points), "")
+    return tuple("tool.length" if target == first else f"point.{target}." for target in seen)
 
 
 def error_kind(model: RobotModel, name: str) -> str:
@@ -93,6 +117,20 @@ def _usual_sizes(model: RobotModel, poses: PoseSet, kinds: dict[str, str]) -> di
     return sizes
 
 
+def _placed(fit: PointFit) -> RobotModel:
+    """The nominal robot with cameras and boards by least squares, which their linear start values only come near."""
+    start, poses = fit.start, fit.poses
+    names = tuple(item.name for item in fit.free if not np.isfinite(item.prior_std))
+    for _ in range(_PLACED if poses.seen.any() else 0):
+        at = predict_measurements(start, poses, elastic=fit.elastic, jacobians=True)
+        weight = 1 / np.hypot(USUAL_SCATTER[ROBOT], at.readings.sigma)
+        columns = (weight[:, :, None] * at.jacobian(names)).reshape(-1, len(names))
+        step = np.linalg.lstsq(columns, (weight * at.residual).ravel(), rcond=RANK_TOLERANCE)[0]
+        changed = zip(names, step.tolist(), strict=True)
+        start = start.with_values({name: start.value(name) + change for name, change in changed})
+    return start
+
+
 @dataclass(frozen=True, eq=False)
 class _Evidence:
     """Marginal likelihood of linear readings y = A x + e, x in prior standard deviations.
@@ -112,18 +150,33 @@ class _Evidence:
 
     @classmethod
     def of(cls, fit: PointFit, kinds: dict[str, str]) -> _Evidence:
-        at = predict_measurements(fit.start, fit.poses, elastic=fit.elastic, jacobians=True)
-        free = fit.free
-        there = at.readings.present.ravel()
-        sizes = np.where(np.isfinite(free.prior_std()), free.prior_std(), _FREE)
+        start, free = _placed(fit), fit.free
+        at = predict_measurements(start, fit.poses, elastic=fit.elastic, jacobians=True)
+        distance = np.linalg.norm(at.residual[: len(fit.poses)], axis=1)
+        right = ~wrong_readings(distance)[at.readings.row]
+        there = (at.readings.present & right[:, None]).ravel()
+        known = np.isfinite(free.prior_std())
+        sizes = np.where(known, free.prior_std(), 1.0)
         columns = at.jacobian(free.names).reshape(-1, len(free))[there] * sizes
         # a rad counts as the reach of the arm
         unit = np.repeat(np.where(at.readings.points, 1.0, fit.start.reach), 3)[there]
         y = at.residual.ravel()[there] * unit
         columns *= unit[:, None]
-        own = tuple(kinds.get(name, "") for name in free.names)
         usual = float(np.hypot(USUAL_SCATTER[ROBOT], stated_sigma(at.readings)))
-        return cls(free.names, own, sizes, usual, len(y), float(y @ y), columns.T @ y, columns.T @ columns)
+        weight = usual / np.hypot(USUAL_SCATTER[ROBOT], at.readings.sigma.ravel()[there] * unit)
+        y, columns = weight * y, weight[:, None] * columns
+        # all lengths may be off in common, whatever the tolerance of each
+        common = start.prior.scale * common_lengths(start, free) / sizes
+        columns = np.column_stack([columns, columns @ common])
+        # where instruments stand is free: restricted likelihood of what that leaves
+        basis, lengths, _ = np.linalg.svd(columns[:, np.append(~known, False)], full_matrices=False)
+        basis = basis[:, lengths > RANK_TOLERANCE * lengths.max(initial=0.0)]
+        columns = columns[:, np.append(known, True)]
+        y, columns = y - basis @ (basis.T @ y), columns - basis @ (basis.T @ columns)
+        names = (*(p.name for p in free if np.isfinite(p.prior_std)), "scale")
+        own, sizes = tuple(kinds.get(name, "") for name in names), np.append(sizes[known], 1.0)
+        count = len(y) - basis.shape[1]
+        return cls(names, own, sizes, usual, count, float(y @ y), columns.T @ y, columns.T @ columns)
 
     @property
     def shared(self) -> tuple[str, ...]:
@@ -135,8 +188,11 @@ class _Evidence:
         from scipy.optimize import minimize
 
         start = np.append(np.zeros(len(self.shared)), np.log(self.usual))
-        bounds = [(-4.0, 6.0)] * len(self.shared) + [(-16.0, 0.0)]
-        found = minimize(self._cost, start, args=(own,), method="L-BFGS-B", bounds=bounds).x
+        bounds = [(-4.0, 6.0)] * len(self.shared) + [(start[-1] - _LEAST, 0.0)]
+        exactly = {"ftol": 1e-15, "gtol": 1e-9}
+        found = minimize(
+            self._cost, start, args=(own,), method="L-BFGS-B", jac=True, bounds=bounds, options=exactly
+        ).x
         named = dict(zip(self.shared, np.exp(found[:-1]).tolist(), strict=True))
         return named | {_NOISE: float(np.exp(found[-1]))}
 
@@ -167,12 +223,25 @@ class _Evidence:
             ]
         )
 
-    def _cost(self, x: np.ndarray, own: dict[str, float]) -> float:
-        """Half the deviance of log factors and the log scatter `x`."""
+    def _cost(self, x: np.ndarray, own: dict[str, float]) -> tuple[float, np.ndarray]:
+        """Half the deviance of log factors and the log scatter `x`, and its gradient."""
         scale = self._scales(dict(zip(self.shared, np.exp(x[:-1]).tolist(), strict=True)), own)
         noise = np.exp(2 * x[-1])
+        along, square = scale * self.along / noise, self.square / noise
         lower = np.linalg.cholesky(scale[:, None] * self.gram * scale / noise + np.eye(len(scale)))
-        left = np.linalg.solve(lower, scale * self.along) / noise
-        fit = 0.5 * (self.square / noise - left @ left) + np.log(np.diag(lower)).sum() + self.count * x[-1]
+        inverse = np.linalg.inv(lower)
+        mean, variance = inverse.T @ (inverse @ along), (inverse**2).sum(axis=0)
         scatter = (x[-1] - np.log(self.usual)) / SCATTER_SPREAD
-        return float(fit + 0.5 * np.sum((x[:-1] / _SCALE) ** 2) + 0.5 * scatter**2)
+        cost = 0.5 * (square - along @ mean) + np.log(np.diag(lower)).sum() + self.count * x[-1]
+        told = 1 - variance - mean**2
+        gradient = [
+            sum(
+                told[i]
+                for i, (n, k) in enumerate(zip(self.names, self.kinds, strict=True))
+                if k == kind and n not in own
+            )
+            for kind in self.shared
+        ]
+        last = along @ mean - square - told.sum() + self.count + scatter / SCATTER_SPREAD
+        slope = np.append(np.array(gradient) + x[:-1] / _SCALE**2, last)
+        return float(cost + 0.5 * np.sum((x[:-1] / _SCALE) ** 2) + 0.5 * scatter**2), slope

@@ -45,15 +45,14 @@ class Kind(ABC):
         raise NotImplementedError
 
     def scales(self, poses: PoseSet) -> dict[str, np.ndarray]:
-        """Parameters that are relative deviations of the readings from the true lengths, with the rows (N,) that each changes."""
+        """Parameters that are relative deviations of the true lengths from the readings, with the rows (N,) that each changes.
+
+        Readings are predicted in the instrument's own lengths: if robot and instrument are larger by one factor, no residual changes.
+        """
         return {}
 
     def scale_std(self, model: RobotModel, name: str) -> float | None:
         """Declared standard deviation of one of the `scales`; None for another parameter, and where none is declared."""
-        return None
-
-    def stretch(self, model: RobotModel, poses: PoseSet) -> np.ndarray | None:
-        """What the readings (N, 3), m, are too short by, due to the `scales`; None where nothing."""
         return None
 
     def shift(self, at: PredictedMeasurements) -> np.ndarray | None:
@@ -72,7 +71,7 @@ class Kind(ABC):
         """Derivative (R, 3) of the readings by a parameter that `owns` names."""
         column, rows = np.zeros((len(at.readings.row), 3)), self.scales(at.poses).get(name)
         if rows is not None:
-            column[: len(at.poses)] = -np.where(rows[:, None], at.poses.position, 0.0)
+            column[: len(at.poses)] = -np.where(rows[:, None], at.position / (1 + at.model.value(name)), 0.0)
         return column
 
     def start(

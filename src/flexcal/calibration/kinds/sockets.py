@@ -38,15 +38,6 @@ class Sockets(Kind):
                 return item.std / item.extent
         return None
 
-    def stretch(self, model: RobotModel, poses: PoseSet) -> np.ndarray | None:
-        """As `Kind.stretch`."""
-        if poses.holder is None or not model.stations.socket_scale.any():
-            return None
-        deviation = np.zeros(len(poses))
-        for name, scale in zip(model.stations.fixtures, model.stations.socket_scale, strict=True):
-            deviation[poses.holder == name] = scale
-        return deviation[:, None] * poses.position
-
     def start(
         self, model: RobotModel, station: str, targets: np.ndarray, readings: np.ndarray
     ) -> dict[str, float]:

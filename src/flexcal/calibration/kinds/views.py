@@ -25,7 +25,7 @@ class Views(Kind):
         return poses.seen
 
     def scales(self, poses: PoseSet) -> dict[str, np.ndarray]:
-        """As `Kind.scales`: of the board's size, which changes what was measured (`shift`)."""
+        """As `Kind.scales`: of the board's size."""
         return {BOARD_SCALE: poses.seen} if poses.seen.any() else {}
 
     def scale_std(self, model: RobotModel, name: str) -> float | None:
@@ -36,14 +36,13 @@ class Views(Kind):
         return next((item.board.std for item in declared if item.kind == "camera"), None)
 
     def shift(self, at: PredictedMeasurements) -> np.ndarray | None:
-        """As `Kind.shift`: by the board's size, and by lenses that differ from those that the poses were measured with.
+        """As `Kind.shift`: by lenses that differ from those that the poses were measured with.
 
         None for a camera whose parameters the robot does not have, as before a calibration.
         """
         if not at.poses.seen.any():
             return None
         lenses, shift = at.model.lenses, np.zeros((len(at.readings.row), 3))
-        shift[: len(at.poses)] = at.model.stations.board_scale[0] * at.poses.position * at.poses.seen[:, None]
         for name, lens in at.poses.lenses.items():
             if name in lenses.names:
                 values = lenses.values[lenses.names.index(name)]

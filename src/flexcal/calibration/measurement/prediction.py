@@ -222,22 +222,29 @@ def _read(model: RobotModel, poses: PoseSet, located: np.ndarray) -> np.ndarray:
         for kind in LOCATING:
             own = kind.rows(poses)
             readings[own] = kind.read(model, poses.station[own], located[own])
+    stretch = _stretch(model, poses)
+    return readings if stretch is None else readings / stretch[:, None]
+
+
+def _stretch(model: RobotModel, poses: PoseSet) -> np.ndarray | None:
+    """True lengths over those of the readings (N,); None where all are true."""
+    deviation = np.zeros(len(poses))
     for kind in LOCATING:
-        stretch = kind.stretch(model, poses)
-        if stretch is not None:
-            readings = readings - stretch
-    return readings
+        for name, rows in kind.scales(poses).items():
+            deviation[rows] = model.value(name)
+    return 1 + deviation if deviation.any() else None
 
 
 def _slopes(model: RobotModel, poses: PoseSet, located: np.ndarray) -> np.ndarray | None:
     """Change (N, 3, 3) of the readings with a displacement of the target; None where all read coordinates."""
+    stretch = _stretch(model, poses)
     if poses.kind is None:
-        return None
+        return None if stretch is None else np.eye(3) / stretch[:, None, None]
     slopes = np.zeros((len(poses), 3, 3))
     for kind in LOCATING:
         own = kind.rows(poses)
         slopes[own] = kind.slopes(model, poses.station[own], located[own])
-    return slopes
+    return slopes if stretch is None else slopes / stretch[:, None, None]
 
 
 def predict_measurements(

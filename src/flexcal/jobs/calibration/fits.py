@@ -88,14 +88,17 @@ class Fits:
         model = model.with_stations(poses.places)
         if not _by_tolerances(poses, settings):
             return cls._of(model, poses, settings, near=near, progress=progress)
-        if enough_for_selection(poses):
+        tracked = bool((poses.located & ~poses.seen).all())
+        if tracked and enough_for_selection(poses):
             plain = cls._of(model, poses, settings, near=near, progress=progress)
             simpler = plain.levels is not None and plain.levels.answer.level != "kinematic"
             if simpler or not (plain.rigid.undetermined or plain.selected.undetermined):
                 return plain
         wide = settings.terms or (*_base(model), _YIELDING)
         informed = with_tolerance_prior(model, poses, wide)
-        return cls._of(informed, poses, settings, near=near, informed=True, progress=progress)
+        # a yielding joint is a choice where there are enough poses for one
+        assumed = (_YIELDING,) if tracked or not enough_for_selection(poses) else ()
+        return cls._of(informed, poses, settings, near=near, assumed=assumed, progress=progress)
 
     @classmethod
     def _of(
@@ -105,10 +108,10 @@ class Fits:
         settings: FitSettings,
         *,
         near: Fits | None,
-        informed: bool = False,
+        assumed: tuple[str, ...] = (),
         progress: Progress,
     ) -> Fits:
-        """Fits of a robot with or without tolerances as prior: `informed`."""
+        """Fits of a robot, with `assumed` terms by their prior."""
         loss, terms = settings.loss, settings.terms
 
         def fit(
@@ -172,7 +175,7 @@ class Fits:
         def choose(robot: RobotModel, begin: GeometricFit) -> tuple[TermSelection, GeometricFit]:
             """Terms beyond the geometry, and the fit with them."""
             progress("terms", 0.0)
-            chosen = select_terms(robot, good, begin if alone else None, (_YIELDING,) if informed else ())
+            chosen = select_terms(robot, good, begin if alone else None, assumed)
             progress("terms", 1.0)
             try:
                 return chosen, fit_of(chosen)
@@ -201,8 +204,8 @@ class Fits:
 
 
 def _by_tolerances(poses: PoseSet, settings: FitSettings) -> bool:
-    """Whether tolerances of manufacture are a prior where the poses do not determine all parameters: of points, without other robots."""
-    return settings.tolerances and bool(poses.located.all()) and settings.fleet is None
+    """Whether tolerances of manufacture are a prior: of readings that say where a target was, without other robots."""
+    return settings.tolerances and len(poses.pointed) > 0 and settings.fleet is None
 
 
 def _base(model: RobotModel) -> tuple[str, ...]:

@@ -12,9 +12,9 @@ from flexcal.calibration.diagnostics import (
     NearestSocket,
     ReadingLag,
     RepeatabilityFloor,
+    RobotSize,
     SensorLag,
     StatedNoise,
-    board_size,
     far_zeros,
     implausible_shifts,
     is_implausible,
@@ -50,8 +50,6 @@ _FLOOR = 2.0
 """Scatter from pose to pose, relative to all other errors together, from which it is what limits the accuracy."""
 _GAIN = 1 / 3
 """Share of the errors before that is left by a calibration which gained little."""
-_ANOTHER_SIZE = 0.01
-"""Relative deviation of a board's size from the nominal robot's above which the declared size is doubtful."""
 
 _LENGTHS = {
     BOARD_SCALE: "by the other readings, the declared size of the board is wrong",
@@ -333,17 +331,7 @@ def _views(fit: GeometricFit) -> Sequence[str]:
         float(np.sqrt(np.mean(np.sum(rows[seen] ** 2, axis=1)))) / MILLIMETRE
         for rows in (fit.poses.sigma, fit.residuals)
     )
-    size = board_size(fit)
-    wrong = (
-        ()
-        if size is None or abs(size - 1) < _ANOTHER_SIZE
-        else (
-            f"against the nominal robot the board is {abs(size - 1):.1%} {'larger' if size > 1 else 'smaller'} than declared: measure "
-            "its squares, and correct `square:` in robot.yaml; the calibrated robot takes its lengths from the board",
-        )
-    )
     return (
-        *wrong,
         f"{seen.sum()} poses were measured by a camera, each with the noise of its own view: {noise:.3f} mm rms expected, {found:.3f} mm "
         "found; the fit weighs the views by their noise",
     )
@@ -359,6 +347,9 @@ def _size(fit: GeometricFit) -> Sequence[str]:
             f"{std / MILLIMETRE:.2g} mm, and all its lengths are off in the same ratio as that; measure with a wire, sockets at a known "
             "distance or an instrument of points too where that matters",
         )
+    size = RobotSize.of(fit)
+    if size is not None:
+        return (size.sentence,)
     estimate = fit.estimate
     wires = {f"station.{name}.scale": name for name in fit.poses.stations}
     sockets = {
@@ -372,7 +363,7 @@ def _size(fit: GeometricFit) -> Sequence[str]:
         | _LENGTHS
         | {scale: f"by the other readings, the lengths of {name} are wrong" for scale, name in wires.items()}
     )
-    remarks = [
+    return [
         f"{what[name]} by {abs(interval[0] + interval[1]) / 2 / _PER_MILLE:.2g} ± {(interval[1] - interval[0]) / 2 / _PER_MILLE:.1g} per "
         "mille (95 %), which the fit takes into account"
         for name in what
@@ -380,15 +371,6 @@ def _size(fit: GeometricFit) -> Sequence[str]:
         and (interval := estimate.interval(name))
         and interval[0] * interval[1] > 0
     ]
-    scales = [i for i, name in enumerate(estimate.parameters.names) if name in wires]
-    if scales and not fit.poses.located.any():
-        # all wires, and the robot with them, may be longer by as much as their mean is uncertain
-        std = float(np.sqrt(estimate.covariance[np.ix_(scales, scales)].mean()))
-        those = "the wire" if len(scales) == 1 else f"the {len(scales)} wires"
-        remarks.append(
-            f"all lengths of the robot are known to {std / _PER_MILLE:.2g} per mille, by the `scale_std` of {those} in robot.yaml"
-        )
-    return remarks
 
 
 def _jumps(fit: GeometricFit) -> Sequence[str]:

@@ -18,6 +18,7 @@ from flexcal.calibration.diagnostics import (
     PlaceAgreement,
     ReadingLag,
     RepeatabilityFloor,
+    RobotSize,
     SensorLag,
     gravity_loads,
     is_implausible,
@@ -60,7 +61,7 @@ from flexcal.jobs.calibration.held_out_tilts import HeldOutTilts
 from flexcal.jobs.calibration.inclinations import inclination_document
 from flexcal.jobs.calibration.prior_of_fleet import contradicts, fleet_document, fleet_remarks
 from flexcal.jobs.calibration.remarks import calibration_remarks, floor_remark, lag_remark, outliers_of
-from flexcal.jobs.calibration.sockets import base_remark, place_remarks, scale_document, scale_remark
+from flexcal.jobs.calibration.sockets import base_remark, place_remarks
 from flexcal.jobs.calibration.subsample import calibration_subsample_remark, subsample_document
 from flexcal.jobs.calibration.thermal import thermal_document
 from flexcal.jobs.inputs import REFUSED, CalibratedRobot
@@ -290,7 +291,7 @@ class Calibration(Identification):
         noise = stated_noise(selected)
         # residuals of far more than the noise may leave no test
         drift = drift if drift is not None and np.isfinite(drift.probability) else None
-        agreement, scale = PlaceAgreement.of(selected), scale_document(selected)
+        agreement, size = PlaceAgreement.of(selected), RobotSize.of(selected)
         coupling = self.coupling
         fleet = fleet_document(selected, self.conflict)
         pooled = self.pooled_stiffness
@@ -360,7 +361,7 @@ class Calibration(Identification):
             "outliers": [outlier.document() for outlier in outliers_of(selected)],
             "places": None if agreement is None else agreement.document(),
             "learning_curve": None if learning is None else learning.document(),
-            "scale": scale,
+            "size": None if size is None else size.document(),
             "bearings": bearings_block(self.bearings),
             "fleet": fleet,
             "pooled_stiffness": None if pooled is None else pooled.document(),
@@ -371,7 +372,6 @@ class Calibration(Identification):
             "remarks": [
                 *calibration_subsample_remark(self.sample, self.everywhere),
                 *([chosen.remark] if chosen and chosen.remark else []),
-                *scale_remark(scale),
                 *base_remark(selected),
                 *fleet_remarks(fleet),
                 *([] if pooled is None else pooled.remarks),

@@ -1,58 +1,14 @@
-"""Results of measurements with a ball in sockets: agreement of the places, and what the scale of the robot rests on."""
+"""Remarks on measurements with a ball in sockets: agreement of the places, and what they cannot tell."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from flexcal.calibration.diagnostics import FEWEST_PLACES, PlaceAgreement, PlaceErrors
 from flexcal.calibration.fit import GeometricFit
-from flexcal.model.robot import GEOMETRY, SocketsConfig, socket_scale
+from flexcal.model.robot import GEOMETRY
 from flexcal.report.results import chance_in_words
 from flexcal.units import MILLIMETRE
-
-_PER_MILLE = 1e-3
-
-
-def scale_document(fit: GeometricFit) -> dict[str, Any] | None:
-    """Block `scale` of results.json: the declared distance that all lengths follow from; null where another instrument measured too.
-
-    Of several fixtures it is that of the one whose distance is known best, relative to itself; `others` are found against it.
-    """
-    declared = fit.model.config.measurements
-    fixtures = {
-        name: item for name in fit.poses.holders if (item := declared[name]).kind == "sockets" and item.extent
-    }
-    if not fit.poses.in_socket.all() or not fixtures:
-        return None
-    best, *others = sorted(fixtures, key=lambda name: fixtures[name].std / fixtures[name].extent)
-    return {
-        "fixture": best,
-        **_declared(fixtures[best]),
-        "others": {
-            name: _declared(fixtures[name]) | {"found": fit.estimate.quantity(socket_scale(name))}
-            for name in others
-        },
-    }
-
-
-def _declared(fixture: SocketsConfig) -> dict[str, float]:
-    return {
-        "relative_std": fixture.std / fixture.extent,
-        "distance_mm": fixture.extent / MILLIMETRE,
-        "std_mm": fixture.std / MILLIMETRE,
-    }
-
-
-def scale_remark(scale: Mapping[str, Any] | None) -> tuple[str, ...]:
-    """Remark on what is known of the robot's size."""
-    if scale is None:
-        return ()
-    which = f"fixture {scale['fixture']}" if scale["others"] else "fixture"
-    return (
-        f"all lengths of the robot are known to ± {scale['relative_std'] / _PER_MILLE:.1f} ‰ (1σ) at best, from the "
-        f"{scale['distance_mm']:.4g} mm ± {scale['std_mm']:.2g} mm of the {which}; these measurements do not improve it",
-    )
 
 
 def base_remark(fit: GeometricFit) -> tuple[str, ...]:

@@ -38,7 +38,8 @@ class PriorConfig:
     controller gives (relative; 0 for measured torques).
 
     `length` (m) and `angle` (rad) are those of the joints' geometric errors, and `parameters` those of single ones by name, relative for a
-    stiffness; a geometric parameter without is estimated from the measurements alone.
+    stiffness; a geometric parameter without is estimated from the measurements alone. `scale` (relative) is that of all nominal lengths
+    together, by which those with a prior may be longer in common.
     """
 
     mass: float = 0.07
@@ -49,6 +50,7 @@ class PriorConfig:
     torque_constant: float = 0.05
     length: float | None = None
     angle: float | None = None
+    scale: float = 5e-4
     parameters: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -59,7 +61,7 @@ class PriorConfig:
                     "the prior's mass, com, inertia and torque_constant must not be negative (0: known exactly), and no less than "
                     f"{_LEAST_PRIOR:g} otherwise; {name} is {getattr(self, name):g}.",
                 )
-        single = {"rotor_inertia": self.rotor_inertia, "stiffness": self.stiffness}
+        single = {"rotor_inertia": self.rotor_inertia, "stiffness": self.stiffness, "scale": self.scale}
         named = single | {"length": self.length, "angle": self.angle} | self.parameters
         for name, value in named.items():
             if value is not None and not value >= _LEAST_PRIOR:

@@ -24,6 +24,7 @@ from flexcal.report.checks.pose_errors import (
     check_left_out,
     check_outliers,
     check_rank,
+    check_size,
 )
 from flexcal.report.checks.temperature import check_instrument_change, check_temperature_sensor
 from flexcal.report.layout import Check
@@ -74,6 +75,7 @@ def calibration_checks(
         *check_fleet(results.get("fleet")),
         *check_pooled_stiffness(results.get("pooled_stiffness")),
         *_stage_one_checks(results.get("stage1")),
+        *check_size(results.get("size")),
         *check_extent(results.get("extent")),
     )
 

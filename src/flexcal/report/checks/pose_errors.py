@@ -202,6 +202,19 @@ def check_extent(extent: Mapping[str, Any] | None) -> tuple[Check, ...]:
     return (Check(question, told, "care").named("extent"),)
 
 
+def check_size(size: Mapping[str, Any] | None) -> tuple[Check, ...]:
+    """Whether declared lengths go together with the nominal ones of the robot; `size` is the block of results.json."""
+    if size is None or not size["contradicted"]:
+        return ()
+    return (
+        Check(
+            "Is its size known?",
+            "Lengths that it has its size from contradict each other by more than is declared of them; the remarks say by how much.",
+            "care",
+        ).named("size"),
+    )
+
+
 def check_rank(parameters: int, rank: int, gap: float) -> Check:
     """Whether the rank is unambiguous: a `gap` in decades between the parameters that are determined and the others."""
     question = "Is the rank of the identification clear?"

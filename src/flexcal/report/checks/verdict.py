@@ -168,6 +168,7 @@ PHRASES: dict[str, dict[str, str]] = {
         "good": "predicted errors are about as small everywhere",
         "else": "it is accurate only near the calibrated poses",
     },
+    "size": {"else": "lengths that it has its size from do not go together"},
     "drift": {"good": "no drift was detected", "else": "residuals drift with time"},
     "torque_constants": {"else": "torque constants are farther off than declared"},
     "torque_scale": {
