@@ -75,6 +75,28 @@ def test_sockets_that_are_closer_than_declared_make_no_larger_robot(tmp_path: Pa
     assert means[0] < 0.8 * means[1]
 
 
+@pytest.mark.parametrize("kind", ["plane", "sockets"])
+def test_a_link_of_another_length_is_named_and_not_trusted(kind: str, tmp_path: Path) -> None:
+    """30 mm in the URDF, 60 tolerances: said of the length and of no other; contacts once made a robot that is a point, of no errors."""
+    arm = ReadArm.drawn(3)
+    readings(tmp_path, arm, [right(kind, 120)], 3)
+    urdf = tmp_path / "arm.urdf"
+    before, after = (
+        f'name="a4" type="revolute"><parent link="l3"/><child link="l4"/><origin xyz="{x!r} '
+        for x in (0.25, 0.28)
+    )
+    assert before in urdf.read_text()
+    urdf.write_text(urdf.read_text().replace(before, after))
+    model = RobotModel.from_yaml(tmp_path / "robot.yaml")
+    result = calibrate(model, read_poses(tmp_path / f"0_{kind}.csv", model), terms=["kinematic"])
+    assert result.trust.status == "bad"
+    (said,) = (remark for remark in result.document()["remarks"] if remark.startswith("implausibly far"))
+    assert said.startswith("implausibly far from the nominal value: a3.length_x (0 to -0.0")
+    assert "," not in said
+    lengths = [v for name, v in result.estimate.values.items() if name.startswith("a") and ".length_" in name]
+    assert np.abs(lengths).max() < 0.04
+
+
 def size_over_std(seed: int, folder: Path, asked: Asked, change: tuple[str, str]) -> tuple[float, float]:
     """Error of the size over its standard deviation, and what is seen of the sockets over theirs."""
     _, _, off, size = errors(folder, seed, asked, change)

@@ -79,16 +79,17 @@ def implausible_shifts(calibration: GeometricFit) -> tuple[ImplausibleShift, ...
     """
     estimate, prior = calibration.estimate.parameters, calibration.prior
     placed = base_errors(calibration.model) if calibration.poses.in_socket.any() else ()
-    every = calibration.identifiability.names
-    kept = [name for name in every if name in estimate and _has_size(name) and name not in placed]
+    kept = [name for name in calibration.identifiability.kept_names if _has_size(name) and name not in placed]
     named = [*kept, *prior.parameters.names]
     end, start = estimate.subset(named).coordinates(), estimate.subset(named).prior_mean()
+    shifts = _shifts(calibration)
+    end[: len(kept)] = start[: len(kept)] + [shifts[name][0] for name in kept]
     size = np.concatenate(
         [manufacturing_tolerances(estimate.subset(kept)), np.sqrt(np.diag(prior.covariance))]
     )
     limits, noise = _limits(kept, size), np.zeros(len(named))
     if not residuals_implausible(calibration):
-        noise[: len(kept)] = [calibration.estimate.std(name) or 0.0 for name in kept]
+        noise[: len(kept)] = [shifts[name][1] for name in kept]
         if calibration.poses.located.all():
             zeros = np.array([name in _zeros(calibration.model) for name in kept], dtype=bool)
             limits = np.where(zeros, FAR_ZERO / size[: len(kept)], limits)
@@ -96,8 +97,25 @@ def implausible_shifts(calibration: GeometricFit) -> tuple[ImplausibleShift, ...
     times = np.abs(end - start) / size
     clear = times - 2 * noise / size
     far = [k for k in np.argsort(-times / limit) if clear[k] > limit[k]]
-    items = [(estimate[named[k]], float(start[k]), float(times[k])) for k in far]
-    return tuple(ImplausibleShift(p.name, p.natural(x), p.value, p.unit, t) for p, x, t in items)
+    items = [(estimate[named[k]], float(start[k]), float(end[k]), float(times[k])) for k in far]
+    return tuple(ImplausibleShift(p.name, p.natural(x), p.natural(y), p.unit, t) for p, x, y, t in items)
+
+
+def _shifts(calibration: GeometricFit) -> dict[str, tuple[float, float]]:
+    """Change of each kept parameter, natural units, with its standard deviation.
+
+    Where priors leave the dropped ones free they share its change, and one wrong length is none that is far off: it has theirs too.
+    """
+    seen, estimate = calibration.identifiability, calibration.estimate
+    places = {name: k for k, name in enumerate(estimate.parameters.names)}
+    alike = [k for k, name in enumerate(seen.names) if name in places and _has_size(name)]
+    items = estimate.parameters.subset([seen.names[k] for k in alike])
+    regrouping = seen.regrouping[:, alike]
+    rows = [places[item.name] for item in items]
+    spread = regrouping @ estimate.covariance[np.ix_(rows, rows)] @ regrouping.T
+    shift = regrouping @ (items.coordinates() - items.prior_mean())
+    stds = np.sqrt(np.maximum(np.diag(spread), 0.0))
+    return dict(zip(seen.kept_names, zip(shift.tolist(), stds.tolist(), strict=True), strict=True))
 
 
 def _limits(kept: list[str], size: np.ndarray) -> np.ndarray:

@@ -102,8 +102,8 @@ class RobotSize:
                 "distance or an instrument of points too where that matters"
             )
         seen = [item.sentence for item in self.standards if item.sentence]
-        by = "its nominal lengths" if len(self.standards) == 1 else "all else"
-        agree = f"; by {by} alone {' and '.join(seen)} than declared (1σ)" if seen else ""
+        by = "its nominal lengths alone" if len(self.standards) == 1 else "all else"
+        agree = f"; by {by} {' and '.join(seen)} than declared (1σ)" if seen else ""
         wrong = ". These do not go together: measure them again, and correct robot.yaml"
         return f"{size}, from {' and '.join(rests)}{agree}{wrong if self.contradicted else ''}"
 

@@ -41,6 +41,8 @@ _TOLD = 0.5
 """Standard deviation after the measurements, over that before, below which these tell a parameter."""
 _NOISE = "scatter"
 """Key of the scatter, m, beside the factors."""
+_LARGEST = float(np.log(10.0))
+"""Logarithm of the largest factor of lengths, 5 mm: with more, contacts fit a robot that is a point."""
 _PLACED = 3
 """Number of steps by which cameras and boards are placed."""
 _RELEASED = 6
@@ -188,7 +190,9 @@ class _Evidence:
         from scipy.optimize import minimize
 
         start = np.append(np.zeros(len(self.shared)), np.log(self.usual))
-        bounds = [(-4.0, 6.0)] * len(self.shared) + [(start[-1] - _LEAST, 0.0)]
+        bounds = [(-4.0, _LARGEST if kind == "m" else 6.0) for kind in self.shared] + [
+            (start[-1] - _LEAST, 0.0)
+        ]
         exactly = {"ftol": 1e-15, "gtol": 1e-9}
         found = minimize(
             self._cost, start, args=(own,), method="L-BFGS-B", jac=True, bounds=bounds, options=exactly
