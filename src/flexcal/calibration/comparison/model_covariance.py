@@ -115,6 +115,6 @@ def common_targets(model: RobotModel, estimates: Sequence[Estimate]) -> list[str
 
 def place_of(model: RobotModel, target: str) -> list[str]:
     """Parameters of the place of a point on the tool."""
-    if target == next(iter(model.points)):
+    if target == model.tool_point:
         return [f"tool.{key}" for key in GEOMETRY if key.startswith("length")]
     return [f"point.{target}.{axis}" for axis in "xyz"]

@@ -36,6 +36,8 @@ KNOWN_POINT_STD = 0.002
 """Standard deviation, m, above which a measured point's place on the tool counts as undetermined."""
 POINT_STD = 0.010
 """Standard deviation, m, per coordinate of a point's place measured with a ruler."""
+_ANYWHERE = 1.0
+"""Standard deviation, m, of that place where it is found beside the flange."""
 _POSES = 60
 _STEPS = 10
 _SMALL = 1e-10
@@ -64,6 +66,8 @@ def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotMod
         return model, model
     names = _names(model, targets, stations)
     std = np.array([_std(model, name, targets) for name in names])
+    # where a point lies is its own: its declared place, which --write-point changes, must not pull at the flange
+    placing = np.where(std == POINT_STD, _ANYWHERE, std)
     poses = _random_poses(model, targets, stations)
     stiff = replace(
         model,
@@ -75,7 +79,7 @@ def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotMod
     )
     poses = _as_predicted(stiff, poses)
     scale = np.where(np.isfinite(std), std, 1.0)
-    weight = np.where(np.isfinite(std), 1 / std, 0.0)
+    weight, placing = (np.where(np.isfinite(each), 1 / each, 0.0) for each in (std, placing))
     seen, free = _directions(stiff, poses, names, scale)
     robot = stiff
     for directions in (seen, np.diag(scale)):
@@ -85,13 +89,13 @@ def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotMod
             step = directions @ np.linalg.lstsq(columns, at.residual.ravel(), rcond=_UNSEEN)[0]
             values = np.array([robot.value(name) for name in names]) + step
             if directions is seen:
-                step += free @ np.linalg.lstsq(weight[:, None] * free, -weight * values, rcond=None)[0]
+                step += free @ np.linalg.lstsq(placing[:, None] * free, -placing * values, rcond=None)[0]
             changed = np.array([robot.value(name) for name in names]) + step
             robot = robot.with_values(dict(zip(names, changed.tolist(), strict=True)))
             if np.abs(step).max() < _SMALL:
                 break
     robot = model.with_values({name: robot.value(name) for name in names})
-    whole, unseen = _propagated(robot, names, free, weight)
+    whole, unseen = _propagated(robot, names, free, weight, placing)
     return replace(robot, posterior=whole), replace(robot, posterior=unseen)
 
 
@@ -130,7 +134,7 @@ def _names(model: RobotModel, targets: Sequence[str], stations: Sequence[str]) -
     """Names of the geometric parameters; for a station in the base frame without its rotation."""
     names = geometric_errors(model, carrying_joints(model, targets, stations))
     names += [f"tool.{key}" for key in GEOMETRY]
-    first = next(iter(model.points))
+    first = model.tool_point
     names += [
         f"point.{t}.{axis}" for t in targets if t != first and not is_inclinometer(model, t) for axis in "xyz"
     ]
@@ -151,7 +155,7 @@ def _std(model: RobotModel, name: str, targets: Sequence[str]) -> float:
     owner, _, key = name.rpartition(".")
     if owner.startswith("station.") or (owner.startswith("point.") and key in (*STATION[3:], *ZEROS)):
         return np.inf
-    first = next(iter(model.points))
+    first = model.tool_point
     pointed = first in targets and not is_inclinometer(model, first)
     if owner.startswith("point.") or (owner == "tool" and key.startswith("length") and pointed):
         return POINT_STD
@@ -205,7 +209,7 @@ def _random_poses(model: RobotModel, targets: Sequence[str], stations: Sequence[
 
 
 def _propagated(
-    model: RobotModel, names: list[str], free: np.ndarray, weight: np.ndarray
+    model: RobotModel, names: list[str], free: np.ndarray, weight: np.ndarray, placing: np.ndarray
 ) -> tuple[Posterior, Posterior]:
     """Posterior about `model` whose free directions, spanned by `free` (p, k), follow the others to where they are most probable; and
     the part due to these directions alone.
@@ -216,9 +220,9 @@ def _propagated(
     covariance = np.zeros((len(every), len(every)))
     covariance[: len(old.parameters), : len(old.parameters)] = old.covariance
     rows = [every.index(name) for name in names]
-    precision = (weight[:, None] * free).T @ (weight[:, None] * free)
+    precision, along = ((each[:, None] * free).T @ (each[:, None] * free) for each in (weight, placing))
     across = np.eye(len(every))
-    across[np.ix_(rows, rows)] -= free @ np.linalg.lstsq(precision, free.T * weight**2, rcond=None)[0]
+    across[np.ix_(rows, rows)] -= free @ np.linalg.lstsq(along, free.T * placing**2, rcond=None)[0]
     covariance = across @ covariance @ across.T
     unseen = np.zeros_like(covariance)
     unseen[np.ix_(rows, rows)] = free @ np.linalg.pinv(precision, hermitian=True) @ free.T

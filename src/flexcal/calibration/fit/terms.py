@@ -140,7 +140,7 @@ def _kinematic(model: RobotModel, poses: PoseSet, joints: Sequence[int]) -> list
     placed = poses.located.any() or level or not len(poses.pointed)
     names += errors if placed else _moving_parts(model, poses.pointed, errors)
     names += [f"tool.{key}" for key in GEOMETRY]
-    first = next(iter(model.points))
+    first = model.tool_point
     names += [f"point.{t}.{key}" for t in poses.pointed.targets if t != first for key in "xyz"]
     for kind in ANGULAR:
         for target in dict.fromkeys(poses.target[kind.rows(poses)].tolist()):

@@ -101,7 +101,7 @@ class ArmColumns:
     def _tool(self, owner: str, key: str) -> np.ndarray:
         column = self._by_geometry[:, :, len(self.at.model.geometry_columns) + GEOMETRY.index(key)]
         if key.startswith("length"):
-            first = next(iter(self.at.model.points))
+            first = self.at.model.tool_point
             return np.where((self.at.by_row(self.at.poses.target) == first)[:, None], column, 0.0)
         return column
 

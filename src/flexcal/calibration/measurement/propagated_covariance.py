@@ -287,7 +287,7 @@ def propagation(
         elif owner == f"point.{name}":
             rows[errors + 3 + "xyz".index(key)] += row
         elif owner == "tool":
-            if not key.startswith("length") or name == next(iter(model.points)):
+            if not key.startswith("length") or name == model.tool_point:
                 rows[errors + GEOMETRY.index(key)] += row
         elif item in columns:
             rows[columns[item]] += row

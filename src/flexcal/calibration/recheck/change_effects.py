@@ -170,7 +170,7 @@ def _flat(columns: np.ndarray) -> np.ndarray:
 
 def _place(model: RobotModel, target: str) -> list[str]:
     """Parameters of the place of a point on the tool."""
-    if target == next(iter(model.points)):
+    if target == model.tool_point:
         return [f"tool.{key}" for key in GEOMETRY if key.startswith("length")]
     return [f"point.{target}.{axis}" for axis in "xyz"]
 

@@ -19,7 +19,7 @@ from flexcal.model.robot import STATION, RobotModel, unit_in
 def fleet_parameters(model: RobotModel, fleet: FleetPrior, setup: MeasuringSetup) -> Parameters:
     """Place of instrument and target, which are the robot's own, and the parameters of the prior; their `prior_std` are plausible sizes."""
     target = model.point(setup.point).name
-    first = target == next(iter(model.points))
+    first = target == model.tool_point
     place = [f"station.{setup.station or model.stations.names[0]}.{key}" for key in STATION]
     place += [f"tool.length_{axis}" if first else f"point.{target}.{axis}" for axis in "xyz"]
     return Parameters(

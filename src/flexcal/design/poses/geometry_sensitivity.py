@@ -57,7 +57,7 @@ def geometry_jacobian(
     names = [f"station.{station}.{axis}" for axis in "xyz"]
     names += list(model.geometry_columns)
     names += [f"tool.{key}" for key in GEOMETRY]
-    if target.name != next(iter(model.points)):
+    if target.name != model.tool_point:
         names[-3:] = [f"point.{target.name}.{axis}" for axis in "xyz"]
     loose = list(model.backlash_joints)
     names += [f"{model.joints[i].name}.backlash" for i in loose]

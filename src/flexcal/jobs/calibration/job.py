@@ -79,7 +79,7 @@ def calibrate_robot(
         progress=progress,
     )
     origin = provenance([robot_file, bare.urdf, *files], None, source if blocks else None, tuple(blocks))
-    origin |= image_provenance(files) | {DECLARED: declared_sha256(bare)}
+    origin |= image_provenance(files) | {DECLARED: declared_sha256(bare, poses.targets)}
     if prior is not None:
         origin[f"input.{fleet_prior.FLEET}"] = sha256_of(prior)
     pooled = None

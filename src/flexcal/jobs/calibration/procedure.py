@@ -36,8 +36,8 @@ from flexcal.jobs.calibration.held_out_tilts import held_out_tilts
 from flexcal.jobs.calibration.joint_ranges import joint_extents
 from flexcal.jobs.calibration.odd_temperatures import plausible_temperatures, with_plausible_temperatures
 from flexcal.jobs.calibration.result import Calibration
-from flexcal.jobs.inputs import TARGETS, TARGETS_BETWEEN, is_station_identified
-from flexcal.model.robot import ZERO_DRIFT, RobotModel
+from flexcal.jobs.inputs import is_station_identified
+from flexcal.model.robot import TARGETS, TARGETS_BETWEEN, ZERO_DRIFT, RobotModel
 from flexcal.progress import Progress, silent
 
 AUTO = "auto"
@@ -159,7 +159,7 @@ def calibrate(
         "loss": loss,
         "secant_scale": secant_scale,
         "elasticity": elasticity,
-        TARGETS: TARGETS_BETWEEN.join(poses.targets),
+        TARGETS.removeprefix("option."): TARGETS_BETWEEN.join(poses.targets),
     } | ({"bearings": fits.model.bearings} if fits.model.has_bearings else {})
     extent = Extent.of(selected)
     ranges = joint_extents(selected.model, selected.poses.q) | _temperatures(selected.poses)

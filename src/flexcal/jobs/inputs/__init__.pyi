@@ -22,8 +22,6 @@ from .misreadings import Misreading, misread_point, other_pose, planned_pose
 from .provenance import image_provenance, robot_provenance
 from .stored_model import (
     REFUSED,
-    TARGETS,
-    TARGETS_BETWEEN,
     CalibratedRobot,
     is_station_identified,
     measured_points,
@@ -39,8 +37,6 @@ __all__ = [
     "FREQUENCY_PLAN",
     "PREDICTED",
     "REFUSED",
-    "TARGETS",
-    "TARGETS_BETWEEN",
     "CalibratedRobot",
     "Misreading",
     "beyond_calibration",

@@ -13,12 +13,16 @@ from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.files.formats import BLOCKS, Block, block_sha256, read_estimates, read_yaml_file
 from flexcal.jobs.result_files import ESTIMATES
-from flexcal.model.robot import DECLARED, RobotModel, declared_sha256, with_blocks
+from flexcal.model.robot import (
+    DECLARED,
+    TARGETS,
+    TARGETS_BETWEEN,
+    RobotModel,
+    declared_sha256,
+    with_blocks,
+)
 from flexcal.printable import quoted
 
-TARGETS = "targets"
-"""Provenance key of a calibration: the measured points."""
-TARGETS_BETWEEN = ", "
 REFUSED = "refused"
 """Provenance key of a calibration whose own verdict was no: why."""
 
@@ -175,7 +179,10 @@ def outdated_remarks(calibrated: CalibratedRobot) -> tuple[str, ...]:
             continue
         origin = calibrated.blocks[block].provenance
         changed = [f"another block '{name}'" for name in used if _is_changed(calibrated, origin, name)]
-        if origin.get(DECLARED, "") not in ("", declared_sha256(calibrated.nominal)):
+        own = calibrated.targets if block == "calibration" else ()
+        # files of older versions have the digest of all points
+        now = {declared_sha256(calibrated.nominal, points) for points in (own, calibrated.nominal.points)}
+        if origin.get(DECLARED, "") not in ("", *now):
             changed.insert(0, "other numbers in robot.yaml or its URDF")
         if changed:
             again = "calibrate" if block == "calibration" else f"identify {block}"
@@ -207,7 +214,7 @@ def measured_points(nominal: RobotModel, blocks: Mapping[Block, Estimate]) -> tu
     if "calibration" not in blocks:
         return ()
     estimate = blocks["calibration"]
-    said = estimate.provenance.get(f"option.{TARGETS}")
+    said = estimate.provenance.get(TARGETS)
     if said is not None:
         return tuple(name for name in said.split(TARGETS_BETWEEN) if name in nominal.points)
     further = (name for name in nominal.points if f"point.{name}.x" in estimate.parameters)

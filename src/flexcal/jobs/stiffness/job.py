@@ -86,7 +86,7 @@ def identify_robot_stiffness(
     origin = provenance(
         [robot_file, bare.urdf, *inputs, *plans], options, source if blocks else None, tuple(blocks)
     )
-    origin[DECLARED] = declared_sha256(bare)
+    origin[DECLARED] = declared_sha256(bare, ())
     if prior is not None and identified.pooled is not None and identified.pooled.used:
         origin[f"input.{FLEET}"] = sha256_of(prior)
     result = replace(

@@ -65,7 +65,7 @@ def point_kinematics(
     joints = len(model.joints)
     own = np.zeros((len(q), joints, 3)) if deflection is None else np.asarray(deflection, dtype=float)
     motion = None if model.relations is None else joint_motion(model, q, own, derivatives=jacobians)
-    first = target.name == next(iter(model.points))
+    first = target.name == model.tool_point
     error = model.geometry.tool[3:] if first else np.zeros(3)
     shift = model.geometry.point_error[list(model.points).index(target.name)]
     tool = np.concatenate([model.geometry.tool[:3], error])

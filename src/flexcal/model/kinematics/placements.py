@@ -45,7 +45,7 @@ def point_placement(model: RobotModel, name: str) -> tuple[int, np.ndarray, np.n
     x, y, z = np.eye(3)
     turn = axis_rotation(y, tool[2]) @ axis_rotation(x, tool[1]) @ axis_rotation(z, tool[0])
     rotation = point.rotation @ turn
-    length = tool[3:] if name == next(iter(model.points)) else np.zeros(3)
+    length = tool[3:] if name == model.tool_point else np.zeros(3)
     position = (
         point.translation + model.geometry.errors[point.joint, 3:] + rotation @ (point.xyz + own + length)
     )

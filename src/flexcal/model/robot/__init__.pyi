@@ -65,7 +65,15 @@ from .prior_parameters import (
     uncertain_tensor_entries,
 )
 from .robot_model import RobotModel
-from .stored_estimates import DECLARED, NUISANCE, PAYLOAD_FRAME, declared_sha256, with_blocks
+from .stored_estimates import (
+    DECLARED,
+    NUISANCE,
+    PAYLOAD_FRAME,
+    TARGETS,
+    TARGETS_BETWEEN,
+    declared_sha256,
+    with_blocks,
+)
 
 __all__ = [
     "ANGLE_TOLERANCE",
@@ -98,6 +106,8 @@ __all__ = [
     "SPRING_LOG_STD",
     "STATION",
     "STATION_DRIFT",
+    "TARGETS",
+    "TARGETS_BETWEEN",
     "VERTICAL",
     "ZEROS",
     "ZERO_DRIFT",

@@ -19,7 +19,8 @@ class Geometry:
     off, in the parent link, zero for others; `point_error` (points, 3), m, in the order of
     the robot's points; `point_turn` (points, 3), rad, rotation vectors from the points' frames to the axes of a target whose orientation is
     measured; `point_zero` (points, 3), rad, what an inclinometer's axes read where they are level; `gravity_compliance` (n,) about the
-    joints' axes and `lateral_compliance` (n, 2) across them, rad/(N m); `loops` (loops, 6), m, in the order of `LOOP`.
+    joints' axes and `lateral_compliance` (n, 2) across them, rad/(N m); `loops` (loops, 6), m, in the order of `LOOP`. The lengths of
+    `tool` are the error of the place of `tool_point` alone, or of the first point where none is named.
     """
 
     errors: np.ndarray
@@ -31,6 +32,7 @@ class Geometry:
     gravity_compliance: np.ndarray
     lateral_compliance: np.ndarray
     loops: np.ndarray
+    tool_point: str = ""
 
 
 @dataclass(frozen=True, eq=False)

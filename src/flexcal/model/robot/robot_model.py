@@ -575,6 +575,11 @@ class RobotModel:
             )
         return self.points[key]
 
+    @property
+    def tool_point(self) -> str:
+        """Point whose place the errors `tool.length_x`, `_y`, `_z` are of: the first, of a calibrated robot that of its calibration."""
+        return self.geometry.tool_point or next(iter(self.points))
+
     def station_index(self, name: str) -> int:
         """Index of a station of the instrument.
 

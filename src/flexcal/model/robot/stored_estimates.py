@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -21,6 +21,9 @@ from flexcal.model.robot.parameter_names import DRIVE_GAIN, unit_in, unit_of
 if TYPE_CHECKING:
     from flexcal.model.robot.robot_model import RobotModel
 
+TARGETS = "option.targets"
+"""Provenance key of the block `calibration`: the measured points."""
+TARGETS_BETWEEN = ", "
 PAYLOAD_FRAME = "frame"
 """Provenance key of the block `payload`: the URDF frame of its values."""
 BEARINGS = "option.bearings"
@@ -37,18 +40,26 @@ DECLARED = "declared"
 """Provenance key: SHA-256 of the numbers of the robot as declared, from which a block was computed."""
 
 
-def declared_sha256(nominal: RobotModel) -> str:
-    """SHA-256 of the numbers of a robot without estimates to which its estimates are relative: joints, points, springs, masses, gravity."""
+def declared_sha256(nominal: RobotModel, points: Iterable[str] | None = None) -> str:
+    """SHA-256 of the numbers of a robot without estimates to which its estimates are relative: joints, springs, masses, gravity, and
+    those `points` that were measured, by default all; others may come and go.
+    """
+    measured = frozenset(nominal.points if points is None else points)
     digest = hashlib.sha256()
     for joint in nominal.joints:
         digest.update(f"{joint.name} {joint.link} {joint.parent} {joint.kind}".encode())
         for array in (joint.rotation, joint.translation, joint.axis):
             digest.update(_rounded(array))
     for name, point in sorted(nominal.points.items()):
+        if name not in measured:
+            continue
         digest.update(f"{name} {point.joint}".encode())
         for array in (point.rotation, point.translation, point.xyz):
             digest.update(_rounded(array))
     for name, value in sorted(nominal.values.items()):
+        owner = name.rpartition(".")[0]
+        if owner.startswith("point.") and owner.removeprefix("point.") not in measured:
+            continue
         if not name.startswith("station.") and not name.endswith(f".{DRIVE_GAIN}"):  # none is declared
             digest.update(name.encode() + _rounded(np.array(value)))
     digest.update(_rounded(np.array(nominal.config.gravity, dtype=float)))
@@ -107,6 +118,8 @@ def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path)
                 "identify again, or give the robot.yaml that belongs to it.",
             )
         _check_units(model, block, estimate, path)
+        if block == "calibration":
+            model = _with_tool_point(model, estimate, path)
         model = _with_backlash_joints(model.with_estimate(estimate), estimate)
         if block == "dynamics" and model.elastic:
             _check_bodies(model, estimate, path)
@@ -165,6 +178,24 @@ def _check_bodies(model: RobotModel, estimate: Estimate, path: Path) -> None:
             f"{path}: the inertials in the block 'dynamics' are not physically consistent for {', '.join(broken)}, as elastic "
             "joints require; run 'flexcal identify dynamics' with --estimator sdp.",
         )
+
+
+def _with_tool_point(model: RobotModel, estimate: Estimate, path: Path) -> RobotModel:
+    """Robot whose errors `tool.length_x`… are those of the point that was the first when it was calibrated."""
+    if not any(name.startswith("tool.length") for name in estimate.parameters.names):
+        return model
+    told = [name for name in estimate.provenance.get(TARGETS, "").split(TARGETS_BETWEEN) if name]
+    inclined = {name for name, item in model.config.measurements.items() if item.kind == "inclinometer"}
+    own = [name for name in told if f"point.{name}.x" not in estimate.parameters and name not in inclined]
+    if not own or next(iter(model.points), "") in own:
+        return model
+    if own[0] not in model.points:
+        raise InputError(
+            "E-ROBOT-084",
+            f"{path}: the calibration measured the point '{own[0]}', which {model.path} does not declare, so where the tool is relative to "
+            "it is not known; add it under `points:` as it was, or calibrate again.",
+        )
+    return replace(model, geometry=replace(model.geometry, tool_point=own[0]))
 
 
 def _with_backlash_joints(model: RobotModel, estimate: Estimate) -> RobotModel:

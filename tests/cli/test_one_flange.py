@@ -1,0 +1,94 @@
+"""One flange for all verbs: a tip that was touched beside a calibration is met, wherever the reflector was declared."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+from yielding_arm import YieldingArm, touches
+
+from flexcal import CalibratedRobot
+from flexcal.model.kinematics import point_kinematics
+
+OFFS = [0.0, 0.002, 0.015]
+
+
+def calibrated(run, folder: Path, off: float, *, written: bool, seed: int = 1) -> tuple[YieldingArm, Path]:
+    """An arm, and its robot.yaml with a calibration beside; the reflector is `off` m from its declared place."""
+    away = off * np.array([0.6, -0.64, 0.48])
+    truth = np.array([0.05, 0.03, 0.08])
+    arm = YieldingArm(seed, declared_xyz=tuple((truth - away).tolist()), point_error=tuple(away.tolist()))
+    robot, rng = arm.write(folder), np.random.default_rng(seed)
+    robot.write_text(robot.read_text().replace("[kinematic]", "[kinematic, gravity_compliance]"))
+    q = arm.postures(60, rng)
+    poses = arm.write_poses(folder / "poses.csv", q, arm.measured(q, rng))
+    outcome = run("calibrate", robot, poses, *(("--write-point",) if written else ()))
+    assert outcome.status == 0, outcome.err
+    return arm, robot
+
+
+def touched_tip(run, arm: YieldingArm, robot: Path, *, first: bool = False) -> np.ndarray:
+    """Copy the line of `identify tool` into robot.yaml, before the reflector's or after it; the tip's place in it, m."""
+    places = [("p", np.array([0.75, 0.1, 0.6]))] * 14
+    file = touches(arm, robot.with_name("touches.csv"), places, np.random.default_rng(3))
+    outcome = run("identify", "tool", robot, file, "--frame", "tool0")
+    assert outcome.status == 0, outcome.err
+    line = re.search(r"points: \{(tip: \{.*\})\}", outcome.out)
+    assert line is not None
+    text = robot.read_text()
+    after = re.search(r"points:\n(  smr:.*\n)", text)
+    assert after is not None
+    at = after.start(1) if first else after.end(1)
+    robot.write_text(f"{text[:at]}  {line[1]}\n{text[at:]}")
+    xyz = re.search(r"xyz: \[(.*?)\]", line[1])
+    assert xyz is not None
+    return np.array([float(value) for value in xyz[1].split(",")])
+
+
+def missed(run, arm: YieldingArm, robot: Path) -> np.ndarray:
+    """Distances (N,), m, of the real tip from its targets, their base placed by best fit, with the commands of `compensate`."""
+    q = arm.postures(25, np.random.default_rng(5), 0.6)
+    header = [f"q{i + 1}" for i in range(arm.n)]
+    numbers = pl.DataFrame(q, schema=header).with_row_index("pose")
+    numbers.write_csv(robot.with_name("targets.csv"))
+    out = robot.with_name("commands.csv")
+    outcome = run("compensate", robot, robot.with_name("targets.csv"), "--target", "tip", "--out", out)
+    assert outcome.status == 0, outcome.err
+    assert "does not belong to this robot" not in outcome.out
+    commands = pl.read_csv(out)
+    wanted = arm.at(q[commands["pose"].to_numpy()], np.array(arm.tip), true=False)
+    real = arm.at(commands.select(header).to_numpy(), np.array(arm.tip))
+    centre, there = wanted.mean(axis=0), real.mean(axis=0)
+    u, _, vt = np.linalg.svd((wanted - centre).T @ (real - there))
+    turn = vt.T @ np.diag([1, 1, np.linalg.det(vt.T @ u.T)]) @ u.T
+    return np.linalg.norm(real - there - (wanted - centre) @ turn.T, axis=1)
+
+
+@pytest.mark.parametrize("first", [False, True], ids=["after", "before"])
+def test_the_tip_is_the_same_wherever_the_reflector_was_declared(tmp_path: Path, run, first: bool) -> None:
+    """Calibrated, touched, and the line copied before or after the reflector's, which `tool.length_x` stays the error of."""
+    places, reached = [], []
+    q = YieldingArm().postures(20, np.random.default_rng(8))
+    for off in OFFS:
+        for written in (False, True):
+            arm, robot = calibrated(run, tmp_path / f"{off}{written}", off, written=written)
+            places.append(touched_tip(run, arm, robot, first=first))
+            model = CalibratedRobot.from_yaml(robot).probable
+            reached.append(
+                [point_kinematics(model, q, point=name, jacobians=False).position for name in ("tip", "smr")]
+            )
+            assert np.median(missed(run, arm, robot)) < 3e-4
+    assert np.abs(np.array(places) - places[0]).max() < 1e-5
+    assert np.abs(np.array(reached) - reached[0]).max() < 1e-5
+
+
+def test_a_calibration_whose_point_is_gone_is_refused(tmp_path: Path, run) -> None:
+    arm, robot = calibrated(run, tmp_path, 0.002, written=False)
+    touched_tip(run, arm, robot)
+    robot.write_text(re.sub(r"  smr:.*\n", "", robot.read_text()))
+    outcome = run("export", "urdf", robot, "--out", tmp_path / "new.urdf")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert "E-ROBOT-084" in outcome.err and "smr" in outcome.err
