@@ -16,7 +16,7 @@ from .moveit_limits import shifted_limits
 from .mujoco_spec import effort_limit, mjcf_spec
 from .offset_fit import undetermined_offsets
 from .offset_table import render_offsets
-from .representation_error import measure_export_error
+from .representation_error import measure_export_error, random_poses
 from .runtime_file import render_runtime
 from .urdf import export_urdf
 from .written_file import ExportedFile, RenderedModel, write_rendered
@@ -49,6 +49,7 @@ __all__ = [
     "joint_motors",
     "measure_export_error",
     "mjcf_spec",
+    "random_poses",
     "read_motor_calibrations",
     "render",
     "render_dh",

@@ -34,7 +34,14 @@ from flexcal.files.formats import sha256_of
 from flexcal.files.transaction import real_path
 from flexcal.jobs.accuracy.verification import require_stations, verification_poses
 from flexcal.jobs.calibration import fitted_files, fitted_points
-from flexcal.jobs.inputs import CalibratedRobot, outdated_remarks, unmeasured_targets_remark, with_temperature
+from flexcal.jobs.inputs import (
+    CalibratedRobot,
+    beyond_calibration,
+    beyond_remark,
+    outdated_remarks,
+    unmeasured_targets_remark,
+    with_temperature,
+)
 from flexcal.jobs.pages import Result
 from flexcal.model.parts import vector_rotation
 from flexcal.model.robot import RobotModel
@@ -108,7 +115,7 @@ class Certificate(Result):
     sample : StratifiedSample or None
         Which of very many points these two are of.
     uncalibrated : tuple of str
-        Remarks on points that the calibration did not measure.
+        Remarks on points that the calibration did not measure, and on poses where it does not hold.
     fitted : tuple of str
         Files or points among those after that the calibration was made from.
     temperatures : tuple of str
@@ -420,7 +427,13 @@ def _compared(
         verification=known,
         scale=error_scale(known, _measured_noise(there, covariance)),
         sample=sample,
-        uncalibrated=(*outdated_remarks(robot), *unmeasured_targets_remark(robot, end.targets)),
+        uncalibrated=(
+            *outdated_remarks(robot),
+            *unmeasured_targets_remark(robot, end.targets),
+            *beyond_remark(
+                robot, beyond_calibration(robot, end.q[judged], end.target[judged]), "measured points"
+            ),
+        ),
         temperatures=warm,
         fitted=fitted_points(robot, end),
     )

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from flexcal.dynamics.torque_model import TorqueModel
 from flexcal.errors import FlexcalError, InputError
 from flexcal.export import (
@@ -13,6 +15,7 @@ from flexcal.export import (
     Convention,
     ExportedFile,
     RenderedModel,
+    random_poses,
     render,
     render_dh,
     render_mjcf,
@@ -25,6 +28,8 @@ from flexcal.files.formats import read_estimates
 from flexcal.jobs.deployment.actuator_export import actuator_remarks, identified_actuators, rendered_actuators
 from flexcal.jobs.inputs import (
     CalibratedRobot,
+    beyond_calibration,
+    beyond_remark,
     held_at,
     stored_estimates,
     use_remarks,
@@ -193,6 +198,7 @@ def export_robot(
     written = write_rendered(probable, path, rendered)
     remarks = (
         *use_remarks(robot),
+        *_extent_remark(robot, rendered),
         *actuator_remarks(robot, format),
         *warm,
     )
@@ -263,6 +269,15 @@ def _check_options(format: str, options: dict[str, object]) -> None:
                 "E-RUN-100",
                 f"the format '{format}' takes no {option}, which {', '.join(_OPTIONS[option])} do; leave it out.",
             )
+
+
+def _extent_remark(robot: CalibratedRobot, rendered: RenderedModel) -> tuple[str, ...]:
+    """Remark on poses for which the file is and where the calibration does not hold; none without geometry or points."""
+    if rendered.tool is None or not robot.probable.points:
+        return ()
+    q, within = random_poses(robot.probable, rendered.point, np.random.default_rng(0))
+    targets = np.full(len(q), robot.probable.point(rendered.point).name)
+    return beyond_remark(robot, beyond_calibration(robot, q, targets), f"random poses of the {within}")
 
 
 def undetermined_zeros(robot: CalibratedRobot) -> tuple[int, ...]:

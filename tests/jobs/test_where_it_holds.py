@@ -1,0 +1,68 @@
+"""Exports and certificates say where a calibration does not hold."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from flexcal import (
+    CalibratedRobot,
+    PoseSet,
+    RobotModel,
+    ToolTargets,
+    calibrate,
+    certify,
+    export_robot,
+    read_poses,
+)
+
+SAYS = "the predicted error is above three times that near the calibrated poses"
+
+
+@pytest.fixture(scope="module")
+def nominal(examples: Path) -> RobotModel:
+    return RobotModel.from_yaml(examples / "ur5_tracker" / "robot.yaml", estimates=False)
+
+
+def poses_within(nominal: RobotModel, examples: Path, reach: float, count: int) -> PoseSet:
+    """Points of the nominal robot by Pinocchio with 50 µm of noise, joints within ± `reach` rad of an elbow-up posture."""
+    like = read_poses(examples / "ur5_tracker" / "grid.csv", nominal).subset(slice(count))
+    read = pin.buildModelFromUrdf(str(nominal.urdf))
+    data, frame = read.createData(), read.getFrameId("tool0")
+    rng = np.random.default_rng(5)
+    q = np.array([0.0, -1.2, 1.5, 0.3, 0.8, 0.0]) + rng.uniform(-reach, reach, (count, 6))
+    points = np.zeros((count, 3))
+    for k, own in enumerate(q):
+        pin.framesForwardKinematics(read, data, own)
+        points[k] = data.oMf[frame].act(np.array([0, 0, 0.031]))
+    return replace(like, q=q, position=points + 5e-5 * rng.normal(size=(count, 3)))
+
+
+@pytest.fixture(scope="module")
+def narrow(nominal: RobotModel, examples: Path) -> CalibratedRobot:
+    return calibrate(nominal, poses_within(nominal, examples, 0.1, 60), terms=["kinematic"]).robot
+
+
+def test_an_export_says_that_the_poses_it_is_for_are_beyond(
+    narrow: CalibratedRobot, nominal: RobotModel, examples: Path, tmp_path: Path
+) -> None:
+    exported = export_robot(narrow, tmp_path / "dh.csv", "mdh")
+    (remark,) = (each for each in exported.document()["remarks"] if SAYS in each)
+    assert "random poses of the joint range" in remark and remark in exported.summary()
+    everywhere = calibrate(nominal, poses_within(nominal, examples, np.pi, 120), terms=["kinematic"]).robot
+    for robot in (everywhere, CalibratedRobot(nominal, nominal, {})):
+        assert SAYS not in export_robot(robot, tmp_path / "robot.json", "json").summary()
+
+
+def test_a_certificate_says_which_points_are_beyond(
+    narrow: CalibratedRobot, nominal: RobotModel, examples: Path
+) -> None:
+    for reach, beyond in ((0.05, False), (1.0, True)):
+        measured = poses_within(nominal, examples, reach, 20)
+        targets = ToolTargets(measured.pose, measured.target, q=measured.q)
+        found = certify(narrow, targets, measured, measured)
+        assert any(SAYS in each for each in found.remarks) is beyond
