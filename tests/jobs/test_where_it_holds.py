@@ -1,7 +1,8 @@
-"""Exports and certificates say where a calibration does not hold."""
+"""Exports, certificates and the server say where a calibration does not hold."""
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from flexcal import (
     export_robot,
     read_poses,
 )
+from flexcal.jobs.serving import Answers
 
 SAYS = "the predicted error is above three times that near the calibrated poses"
 
@@ -66,3 +68,13 @@ def test_a_certificate_says_which_points_are_beyond(
         targets = ToolTargets(measured.pose, measured.target, q=measured.q)
         found = certify(narrow, targets, measured, measured)
         assert any(SAYS in each for each in found.remarks) is beyond
+
+
+def test_the_server_says_where_a_pose_is_beyond(narrow: CalibratedRobot) -> None:
+    answers = Answers(narrow)
+    near, far = (
+        json.loads(answers.of(json.dumps({"do": "extent", "q": q}).encode()))
+        for q in ([0.0, -1.2, 1.5, 0.3, 0.8, 0.0], [2.0, 0.5, -1.5, 2.0, -1.0, 1.0])
+    )
+    assert near == {"status": "done", "beyond": 0.0}
+    assert far["status"] == "done" and 1e-5 < far["beyond"] < 0.1

@@ -13,7 +13,7 @@ import numpy as np
 from flexcal.dynamics.torque_model import TorqueModel
 from flexcal.errors import FlexcalError
 from flexcal.export import render_runtime
-from flexcal.jobs.inputs import CalibratedRobot, held_at
+from flexcal.jobs.inputs import CalibratedRobot, beyond_calibration, held_at
 from flexcal.kernels import RuntimeRobot
 from flexcal.model.parts import rotation_wxyz, wxyz_rotation
 
@@ -46,7 +46,7 @@ class Answers:
         drives = TorqueModel.of_blocks(model, robot.blocks).document()
         self._robot = RuntimeRobot.read(render_runtime(model, robot.with_points, drives).text)
         self._joints, self._points = self._robot.joint_names, self._robot.point_names
-        self._name = robot.nominal.name
+        self._calibrated, self._name = robot, robot.nominal.name
         self._free = np.zeros((0, len(self._joints)))
         self._verbs: dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
             "compensate": self._compensate,
@@ -54,6 +54,7 @@ class Answers:
             "forward": self._forward,
             "nominal": self._nominal,
             "torque": self._torque,
+            "extent": self._extent,
             "describe": self._describe,
         }
 
@@ -116,6 +117,11 @@ class Answers:
         if status[0] != 0:
             return {"status": RuntimeRobot.describe(int(status[0]))}
         return {"status": DONE, "torque": torque[0].tolist()}
+
+    def _extent(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+        point = np.array([self._points[self._point(asked)]])
+        beyond = beyond_calibration(self._calibrated, self._positions(asked, "q"), point)
+        return {"status": DONE, "beyond": float(beyond[0])}
 
     def _describe(self, asked: Mapping[str, Any]) -> dict[str, Any]:
         return {"status": DONE, "robot": self._name, "joints": self._joints, "points": self._points}
