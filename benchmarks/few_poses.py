@@ -59,9 +59,14 @@ def drawn(arm: str, seed: int) -> YieldingRobot:
     """Robot of an arm as built."""
     bodies = ARMS[arm]
     rng = np.random.default_rng([seed, len(arm)])
+    return YieldingRobot(bodies, drive_compliance(bodies, rng), rng)
+
+
+def drive_compliance(bodies: tuple[Body, ...], rng: np.random.Generator) -> np.ndarray:
+    """Compliance (n, 3) of every joint, rad/(N m): of its drive alone."""
     compliance = np.zeros((len(bodies), 3))
     compliance[:, 2] = _YIELD / _loads(bodies) * np.exp(rng.normal(0, 0.3, len(bodies)))
-    return YieldingRobot(bodies, compliance, rng)
+    return compliance
 
 
 def _loads(bodies: tuple[Body, ...]) -> np.ndarray:

@@ -169,7 +169,7 @@ def test_intervals_follow_the_scatter_where_no_sigma_is_given(run, ur5_folder: P
     stated = run("calibrate", robot, given, "--terms", "kinematic", "--json").document
     assert stated["fit"]["sigma_given"]
     assert stated["variances"]["robot_mm"] < 0.5 * stated["variances"]["instrument_mm"]
-    name = "elbow_joint.length_x"
+    name = "shoulder_lift_joint.length_z"
     assert stated["parameters"][name]["std"] == pytest.approx(scatter["parameters"][name]["std"], rel=0.2)
 
 

@@ -23,6 +23,10 @@ _TOLD_APART = 1e6
 """Condition number of the correlation of the variances up to which their standard deviations are of use for that."""
 _LARGEST = 30.0
 """Upper bound of a component, relative to the variance about the fit."""
+_LARGEST_WAVE = 3e-5
+"""Largest standard deviation, rad, of a transmission error of order 1, of gears accurate to about an arcminute. Errors that are none of
+gears may ask for ten times as much, and waves of that size fit a part of a joint's range and are millimetres off in the rest.
+"""
 _NEGLIGIBLE = 1e-4
 """Share of the total variance below which a component is zero."""
 TRANSMISSION = "transmission"
@@ -268,6 +272,8 @@ class LinearFit:
         """
         start = np.full(len(names), 0.7 / len(names)) if near is None else near.copy()
         largest = np.full(len(names), _LARGEST)
+        waves = np.array(names) == TRANSMISSION
+        largest[waves] = np.minimum(_LARGEST, _LARGEST_WAVE**2 / scale[waves])
         if share is None:
             start[-1], largest[-1] = _ALONE, min(1.0 / float(scale[-1]), _LARGEST)
         x = np.clip(start, _SMALLEST, largest)

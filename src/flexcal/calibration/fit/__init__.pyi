@@ -28,7 +28,7 @@ from .terms import (
     plausible_size,
 )
 from .thermal_terms import THERMAL, is_thermal, thermal_parameters, with_reference_temperature
-from .tolerance_prior import LENGTH_TOLERANCE, error_kind, with_tolerance_prior
+from .tolerance_prior import LENGTH_TOLERANCE, are_tracked, error_kind, with_tolerance_prior
 
 __all__ = [
     "CONVERGED",
@@ -47,6 +47,7 @@ __all__ = [
     "StratifiedSample",
     "TemperatureEvidence",
     "all_errors",
+    "are_tracked",
     "base_errors",
     "common_lengths",
     "declared_size",

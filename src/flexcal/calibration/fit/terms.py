@@ -180,15 +180,18 @@ def _moving_parts(model: RobotModel, poses: PoseSet, names: Sequence[str]) -> li
 
 
 def random_waves(model: RobotModel, poses: PoseSet, free: Parameters) -> dict[str, float]:
-    """Waves of the term `transmission`, each with its size relative to order 1, which is 1 / order.
+    """Waves of the term `transmission`, each with its size relative to order 1: 1 / order, of each order between those of the robot.
 
-    Those of every revolute joint on the way to a measured target that are not among the `free` parameters.
+    Those of every revolute joint on the way to a measured target that are not among the `free` parameters. An error of all orders with these
+    sizes is as rough as a random walk: what is known of a part of the range says little of angles far from it.
     """
     joints = free_joints(model, "transmission", moving_joints(model, poses))
+    orders = np.array(model.drives.harmonics, dtype=float)
+    sizes = np.sqrt(np.gradient(orders) if len(orders) > 1 else 1.0) / orders
     every = {
-        f"{model.joints[i].name}.{key}": 1.0 / order
+        f"{model.joints[i].name}.{key}": float(size)
         for i in joints
-        for order in model.drives.harmonics
+        for order, size in zip(model.drives.harmonics, sizes, strict=True)
         for key in _keys(f"transmission_{order}")
     }
     return {name: size for name, size in every.items() if name not in free}

@@ -1,9 +1,10 @@
-"""Tolerances of manufacture as the prior of every error, where the poses do not determine all of them."""
+"""Tolerances of manufacture as the prior of every error, where the poses do not tell all of them far better."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -35,6 +36,10 @@ _SCALE = np.log(3.0)
 """Standard deviation of the logarithm of the factor by which the errors of a kind are larger than these."""
 _LEAST = 3.0
 """Logarithm of the factor by which the scatter may be smaller than usual."""
+_SURELY, _UNSEEN = 30.0, 1e-9
+"""Information, in that of the prior, from which this changes little, and, in the largest, below which the poses tell nothing."""
+_WRONG, _PASSES = 5.0, 4
+"""Distance of a point, in the median of all, from which it tells nothing of the others, and how often such points are looked for."""
 _FAR = 3.5
 """Deviation, in standard deviations of its kind, from which a parameter has one of its own."""
 _TOLD = 0.5
@@ -49,8 +54,10 @@ _RELEASED = 6
 """Largest number of parameters with a standard deviation of their own."""
 
 
-def with_tolerance_prior(model: RobotModel, poses: PoseSet, terms: Sequence[str]) -> RobotModel:
+def with_tolerance_prior(model: RobotModel, poses: PoseSet, terms: Sequence[str]) -> RobotModel | None:
     """Robot whose errors of some terms have a prior about nominal: what robot.yaml declares, else tolerances of manufacture.
+
+    None where points tell all that any poses would so well that these change nothing.
 
     Errors of the joints are of four kinds: zeros, other angles, lengths, and compliances. How much larger than the usual ones those of a
     kind are is estimated from the points, by the marginal likelihood with a lognormal prior of a factor of three (empirical Bayes, Morris
@@ -74,12 +81,24 @@ def with_tolerance_prior(model: RobotModel, poses: PoseSet, terms: Sequence[str]
     )
     evidence = _Evidence.of(fit, kinds)
     factors = evidence.factors({})
+    for _ in range(_PASSES):
+        if not (wrong := evidence.wrong(factors)).any():
+            break
+        evidence = evidence.without(wrong)
+        factors = evidence.factors({})
     own: dict[str, float] = {}
     while len(own) < _RELEASED and (far := evidence.farthest(factors, own)):
         own[far[0]] = far[1]
         factors = evidence.factors(own)
+    if are_tracked(poses) and not fit.hidden and evidence.tells_all(factors, own):
+        return None
     scaled = {name: size * factors.get(kinds[name], 1.0) for name, size in sizes.items()}
     return model.with_priors(scaled | own)
+
+
+def are_tracked(poses: PoseSet) -> bool:
+    """Whether an instrument measured all poses as points, whose lengths need no prior."""
+    return bool((poses.located & ~poses.seen).all())
 
 
 def _of_cameras(model: RobotModel, poses: PoseSet) -> tuple[str, ...]:
@@ -137,18 +156,18 @@ def _placed(fit: PointFit) -> RobotModel:
 class _Evidence:
     """Marginal likelihood of linear readings y = A x + e, x in prior standard deviations.
 
-    `names` of the parameters, `kinds` those with a common factor, `sizes` (p,) their standard deviations; `usual` scatter, m, `count` of
-    the readings, `square` yᵀy, `along` (p,) Aᵀy and `gram` (p, p) AᵀA.
+    `names` of the parameters, `kinds` those with a common factor, `sizes` (p,) their standard deviations; `usual` scatter, m, `readings`
+    (n,) y and `columns` (n, p) A, m, of the `points` (n,); the place of instruments is projected off them by the `basis` (n, k).
     """
 
     names: tuple[str, ...]
     kinds: tuple[str, ...]
     sizes: np.ndarray
     usual: float
-    count: int
-    square: float
-    along: np.ndarray
-    gram: np.ndarray
+    points: np.ndarray
+    readings: np.ndarray
+    columns: np.ndarray
+    basis: np.ndarray
 
     @classmethod
     def of(cls, fit: PointFit, kinds: dict[str, str]) -> _Evidence:
@@ -177,8 +196,54 @@ class _Evidence:
         y, columns = y - basis @ (basis.T @ y), columns - basis @ (basis.T @ columns)
         names = (*(p.name for p in free if np.isfinite(p.prior_std)), "scale")
         own, sizes = tuple(kinds.get(name, "") for name in names), np.append(sizes[known], 1.0)
-        count = len(y) - basis.shape[1]
-        return cls(names, own, sizes, usual, count, float(y @ y), columns.T @ y, columns.T @ columns)
+        points = np.repeat(np.arange(len(at.residual)), 3)[there]
+        return cls(names, own, sizes, usual, points, y, columns, basis)
+
+    @cached_property
+    def gram(self) -> np.ndarray:
+        """AᵀA (p, p)."""
+        return self.columns.T @ self.columns
+
+    @cached_property
+    def along(self) -> np.ndarray:
+        """Aᵀy (p,)."""
+        return self.columns.T @ self.readings
+
+    @cached_property
+    def square(self) -> float:
+        """yᵀy."""
+        return float(self.readings @ self.readings)
+
+    @property
+    def count(self) -> int:
+        """Number of readings beyond those that place the instruments."""
+        return len(self.readings) - self.basis.shape[1]
+
+    def wrong(self, factors: dict[str, float]) -> np.ndarray:
+        """Mask (n,) of the readings of points that are far farther off than most."""
+        scale = self._scales(factors, {})
+        told = scale[:, None] * self.gram * scale + factors[_NOISE] ** 2 * np.eye(len(scale))
+        left = self.readings - self.columns @ (scale * np.linalg.solve(told, scale * self.along))
+        distance = np.sqrt(np.bincount(self.points, left**2))
+        return distance[self.points] > _WRONG * np.median(distance[np.unique(self.points)])
+
+    def without(self, rows: np.ndarray) -> _Evidence:
+        """The same of all but some readings, a mask (n,), which nothing explains."""
+        eye = np.eye(len(rows))[:, rows]
+        eye -= self.basis @ (self.basis.T @ eye)
+        basis = np.linalg.qr(eye)[0]
+        y, columns = (a - basis @ (basis.T @ a) for a in (self.readings, self.columns))
+        return replace(self, readings=y, columns=columns, basis=np.column_stack([self.basis, basis]))
+
+    def tells_all(self, factors: dict[str, float], own: dict[str, float]) -> bool:
+        """Whether the readings tell every combination of errors that they tell at all far better than the prior."""
+        scale = self._scales(factors, own)
+        told = scale[:, None] * self.gram * scale / factors[_NOISE] ** 2
+        kept = np.array([bool(kind) for kind in self.kinds])
+        across = told[np.ix_(~kept, kept)]
+        taken = across.T @ np.linalg.pinv(told[np.ix_(~kept, ~kept)], hermitian=True) @ across
+        information = np.linalg.eigvalsh(told[np.ix_(kept, kept)] - taken)
+        return not np.any((information > _UNSEEN * information[-1]) & (information < _SURELY))
 
     @property
     def shared(self) -> tuple[str, ...]:

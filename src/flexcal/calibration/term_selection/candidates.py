@@ -27,6 +27,10 @@ _LOAD = 1e-3
 """Gravity load, N m, below which a robot has none."""
 
 
+_SINGLE_ORDERS = 3
+"""Number of orders whose waves are terms of their own; the higher ones are random effects alone."""
+
+
 @dataclass(frozen=True, eq=False)
 class CandidateTerms:
     """Terms that may be added to the kinematic ones.
@@ -96,7 +100,7 @@ def candidates(model: RobotModel, poses: PoseSet) -> CandidateTerms:
             model = wider
             kinds.append("backlash")
     kinds += ["ratio"] if geometric_parameters(model, poses, ["ratio"]).names else []
-    kinds += [f"transmission_{order}" for order in model.drives.harmonics]
+    kinds += [f"transmission_{order}" for order in model.drives.harmonics[:_SINGLE_ORDERS]]
     return CandidateTerms(model, tuple(kinds), single, tuple(excluded))
 
 

@@ -17,6 +17,7 @@ from flexcal.calibration.fit import (
     GeometricFit,
     LossName,
     StratifiedSample,
+    are_tracked,
     fit_geometry,
     with_tolerance_prior,
 )
@@ -24,11 +25,8 @@ from flexcal.calibration.kinds import LEAST_REGISTERED
 from flexcal.calibration.measurement import OneFlank
 from flexcal.calibration.term_selection import (
     TermSelection,
-    ZerosOrGeometry,
-    asks_for_levels,
     enough_for_selection,
     select_terms,
-    zeros_or_geometry,
 )
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
@@ -58,8 +56,7 @@ class FitSettings:
 class Fits:
     """The `rigid` fit and the one of the `selected` terms, of a `model` with the bearing axes and the backlash that they have.
 
-    `terms` are those asked for or selected, of which few poses may not support all; `levels` compares joint zeros alone with more of the
-    geometry, where the scatter may hide it.
+    `terms` are those asked for or selected, of which few poses may not support all.
     """
 
     model: RobotModel
@@ -67,7 +64,6 @@ class Fits:
     rigid: GeometricFit
     bearings: BearingAxes | None
     selection: TermSelection | None
-    levels: ZerosOrGeometry | None
     selected: GeometricFit
 
     @classmethod
@@ -82,37 +78,15 @@ class Fits:
     ) -> Fits:
         """Fit the nominal robot `model`, starting from the fits `near` of most of these poses, where there are some, and in their frame.
 
-        Where the poses do not determine all parameters, tolerances of manufacture are their prior; but those of `ZerosOrGeometry`, where
-        the scatter hides all but joint zeros or lengths.
+        Tolerances of manufacture are the prior of what the poses do not tell far better.
         """
         model = model.with_stations(poses.places)
-        if not _by_tolerances(poses, settings):
-            return cls._of(model, poses, settings, near=near, progress=progress)
-        tracked = bool((poses.located & ~poses.seen).all())
-        if tracked and enough_for_selection(poses):
-            plain = cls._of(model, poses, settings, near=near, progress=progress)
-            simpler = plain.levels is not None and plain.levels.answer.level != "kinematic"
-            if simpler or not (plain.rigid.undetermined or plain.selected.undetermined):
-                return plain
-        wide = settings.terms or (*_base(model), _YIELDING)
-        informed = with_tolerance_prior(model, poses, wide)
-        # a yielding joint is a choice where there are enough poses for one
-        assumed = (_YIELDING,) if tracked or not enough_for_selection(poses) else ()
-        return cls._of(informed, poses, settings, near=near, assumed=assumed, progress=progress)
-
-    @classmethod
-    def _of(
-        cls,
-        model: RobotModel,
-        poses: PoseSet,
-        settings: FitSettings,
-        *,
-        near: Fits | None,
-        assumed: tuple[str, ...] = (),
-        progress: Progress,
-    ) -> Fits:
-        """Fits of a robot, with `assumed` terms by their prior."""
         loss, terms = settings.loss, settings.terms
+        informed = _with_tolerances(model, poses, settings)
+        # a yielding joint is a choice where there are enough poses for one
+        few = are_tracked(poses) or not enough_for_selection(poses)
+        assumed = (_YIELDING,) if informed is not None and few else ()
+        model = informed or model
 
         def fit(
             robot: RobotModel,
@@ -161,7 +135,7 @@ class Fits:
                 if same
                 else fit(model, terms, "selected fit", start, elastic=elastic, frame=of_selected)
             )
-            return cls(model, terms, rigid, bearings, None, None, selected)
+            return cls(model, terms, rigid, bearings, None, selected)
         good = poses.subset(np.setdiff1d(np.flatnonzero(~poses.tilted), rigid.estimate.outliers))
         for name, told in outlying_stations(poses, rigid.estimate.outliers).items():
             if np.sum(good.station == name) < LEAST_REGISTERED:
@@ -187,25 +161,14 @@ class Fits:
                 return chosen, fit_of(chosen)
 
         selection, selected = choose(model, rigid)
-        levels = zeros_or_geometry(model, good) if not elastic and asks_for_levels(selected) else None
-        if levels is not None and levels.answer.level != "kinematic":
-            model = levels.with_tolerances(model, poses)
-            rigid = fit(model, base, "rigid fit", levels.answer.fit, elastic=False, frame=of_rigid)
-            selection, selected = choose(model, rigid)
-        return cls(
-            selection.model,
-            _with_random_waves(selection.terms),
-            rigid,
-            bearings,
-            selection,
-            levels,
-            selected,
-        )
+        return cls(selection.model, _with_random_waves(selection.terms), rigid, bearings, selection, selected)
 
 
-def _by_tolerances(poses: PoseSet, settings: FitSettings) -> bool:
-    """Whether tolerances of manufacture are a prior: of readings that say where a target was, without other robots."""
-    return settings.tolerances and len(poses.pointed) > 0 and settings.fleet is None
+def _with_tolerances(model: RobotModel, poses: PoseSet, settings: FitSettings) -> RobotModel | None:
+    """Robot with tolerances of manufacture as prior, where readings say where a target was and no other robots tell more, if they matter."""
+    if not settings.tolerances or settings.fleet is not None or not len(poses.pointed):
+        return None
+    return with_tolerance_prior(model, poses, settings.terms or (*_base(model), _YIELDING))
 
 
 def _base(model: RobotModel) -> tuple[str, ...]:

@@ -177,7 +177,6 @@ def calibrate(
         before=uncalibrated.errors(poses.pointed),
         rigid=fits.rigid,
         selection=fits.selection,
-        levels=fits.levels,
         selected=selected,
         bearings=fits.bearings,
         validated=None

@@ -36,7 +36,6 @@ from flexcal.calibration.term_selection import (
     CONDITIONAL,
     CrossValidation,
     TermSelection,
-    ZerosOrGeometry,
     considered_document,
 )
 from flexcal.calibration.verification import (
@@ -110,9 +109,6 @@ class Calibration(Identification):
         Fit without elasticity and further terms.
     selection : TermSelection or None
         Cross-validation of the terms; None where they were given.
-    levels : ZerosOrGeometry or None
-        Comparison of joint zeros alone with more of the geometry; None where terms were given, and where the points scatter by less than
-        tolerances of manufacture.
     selected : GeometricFit
         The fit that `estimate` is of.
     bearings : BearingAxes or None
@@ -146,7 +142,6 @@ class Calibration(Identification):
     before: UncalibratedErrors
     rigid: GeometricFit
     selection: TermSelection | None
-    levels: ZerosOrGeometry | None
     selected: GeometricFit
     bearings: BearingAxes | None = None
     stiffness: Estimate | None = None
@@ -318,7 +313,6 @@ class Calibration(Identification):
             },
             "terms": list(selected.terms),
             "term_selection": [considered_document(row) for row in chosen.considered] if chosen else [],
-            "zeros_or_geometry": None if self.levels is None else self.levels.document(),
             "term_selection_by": chosen.by if chosen else None,
             "cross_validation": None
             if self.validated is None
@@ -375,7 +369,6 @@ class Calibration(Identification):
                 *base_remark(selected),
                 *fleet_remarks(fleet),
                 *([] if pooled is None else pooled.remarks),
-                *([] if self.levels is None or coupling is not None else [self.levels.sentence]),
                 *calibration_remarks(
                     selected, self._cause, prior_misfits=contradicted, sensor_lag=sensor_lag
                 ),

@@ -32,7 +32,8 @@ from flexcal.model.urdf import Description, Frame, read_urdf
 if TYPE_CHECKING:
     from flexcal.model.robot.robot_model import RobotModel
 
-HARMONICS = (1, 2, 3)
+HARMONICS = (1, 2, 3, 5, 8, 13)
+"""Orders of transmission errors; the higher ones stand for those between them too."""
 
 
 def read_robot(robot_type: type[RobotModel], file: YamlFile) -> RobotModel:

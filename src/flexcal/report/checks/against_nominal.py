@@ -26,17 +26,19 @@ def check_own_verdict(refused: str) -> tuple[Check, ...]:
 
 
 def check_smaller_errors(before: np.ndarray, after: np.ndarray) -> Check:
-    """Check whether distances (N,) m at the same poses fell, with the paired test of Wilcoxon (1945), one-sided.
+    """Check whether distances (N,) m at the same poses fell, or rose, with the paired test of Wilcoxon (1945), one-sided.
 
     `before` are those of the nominal robot, larger by what was fitted to these poses to place it.
     """
     from scipy.stats import wilcoxon
 
     sizes = f"the mean error is {millimetres(after.mean())} mm, and {millimetres(before.mean())} mm before the calibration"
-    if not after.mean() < before.mean():
+    smaller = bool(after.mean() < before.mean())
+    of_sign = wilcoxon(before, after, alternative="greater" if smaller else "less")
+    chance = float(np.asarray(of_sign)[1])
+    if not smaller:
         answer = f"No: {sizes}, placed as well as possible. This calibration does not make the robot more accurate."
-        return Check(_QUESTION, answer, "bad", "improvement")
-    chance = float(np.asarray(wilcoxon(before, after, alternative="greater"))[1])
+        return Check(_QUESTION, answer, "bad" if chance < _CHANCE else "care", "improvement")
     if chance >= _CHANCE:
         answer = f"Perhaps: {sizes}, which may be chance (p = {p_value(chance)}); measure more poses."
         return Check(_QUESTION, answer, "care", "improvement")

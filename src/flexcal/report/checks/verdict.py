@@ -124,8 +124,8 @@ PHRASES: dict[str, dict[str, str]] = {
     "own_verdict": {"else": "the calibration itself was not trusted"},
     "improvement": {
         "good": "the errors are smaller than before",
-        "care": "it may be chance that the errors are smaller than before",
-        "else": "the errors are not smaller than before",
+        "care": "the errors are no smaller than before, or by chance",
+        "else": "the errors are larger than before",
     },
     "unseen_poses": {
         "good": "no pose was used for the fit",
