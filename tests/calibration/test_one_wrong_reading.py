@@ -16,7 +16,7 @@ from flexcal.model.robot import RobotModel
 NOISE = 3e-5
 
 
-@pytest.mark.parametrize(("seed", "count", "row"), [(1, 40, 10), (2, 25, 24), (3, 60, 0)])
+@pytest.mark.parametrize(("seed", "count", "row"), [(4, 40, 10), (2, 25, 24), (3, 60, 0)])
 def test_the_verdict_does_not_depend_on_its_size(seed: int, count: int, row: int, tmp_path: Path) -> None:
     """Wrong by 20 mm to 5 m, in any direction."""
     model = RobotModel.from_yaml(write_robot(tmp_path), estimates=False)

@@ -14,7 +14,8 @@ _FIRST_DAMPING = 1e-3
 _LARGEST_DAMPING = 1e14
 _SMALLEST_DAMPING = 1e-18
 _ROUNDING = 1e-13
-_STATIONARY = 1e-3
+_STATIONARY, _SHORT = 1e-3, 0.1
+"""Relative offset, and step in standard deviations of the estimate, at which a fit that cannot go on is at its minimum."""
 _EXACT = 1e-16
 _CLOSE = 0.1
 """Relative offset and deviation of the gain ratio from 1 below which a minimum is near: the damping starts lower and falls ever faster."""
@@ -59,7 +60,8 @@ def minimise(
     moved.
 
     Converged: the relative offset ‖Qᵀb‖/‖b‖ (Bates & Watts 1981) or the scaled step is below `tolerance`, or the cost no
-    longer changes beyond rounding, or after `max_iterations` the relative offset is at most 1e-3, which Bates and Watts suggest.
+    longer changes beyond rounding, or after `max_iterations` the relative offset is at most 1e-3, which Bates and Watts suggest, or
+    0.1/√n for n residuals: the step is then a tenth of a standard deviation, over all coordinates together.
     Stalled: no step lowers the cost although the relative offset is above that, and the cost not yet 1e-16 of the first one. Raises
     FlexcalError when the start itself cannot be evaluated.
     """
@@ -71,6 +73,7 @@ def minimise(
     damping, growth, fall, best_offset = _FIRST_DAMPING, 2.0, 1.0 / 3.0, np.inf
     status, message, iteration, polishing = "iteration limit", "", 0, False
     acceleration, moved = AndersonAcceleration(), np.zeros(0, dtype=int)
+    stationary = max(_STATIONARY, _SHORT / np.sqrt(max(residual.size, 1)))
     while True:
         progress("fitting", iteration / max_iterations)
         weights = objective.weights(residual)
@@ -96,7 +99,7 @@ def minimise(
             acceleration.forget()
         best_offset = min(best_offset, offset)
         if iteration >= max_iterations:
-            if offset <= _STATIONARY:
+            if offset <= stationary:
                 status, message = "converged", f"relative offset {offset:.1e}, after {iteration} iterations"
                 break
             message = f"not converged after {iteration} iterations (relative offset {offset:.1e}); allow more"
@@ -116,7 +119,7 @@ def minimise(
             if damping > _LARGEST_DAMPING or np.linalg.norm(unit * step) <= tolerance * 1e-3 * np.linalg.norm(
                 unit * x
             ):
-                negligible = not rejected or offset <= _STATIONARY or cost <= _EXACT * first_cost
+                negligible = not rejected or offset <= stationary or cost <= _EXACT * first_cost
                 status, message = _CANNOT_STEP[negligible]
                 break
             # an extrapolated step is one of Newton's, whose Hessian is not that of the linearisation
