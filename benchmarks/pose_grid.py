@@ -2,10 +2,10 @@
 
 `python -m benchmarks.pose_grid [--arms 10] [--first 0] [--poses 6 12 …] [--noise-um 0 1 …] [--processes 2] [--each]`
 
-Robots are of the tests' simulator, as in `few_poses`, of arms that are drawn too. Of every calibration: P90 at fresh poses beside that of the
-nominal robot with base and point found from the same poses, observed over predicted errors, the verdict of `calibrate`, and that of `verify`
-at 40 fresh poses read with the same noise. Told apart are the wrong ones: worse than uncalibrated by more than 5 %, a yes where fresh errors
-are half as large again as predicted, and a no where they are as predicted.
+Robots are of the tests' simulator, as in `few_poses`, of arms that are drawn too. Of every calibration: P90 at fresh poses beside that of
+the nominal robot with base and point found from the same poses, observed over predicted errors, the verdict of `calibrate`, and that of
+`verify` at 40 fresh poses read with the same noise. Told apart are the wrong ones: worse than uncalibrated by more than 5 %, a yes where
+fresh errors are half as large again as predicted, and a no where they are as predicted.
 """
 
 from __future__ import annotations
@@ -168,8 +168,8 @@ def main() -> None:
         cells[tried.poses, tried.noise_um].append(tried)
         if given.each or tried.faults:
             print(
-                f"arm {tried.arm} ({tried.axes} axes), {tried.poses} poses, {tried.noise_um:g} µm: {tried.before:.3f} -> {tried.after:.3f} mm, "
-                f"observed over predicted {tried.ratio:.2f}, {tried.trust}/{tried.verified}, {tried.seconds:.1f} s"
+                f"arm {tried.arm} ({tried.axes} axes), {tried.poses} poses, {tried.noise_um:g} µm: {tried.before:.3f} -> "
+                f"{tried.after:.3f} mm, observed over predicted {tried.ratio:.2f}, {tried.trust}/{tried.verified}, {tried.seconds:.1f} s"
                 f"{' !! ' if tried.faults else ''}{', '.join(tried.faults)} {tried.refused} {'; '.join(tried.wide)}",
                 flush=True,
             )

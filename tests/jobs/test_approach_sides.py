@@ -263,7 +263,10 @@ def test_derivatives_are_those_of_differences() -> None:
     roots = propagation(model).roots(poses.q)[1]
     _, errors = prediction_errors_with_covariance(model, replace(poses, approach=None), noise_free=True)
     parts = errors.roots[:, :, : errors.roots.shape[2] - errors.shared]
-    scatter = [6 * (model.value("scatter.angular") > 0), 3 * (model.value("scatter.robot") + model.value("scatter.model") > 0)]
+    scatter = [
+        6 * (model.value("scatter.angular") > 0),
+        3 * (model.value("scatter.robot") + model.value("scatter.model") > 0),
+    ]
     exact = (parts**2).sum(axis=(1, 2))
     fast = (np.delete(roots, _scatter_columns(roots.shape[2], *scatter), axis=2) ** 2).sum(axis=(1, 2))
     np.testing.assert_allclose(fast, exact, rtol=1e-2)

@@ -180,10 +180,10 @@ def _moving_parts(model: RobotModel, poses: PoseSet, names: Sequence[str]) -> li
 
 
 def random_waves(model: RobotModel, poses: PoseSet, free: Parameters) -> dict[str, float]:
-    """Waves of the term `transmission`, each with its size relative to order 1: 1 / order, of each order between those of the robot.
+    """Waves of the term `transmission`, each with its size relative to order 1: √(distance of the orders) / order.
 
-    Those of every revolute joint on the way to a measured target that are not among the `free` parameters. An error of all orders with these
-    sizes is as rough as a random walk: what is known of a part of the range says little of angles far from it.
+    Those of every revolute joint on the way to a measured target that are not among the `free` parameters. With these sizes the error of
+    a joint is as rough as a random walk, so that what is known of a part of the range says little of angles far from it.
     """
     joints = free_joints(model, "transmission", moving_joints(model, poses))
     orders = np.array(model.drives.harmonics, dtype=float)

@@ -41,7 +41,7 @@ def parameter_figures(estimate: Estimate, names: tuple[str, ...]) -> tuple[Figur
             "transmission",
             "Transmission errors",
             "amplitude of a sine or cosine / (0.5 mrad)",
-            "Waves of order 1, 2 and 3 in the joint position, shrunk towards zero as far as the data say little of them; those of which "
+            "Waves in the joint position, shrunk towards zero as far as the data say little of them; those of which "
             "they say nothing are left out. Effective values: they take up a part of higher orders and compliances that the model lacks.",
         ),
     ):
