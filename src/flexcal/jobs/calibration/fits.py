@@ -165,7 +165,7 @@ class Fits:
 
 
 def _with_tolerances(model: RobotModel, poses: PoseSet, settings: FitSettings) -> RobotModel | None:
-    """Robot with tolerances of manufacture as prior, where readings say where a target was and no other robots tell more, if they matter."""
+    """Robot with tolerances of manufacture as prior, where readings say where a target was and no other robots are known."""
     if not settings.tolerances or settings.fleet is not None or not len(poses.pointed):
         return None
     return with_tolerance_prior(model, poses, settings.terms or (*_base(model), _YIELDING))
