@@ -77,7 +77,10 @@ def test_a_wrong_touch_is_named_and_left_out(tmp_path: Path) -> None:
 
 
 def test_the_calibrated_arm_narrows_the_interval(tmp_path: Path) -> None:
-    """Touches that an uncalibrated arm blurs are known better after a calibration, and the remark says whose error it is."""
+    """Touches that an uncalibrated arm blurs are known better after a calibration, and the remark says whose error it is.
+
+    But along the last axis, where no point tells the flange from the tool: it is known to the tolerance of lengths, as it is off.
+    """
     arm, rng = StrangerArm(7, axes=tuple(SIX)), np.random.default_rng(7)
     model = RobotModel.from_yaml(arm.write(tmp_path))
     file = touched(arm, tmp_path / "touches.csv", 10, rng, noise=2e-5)
@@ -86,7 +89,8 @@ def test_the_calibrated_arm_narrows_the_interval(tmp_path: Path) -> None:
     poses = read_poses(arm.write_poses(tmp_path / "points.csv", q, arm.measured(q, rng)), model)
     calibrated = calibrate(model, poses, terms=["kinematic"]).model
     sharp = identify_tip(calibrated, read_touches(file, model), frame="tool0")
-    assert sharp.half_width.max() < 0.5 * blurred.half_width.max()
+    assert np.median(sharp.half_width) < 0.5 * np.median(blurred.half_width)
+    assert 3e-4 < sharp.half_width.max() < 1.5e-3
     assert sharp.fit.rms < 0.5 * blurred.fit.rms
     assert "not calibrated" in blurred.remarks[0]
     assert "its calibration leaves" in sharp.remarks[0]

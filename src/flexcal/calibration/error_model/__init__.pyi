@@ -2,10 +2,11 @@ from .error_components import ErrorComponents, joint_rotation_jacobian, known_sc
 from .error_statistics import ErrorStatistics
 from .folds import are_different, order_folds, repeated_pose_numbers, workspace_folds
 from .groups import SAME_COMMAND, ErrorGroups, block_columns, group_numbers, occurrence
-from .variance_components import SCATTER_SPREAD, TRANSMISSION, USUAL_SCATTER, LinearFit
+from .variance_components import LARGEST_WAVE, SCATTER_SPREAD, TRANSMISSION, USUAL_SCATTER, LinearFit
 from .whitening import Whitening
 
 __all__ = [
+    "LARGEST_WAVE",
     "SAME_COMMAND",
     "SCATTER_SPREAD",
     "TRANSMISSION",

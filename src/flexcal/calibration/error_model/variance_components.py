@@ -23,9 +23,9 @@ _TOLD_APART = 1e6
 """Condition number of the correlation of the variances up to which their standard deviations are of use for that."""
 _LARGEST = 30.0
 """Upper bound of a component, relative to the variance about the fit."""
-_LARGEST_WAVE = 3e-5
-"""Largest standard deviation, rad, of a transmission error of order 1, of gears accurate to about an arcminute. Errors that are none of
-gears may ask for ten times as much, and waves of that size fit a part of a joint's range and are millimetres off in the rest.
+LARGEST_WAVE = 3e-5
+"""Largest standard deviation, rad, of a transmission error of order 1, of gears accurate to about half an arcminute. Errors that are none
+of gears may ask for ten times as much, and waves of that size fit a part of a joint's range and are millimetres off in the rest.
 """
 _NEGLIGIBLE = 1e-4
 """Share of the total variance below which a component is zero."""
@@ -241,8 +241,10 @@ class LinearFit:
         units = {name: own for name, own in units.items() if own.any()}
         if (turned := (readings.unit == RADIANS).ravel()).any():
             units[ORIENTATION] = turned
-        rows, size = self.residual.size, self.free.shape[2]
-        residual, free = self.residual.ravel(), self.free.reshape(rows, size)
+        # what parameters with a prior explain is no scatter either, where there are readings enough to tell
+        columns = np.concatenate([self.free, self.tied], axis=2) if self._tells_scatter else self.free
+        rows, size = self.residual.size, columns.shape[2]
+        residual, free = self.residual.ravel(), columns.reshape(rows, size)
         weight = np.ones(rows)
         for own in units.values():
             weight[own] = 1 / (float(np.sqrt(np.mean(residual[own] ** 2))) + 1e-12)
@@ -273,7 +275,7 @@ class LinearFit:
         start = np.full(len(names), 0.7 / len(names)) if near is None else near.copy()
         largest = np.full(len(names), _LARGEST)
         waves = np.array(names) == TRANSMISSION
-        largest[waves] = np.minimum(_LARGEST, _LARGEST_WAVE**2 / scale[waves])
+        largest[waves] = np.minimum(_LARGEST, LARGEST_WAVE**2 / scale[waves])
         if share is None:
             start[-1], largest[-1] = _ALONE, min(1.0 / float(scale[-1]), _LARGEST)
         x = np.clip(start, _SMALLEST, largest)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.calibration.error_model import ErrorComponents, LinearFit, joint_rotation_jacobian
+from flexcal.calibration.error_model import LARGEST_WAVE, ErrorComponents, LinearFit, joint_rotation_jacobian
 from flexcal.calibration.fit.least_squares_problem import GeometryProblem
 from flexcal.calibration.fit.practical_identifiability import Undetermined, cause_of, undetermined
 from flexcal.calibration.fit.temperature_evidence import TemperatureEvidence, time_columns, widened
@@ -260,10 +260,14 @@ class FittedPoints:
         return -estimate.covariance @ own.T @ self.task.columns(self.at, tuple(names))
 
     def _identifiable(self) -> tuple[bool, ...]:
-        """Parameters of the estimate without those determined only by a declared prior or the variance of transmission errors."""
+        """Parameters of the estimate without those determined only by a declared prior or the variance of transmission errors.
+
+        Where that is as large as it may be, the waves are larger than their prior, which pulls them towards zero by more than they err.
+        """
         estimate = self.estimate
         stds = np.sqrt(np.diag(estimate.covariance))
-        waves = {name: size * self.scatter.transmission for name, size in self.fit.waves.items()}
+        pulled = self.scatter.transmission > 0.99 * LARGEST_WAVE
+        waves = {n: 0.0 if pulled else size * self.scatter.transmission for n, size in self.fit.waves.items()}
         beforehand = {p.name: p.prior_std for p in self.task.kept} | waves
         if self.fit.fleet is not None:
             # what other robots of the model tell is known; of a sum that they tell, neither of its two terms is

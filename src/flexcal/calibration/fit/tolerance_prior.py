@@ -44,6 +44,8 @@ _FAR = 3.5
 """Deviation, in standard deviations of its kind, from which a parameter has one of its own."""
 _TOLD = 0.5
 """Standard deviation after the measurements, over that before, below which these tell a parameter."""
+_ITERATIONS, _HALVINGS, _DIFFERENCE, _STILL = 50, 20, 1e-5, 1e-10
+"""Bounds and steps of the search for the factors; it has converged when half the deviance changes by less than the last."""
 _NOISE = "scatter"
 """Key of the scatter, m, beside the factors."""
 _LARGEST = float(np.log(10.0))
@@ -57,7 +59,7 @@ _RELEASED = 6
 def with_tolerance_prior(model: RobotModel, poses: PoseSet, terms: Sequence[str]) -> RobotModel | None:
     """Robot whose errors of some terms have a prior about nominal: what robot.yaml declares, else tolerances of manufacture.
 
-    None where points tell all that any poses would so well that these change nothing.
+    None where points tell all that any poses would so well that these change nothing, and where readings are beyond all numbers.
 
     Errors of the joints are of four kinds: zeros, other angles, lengths, and compliances. How much larger than the usual ones those of a
     kind are is estimated from the points, by the marginal likelihood with a lognormal prior of a factor of three (empirical Bayes, Morris
@@ -80,6 +82,8 @@ def with_tolerance_prior(model: RobotModel, poses: PoseSet, terms: Sequence[str]
         first, poses, tuple(terms), prior, elastic, marginalised=False, near={}, progress=silent
     )
     evidence = _Evidence.of(fit, kinds)
+    if not np.isfinite(evidence.gram).all() or not np.isfinite(evidence.along).all():
+        return None
     factors = evidence.factors({})
     for _ in range(_PASSES):
         if not (wrong := evidence.wrong(factors)).any():
@@ -252,18 +256,33 @@ class _Evidence:
 
     def factors(self, own: dict[str, float]) -> dict[str, float]:
         """Most probable factor of every kind, some parameters having standard deviations of their `own`."""
-        from scipy.optimize import minimize
-
-        start = np.append(np.zeros(len(self.shared)), np.log(self.usual))
-        bounds = [(-4.0, _LARGEST if kind == "m" else 6.0) for kind in self.shared] + [
-            (start[-1] - _LEAST, 0.0)
-        ]
-        exactly = {"ftol": 1e-15, "gtol": 1e-9}
-        found = minimize(
-            self._cost, start, args=(own,), method="L-BFGS-B", jac=True, bounds=bounds, options=exactly
-        ).x
-        named = dict(zip(self.shared, np.exp(found[:-1]).tolist(), strict=True))
-        return named | {_NOISE: float(np.exp(found[-1]))}
+        x = np.append(np.zeros(len(self.shared)), np.log(self.usual))
+        lower = np.append(np.full(len(self.shared), -4.0), x[-1] - _LEAST)
+        upper = np.array([*(_LARGEST if kind == "m" else 6.0 for kind in self.shared), 0.0])
+        cost, slope = self._cost(x, own)
+        for _ in range(_ITERATIONS):
+            # Newton's steps, with the second derivatives by differences of the first
+            ahead = np.array([self._cost(x + step, own)[1] for step in _DIFFERENCE * np.eye(len(x))])
+            bend = (ahead - slope) / _DIFFERENCE
+            moving = ~(((x <= lower) & (slope > 0)) | ((x >= upper) & (slope < 0)))
+            sizes, axes = np.linalg.eigh((bend + bend.T)[np.ix_(moving, moving)] / 2)
+            step = np.zeros(len(x))
+            step[moving] = -axes @ ((axes.T @ slope[moving]) / np.maximum(np.abs(sizes), 1.0))
+            step *= min(1.0, 2.0 / max(np.abs(step).max(), 1e-12))
+            for _ in range(_HALVINGS):
+                tried = np.clip(x + step, lower, upper)
+                expected = float(slope @ (tried - x))
+                after = self._cost(tried, own)
+                if after[0] <= cost + 1e-4 * expected:
+                    break
+                step /= 2
+            else:
+                break
+            x, (cost, slope) = tried, after
+            if -expected < _STILL:
+                break
+        named = dict(zip(self.shared, np.exp(x[:-1]).tolist(), strict=True))
+        return named | {_NOISE: float(np.exp(x[-1]))}
 
     def farthest(self, factors: dict[str, float], own: dict[str, float]) -> tuple[str, float] | None:
         """Angle of a joint that is farther off than its kind explains, with its deviation."""
@@ -297,7 +316,9 @@ class _Evidence:
         scale = self._scales(dict(zip(self.shared, np.exp(x[:-1]).tolist(), strict=True)), own)
         noise = np.exp(2 * x[-1])
         along, square = scale * self.along / noise, self.square / noise
-        lower = np.linalg.cholesky(scale[:, None] * self.gram * scale / noise + np.eye(len(scale)))
+        told = scale[:, None] * self.gram * scale / noise
+        # a little more than one, or rounding of readings without noise would make it indefinite
+        lower = np.linalg.cholesky(told + (1.0 + 1e-13 * np.trace(told)) * np.eye(len(scale)))
         inverse = np.linalg.inv(lower)
         mean, variance = inverse.T @ (inverse @ along), (inverse**2).sum(axis=0)
         scatter = (x[-1] - np.log(self.usual)) / SCATTER_SPREAD

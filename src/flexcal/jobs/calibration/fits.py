@@ -19,6 +19,7 @@ from flexcal.calibration.fit import (
     StratifiedSample,
     are_tracked,
     fit_geometry,
+    geometric_parameters,
     with_tolerance_prior,
 )
 from flexcal.calibration.kinds import LEAST_REGISTERED
@@ -36,6 +37,8 @@ from flexcal.progress import Progress, silent
 
 _YIELDING = PER_JOINT[0]
 """Term that poses which do not determine all parameters have by its prior."""
+_MOST = 0.5
+"""Ratio of the errors at left-out poses from which a wave is a fact of these gears, and no random effect of any gear's size."""
 _COMPARED = 1e-4
 """Relative offset at which fits to most of the poses have converged, of which nothing but errors elsewhere is told."""
 
@@ -81,11 +84,16 @@ class Fits:
         Tolerances of manufacture are the prior of what the poses do not tell far better.
         """
         model = model.with_stations(poses.places)
+        for station in poses.stations:
+            model.station_index(station)
         loss, terms = settings.loss, settings.terms
         informed = _with_tolerances(model, poses, settings)
         # a yielding joint is a choice where there are enough poses for one
         few = are_tracked(poses) or not enough_for_selection(poses)
-        assumed = (_YIELDING,) if informed is not None and few else ()
+        yields = any(
+            name.endswith(_YIELDING) for name in geometric_parameters(model, poses, (_YIELDING,)).names
+        )
+        assumed = (_YIELDING,) if informed is not None and few and yields else ()
         model = informed or model
 
         def fit(
@@ -143,7 +151,7 @@ class Fits:
         alone = loss == "auto" and not poses.tilted.any()
 
         def fit_of(chosen: TermSelection) -> GeometricFit:
-            found = _with_random_waves(chosen.terms)
+            found = _with_random_waves(chosen)
             return fit(chosen.model, found, "selected fit", start, elastic=elastic, frame=of_selected)
 
         def choose(robot: RobotModel, begin: GeometricFit) -> tuple[TermSelection, GeometricFit]:
@@ -161,7 +169,7 @@ class Fits:
                 return chosen, fit_of(chosen)
 
         selection, selected = choose(model, rigid)
-        return cls(selection.model, _with_random_waves(selection.terms), rigid, bearings, selection, selected)
+        return cls(selection.model, _with_random_waves(selection), rigid, bearings, selection, selected)
 
 
 def _with_tolerances(model: RobotModel, poses: PoseSet, settings: FitSettings) -> RobotModel | None:
@@ -182,6 +190,15 @@ def sampled(poses: PoseSet) -> PoseSet:
     return poses if sample is None else poses.subset(sample.rows)
 
 
-def _with_random_waves(terms: Sequence[str]) -> tuple[str, ...]:
-    """Selected terms with all transmission errors as random effects, in place of those of single orders."""
-    return (*(term for term in terms if not term.startswith(TRANSMISSION)), TRANSMISSION)
+def _with_random_waves(selection: TermSelection) -> tuple[str, ...]:
+    """Selected terms with all transmission errors as random effects, in place of those of single orders but what explains most errors."""
+    means = {row.terms: max(row.order, row.workspace, row.single) for row in selection.considered}
+    large = [
+        row.term
+        for row in selection.considered
+        if row.taken
+        and row.term is not None
+        and means[row.terms] < _MOST * means.get(tuple(t for t in row.terms if t != row.term), np.nan)
+    ]
+    waves = [term for term in selection.terms if term.startswith(TRANSMISSION) and term not in large]
+    return (*(term for term in selection.terms if term not in waves), TRANSMISSION)
