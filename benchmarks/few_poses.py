@@ -23,7 +23,7 @@ import numpy as np
 
 from benchmarks._tasks import in_parallel
 from flexcal import PoseRequest, RobotModel, calibrate, design_poses, read_poses
-from flexcal.calibration.verification import prediction_errors, uncalibrated_model
+from flexcal.calibration.verification import PredictionErrors, prediction_errors, uncalibrated_model
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from tests.jobs.yielding_robot import (
@@ -103,11 +103,16 @@ def poses_in(region: str, robot: YieldingRobot, count: int) -> np.ndarray:
     return rng.uniform(centre - half, centre + half, (count, n))
 
 
-def _uncalibrated(model: RobotModel, poses: PoseSet, fresh: PoseSet) -> float:
+def uncalibrated_p90(model: RobotModel, poses: PoseSet, fresh: PoseSet) -> float:
     """P90, m, of the nominal robot with base and point found from the poses."""
     registered = uncalibrated_model(model, poses).registered
     assert registered is not None
     return prediction_errors(registered, fresh).all.p90
+
+
+def observed_over_predicted(errors: PredictionErrors) -> float:
+    """Ratio of root mean square errors to those that were predicted."""
+    return float(np.sqrt(np.sum(errors.errors**2) / np.sum(errors.expected_rms**2)))
 
 
 def in_region(task: tuple[str, int, str]) -> Tried:
@@ -121,14 +126,19 @@ def in_region(task: tuple[str, int, str]) -> Tried:
         fresh = read_poses(
             robot.write(folder / "fresh.csv", FRESH, noise=False), model.with_stations(poses.places)
         )
-        uncalibrated = _uncalibrated(model, poses, fresh)
+        uncalibrated = uncalibrated_p90(model, poses, fresh)
         without = prediction_errors(calibrate(model, poses, tolerances=False).model, fresh).all.p90
         own = calibrate(model, poses)
         errors = prediction_errors(own.model, fresh)
-    ratio = np.sqrt(np.sum(errors.errors**2) / np.sum(errors.expected_rms**2))
     p90 = {"uncalibrated": uncalibrated, "without prior": without, "with prior": errors.all.p90}
     return Tried(
-        arm, seed, 50, {way: 1e3 * e for way, e in p90.items()}, float(ratio), region, own.trust.status
+        arm,
+        seed,
+        50,
+        {way: 1e3 * e for way, e in p90.items()},
+        observed_over_predicted(errors),
+        region,
+        own.trust.status,
     )
 
 
@@ -168,7 +178,7 @@ def one(task: tuple[str, int, int], designed: bool) -> Tried:
             placed = model.with_stations(poses.places)
             fresh = read_poses(folder / "fresh.csv", placed)
             if way == "random":
-                found["uncalibrated"] = _uncalibrated(model, poses, fresh)
+                found["uncalibrated"] = uncalibrated_p90(model, poses, fresh)
                 try:
                     without = calibrate(model, poses, tolerances=False).model
                     found["without prior"] = prediction_errors(without, fresh).all.p90
@@ -177,8 +187,8 @@ def one(task: tuple[str, int, int], designed: bool) -> Tried:
             errors = prediction_errors(calibrate(model, poses).model, fresh)
             found[way] = errors.all.p90
             if way == "random":
-                ratio = np.sqrt(np.sum(errors.errors**2) / np.sum(errors.expected_rms**2))
-    return Tried(arm, seed, count, {way: 1e3 * p90 for way, p90 in found.items()}, float(ratio))
+                ratio = observed_over_predicted(errors)
+    return Tried(arm, seed, count, {way: 1e3 * p90 for way, p90 in found.items()}, ratio)
 
 
 def main() -> None:

@@ -18,18 +18,18 @@ import argparse
 import tempfile
 import time
 from collections import defaultdict
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks._tasks import in_parallel
-from benchmarks.few_poses import FRESH, drive_compliance
+from benchmarks.few_poses import FRESH, drive_compliance, observed_over_predicted, uncalibrated_p90
 from flexcal import RobotModel, calibrate, read_poses, verify
-from flexcal.calibration.verification import prediction_errors, uncalibrated_model
+from flexcal.calibration.verification import prediction_errors
 from flexcal.errors import FlexcalError
+from tests.jobs import yielding_robot
 from tests.jobs.yielding_robot import (
-    CARRIER,
     PANDA_LIKE,
     TX90L_LIKE,
     UR_LIKE,
@@ -58,7 +58,7 @@ class Tried:
     trust: str = ""
     verified: str = ""
     reasons: tuple[str, ...] = ()
-    wide: tuple[str, ...] = field(default=())
+    wide: tuple[str, ...] = ()
     seconds: float = 0.0
 
     @property
@@ -95,7 +95,8 @@ def drawn_arm(number: int) -> tuple[Body, ...]:
         half = float(rng.uniform(1.2, 2.8))
         bodies.append(Body(i - 1, xyz, (turn, 0.0, 0.0), mass, com, (-half, half)))
     arm = tuple(bodies)
-    CARRIER.setdefault(arm, axes - 1)
+    # by its module: a worker has copies of what is imported by name
+    yielding_robot.CARRIER.setdefault(arm, axes - 1)
     return arm
 
 
@@ -117,12 +118,10 @@ def one(task: tuple[int, int, float]) -> Tried:
         try:
             own = calibrate(model, poses)
         except FlexcalError as error:
-            return Tried(number, len(arm), count, noise_um, f"{error.code}: {error}")
+            return replace(begin, refused=f"{error.code}: {error}")
         seconds = time.process_time() - start
-        registered = uncalibrated_model(model, poses).registered or placed
-        before = prediction_errors(registered, fresh).all.p90
+        before = uncalibrated_p90(model, poses, fresh)
         errors = prediction_errors(own.model, fresh)
-        ratio = np.sqrt(np.sum(errors.errors**2) / np.sum(errors.expected_rms**2))
         verified = verify(own.robot, check).trust
         reasons = (own.trust.because, f"verify: {verified.because}")
     limits = {"rad": np.pi, "m": 0.3}
@@ -132,20 +131,16 @@ def one(task: tuple[int, int, float]) -> Tried:
         if p.unit in limits and not p.name.startswith("station")
         if (std := own.estimate.std(p.name)) is not None and 1.96 * std > limits[p.unit]
     ]
-    return Tried(
-        begin.arm,
-        begin.axes,
-        count,
-        noise_um,
-        "",
-        1e3 * before,
-        1e3 * errors.all.p90,
-        float(ratio),
-        own.trust.status,
-        verified.status,
-        reasons,
-        tuple(wide),
-        seconds,
+    return replace(
+        begin,
+        before=1e3 * before,
+        after=1e3 * errors.all.p90,
+        ratio=observed_over_predicted(errors),
+        trust=own.trust.status,
+        verified=verified.status,
+        reasons=reasons,
+        wide=tuple(wide),
+        seconds=seconds,
     )
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.few_poses import observed_over_predicted
 from flexcal import RobotModel, calibrate, read_poses
 from flexcal.calibration.verification import prediction_errors
 from flexcal.data.poses import PoseSet
@@ -48,7 +49,7 @@ def main() -> None:
                 robot = calibrate(model, fitted, terms=terms).model
                 there = prediction_errors(robot, poses.subset(rest))
                 p90.append((there.all.p90, prediction_errors(robot, inside).all.p90))
-            predicted = np.sqrt(np.sum(there.errors**2) / np.sum(there.expected_rms**2))
+            predicted = observed_over_predicted(there)
             rows.append((p90[1][0] / p90[0][0], p90[1][1] / p90[0][1], predicted))
             print(
                 f"{name:7s} {count:3d} poses: P90 {1e3 * p90[1][0]:.3f} mm, {rows[-1][0]:.2f} times that of the geometry alone, inside "

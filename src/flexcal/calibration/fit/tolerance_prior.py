@@ -108,8 +108,7 @@ def are_tracked(poses: PoseSet) -> bool:
 def _of_cameras(model: RobotModel, poses: PoseSet) -> tuple[str, ...]:
     """Beginnings of the names of parameters that place what the robot carries of cameras and boards, which the views find anywhere."""
     seen = dict.fromkeys(poses.target[poses.seen].tolist())
-    first = next(iter(model.points), "")
-    return tuple("tool.length" if target == first else f"point.{target}." for target in seen)
+    return tuple("tool.length" if target == model.tool_point else f"point.{target}." for target in seen)
 
 
 def error_kind(model: RobotModel, name: str) -> str:

@@ -89,11 +89,13 @@ class Fits:
         loss, terms = settings.loss, settings.terms
         informed = _with_tolerances(model, poses, settings)
         # a yielding joint is a choice where there are enough poses for one
-        few = are_tracked(poses) or not enough_for_selection(poses)
-        yields = any(
-            name.endswith(_YIELDING) for name in geometric_parameters(model, poses, (_YIELDING,)).names
+        assumed = (
+            (_YIELDING,)
+            if informed is not None
+            and (are_tracked(poses) or not enough_for_selection(poses))
+            and any(n.endswith(_YIELDING) for n in geometric_parameters(model, poses, (_YIELDING,)).names)
+            else ()
         )
-        assumed = (_YIELDING,) if informed is not None and few and yields else ()
         model = informed or model
 
         def fit(
