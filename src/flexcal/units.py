@@ -11,6 +11,8 @@ SMALLEST = 1e-50
 """Numbers nearer to zero are zero: beyond, quotients overflow."""
 LEAST_STD = 1e-12
 """No instrument's standard deviation is as small, m or rad."""
+FELT = 1e-5
+"""Displacement of a tool, m, to which the best robots repeat: less is no error of one."""
 
 COLDEST, HOTTEST = -50.0, 150.0
 """Temperatures of an arm, °C: no robot works beyond."""

@@ -9,7 +9,7 @@ import pytest
 from over_seeds import over_seeds
 from refusals import refused
 
-from flexcal.calibration.diagnostics import implausible_shifts
+from flexcal.calibration.diagnostics import deviations_from_prior, implausible_shifts
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.fit import ElasticPrior, GeometricFit, fit_geometry
 from flexcal.calibration.measurement import predict_measurements
@@ -318,6 +318,11 @@ def test_a_spring_far_from_what_stage_one_said_is_remarked(simulate: Callable, t
     sure = replace(tx90l.config, prior=replace(tx90l.config.prior, mass=1e-3, com=1e-4))
     known = replace(tx90l, config=sure).with_values(elastic)
     stiffer = known.with_values({name: 1.5 * known.value(name)})
-    assert not implausible_shifts(fit_geometry(known.with_estimate(stage_one(known, 0.02)), simulated.poses))
-    far = implausible_shifts(fit_geometry(stiffer.with_estimate(stage_one(stiffer, 0.02)), simulated.poses))
-    assert far[0].name == name and far[0].start > 1.2 * far[0].value
+    assert not deviations_from_prior(
+        fit_geometry(known.with_estimate(stage_one(known, 0.02)), simulated.poses)
+    )
+    found = fit_geometry(stiffer.with_estimate(stage_one(stiffer, 0.02)), simulated.poses)
+    (far,) = deviations_from_prior(found)
+    assert far.name == name and far.start > 1.2 * far.value
+    # by less than a millimetre at the tool, which is no reason not to use the calibration
+    assert not implausible_shifts(found)

@@ -102,6 +102,34 @@ def test_chi_square_is_one_where_the_noise_is_right(tmp_path: Path) -> None:
     assert mean == pytest.approx(1, abs=3 * np.sqrt(2 / np.sum(found[:, 1])))
 
 
+def verdict(seed: int, folder: Path, asked: Sequence[Asked], prior: str) -> tuple[str, bool]:
+    """Of a calibration with the defaults and a line of robot.yaml: the verdict, and whether something is implausible."""
+    model, _ = readings(folder / str(seed), ReadArm.drawn(seed), asked, seed)
+    model.path.write_text(f"{model.path.read_text()}{prior}")
+    robot = RobotModel.from_yaml(model.path)
+    poses = read_poses(sorted(model.path.parent.glob("*.csv")), robot)
+    found = calibrate(robot, poses, terms=["auto"])
+    return found.trust.status, found.is_implausible
+
+
+PRIORS = ("", "prior: {length: 0.0005, angle: 0.001}\n")
+
+
+@pytest.mark.parametrize("case", ["points", "points and sockets"])
+def test_where_the_reflector_is_is_nothing_implausible(tmp_path: Path, case: str) -> None:
+    """With tolerances of the links the tool turns to take up a reflector that is millimetres off, by 10 degrees and more."""
+    status, implausible = verdict(1, tmp_path, KINDS[case], PRIORS[1])
+    assert status in ("good", "care") and not implausible
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("prior", PRIORS)
+@pytest.mark.parametrize("case", list(KINDS))
+def test_no_right_readings_are_implausible(tmp_path: Path, case: str, prior: str) -> None:
+    found = over_seeds(verdict, range(950, 960), tmp_path, KINDS[case], prior)
+    assert not any(implausible or status == "bad" for status, implausible in found)
+
+
 @pytest.mark.parametrize("factor", [1 / 1.5, 1.5])
 @pytest.mark.parametrize("wrong", ["points", "east"])
 def test_the_instrument_whose_sigma_is_wrong_is_named(tmp_path: Path, factor: float, wrong: str) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from rich.console import Console
@@ -59,7 +61,11 @@ def test_intervals_at_a_bound_cover(truth: float, rng: np.random.Generator) -> N
 @pytest.mark.parametrize("key", ["gravity_compliance", "gravity_compliance_2"])
 def test_a_compliance_that_is_surely_negative_is_said(key: str) -> None:
     name = f"joint_3.{key}"
-    (said,) = negative_compliances(estimate(-4.1e-6, 1e-6, name=name))
-    assert "joint_3 (−4.1 ± 1" in said
-    assert negative_compliances(estimate(-2.9e-6, 1e-6, name=name)) == ()
-    assert negative_compliances(estimate(-4.1e-6, 1e-6, name="joint_3.offset")) == ()
+
+    def said(value: float, *, of: str = name, moved: float = 1e-4) -> Sequence[str]:
+        return negative_compliances(estimate(value, 1e-6, name=of), lambda names: np.full(len(names), moved))
+
+    assert "joint_3 (−4.1 ± 1" in said(-4.1e-6)[0]
+    assert said(-2.9e-6) == said(-4.1e-6, of="joint_3.offset") == ()
+    # what moves no point by more than the best robots repeat to has no cause to look for
+    assert said(-4.1e-6, moved=5e-6) == ()

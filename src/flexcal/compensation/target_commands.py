@@ -18,7 +18,7 @@ from flexcal.compensation.start_postures import (
 )
 from flexcal.data.poses import ToolTargets
 from flexcal.model.robot import RobotModel
-from flexcal.model.statics import carried_mass, certain_flank
+from flexcal.model.statics import are_flanks_certain, carried_mass
 from flexcal.progress import Progress, silent
 
 _BLOCK = 4096
@@ -158,8 +158,7 @@ def _take(found: MotorCommands, rows: _Rows, targets: ToolTargets) -> None:
         # the arm lags behind the last motion of its motors
         found.q[done] += targets.approach[done] * search.model.drives.hysteresis[list(search.model.motors)]
     mass = carried_mass(search.model, targets.payload, len(targets))[done]
-    certain = certain_flank(search.model, there.q, there.torque, mass)
-    found.unambiguous[done] = certain[:, list(search.model.backlash_joints)].all(axis=1)
+    found.unambiguous[done] = are_flanks_certain(search.model, there.q, there.torque, mass)
 
 
 def _take_damped(found: MotorCommands, lost: list[_Rows], targets: ToolTargets) -> None:

@@ -9,7 +9,15 @@ from .learning_curve import LearningCurve, LearningPoint
 from .nearest_socket import NearestSocket, nearest_sockets
 from .noise_test import StatedNoise, stated_noise
 from .place_agreement import FEWEST_PLACES, Disagreement, PlaceAgreement, PlaceErrors
-from .plausibility import FarZero, far_zeros, implausible_shifts, is_implausible, residuals_implausible
+from .plausibility import (
+    FarZero,
+    deviations_from_prior,
+    displacements,
+    far_zeros,
+    implausible_shifts,
+    is_implausible,
+    residuals_implausible,
+)
 from .reading_lag import ReadingLag
 from .repeatability_floor import RepeatabilityFloor
 from .robot_size import RobotSize
@@ -37,6 +45,8 @@ __all__ = [
     "SensorLag",
     "StatedNoise",
     "compare_bearings",
+    "deviations_from_prior",
+    "displacements",
     "far_zeros",
     "gravity_loads",
     "implausible_shifts",

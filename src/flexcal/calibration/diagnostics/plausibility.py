@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.fit import TOLERANCE, GeometricFit, base_errors, manufacturing_tolerances
+from flexcal.calibration.fit import (
+    TOLERANCE,
+    GeometricFit,
+    base_errors,
+    manufacturing_tolerances,
+    point_uncertainty,
+)
 from flexcal.calibration.measurement import predict_measurements
+from flexcal.estimation import Parameter, Parameters
+from flexcal.model.kinematics import found_xyz
 from flexcal.model.parts import vector_rotation
 from flexcal.model.robot import RobotModel
 
@@ -18,7 +27,7 @@ FAR_POINT = 0.05
 """Largest plausible deviation, m, of a reflector's place on the tool, which is often guessed."""
 
 FAR_FROM_PRIOR = 5.0
-"""Largest plausible deviation of a stiffness, mass or centre of mass, in standard deviations of its prior."""
+"""Deviation of a stiffness, mass or centre of mass, in standard deviations of its prior, from which points and prior do not agree."""
 
 NOISY = 3.0
 """Ratio of errors after the fit to the known noise of a camera's single views below which they are that noise."""
@@ -31,6 +40,13 @@ PLAY = 6e-3
 
 SCATTERED = 0.01
 """Ratio of errors after the fit to the extent of the points (root mean square both) from which data and robot do not belong together."""
+
+_PLACES = ("station.", "tool.", "point.")
+"""Parameters of where instruments stand and of where points are on the tool."""
+_OF_INSTRUMENTS = (*_PLACES, "sockets.", "wires.", "board.", "camera.")
+_WAVE = ".transmission_"
+_SAME = 1e-9
+"""Relative singular value below which places look the same."""
 
 
 @dataclass(frozen=True)
@@ -52,11 +68,17 @@ def is_implausible(calibration: GeometricFit) -> bool:
 def residuals_implausible(calibration: GeometricFit) -> bool:
     """Whether the residuals, without outliers, are larger than plausible for any robot."""
     rows = ~np.isin(np.arange(len(calibration.poses)), calibration.estimate.outliers)
-    position = _in_base(calibration)[rows]
-    extent = np.sqrt(np.mean((position - position.mean(axis=0)) ** 2))
     size = float(np.sqrt(np.mean(calibration.residuals[rows] ** 2)))
     noise = np.where(calibration.poses.seen[:, None], calibration.poses.sigma, 0.0)[rows]
-    return size > max(SCATTERED * extent, PLAY) and size > NOISY * float(np.sqrt(np.mean(noise**2)))
+    return size > _plausible_size(calibration) and size > NOISY * float(np.sqrt(np.mean(noise**2)))
+
+
+def _plausible_size(calibration: GeometricFit) -> float:
+    """Largest plausible error of a coordinate of a point, m (root mean square)."""
+    rows = ~np.isin(np.arange(len(calibration.poses)), calibration.estimate.outliers)
+    position = _in_base(calibration)[rows]
+    extent = np.sqrt(np.mean((position - position.mean(axis=0)) ** 2))
+    return max(SCATTERED * float(extent), PLAY)
 
 
 def _in_base(calibration: GeometricFit) -> np.ndarray:
@@ -72,36 +94,36 @@ def _in_base(calibration: GeometricFit) -> np.ndarray:
 
 
 def implausible_shifts(calibration: GeometricFit) -> tuple[ImplausibleShift, ...]:
-    """Parameters with an implausibly large change from their start values, the largest first.
+    """Parameters with an implausibly large change from their start values, the largest first, and far places of points.
 
-    Where the residuals are plausible, beyond what the noise of the estimate (2σ) explains. Beside a fixture, whose place starts from the
-    nominal robot at a few poses, errors of the first joint that another place of the robot looks like say where the instruments stand.
+    Where the residuals are plausible, beyond what the noise of the estimate (2σ) explains. A change that moves the measured points by no
+    more than is plausible is none, and neither is what other places of instruments and points look like, as of errors of the first joint.
     """
-    estimate, prior = calibration.estimate.parameters, calibration.prior
-    placed = base_errors(calibration.model) if calibration.poses.in_socket.any() else ()
-    kept = [name for name in calibration.identifiability.kept_names if _has_size(name) and name not in placed]
-    named = [*kept, *prior.parameters.names]
-    end, start = estimate.subset(named).coordinates(), estimate.subset(named).prior_mean()
-    shifts = _shifts(calibration)
-    end[: len(kept)] = start[: len(kept)] + [shifts[name][0] for name in kept]
-    size = np.concatenate(
-        [manufacturing_tolerances(estimate.subset(kept)), np.sqrt(np.diag(prior.covariance))]
-    )
-    limits, noise = _limits(kept, size), np.zeros(len(named))
+    estimate, poses = calibration.estimate.parameters, calibration.poses
+    regrouped = _regrouped_shifts(calibration)
+    waves = [name for name in calibration.prior.parameters.names if _WAVE in name]
+    names = [name for name in calibration.identifiability.kept_names if _has_size(name)]
+    kept = estimate.subset([*names, *waves])
+    shift = {p.name: float(d) for p, d in zip(estimate, _changes(estimate), strict=True)}
+    shift |= {name: regrouped[name][0] for name in names}
+    sizes = dict(zip(kept.names, manufacturing_tolerances(kept).tolist(), strict=True))
+    limit = dict.fromkeys(kept.names, FAR)
+    noise = {name: 0.0 for name in kept.names}
     if not residuals_implausible(calibration):
-        noise[: len(kept)] = [shifts[name][1] for name in kept]
-        if calibration.poses.located.all():
-            zeros = np.array([name in _zeros(calibration.model) for name in kept], dtype=bool)
-            limits = np.where(zeros, FAR_ZERO / size[: len(kept)], limits)
-    limit = np.concatenate([limits, np.full(len(prior.parameters), FAR_FROM_PRIOR)])
-    times = np.abs(end - start) / size
-    clear = times - 2 * noise / size
-    far = [k for k in np.argsort(-times / limit) if clear[k] > limit[k]]
-    items = [(estimate[named[k]], float(start[k]), float(end[k]), float(times[k])) for k in far]
-    return tuple(ImplausibleShift(p.name, p.natural(x), p.natural(y), p.unit, t) for p, x, y, t in items)
+        noise |= {name: regrouped[name][1] for name in names}
+        noise |= {name: calibration.estimate.std(name) or 0.0 for name in waves}
+        if poses.located.all():
+            limit |= {name: FAR_ZERO / TOLERANCE["rad"] for name in _zeros(calibration.model)}
+    far = [n for n in kept.names if abs(shift[n]) - 2 * noise[n] > limit[n] * sizes[n]]
+    found = [_shifted(estimate[n], shift[n], abs(shift[n]) / sizes[n]) for n in far]
+    found += deviations_from_prior(calibration)
+    moved = displacements(calibration, {s.name: shift[s.name] for s in found})
+    found = [s for s, own in zip(found, moved, strict=True) if own > _plausible_size(calibration)]
+    found.sort(key=lambda s: -s.times / limit.get(s.name, FAR_FROM_PRIOR))
+    return (*found, *_far_points(calibration))
 
 
-def _shifts(calibration: GeometricFit) -> dict[str, tuple[float, float]]:
+def _regrouped_shifts(calibration: GeometricFit) -> dict[str, tuple[float, float]]:
     """Change of each kept parameter, natural units, with its standard deviation.
 
     Where priors leave the dropped ones free they share its change, and one wrong length is none that is far off: it has theirs too.
@@ -118,10 +140,67 @@ def _shifts(calibration: GeometricFit) -> dict[str, tuple[float, float]]:
     return dict(zip(seen.kept_names, zip(shift.tolist(), stds.tolist(), strict=True), strict=True))
 
 
-def _limits(kept: list[str], size: np.ndarray) -> np.ndarray:
-    """Largest plausible change of each geometric parameter, in tolerances."""
-    points = [name.startswith(("tool.length", "point.")) for name in kept]
-    return np.where(points, FAR_POINT / size[: len(kept)], FAR)
+def deviations_from_prior(calibration: GeometricFit) -> list[ImplausibleShift]:
+    """Stiffnesses, masses and centres of mass that the points put far from their prior, beyond 5 of its standard deviations."""
+    prior = calibration.prior
+    items = calibration.estimate.parameters.subset(prior.parameters.names)
+    shift, size = _changes(items), np.sqrt(np.diag(prior.covariance))
+    found = [_shifted(p, float(d), float(abs(d) / s)) for p, d, s in zip(items, shift, size, strict=True)]
+    return [s for s in found if s.times > FAR_FROM_PRIOR and _has_size(s.name) and _WAVE not in s.name]
+
+
+def _changes(items: Parameters) -> np.ndarray:
+    """Changes (p,) of parameters from their start values, in estimation coordinates."""
+    return items.coordinates() - items.prior_mean()
+
+
+def _shifted(item: Parameter, shift: float, times: float) -> ImplausibleShift:
+    """Parameter that changed by `shift` from its start value, in its estimation coordinate."""
+    start = float(Parameters([item]).prior_mean()[0])
+    return ImplausibleShift(item.name, item.natural(start), item.natural(start + shift), item.unit, times)
+
+
+def displacements(calibration: GeometricFit, changes: Mapping[str, float]) -> np.ndarray:
+    """Displacement (k,) of a coordinate of the measured points, m (root mean square), by each of the `changes` of parameters (in their
+    estimation coordinates), to first order.
+
+    Without what other places of instruments, base and points explain. A rad counts as the reach of the robot.
+    """
+    if not changes:
+        return np.zeros(0)
+    names = list(changes)
+    estimate, model = calibration.estimate.parameters, calibration.model
+    at = predict_measurements(model, calibration.poses, elastic=bool(model.elastic), jacobians=True)
+    lever = np.repeat(np.where(at.readings.points, 1.0, model.reach), 3)
+    rows = (at.readings.present & ~np.isin(at.readings.row, calibration.estimate.outliers)[:, None]).ravel()
+
+    def columns(of: Sequence[str]) -> np.ndarray:
+        return (at.jacobian(of).reshape(len(lever), -1) * lever[:, None])[rows]
+
+    base = base_errors(model)
+    places = [name for name in estimate.names if name.startswith(_PLACES) or name in base]
+    own = estimate.subset(names)
+    moved = columns(names) * own.natural_slope(own.coordinates()) * np.array(list(changes.values()))
+    gauge = columns(places)
+    gauge = gauge / np.maximum(np.linalg.norm(gauge, axis=0), np.finfo(float).tiny)
+    moved -= gauge @ np.linalg.lstsq(gauge, moved, rcond=_SAME)[0]
+    return np.sqrt(np.mean(moved**2, axis=0))
+
+
+def _far_points(calibration: GeometricFit) -> list[ImplausibleShift]:
+    """Coordinates of measured points in their frames that are implausibly far from where robot.yaml has them."""
+    found = []
+    for target in calibration.poses.pointed.targets:
+        declared = calibration.model.points[target].xyz
+        shifts = found_xyz(calibration.model, target) - declared
+        found += [
+            ImplausibleShift(
+                f"point.{target}.{axis}", float(x), float(x + d), "m", abs(float(d)) / TOLERANCE["m"]
+            )
+            for axis, x, d in zip("xyz", declared, shifts, strict=True)
+            if abs(d) > FAR_POINT + 2 * point_uncertainty(calibration.model, target)
+        ]
+    return found
 
 
 def _zeros(model: RobotModel) -> tuple[str, ...]:
@@ -156,12 +235,5 @@ def far_zeros(calibration: GeometricFit) -> tuple[FarZero, ...]:
 
 
 def _has_size(name: str) -> bool:
-    """Whether robot.yaml or the URDF give a parameter's size: not for the place of the instrument, how a target's axes are mounted, nor
-    for a compliance.
-    """
-    mounted = name.startswith("point.") and name.endswith(("rx", "ry", "rz"))
-    return (
-        not mounted
-        and not name.startswith(("station.", "sockets.", "wires."))
-        and ".gravity_compliance" not in name
-    )
+    """Whether robot.yaml, the URDF or stage 1 give a parameter's size: not for what is of instruments and points, nor for a compliance."""
+    return not name.startswith(_OF_INSTRUMENTS) and ".gravity_compliance" not in name

@@ -7,7 +7,7 @@ import numpy as np
 from flexcal.calibration.measurement.prediction import PredictedMeasurements
 from flexcal.errors import FlexcalError
 from flexcal.model.robot import RobotModel
-from flexcal.model.statics import carried_mass, certain_flank
+from flexcal.model.statics import are_flanks_certain, carried_mass
 
 
 class OneFlank(FlexcalError):
@@ -20,8 +20,7 @@ def ambiguous_poses(model: RobotModel, prediction: PredictedMeasurements) -> np.
     The torque is that of the `prediction` at rest; its standard deviation comes from what `model` knows of masses and centres of mass.
     """
     payload = carried_mass(model, prediction.poses.payload, len(prediction.poses))
-    certain = certain_flank(model, prediction.poses.q, prediction.rest.torque, payload)
-    return np.any(~certain[:, list(model.backlash_joints)], axis=1)
+    return ~are_flanks_certain(model, prediction.poses.q, prediction.rest.torque, payload)
 
 
 def require_both_flanks(model: RobotModel, flank: np.ndarray) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,8 @@ from flexcal.calibration.diagnostics import (
     RobotSize,
     SensorLag,
     StatedNoise,
+    deviations_from_prior,
+    displacements,
     far_zeros,
     implausible_shifts,
     is_implausible,
@@ -31,9 +33,10 @@ from flexcal.jobs.calibration.ignored_columns import ignored_columns_remarks
 from flexcal.jobs.calibration.inclinations import inclination_remarks
 from flexcal.jobs.calibration.thermal import thermal_remarks
 from flexcal.model.robot import BOARD_SCALE, LATERAL, socket_scale
+from flexcal.report.checks import INVISIBLE
 from flexcal.report.layout import counted, listed
 from flexcal.report.results import chance_in_words
-from flexcal.units import MILLIMETRE, decimals
+from flexcal.units import FELT, MILLIMETRE, decimals
 
 _LOOK = (
     "data and robot.yaml do not go together: look for a column with wrong sign, unit or order, for a wrong xyz under `points:`, for "
@@ -194,7 +197,7 @@ def calibration_remarks(
         *_noise(fit, prior_misfits=prior_misfits),
         *few_readings_remarks(fit),
         *_jumps(fit),
-        *negative_compliances(fit.estimate),
+        *negative_compliances(fit.estimate, lambda changes: displacements(fit, changes)),
     ]
     remarks += inclination_remarks(fit)
     drift = Drift.of(fit) if fit.poses.located.any() else None
@@ -204,6 +207,7 @@ def calibration_remarks(
             f"pose, and the fit may have taken up more: a drift of {drift.distance / MILLIMETRE:.3f} mm beside it explains the readings "
             "best; robot or instrument warmed up, or position and measuring order are correlated"
         )
+    remarks += _against_prior(fit)
     remarks += cause
     if not cause and not residuals_implausible(fit):
         remarks += _zeros(fit)
@@ -222,18 +226,28 @@ def calibration_remarks(
     return tuple(remarks)
 
 
-def negative_compliances(estimate: Estimate) -> Sequence[str]:
-    """Remark on compliances that are negative beyond three standard deviations."""
+def negative_compliances(
+    estimate: Estimate, displacements: Callable[[Mapping[str, float]], np.ndarray]
+) -> Sequence[str]:
+    """Remark on compliances that are negative beyond three standard deviations, and move the points by more than robots repeat to.
+
+    `displacements` are those (k,), m, by changes of parameters.
+    """
+    stds = {
+        item.name: estimate.std(item.name)
+        for item in estimate.parameters
+        if item.name.rpartition(".")[2] in ("gravity_compliance", *LATERAL)
+    }
+    found = [name for name, std in stds.items() if std and estimate.values[name] < -_CERTAINLY * std]
     told = []
-    for item in estimate.parameters:
-        owner, _, key = item.name.rpartition(".")
-        std = estimate.std(item.name) if key in ("gravity_compliance", *LATERAL) else None
-        if std is not None and item.value < -_CERTAINLY * std:
-            across = "" if key not in LATERAL else ", across its axis"
-            size = (
-                f"{1e6 * item.value:.3g} {estimate.spread(item.name, 1e6)} {item.unit.replace('rad', 'µrad')}"
-            )
-            told.append(f"{owner} ({size}{across})".replace("-", "−"))
+    for name, moved in zip(
+        found, displacements({name: estimate.values[name] for name in found}), strict=True
+    ):
+        if moved > FELT:
+            across = "" if name.endswith("gravity_compliance") else ", across its axis"
+            unit = estimate.parameters[name].unit.replace("rad", "µrad")
+            size = f"{1e6 * estimate.values[name]:.3g} {estimate.spread(name, 1e6)} {unit}"
+            told.append(f"{name.rpartition('.')[0]} ({size}{across})".replace("-", "−"))
     if not told:
         return ()
     return (
@@ -250,6 +264,20 @@ def _zeros(fit: GeometricFit) -> Sequence[str]:
     return (
         f"joint zeros are far from those of the URDF: {', '.join(map(str, zeros))}; the calibrated robot takes them into account, and "
         "'flexcal export offsets' lists them for the controller; set them there, and smaller errors will show",
+    )
+
+
+def _against_prior(fit: GeometricFit) -> Sequence[str]:
+    """Remark on springs and inertia that the points put far from what is known of them beforehand."""
+    far = deviations_from_prior(fit)
+    if not far:
+        return ()
+    named = [
+        f"{s.name} ({s.start:.4g} to {s.value:.4g} {s.unit}, {s.times:.2g} standard deviations)" for s in far
+    ]
+    return (
+        f"the points do not agree with what robot.yaml or stage 1 says of {listed(named, _LISTED)}: one of the two is wrong, or an error "
+        "that changes with the load is in these parameters",
     )
 
 
@@ -509,7 +537,7 @@ def _noise(fit: GeometricFit, *, prior_misfits: bool) -> Sequence[str]:
     else:
         tests = stated_noise(fit)
         remarks += [_contradicted(test) for test in tests[1:] or tests if test.contradicted]
-    if model > 0:
+    if model > INVISIBLE:
         remarks.append(
             f"systematic model errors of {model:.{decimals(robot)}f} mm per coordinate (1σ) remain; intervals include them"
         )

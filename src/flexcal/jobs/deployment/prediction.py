@@ -20,7 +20,7 @@ from flexcal.jobs.inputs import (
 )
 from flexcal.jobs.pages import Result
 from flexcal.model.robot import RobotModel
-from flexcal.model.statics import carried_mass, certain_flank, points_kinematics, tool_at_rest
+from flexcal.model.statics import are_flanks_certain, carried_mass, points_kinematics, tool_at_rest
 from flexcal.progress import Progress, silent
 
 _BLOCK = 20_000
@@ -173,6 +173,6 @@ def _predicted(
     )
     there = points_kinematics(nominal, commands.q, None, commands.target, jacobians=False).position
     payload = carried_mass(model, commands.payload, len(commands))
-    certain = certain_flank(model, commands.q, at.rest.torque, payload)[:, list(model.backlash_joints)]
+    certain = are_flanks_certain(model, commands.q, at.rest.torque, payload)
     position = at.kinematics.position
-    return position, at.kinematics.orientation, position - there, np.all(certain, axis=1)
+    return position, at.kinematics.orientation, position - there, certain

@@ -10,7 +10,7 @@ from .equilibrium import (
     spring_loads,
     static_equilibrium,
 )
-from .flank import certain_flank
+from .flank import are_flanks_certain, certain_flank
 from .hardening import REFERENCE_TWIST, tangent_ratio, twist_by_hardening, twist_from_torque
 from .transmission import transmission_column
 
@@ -18,6 +18,7 @@ __all__ = [
     "REFERENCE_TWIST",
     "Equilibrium",
     "ToolAtRest",
+    "are_flanks_certain",
     "carried_mass",
     "certain_flank",
     "elastic_axes",

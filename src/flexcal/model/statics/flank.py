@@ -6,6 +6,7 @@ import numpy as np
 
 from flexcal.model.robot import MASS_AND_COM, RobotModel
 from flexcal.model.statics.equilibrium import gravity_regressor, payload_batch
+from flexcal.units import FELT
 
 CERTAIN = 3.0
 """Distance of a drive torque from zero, in standard deviations, from which its sign counts as certain."""
@@ -16,6 +17,22 @@ def certain_flank(
 ) -> np.ndarray:
     """Mask (samples, N) of drives whose gravity `torque` (samples, N) N m at `q` (samples, n) has a certain sign."""
     return np.abs(torque) > CERTAIN * gravity_torque_std(model, q, payload)
+
+
+def are_flanks_certain(
+    model: RobotModel, q: np.ndarray, torque: np.ndarray, payload: np.ndarray | float | None = None
+) -> np.ndarray:
+    """Mask (samples,) of configurations in which every joint with backlash is on a certain flank, as in `certain_flank`.
+
+    A joint whose backlash was estimated, and moves no point by more than the best robots repeat to, may be on either.
+    """
+    joints = [i for i in model.backlash_joints if _is_felt(model, f"{model.joints[i].name}.backlash")]
+    return np.all(certain_flank(model, q, torque, payload)[:, joints], axis=1)
+
+
+def _is_felt(model: RobotModel, name: str) -> bool:
+    """Whether a backlash may move a point at the reach of the arm by more than the best robots repeat to; unknown ones may."""
+    return name not in model.posterior.parameters or 2 * model.value(name) * model.reach > FELT
 
 
 def gravity_torque_std(

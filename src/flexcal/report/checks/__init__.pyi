@@ -37,6 +37,7 @@ from .payload import BODILESS, UNLIKE, payload_checks
 from .places import check_places
 from .pose_errors import (
     BEYOND,
+    INVISIBLE,
     check_claimed_uncertainty,
     check_drift,
     check_enough,
@@ -65,6 +66,7 @@ __all__ = [
     "ANSWERS",
     "BEYOND",
     "BODILESS",
+    "INVISIBLE",
     "LARGE",
     "TOO_LARGE",
     "UNLIKE",

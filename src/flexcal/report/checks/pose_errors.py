@@ -28,7 +28,7 @@ _PLACES = 9
 """Numbers of the place of an instrument and a point."""
 BEYOND = 3.0
 """Ratio of predicted errors where the robot works to those near the poses of its calibration from which these do not tell it."""
-_INVISIBLE = 1e-3
+INVISIBLE = 1e-3
 """Model error, mm, that no instrument sees."""
 
 
@@ -132,7 +132,7 @@ def check_error_budget(
             f"No: the data do not fit the robot as its files describe it; the remarks say what is implausible. {answer}",
             "bad",
         ).named("residual")
-    if model > max(np.hypot(instrument or 0.0, robot), _INVISIBLE):
+    if model > max(np.hypot(instrument or 0.0, robot), INVISIBLE):
         what = f"No: systematic model errors are larger than the noise. {answer}"
         return Check(question, what, "care").named("model_error")
     if instrument is not None and stated is not None and instrument < OVERSTATED * stated:
