@@ -41,9 +41,9 @@ PLAY = 6e-3
 SCATTERED = 0.01
 """Ratio of errors after the fit to the extent of the points (root mean square both) from which data and robot do not belong together."""
 
-_PLACES = ("station.", "tool.", "point.")
-"""Parameters of where instruments stand and of where points are on the tool."""
-_OF_INSTRUMENTS = (*_PLACES, "sockets.", "wires.", "board.", "camera.")
+_POINTS = ("tool.", "point.")
+"""Parameters of where points are on the tool."""
+_OF_INSTRUMENTS = (*_POINTS, "station.", "sockets.", "wires.", "board.", "camera.")
 _WAVE = ".transmission_"
 _SAME = 1e-9
 """Relative singular value below which places look the same."""
@@ -70,15 +70,15 @@ def residuals_implausible(calibration: GeometricFit) -> bool:
     rows = ~np.isin(np.arange(len(calibration.poses)), calibration.estimate.outliers)
     size = float(np.sqrt(np.mean(calibration.residuals[rows] ** 2)))
     noise = np.where(calibration.poses.seen[:, None], calibration.poses.sigma, 0.0)[rows]
-    return size > _plausible_size(calibration) and size > NOISY * float(np.sqrt(np.mean(noise**2)))
+    return size > max(_moved(calibration), PLAY) and size > NOISY * float(np.sqrt(np.mean(noise**2)))
 
 
-def _plausible_size(calibration: GeometricFit) -> float:
-    """Largest plausible error of a coordinate of a point, m (root mean square)."""
+def _moved(calibration: GeometricFit) -> float:
+    """Displacement of a coordinate of the points, m (root mean square), that is a hundredth of their extent."""
     rows = ~np.isin(np.arange(len(calibration.poses)), calibration.estimate.outliers)
     position = _in_base(calibration)[rows]
     extent = np.sqrt(np.mean((position - position.mean(axis=0)) ** 2))
-    return max(SCATTERED * float(extent), PLAY)
+    return SCATTERED * float(extent)
 
 
 def _in_base(calibration: GeometricFit) -> np.ndarray:
@@ -97,7 +97,7 @@ def implausible_shifts(calibration: GeometricFit) -> tuple[ImplausibleShift, ...
     """Parameters with an implausibly large change from their start values, the largest first, and far places of points.
 
     Where the residuals are plausible, beyond what the noise of the estimate (2σ) explains. A change that moves the measured points by no
-    more than is plausible is none, and neither is what other places of instruments and points look like, as of errors of the first joint.
+    more than is plausible is none, and neither is what another place of the base or of a point looks like.
     """
     estimate, poses = calibration.estimate.parameters, calibration.poses
     regrouped = _regrouped_shifts(calibration)
@@ -118,7 +118,7 @@ def implausible_shifts(calibration: GeometricFit) -> tuple[ImplausibleShift, ...
     found = [_shifted(estimate[n], shift[n], abs(shift[n]) / sizes[n]) for n in far]
     found += deviations_from_prior(calibration)
     moved = displacements(calibration, {s.name: shift[s.name] for s in found})
-    found = [s for s, own in zip(found, moved, strict=True) if own > _plausible_size(calibration)]
+    found = [s for s, own in zip(found, moved, strict=True) if own > _moved(calibration)]
     found.sort(key=lambda s: -s.times / limit.get(s.name, FAR_FROM_PRIOR))
     return (*found, *_far_points(calibration))
 
@@ -164,7 +164,7 @@ def displacements(calibration: GeometricFit, changes: Mapping[str, float]) -> np
     """Displacement (k,) of a coordinate of the measured points, m (root mean square), by each of the `changes` of parameters (in their
     estimation coordinates), to first order.
 
-    Without what other places of instruments, base and points explain. A rad counts as the reach of the robot.
+    Without what other places of base and points explain. A rad counts as the reach of the robot.
     """
     if not changes:
         return np.zeros(0)
@@ -178,7 +178,7 @@ def displacements(calibration: GeometricFit, changes: Mapping[str, float]) -> np
         return (at.jacobian(of).reshape(len(lever), -1) * lever[:, None])[rows]
 
     base = base_errors(model)
-    places = [name for name in estimate.names if name.startswith(_PLACES) or name in base]
+    places = [name for name in estimate.names if name.startswith(_POINTS) or name in base]
     own = estimate.subset(names)
     moved = columns(names) * own.natural_slope(own.coordinates()) * np.array(list(changes.values()))
     gauge = columns(places)
