@@ -132,3 +132,22 @@ def test_common_lengths_are_those_of_a_larger_robot(tmp_path: Path) -> None:
     at = [point_kinematics(m, q, point="smr", jacobians=False).position for m in (*models, changed)]
     by_urdf, by_errors = ((end - at[0]) - (end - at[0]).mean(axis=0) for end in at[1:])
     np.testing.assert_allclose(by_errors, by_urdf, atol=1e-11)
+
+
+@pytest.mark.parametrize("kind", ["plane", "wires"])
+def test_errors_are_predicted_for_a_robot_whose_base_nothing_places(kind: str, tmp_path: Path) -> None:
+    """Not 1.5 m, by rotations of the whole robot that these readings do not tell: those of the arm, its base placed by best fit."""
+    arm = ReadArm.drawn(11)
+    readings(tmp_path, arm, [right(kind, 120)], 11)
+    model = RobotModel.from_yaml(tmp_path / "robot.yaml")
+    result = calibrate(model, read_poses(tmp_path / f"0_{kind}.csv", model), terms=["kinematic"])
+    assert not {"a1.offset", "a1.misalignment_1", "a1.misalignment_2"}.intersection(result.estimate.values)
+    q = arm.postures(300, np.random.default_rng(7))
+    found = point_kinematics(result.model, q, point="smr", jacobians=False).position
+    true = arm.points(q)
+    found, true = found - found.mean(axis=0), true - true.mean(axis=0)
+    left, _, right_ = np.linalg.svd(true.T @ found)
+    turn = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right_)]) @ right_
+    error = np.sqrt(np.mean(np.sum((true - found @ turn.T) ** 2, axis=1)))
+    assert result.extent is not None
+    assert error / 2 < result.extent.inside < 1.5e-3

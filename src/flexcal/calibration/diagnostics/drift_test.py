@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -60,6 +61,7 @@ class Drift:
         }
 
     @classmethod
+    @lru_cache(maxsize=1)
     def of(cls, fit: GeometricFit) -> Drift:
         """Score test (Rao) on the residuals of a fit: first-order estimate of a drift with three further coordinates.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -93,6 +94,7 @@ def _in_base(calibration: GeometricFit) -> np.ndarray:
     return result
 
 
+@lru_cache(maxsize=1)
 def implausible_shifts(calibration: GeometricFit) -> tuple[ImplausibleShift, ...]:
     """Parameters with an implausibly large change from their start values, the largest first, and far places of points.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ class RepeatabilityFloor:
     apart: bool
 
     @classmethod
+    @lru_cache(maxsize=1)
     def of(cls, fit: GeometricFit) -> RepeatabilityFloor | None:
         """Floor of a fit to points whose scatter exceeds tolerances of manufacture; None of others, whose geometry is what counts."""
         if not fit.poses.located.all():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -68,6 +69,7 @@ class RobotSize:
     standards: tuple[LengthStandard, ...]
 
     @classmethod
+    @lru_cache(maxsize=1)
     def of(cls, fit: GeometricFit) -> RobotSize | None:
         """What the size of a calibrated robot rests on; None where an instrument of points, or other robots of the model, tell it."""
         poses = fit.poses.pointed

@@ -13,19 +13,20 @@ from flexcal.model.kinematics import (
 from flexcal.model.robot import GEOMETRY, RobotModel
 
 _POSES = 40
-_AS_ONE = 1e-6
+_AS_ONE = 1e-4
 """Relative motion of the points, beside that of a rigid body, below which the whole robot moves as one."""
 
 
 def base_errors(model: RobotModel) -> tuple[str, ...]:
-    """Names of the errors of joints on the base that move every point as a rigid motion of the whole robot does.
+    """Names of the errors of joints that move every point as a rigid motion of the whole robot does.
 
-    Offset and tilts of the first axis, and the length along it: another place of the base looks the same.
+    Offset and tilts of the first axis, and the length along it: another place of the base looks the same. Where the second axis crosses
+    the first, a rotation of the second about the first too.
     """
-    first = [i for i, joint in enumerate(model.joints) if joint.parent < 0]
-    names = [f"{model.joints[i].name}.{key}" for i in first for key in GEOMETRY]
+    names = [f"{joint.name}.{key}" for joint in model.joints for key in GEOMETRY]
+    first = [name for name in names if model.joints[model.joint_index(name.rpartition(".")[0])].parent < 0]
     if not model.points:
-        return tuple(names)
+        return tuple(first)
     columns = [model.geometry_columns[name] for name in names]
     reach = np.where([joint.kind == "prismatic" for joint in model.motor_joints], 1.0, np.pi)
     lower, upper = (np.clip(limit, -reach, reach) for limit in joint_limits(model))

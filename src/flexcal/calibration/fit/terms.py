@@ -7,12 +7,12 @@ from functools import lru_cache
 
 import numpy as np
 
+from flexcal.calibration.fit.base_placement import base_errors
 from flexcal.calibration.fit.thermal_terms import THERMAL, plausible_thermal_size, thermal_parameters
 from flexcal.calibration.kinds import ANGULAR, KINDS, declared_level, kind_of
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameter, Parameters
-from flexcal.model.kinematics import rigid_motion_columns
 from flexcal.model.parts import LOOP
 from flexcal.model.robot import (
     GEOMETRY,
@@ -57,8 +57,6 @@ PER_JOINT = ("gravity_compliance", "lateral_compliance")
 """Kinds of terms that may be named for one joint, as `<joint>.<kind>`: compliance about its axis, and about the two axes normal to it."""
 
 
-_AS_ONE = 1e-4
-"""Relative motion of the points, beside that of a rigid body, below which the whole robot moves as one."""
 _LOADED = 0.01
 """Least standard deviation of a gravity load, relative to the largest, at which its compliance is separable from a constant."""
 _LEAST_LOAD = 1e-6
@@ -138,7 +136,8 @@ def _kinematic(model: RobotModel, poses: PoseSet, joints: Sequence[int]) -> list
         names += [f"station.{station}.{key}" for key in told]
     errors = geometric_errors(model, joints)
     placed = poses.located.any() or level or not len(poses.pointed)
-    names += errors if placed else _moving_parts(model, poses.pointed, errors)
+    as_one = () if placed else base_errors(model)
+    names += [name for name in errors if name not in as_one]
     names += [f"tool.{key}" for key in GEOMETRY]
     first = model.tool_point
     names += [f"point.{t}.{key}" for t in poses.pointed.targets if t != first for key in "xyz"]
@@ -161,22 +160,6 @@ def _is_of_level(model: RobotModel, name: str, level: str) -> bool:
 
 def _is_at_base(model: RobotModel, owner: str) -> bool:
     return owner in model.joint_names and model.joints[model.joint_index(owner)].parent < 0
-
-
-def _moving_parts(model: RobotModel, poses: PoseSet, names: Sequence[str]) -> list[str]:
-    """Those of the `names` that do not move the whole robot as one, as an offset of the first joint does."""
-    at = predict_measurements(model, poses, elastic=False, jacobians=True)
-    point = at.kinematics.position
-    rigid = rigid_motion_columns(point)
-    columns = np.matmul(at.base.swapaxes(1, 2), at.jacobian(names)).reshape(3 * len(point), -1)
-    flat = rigid.reshape(3 * len(point), 6)
-    left = columns - flat @ np.linalg.lstsq(flat, columns, rcond=None)[0]
-    size = np.linalg.norm(columns, axis=0)
-    return [
-        name
-        for name, own, whole in zip(names, np.linalg.norm(left, axis=0), size, strict=True)
-        if own > _AS_ONE * whole
-    ]
 
 
 def random_waves(model: RobotModel, poses: PoseSet, free: Parameters) -> dict[str, float]:

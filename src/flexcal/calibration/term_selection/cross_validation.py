@@ -88,8 +88,8 @@ def cross_validated(fit: GeometricFit) -> CrossValidation | None:
         return None
     by = left_out_by(inside.poses, distinct)
     trials = TermTrials(inside, fit.model, fit.terms, folds, by=by)
-    left = trials.with_expected(fit.terms)
-    worst = max(trials.deciding, key=lambda kind: left.distances[kind].mean())
+    left = trials.decided(fit.terms)
+    worst = int(np.argmax([distance.mean() for distance in left.distances]))
     growth = left.expected[worst].mean() / left.expected_fitted.mean()
     mean = float(left.distances[worst].mean())
     return CrossValidation(by, mean, left.freedom, float(growth * left.fitted.mean()))

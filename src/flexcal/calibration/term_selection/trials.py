@@ -146,27 +146,23 @@ class TermTrials:
             self._fits[terms] = self._left_out(*self._blocks(terms))
         return self._fits[terms]
 
-    def with_expected(self, terms: tuple[str, ...]) -> LeaveOutErrors:
-        """Fit of some terms, with the errors to expect from the scatter of the base fit."""
-        return self._left_out(*self._blocks(terms), self._variances)
+    def decided(self, terms: tuple[str, ...]) -> LeaveOutErrors:
+        """Fit of some terms, with the decisive kinds of folds alone, and the errors to expect from the scatter of the base fit."""
+        folds = [self._row_folds[kind] for kind in self.deciding]
+        fit = leave_out_fit(*self._blocks(terms), self._residual, folds, self._places, self._variances)
+        return fit.of_points(len(self.rigid.poses))
 
     def _blocks(self, terms: tuple[str, ...]) -> tuple[list[np.ndarray], list[float]]:
         """Columns of some terms and of what has a prior, and the penalty of each."""
         return [*map(self._block, terms), self._held], [*[0.0] * len(terms), self._noise]
 
-    def _left_out(
-        self, blocks: list[np.ndarray], penalty: list[float], variances: np.ndarray | None = None
-    ) -> LeaveOutErrors:
+    def _left_out(self, blocks: list[np.ndarray], penalty: list[float]) -> LeaveOutErrors:
         order, workspace, alone = self._row_folds
         # folds in measuring order are those in the workspace where both are places of a fixture
         folds = (order, alone) if (order == workspace).all() else (order, workspace, alone)
-        fit = leave_out_fit(blocks, penalty, self._residual, folds, self._places, variances)
+        fit = leave_out_fit(blocks, penalty, self._residual, folds, self._places)
         if len(folds) < len(self._row_folds):
-            fit = replace(
-                fit,
-                distances=(fit.distances[0], *fit.distances),
-                expected=(*fit.expected[:1], *fit.expected),
-            )
+            fit = replace(fit, distances=(fit.distances[0], *fit.distances))
         return fit.of_points(len(self.rigid.poses))
 
     def determined(self) -> LeaveOutErrors:

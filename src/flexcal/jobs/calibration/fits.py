@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -172,6 +172,18 @@ class Fits:
 
         selection, selected = choose(model, rigid)
         return cls(selection.model, _with_random_waves(selection), rigid, bearings, selection, selected)
+
+    def again(self, poses: PoseSet, settings: FitSettings) -> GeometricFit:
+        """Fit of the same terms, with the same priors, to some of the poses; without backlash where these are on one flank of it."""
+        try:
+            return Fits.of(
+                self.model, poses, replace(settings, terms=self.terms, tolerances=False), near=self
+            ).selected
+        except OneFlank:
+            terms = tuple(term for term in self.terms if term != "backlash")
+            return Fits.of(
+                self.model, poses, replace(settings, terms=terms, tolerances=False), near=self
+            ).selected
 
 
 def _with_tolerances(model: RobotModel, poses: PoseSet, settings: FitSettings) -> RobotModel | None:

@@ -146,7 +146,7 @@ def calibrate(
         )
         compare = held_out_errors if len(measured.pointed) else held_out_tilts
         held_out = compare(
-            lambda rest: Fits.of(nominal, sampled(rest), settings, near=fits).selected.model,
+            lambda rest: fits.again(sampled(rest), settings).model,
             measured.subset(kept),
             hold_out[0],
             hold_out[1][kept],
